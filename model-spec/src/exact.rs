@@ -1,0 +1,103 @@
+//! Exact scalars and angles as a model file writes them: `"-pi/2"`, `"1/2"`, `"2*r3 + d4"`.
+//!
+//! Text goes in (see `parse`), trees over the file's symbols come out; nothing here is rounded.
+
+use num_rational::BigRational;
+
+/// Index of a constant in [`crate::Mechanism::constants`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ConstantIdx(pub usize);
+/// Index of a dynamic parameter in [`crate::Mechanism::parameters`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ParameterIdx(pub usize);
+/// Index of a coordinate in [`crate::Mechanism::coordinates`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct CoordinateIdx(pub usize);
+
+/// What an effect may refer to at its place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum PlaceQuantity {
+    /// The actuator's length or angle, or the joint coordinate itself.
+    Coordinate,
+    /// Its first time derivative.
+    Rate,
+    /// Its second time derivative.
+    Acceleration,
+    /// The force or torque that the place carries, effects aside.
+    Load,
+}
+
+/// A name of the model file, resolved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Symbol {
+    /// Known geometry, gravity and the like.
+    Constant(ConstantIdx),
+    /// A dynamic parameter, which identification may find.
+    Parameter(ParameterIdx),
+    /// A joint coordinate.
+    Coordinate(CoordinateIdx),
+    /// A quantity of the place on which an effect acts.
+    Place(PlaceQuantity),
+}
+
+/// Functions that may stand in an exact expression.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Function {
+    /// Sine of an angle.
+    Sin,
+    /// Cosine of an angle.
+    Cos,
+    /// Square root.
+    Sqrt,
+    /// Absolute value.
+    Abs,
+    /// Sign: -1, 0 or 1.
+    Sign,
+    /// Hyperbolic tangent.
+    Tanh,
+    /// Exponential.
+    Exp,
+}
+
+/// An exact expression over the symbols of a model file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Exact {
+    /// A rational number; decimals such as `0.316` are rationals too.
+    Rational(BigRational),
+    /// The ratio of a circle's circumference to its diameter.
+    Pi,
+    /// A named quantity.
+    Symbol(Symbol),
+    /// Sum of the operands.
+    Sum(Vec<Exact>),
+    /// Product of the operands.
+    Product(Vec<Exact>),
+    /// First operand over the second.
+    Quotient(Box<Exact>, Box<Exact>),
+    /// The operand with its sign changed.
+    Negative(Box<Exact>),
+    /// Integer power; the exponent's magnitude is at most 16.
+    Power(Box<Exact>, i32),
+    /// A function of the operand.
+    Apply(Function, Box<Exact>),
+}
+
+/// An angle whose sine and cosine are exact: `pi * turns + sum of integer multiples of symbols`, in rad.
+///
+/// `pi` is a multiple of 1/12, so that the sine and cosine of the fixed part lie in Q(sqrt 2, sqrt 3).
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Angle {
+    /// Coefficient of pi.
+    pub pi: BigRational,
+    /// Constants (unit rad) and revolute coordinates with their integer factors; sorted, without zeros.
+    pub terms: Vec<(Symbol, i32)>,
+}
+
+/// A length that is linear in prismatic coordinates, in m.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Length {
+    /// The part that does not move; an expression over constants only.
+    pub offset: Exact,
+    /// Prismatic coordinates with their rational factors; sorted, without zeros.
+    pub coordinates: Vec<(CoordinateIdx, BigRational)>,
+}

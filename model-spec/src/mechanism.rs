@@ -1,0 +1,280 @@
+//! A validated mechanism: what a model file means once every name is resolved and every check has passed.
+//!
+//! [`crate::load`] makes it, `modelmill-codegen` consumes it. Indices point into the vectors of [`Mechanism`].
+
+use num_rational::BigRational;
+
+use crate::exact::{Angle, CoordinateIdx, Exact, Length, ParameterIdx};
+
+/// Index of a frame in [`Mechanism::frames`]; 0 is the base.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct FrameIdx(pub usize);
+/// Index of a point in [`Mechanism::points`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PointIdx(pub usize);
+/// Index of a drive in [`Mechanism::drives`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct DriveIdx(pub usize);
+
+/// A mechanism whose names are resolved and whose consistency is checked.
+#[derive(Clone, Debug)]
+pub struct Mechanism {
+    /// Name of the model; an identifier, used for the emitted module.
+    pub name: String,
+    /// One line for people.
+    pub title: Option<String>,
+    /// Gravity in the base frame, m/s^2; expressions over constants.
+    pub gravity: [Exact; 3],
+    /// Known geometry and the like.
+    pub constants: Vec<Constant>,
+    /// Dynamic parameters in the order of declaration, which orders p_g.
+    pub parameters: Vec<Parameter>,
+    /// Joint coordinates in the order of declaration.
+    pub coordinates: Vec<Coordinate>,
+    /// Frames; parents come before their children, 0 is the base.
+    pub frames: Vec<Frame>,
+    /// Named points.
+    pub points: Vec<Point>,
+    /// Rigid bodies.
+    pub parts: Vec<Part>,
+    /// Lumped masses.
+    pub lumped_masses: Vec<LumpedMass>,
+    /// Loops closed by coincident points.
+    pub loops: Vec<Loop>,
+    /// Drives, one per degree of freedom.
+    pub drives: Vec<Drive>,
+    /// Friction, drive inertia and the like.
+    pub effects: Vec<Effect>,
+    /// Products of dynamic parameters whose columns should be retained, most wanted first;
+    /// each is a product of powers of parameters.
+    pub retain: Vec<Vec<(ParameterIdx, u32)>>,
+    /// How recordings name their columns: ours to theirs.
+    pub recording: Recording,
+}
+
+/// A known quantity.
+#[derive(Clone, Debug)]
+pub struct Constant {
+    /// Identifier.
+    pub name: String,
+    /// Value in SI units.
+    pub value: f64,
+    /// Unit as printed, e.g. `m`, `rad`, `m/s^2`, `1`.
+    pub unit: String,
+    /// True if it is an angle (unit rad) and may stand in [`Angle`].
+    pub is_angle: bool,
+    /// Remark of the author.
+    pub note: Option<String>,
+}
+
+/// A dynamic parameter.
+#[derive(Clone, Debug)]
+pub struct Parameter {
+    /// Identifier.
+    pub name: String,
+    /// Nominal value in SI units; zero where the file gives none.
+    pub nominal: f64,
+    /// Unit as printed.
+    pub unit: String,
+    /// Remark of the author.
+    pub note: Option<String>,
+}
+
+/// Kind of motion of a coordinate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Motion {
+    /// Angle in rad.
+    Revolute,
+    /// Length in m.
+    Prismatic,
+}
+
+/// A joint coordinate.
+#[derive(Clone, Debug)]
+pub struct Coordinate {
+    /// Identifier.
+    pub name: String,
+    /// Angle or length.
+    pub motion: Motion,
+    /// Passive coordinates follow from the loops; the others are independent.
+    pub passive: bool,
+    /// Value at the nominal pose, which chooses the assembly mode.
+    /// For passive coordinates refined until the loops close.
+    pub nominal: f64,
+}
+
+/// An axis of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Axis {
+    X,
+    Y,
+    Z,
+}
+
+/// One elementary motion from a parent frame towards its child; each acts about or along the axes reached so far.
+#[derive(Clone, Debug)]
+pub enum Step {
+    /// Rotation about an axis.
+    Rotate(Axis, Angle),
+    /// Translation along an axis.
+    Translate(Axis, Length),
+}
+
+/// A frame in the tree.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Identifier; `base` for the base.
+    pub name: String,
+    /// Parent; the base is its own.
+    pub parent: FrameIdx,
+    /// Elementary motions from the parent, e.g. Rx(alpha) Tx(a) Rz(theta) Tz(d) for modified DH.
+    pub steps: Vec<Step>,
+    /// The convention the file used, for the frames table of a page.
+    pub convention: Convention,
+}
+
+/// How a frame was written in the file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Convention {
+    /// The base frame.
+    Base,
+    /// Rx(alpha) Tx(a) Rz(theta) Tz(d); the texts of a, alpha, d, theta.
+    ModifiedDh([String; 4]),
+    /// Rz(theta) Tz(d) Tx(a) Rx(alpha); the texts of a, alpha, d, theta.
+    StandardDh([String; 4]),
+    /// A transform, perhaps followed by a joint; as text.
+    Transform(String),
+}
+
+/// A point fixed to a frame.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// Identifier.
+    pub name: String,
+    /// Its frame.
+    pub frame: FrameIdx,
+    /// Position in that frame, m; expressions over constants.
+    pub at: [Exact; 3],
+}
+
+/// Inertia of a part; expressions over constants and parameters, polynomial in the parameters.
+#[derive(Clone, Debug)]
+pub enum Inertial {
+    /// Mass, centre of mass in the frame, and inertia about the centre (xx, xy, xz, yy, yz, zz) along the frame's axes.
+    AboutCentre {
+        /// kg
+        mass: Exact,
+        /// m
+        centre: [Exact; 3],
+        /// kg m^2; the off-diagonal entries are elements of the inertia matrix (negative products).
+        inertia: [Exact; 6],
+    },
+    /// The ten linear parameters about the frame's origin.
+    Linear {
+        /// kg
+        mass: Exact,
+        /// Mass times centre, kg m.
+        first_moment: [Exact; 3],
+        /// xx, xy, xz, yy, yz, zz about the origin, kg m^2.
+        inertia: [Exact; 6],
+    },
+}
+
+/// A rigid body on a frame.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Name for people; the frame's if the file gives none.
+    pub name: String,
+    /// The frame that carries it.
+    pub frame: FrameIdx,
+    /// Its inertia.
+    pub inertial: Inertial,
+}
+
+/// A mass concentrated at a point of a frame, or at different points for the two balances of a body.
+#[derive(Clone, Debug)]
+pub struct LumpedMass {
+    /// The mass; an expression over constants and parameters, kg.
+    pub mass: Exact,
+    /// The share of that mass which sits here.
+    pub share: BigRational,
+    /// The frame that carries it.
+    pub frame: FrameIdx,
+    /// Where the balance of forces sees it, in the frame, m; over constants and parameters.
+    pub force_at: [Exact; 3],
+    /// Where the balance of moments about the frame's origin sees it, in the frame, m.
+    pub moment_at: [Exact; 3],
+}
+
+/// A loop closed by two points that coincide.
+#[derive(Clone, Debug)]
+pub struct Loop {
+    /// Name for people.
+    pub name: String,
+    /// The points.
+    pub joins: [PointIdx; 2],
+}
+
+/// A drive.
+#[derive(Clone, Debug)]
+pub struct Drive {
+    /// Identifier; the name of its force in recordings.
+    pub name: String,
+    /// How it acts.
+    pub kind: DriveKind,
+}
+
+/// How a drive acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriveKind {
+    /// Torque or force on a coordinate.
+    Joint(CoordinateIdx),
+    /// Force between two points, positive when it pushes them apart.
+    Linear {
+        /// One end, often on the base.
+        from: PointIdx,
+        /// The other end.
+        to: PointIdx,
+    },
+}
+
+/// Where an effect acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// On a drive: adds to its force.
+    Drive(DriveIdx),
+    /// On a joint coordinate, also a passive one: adds to its torque or force.
+    Coordinate(CoordinateIdx),
+    /// At a point: adds a mass there.
+    Point(PointIdx),
+}
+
+/// An effect of the file, with its kind's expressions put in place.
+#[derive(Clone, Debug)]
+pub struct Effect {
+    /// Name of the kind.
+    pub kind: String,
+    /// Where it acts; its parameters are shared by all places.
+    pub places: Vec<Place>,
+    /// The effect is `sum of parameter * expression`, the same at every place.
+    /// On drives and coordinates the sum is a force or torque;
+    /// at points the parameter is a mass and the expression its factor.
+    pub terms: Vec<EffectTerm>,
+}
+
+/// One parameter of an effect with what it multiplies.
+#[derive(Clone, Debug)]
+pub struct EffectTerm {
+    /// The parameter, listed in [`Mechanism::parameters`] after those that the file declares.
+    pub parameter: ParameterIdx,
+    /// Expression over constants and [`crate::PlaceQuantity`].
+    pub expression: Exact,
+}
+
+/// How recordings name their columns.
+#[derive(Clone, Debug, Default)]
+pub struct Recording {
+    /// Pairs of our name (`t`, a coordinate, with `_d` or `_dd`, a drive) and theirs.
+    pub columns: Vec<(String, String)>,
+}
