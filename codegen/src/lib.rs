@@ -1,1 +1,44 @@
-//! To be written.
+//! From a mechanism to its base parameters and fast code: the mill itself.
+
+mod closure;
+mod dyad;
+mod error;
+mod exact;
+pub mod expr;
+pub mod field;
+mod inertia;
+mod linear;
+mod newton_euler;
+mod projection;
+mod reduce;
+mod regressor;
+mod tree;
+mod vector;
+
+use modelmill_spec::Mechanism;
+
+pub use error::DeriveError;
+pub use exact::Monomial;
+pub use reduce::{Dependency, RationalFunction, Reduction, Variable};
+
+use expr::Graph;
+use regressor::Equations;
+
+/// Everything that the mill knows about a mechanism.
+pub struct Derivation {
+    /// The mechanism that was derived.
+    pub mechanism: Mechanism,
+    /// The arena of all expressions.
+    pub graph: Graph,
+    /// Which products are retained and how the others follow.
+    pub reduction: Reduction,
+    pub(crate) equations: Equations,
+}
+
+/// Derives the inverse dynamics of a mechanism and reduces it to base parameters, exactly.
+pub fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
+    let mut graph = Graph::new();
+    let equations = regressor::equations(&mut graph, mechanism)?;
+    let reduction = reduce::reduce(&mut graph, mechanism, &equations.projection, &equations.products, &equations.columns)?;
+    Ok(Derivation { mechanism: mechanism.clone(), graph, reduction, equations })
+}

@@ -1,0 +1,158 @@
+//! Loops: the vector equation that closes each of them, in a frame in which it is as simple as it can be.
+
+use modelmill_spec::{FrameIdx, Mechanism, Point};
+
+use crate::DeriveError;
+use crate::exact;
+use crate::expr::{AngleSum, Atom, ExprId, Graph};
+use crate::tree::Tree;
+use crate::vector::{self, Turn, Vector, push_turn};
+
+/// A loop cut open at two points that must coincide.
+#[derive(Clone, Debug)]
+pub(crate) struct Closure {
+    /// Name for people.
+    pub(crate) name: String,
+    /// Difference of the two positions in the plane of the loop (2) or in the frame of its root (3); all zero.
+    pub(crate) residual: Vec<ExprId>,
+    /// The same as a chain of vectors turned about one axis, if the loop is planar.
+    pub(crate) chain: Option<Vec<Leg>>,
+    /// Coordinates on which it depends, sorted.
+    pub(crate) coordinates: Vec<usize>,
+}
+
+/// A vector of a planar chain, turned by `angle + pi12 * pi/12`.
+#[derive(Clone, Debug)]
+pub(crate) struct Leg {
+    pub(crate) angle: AngleSum,
+    pub(crate) pi12: i32,
+    pub(crate) vector: [ExprId; 2],
+}
+
+/// A stretch of a path: a vector given in a frame that `turns` lead to.
+struct Stretch {
+    turns: Vec<Turn>,
+    vector: Vector,
+}
+
+/// Position of a point in a frame up its tree, as stretches: `start` turns stand in front of all.
+fn stretches(tree: &Tree, links: &[usize], start: &[Turn], at: &Vector) -> Vec<Stretch> {
+    let mut turns = start.to_vec();
+    let mut path = Vec::new();
+    for &i in links {
+        let link = &tree.links[i];
+        path.push(Stretch { turns: turns.clone(), vector: link.position });
+        for turn in link.pre.iter().chain([&link.joint]) {
+            push_turn(&mut turns, turn);
+        }
+    }
+    path.push(Stretch { turns, vector: *at });
+    path.retain(|stretch| stretch.vector != vector::ZERO);
+    path
+}
+
+fn sum_of(graph: &mut Graph, path: &[Stretch]) -> Vector {
+    let vectors: Vec<Vector> = path
+        .iter()
+        .map(|stretch| {
+            let mut v = stretch.vector;
+            for turn in stretch.turns.iter().rev() {
+                v = graph.turn_out(turn, &v);
+            }
+            v
+        })
+        .collect();
+    graph.add_vectors(&vectors)
+}
+
+fn point_at(graph: &mut Graph, point: &Point) -> Result<Vector, DeriveError> {
+    Ok([
+        exact::expression(graph, &point.at[0])?,
+        exact::expression(graph, &point.at[1])?,
+        exact::expression(graph, &point.at[2])?,
+    ])
+}
+
+/// Position of a point in the base frame.
+pub(crate) fn position_in_base(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    tree: &Tree,
+    point: usize,
+) -> Result<Vector, DeriveError> {
+    let point = &mechanism.points[point];
+    let at = point_at(graph, point)?;
+    let path = stretches(tree, &tree.path(tree.link_of(point.frame)), &[], &at);
+    Ok(sum_of(graph, &path))
+}
+
+/// The closure of every loop of the mechanism.
+pub(crate) fn closures(graph: &mut Graph, mechanism: &Mechanism, tree: &Tree) -> Result<Vec<Closure>, DeriveError> {
+    mechanism
+        .loops
+        .iter()
+        .map(|l| {
+            let [a, b] = l.joins.map(|p| &mechanism.points[p.0]);
+            let path = |frame: FrameIdx| tree.path(tree.link_of(frame));
+            let (pa, pb) = (path(a.frame), path(b.frame));
+            let common = pa.iter().zip(&pb).take_while(|(x, y)| x == y).count();
+            let (pa, pb) = (&pa[common..], &pb[common..]);
+            // The first link's fixed rotation leads into the plane of the loop, if it has one.
+            let first = pa.first().or(pb.first());
+            let into: Vec<Turn> = first.map_or(Vec::new(), |i| tree.links[*i].pre.clone());
+            let back: Vec<Turn> = into
+                .iter()
+                .rev()
+                .map(|t| Turn { axis: t.axis, sum: AngleSum::NONE.plus(&t.sum, -1), pi12: -t.pi12 })
+                .collect();
+            let (at_a, at_b) = (point_at(graph, a)?, point_at(graph, b)?);
+            let mut path = stretches(tree, pa, &back, &at_a);
+            for mut stretch in stretches(tree, pb, &back, &at_b) {
+                stretch.vector = stretch.vector.map(|x| graph.neg(x));
+                path.push(stretch);
+            }
+            Ok(close(graph, l.name.clone(), &path))
+        })
+        .collect()
+}
+
+fn close(graph: &mut Graph, name: String, path: &[Stretch]) -> Closure {
+    let total = sum_of(graph, path);
+    let mut chain = Some(Vec::new());
+    for stretch in path {
+        // Fixed rotations at the inner end are applied, which leaves one turn about the normal of a planar loop.
+        let (mut turns, mut vector) = (stretch.turns.as_slice(), stretch.vector);
+        while let [rest @ .., last] = turns
+            && last.sum.is_empty()
+        {
+            vector = graph.turn_out(last, &vector);
+            turns = rest;
+        }
+        let turn = match turns {
+            [] => None,
+            [turn] if turn.axis == modelmill_spec::Axis::Z => Some(turn),
+            _ => {
+                chain = None;
+                break;
+            }
+        };
+        let (angle, pi12) = turn.map_or((AngleSum::NONE, 0), |t| (t.sum.clone(), t.pi12));
+        if let Some(legs) = &mut chain
+            && vector[..2] != [Graph::ZERO; 2]
+        {
+            legs.push(Leg { angle, pi12, vector: [vector[0], vector[1]] });
+        }
+    }
+    if total[2] != Graph::ZERO {
+        chain = None;
+    }
+    let residual: Vec<ExprId> = total.into_iter().filter(|r| *r != Graph::ZERO).collect();
+    let coordinates = coordinates_of(graph, &residual);
+    Closure { name, residual, chain, coordinates }
+}
+
+/// Coordinates on which some expressions depend.
+pub(crate) fn coordinates_of(graph: &Graph, roots: &[ExprId]) -> Vec<usize> {
+    let atoms = graph.atoms(roots);
+    atoms.into_iter().filter_map(|atom| if let Atom::Coordinate(i) = atom { Some(i) } else { None }).collect()
+}

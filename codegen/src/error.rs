@@ -1,0 +1,111 @@
+//! Why a valid model file may still have no derivation.
+
+use std::fmt;
+
+use modelmill_spec::Exact;
+
+/// A mechanism that the mill cannot derive, and what to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DeriveError {
+    /// An expression is used in a way that has no meaning here.
+    Unsupported {
+        /// What is wrong.
+        why: &'static str,
+        /// The expression.
+        expression: String,
+    },
+    /// A linear system is singular for every pose.
+    Singular {
+        /// Which system.
+        what: String,
+    },
+    /// A linear system is larger than cofactors should solve.
+    TooLarge {
+        /// Which system.
+        what: String,
+        /// Its size.
+        size: usize,
+        /// The largest size.
+        limit: usize,
+    },
+    /// The loops do not determine the passive coordinates, or determine too much.
+    LoopCount {
+        /// Independent equations.
+        equations: usize,
+        /// Passive coordinates.
+        passive: usize,
+    },
+    /// There must be one drive per degree of freedom.
+    DriveCount {
+        /// Drives.
+        drives: usize,
+        /// Degrees of freedom.
+        freedoms: usize,
+    },
+    /// No order was found in which every loop is a planar dyad, so that it cannot be sampled exactly.
+    LoopsNotSampled {
+        /// Names of the loops.
+        loops: Vec<String>,
+    },
+    /// No point of the loops' variety came up.
+    NoPointFound {
+        /// How many draws were made.
+        draws: usize,
+    },
+    /// A factor of eq. (6) is no rational function of reasonable size.
+    FactorNotRecovered {
+        /// The eliminated product.
+        product: String,
+        /// The retained product.
+        retained: String,
+    },
+    /// The rank differs between two random sets of constants.
+    RankChanged,
+    /// The final proof at fresh points failed.
+    NotConfirmed,
+}
+
+impl DeriveError {
+    pub(crate) fn unsupported(why: &'static str, expression: &Exact) -> Self {
+        Self::Unsupported { why, expression: format!("{expression:?}") }
+    }
+}
+
+impl fmt::Display for DeriveError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unsupported { why, expression } => write!(f, "{why}: {expression}"),
+            Self::Singular { what } => write!(
+                f,
+                "{what} are singular at every pose; check that the passive coordinates can move the loops shut and that every drive moves something"
+            ),
+            Self::TooLarge { what, size, limit } => {
+                write!(f, "{what} make a coupled system of {size} unknowns; at most {limit} can be solved in symbols")
+            }
+            Self::LoopCount { equations, passive } => write!(
+                f,
+                "the loops give {equations} independent equations for {passive} passive coordinates; mark as many coordinates passive as there are equations"
+            ),
+            Self::DriveCount { drives, freedoms } => {
+                write!(f, "{drives} drives for {freedoms} degrees of freedom; there must be one drive for each")
+            }
+            Self::LoopsNotSampled { loops } => write!(
+                f,
+                "no exact reduction for the loops {}: they are not planar, or no two coordinates of each can be solved for in turn; the numeric reduction still works",
+                loops.join(", ")
+            ),
+            Self::NoPointFound { draws } => {
+                write!(f, "no pose that closes the loops was found in {draws} draws; the loops may contradict each other")
+            }
+            Self::FactorNotRecovered { product, retained } => write!(
+                f,
+                "the factor between the columns of {product} and {retained} is no rational function of the constants of reasonable size"
+            ),
+            Self::RankChanged => f.write_str("the rank differs between random constants; this is a fault of the program"),
+            Self::NotConfirmed => f.write_str("the reduction failed its own proof; this is a fault of the program"),
+        }
+    }
+}
+
+impl std::error::Error for DeriveError {}

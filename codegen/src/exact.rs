@@ -1,0 +1,309 @@
+//! Expressions of the model file brought into the graph, and polynomials in the dynamic parameters.
+
+use std::collections::BTreeMap;
+
+use modelmill_spec::{Angle, Exact, Function, Length, Mechanism, PlaceQuantity, Symbol};
+use num_traits::ToPrimitive;
+
+use crate::DeriveError;
+use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational, Unary};
+
+/// A product of powers of dynamic parameters: `m1*dc1^2` is `[(0, 1), (4, 2)]`. Sorted by parameter.
+///
+/// Monomials are ordered as a dictionary orders the parameters written out one by one, in order of declaration;
+/// this is the order of eq. (5).
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Monomial(pub Vec<(usize, u32)>);
+
+impl Monomial {
+    /// The product of two monomials.
+    #[must_use]
+    pub fn times(&self, other: &Self) -> Self {
+        let mut powers: BTreeMap<usize, u32> = self.0.iter().copied().collect();
+        for (parameter, n) in &other.0 {
+            *powers.entry(*parameter).or_insert(0) += n;
+        }
+        Self(powers.into_iter().collect())
+    }
+
+    fn written_out(&self) -> impl Iterator<Item = usize> {
+        self.0.iter().flat_map(|(p, n)| std::iter::repeat_n(*p, *n as usize))
+    }
+
+    /// As infix text: `m1*dc1^2`.
+    pub fn text(&self, mechanism: &Mechanism) -> String {
+        if self.0.is_empty() {
+            return "1".to_owned();
+        }
+        let factors: Vec<String> = self
+            .0
+            .iter()
+            .map(|(p, n)| {
+                let name = &mechanism.parameters[*p].name;
+                if *n == 1 { name.clone() } else { format!("{name}^{n}") }
+            })
+            .collect();
+        factors.join("*")
+    }
+
+    /// Its value for given parameters.
+    pub fn value(&self, parameters: &[f64]) -> f64 {
+        self.0.iter().map(|(p, n)| parameters[*p].powi(i32::try_from(*n).unwrap_or(i32::MAX))).product()
+    }
+}
+
+impl PartialOrd for Monomial {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Monomial {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.written_out().cmp(other.written_out())
+    }
+}
+
+/// A polynomial in the dynamic parameters whose coefficients are expressions over constants.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Polynomial(pub(crate) BTreeMap<Monomial, ExprId>);
+
+impl Polynomial {
+    fn constant(value: ExprId) -> Self {
+        let mut terms = BTreeMap::new();
+        if value != Graph::ZERO {
+            terms.insert(Monomial::default(), value);
+        }
+        Self(terms)
+    }
+
+    pub(crate) fn is_zero(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    pub(crate) fn plus(&self, other: &Self, graph: &mut Graph) -> Self {
+        let mut terms = self.0.clone();
+        for (monomial, value) in &other.0 {
+            let old = terms.get(monomial).copied().unwrap_or(Graph::ZERO);
+            terms.insert(monomial.clone(), graph.add(old, *value));
+        }
+        terms.retain(|_, value| *value != Graph::ZERO);
+        Self(terms)
+    }
+
+    pub(crate) fn scaled(&self, factor: &Rational, graph: &mut Graph) -> Self {
+        Self(self.0.iter().map(|(m, v)| (m.clone(), graph.scale(*v, factor))).collect())
+    }
+
+    pub(crate) fn times(&self, other: &Self, graph: &mut Graph) -> Self {
+        let mut product = Self::default();
+        for (m, a) in &self.0 {
+            for (n, b) in &other.0 {
+                let value = graph.mul(*a, *b);
+                product = product.plus(&Self(BTreeMap::from([(m.times(n), value)])), graph);
+            }
+        }
+        product
+    }
+}
+
+/// A multiple of pi/12 and a sum of atoms.
+pub(crate) fn angle_sum(angle: &Angle) -> (AngleSum, i32) {
+    let twelfths = Rational::from(angle.pi.clone());
+    let twelfths = &twelfths * &Rational::integer(12);
+    assert!(twelfths.is_integer(), "a validated angle's fixed part is a multiple of pi/12, not pi * {}", angle.pi);
+    let pi12 = twelfths.to_big().to_integer() % num_bigint::BigInt::from(24);
+    let terms = angle.terms.iter().map(|(symbol, n)| (atom(*symbol), *n));
+    (AngleSum::new(terms), pi12.to_i32().expect("a remainder modulo 24 fits"))
+}
+
+fn atom(symbol: Symbol) -> Atom {
+    match symbol {
+        Symbol::Constant(i) => Atom::Constant(i.0),
+        Symbol::Parameter(i) => Atom::Parameter(i.0),
+        Symbol::Coordinate(i) => Atom::Coordinate(i.0),
+        Symbol::Place(_) => unreachable!("quantities of a place are put in before"),
+    }
+}
+
+/// The offset and the coordinates of a length as one expression.
+pub(crate) fn length(graph: &mut Graph, length: &Length) -> Result<ExprId, DeriveError> {
+    let mut terms = vec![(expression(graph, &length.offset)?, Rational::ONE)];
+    for (coordinate, factor) in &length.coordinates {
+        terms.push((graph.atom(Atom::Coordinate(coordinate.0)), Rational::from(factor.clone())));
+    }
+    Ok(graph.sum(&terms))
+}
+
+/// An expression without dynamic parameters or quantities of a place.
+pub(crate) fn expression(graph: &mut Graph, exact: &Exact) -> Result<ExprId, DeriveError> {
+    expression_at(graph, exact, &|_| None)
+}
+
+/// An expression over constants and the quantities of a place.
+pub(crate) fn expression_at(
+    graph: &mut Graph,
+    exact: &Exact,
+    place: &dyn Fn(PlaceQuantity) -> Option<ExprId>,
+) -> Result<ExprId, DeriveError> {
+    let polynomial = polynomial_at(graph, exact, place)?;
+    match polynomial.0.len() {
+        0 => Ok(Graph::ZERO),
+        1 if polynomial.0.contains_key(&Monomial::default()) => Ok(polynomial.0[&Monomial::default()]),
+        _ => Err(DeriveError::unsupported("a dynamic parameter stands where only constants may", exact)),
+    }
+}
+
+/// An expression as a polynomial in the dynamic parameters.
+pub(crate) fn polynomial(graph: &mut Graph, exact: &Exact) -> Result<Polynomial, DeriveError> {
+    polynomial_at(graph, exact, &|_| None)
+}
+
+fn polynomial_at(
+    graph: &mut Graph,
+    exact: &Exact,
+    place: &dyn Fn(PlaceQuantity) -> Option<ExprId>,
+) -> Result<Polynomial, DeriveError> {
+    Ok(match exact {
+        Exact::Rational(value) => Polynomial::constant(graph.rational(Rational::from(value.clone()))),
+        Exact::Pi => {
+            return Err(DeriveError::unsupported("pi may stand only inside an angle, sin or cos", exact));
+        }
+        Exact::Symbol(Symbol::Parameter(i)) => Polynomial(BTreeMap::from([(Monomial(vec![(i.0, 1)]), Graph::ONE)])),
+        Exact::Symbol(Symbol::Place(quantity)) => match place(*quantity) {
+            Some(value) => Polynomial::constant(value),
+            None => return Err(DeriveError::unsupported("a quantity of a place stands outside an effect", exact)),
+        },
+        Exact::Symbol(symbol) => Polynomial::constant(graph.atom(atom(*symbol))),
+        Exact::Sum(operands) => {
+            let mut total = Polynomial::default();
+            for operand in operands {
+                let operand = polynomial_at(graph, operand, place)?;
+                total = total.plus(&operand, graph);
+            }
+            total
+        }
+        Exact::Product(operands) => {
+            let mut total = Polynomial::constant(Graph::ONE);
+            for operand in operands {
+                let operand = polynomial_at(graph, operand, place)?;
+                total = total.times(&operand, graph);
+            }
+            total
+        }
+        Exact::Quotient(a, b) => {
+            let divisor = expression_at(graph, b, place)?;
+            if divisor == Graph::ZERO {
+                return Err(DeriveError::unsupported("division by zero", exact));
+            }
+            let inverse = Polynomial::constant(graph.pow(divisor, -1));
+            polynomial_at(graph, a, place)?.times(&inverse, graph)
+        }
+        Exact::Negative(a) => polynomial_at(graph, a, place)?.scaled(&Rational::MINUS_ONE, graph),
+        Exact::Power(a, n) if *n < 0 => {
+            let base = expression_at(graph, a, place)?;
+            if base == Graph::ZERO {
+                return Err(DeriveError::unsupported("division by zero", exact));
+            }
+            Polynomial::constant(graph.pow(base, *n))
+        }
+        Exact::Power(a, n) => {
+            let base = polynomial_at(graph, a, place)?;
+            (0..*n).fold(Polynomial::constant(Graph::ONE), |total, _| total.times(&base, graph))
+        }
+        Exact::Apply(function @ (Function::Sin | Function::Cos), a) => {
+            let mut angle = AngleParts::default();
+            angle.collect(a, &Rational::ONE, exact)?;
+            let (sum, pi12) = angle.finish(exact)?;
+            let (c, s) = graph.cos_sin(&sum, pi12);
+            Polynomial::constant(if *function == Function::Sin { s } else { c })
+        }
+        Exact::Apply(function, a) => {
+            let argument = expression_at(graph, a, place)?;
+            let function = match function {
+                Function::Sqrt => Unary::Sqrt,
+                Function::Abs => Unary::Abs,
+                Function::Sign => Unary::Sign,
+                Function::Tanh => Unary::Tanh,
+                Function::Exp | Function::Sin | Function::Cos => Unary::Exp,
+            };
+            Polynomial::constant(graph.unary(function, argument))
+        }
+    })
+}
+
+/// An angle in the making: multiples of pi and of atoms.
+#[derive(Default)]
+struct AngleParts {
+    pi: Rational,
+    atoms: Vec<(Atom, Rational)>,
+}
+
+impl AngleParts {
+    fn collect(&mut self, exact: &Exact, factor: &Rational, whole: &Exact) -> Result<(), DeriveError> {
+        match exact {
+            Exact::Rational(value) if Rational::from(value.clone()).is_zero() => {}
+            Exact::Pi => self.pi = &self.pi + factor,
+            Exact::Symbol(symbol @ (Symbol::Constant(_) | Symbol::Coordinate(_))) => {
+                self.atoms.push((atom(*symbol), factor.clone()));
+            }
+            Exact::Sum(operands) => {
+                for operand in operands {
+                    self.collect(operand, factor, whole)?;
+                }
+            }
+            Exact::Negative(a) => self.collect(a, &-factor, whole)?,
+            Exact::Quotient(a, b) => match b.as_ref() {
+                Exact::Rational(value) if !Rational::from(value.clone()).is_zero() => {
+                    let factor = factor * &Rational::from(value.clone()).recip();
+                    self.collect(a, &factor, whole)?;
+                }
+                _ => return Err(Self::refuse(whole)),
+            },
+            Exact::Product(operands) => {
+                let mut factor = factor.clone();
+                let mut rest = None;
+                for operand in operands {
+                    match operand {
+                        Exact::Rational(value) => factor = &factor * &Rational::from(value.clone()),
+                        _ if rest.is_none() => rest = Some(operand),
+                        _ => return Err(Self::refuse(whole)),
+                    }
+                }
+                match rest {
+                    Some(rest) => self.collect(rest, &factor, whole)?,
+                    None => return Err(Self::refuse(whole)),
+                }
+            }
+            _ => return Err(Self::refuse(whole)),
+        }
+        Ok(())
+    }
+
+    fn finish(self, whole: &Exact) -> Result<(AngleSum, i32), DeriveError> {
+        let twelfths = &self.pi * &Rational::integer(12);
+        let pi12 = twelfths.as_small().filter(|(_, d)| *d == 1).map(|(n, _)| n.rem_euclid(24));
+        let atoms: Option<Vec<_>> = self
+            .atoms
+            .iter()
+            .map(|(a, k)| k.as_small().filter(|(_, d)| *d == 1).and_then(|(n, _)| Some((*a, i32::try_from(n).ok()?))))
+            .collect();
+        match (pi12.and_then(|n| i32::try_from(n).ok()), atoms) {
+            (Some(pi12), Some(atoms)) => Ok((AngleSum::new(atoms), pi12)),
+            _ => Err(Self::refuse(whole)),
+        }
+    }
+
+    fn refuse(whole: &Exact) -> DeriveError {
+        DeriveError::unsupported(
+            "the argument of sin and cos must be a sum of integer multiples of angles and a multiple of pi/12",
+            whole,
+        )
+    }
+}
+
+impl Default for Rational {
+    fn default() -> Self {
+        Self::ZERO
+    }
+}

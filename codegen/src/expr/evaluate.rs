@@ -1,0 +1,284 @@
+//! Evaluation of expressions: one traversal, many domains (floating point, exact rationals, a prime field).
+
+use std::collections::BTreeMap;
+
+use super::{AngleSum, Atom, ExprId, Graph, Node, Rational, Unary};
+use crate::field::{self, Element};
+
+/// A number system in which expressions can be evaluated. `None` means that the value does not exist there:
+/// a division by zero, a root that is not in the field, a function that the domain does not know.
+pub trait Domain {
+    /// Its numbers.
+    type Value: Clone;
+    /// A rational number.
+    fn rational(&self, value: &Rational) -> Option<Self::Value>;
+    /// `a + b`
+    fn add(&self, a: &Self::Value, b: &Self::Value) -> Self::Value;
+    /// `a * b`
+    fn mul(&self, a: &Self::Value, b: &Self::Value) -> Self::Value;
+    /// `a^n`
+    fn power(&self, a: &Self::Value, n: i32) -> Option<Self::Value>;
+    /// A function of one argument.
+    fn unary(&self, function: Unary, a: &Self::Value) -> Option<Self::Value>;
+    /// What an atom stands for.
+    fn atom(&self, atom: Atom) -> Option<Self::Value>;
+    /// Cosine and sine of a sum of atoms.
+    fn cos_sin(&self, angle: &AngleSum) -> Option<(Self::Value, Self::Value)>;
+}
+
+/// The nodes that some roots need, in the order of evaluation.
+#[derive(Clone, Debug)]
+pub struct Tape {
+    steps: Vec<(ExprId, Node)>,
+    roots: Vec<ExprId>,
+    positions: BTreeMap<ExprId, usize>,
+    /// Per step the index of its operands' steps, flattened.
+    operands: Vec<Vec<usize>>,
+}
+
+impl Tape {
+    /// Collects what `roots` need.
+    pub fn new(graph: &Graph, roots: &[ExprId]) -> Self {
+        let mut positions = BTreeMap::new();
+        let mut steps = Vec::new();
+        let mut operands = Vec::new();
+        for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
+            if needed {
+                let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
+                let mut children = Vec::new();
+                graph.for_each_child(id, |child| children.push(positions[&child]));
+                positions.insert(id, steps.len());
+                operands.push(children);
+                steps.push((id, graph.node(id).clone()));
+            }
+        }
+        Self { steps, roots: roots.to_vec(), positions, operands }
+    }
+
+    /// How many nodes it evaluates.
+    pub fn len(&self) -> usize {
+        self.steps.len()
+    }
+
+    /// Whether there is nothing to evaluate.
+    pub fn is_empty(&self) -> bool {
+        self.steps.is_empty()
+    }
+
+    /// Values of the roots; `None` if any of them does not exist.
+    pub fn evaluate<D: Domain>(&self, domain: &D) -> Option<Vec<D::Value>> {
+        let mut values: Vec<D::Value> = Vec::with_capacity(self.steps.len());
+        for ((_, node), operands) in self.steps.iter().zip(&self.operands) {
+            let value = match node {
+                Node::Rational(value) => domain.rational(value)?,
+                Node::Atom(atom) => domain.atom(*atom)?,
+                Node::Sin(angle) => domain.cos_sin(angle)?.1,
+                Node::Cos(angle) => domain.cos_sin(angle)?.0,
+                Node::Sum(terms) => {
+                    let mut total: Option<D::Value> = None;
+                    for ((_, factor), operand) in terms.iter().zip(operands) {
+                        let value = &values[*operand];
+                        let term =
+                            if factor.is_one() { value.clone() } else { domain.mul(&domain.rational(factor)?, value) };
+                        total = Some(match total {
+                            Some(sum) => domain.add(&sum, &term),
+                            None => term,
+                        });
+                    }
+                    total?
+                }
+                Node::Product(factors) => {
+                    let mut total: Option<D::Value> = None;
+                    for ((_, n), operand) in factors.iter().zip(operands) {
+                        let value = &values[*operand];
+                        let factor = if *n == 1 { value.clone() } else { domain.power(value, *n)? };
+                        total = Some(match total {
+                            Some(product) => domain.mul(&product, &factor),
+                            None => factor,
+                        });
+                    }
+                    total?
+                }
+                Node::Unary(function, _) => domain.unary(*function, &values[operands[0]])?,
+            };
+            values.push(value);
+        }
+        Some(self.roots.iter().map(|root| values[self.positions[root]].clone()).collect())
+    }
+}
+
+/// Floating-point evaluation; atoms come from a function.
+pub struct F64<F: Fn(Atom) -> f64>(
+    /// Value of an atom.
+    pub F,
+);
+
+impl<F: Fn(Atom) -> f64> Domain for F64<F> {
+    type Value = f64;
+    fn rational(&self, value: &Rational) -> Option<f64> {
+        Some(value.to_f64())
+    }
+    fn add(&self, a: &f64, b: &f64) -> f64 {
+        a + b
+    }
+    fn mul(&self, a: &f64, b: &f64) -> f64 {
+        a * b
+    }
+    fn power(&self, a: &f64, n: i32) -> Option<f64> {
+        (*a != 0.0 || n > 0).then(|| a.powi(n))
+    }
+    fn unary(&self, function: Unary, a: &f64) -> Option<f64> {
+        match function {
+            Unary::Sqrt => (*a >= 0.0).then(|| a.sqrt()),
+            Unary::Sign => Some(if *a == 0.0 { 0.0 } else { a.signum() }),
+            Unary::Abs => Some(a.abs()),
+            Unary::Tanh => Some(a.tanh()),
+            Unary::Exp => Some(a.exp()),
+        }
+    }
+    fn atom(&self, atom: Atom) -> Option<f64> {
+        Some((self.0)(atom))
+    }
+    fn cos_sin(&self, angle: &AngleSum) -> Option<(f64, f64)> {
+        let total: f64 = angle.terms().iter().map(|(atom, n)| f64::from(*n) * (self.0)(*atom)).sum();
+        Some((total.cos(), total.sin()))
+    }
+}
+
+/// Evaluation in the prime field.
+///
+/// Functions that are not algebraic are opaque: equal arguments get equal random values. They keep the laws that
+/// matter for dependence: `sign` is odd with square 1, `abs(x) = x sign(x)`, `tanh` is odd.
+#[derive(Clone, Debug, Default)]
+pub struct FieldPoint {
+    /// Values of atoms that are not angles.
+    pub values: BTreeMap<Atom, Element>,
+    /// Cosine and sine of angle atoms.
+    pub angles: BTreeMap<Atom, (Element, Element)>,
+    /// Seed of the opaque functions.
+    pub seed: u64,
+    /// Seed of the choice between the two roots of a square.
+    pub root_seed: u64,
+}
+
+impl FieldPoint {
+    fn sign(&self, a: Element) -> Element {
+        let (key, odd) = canonical(a);
+        let value = if field::hashed(self.seed, key).representative() & 1 == 0 { Element::ONE } else { -Element::ONE };
+        if a == Element::ZERO {
+            Element::ZERO
+        } else if odd {
+            -value
+        } else {
+            value
+        }
+    }
+}
+
+/// The smaller of `a` and `-a`, and whether it was `-a`.
+fn canonical(a: Element) -> (Element, bool) {
+    if (-a) < a { (-a, true) } else { (a, false) }
+}
+
+impl Domain for FieldPoint {
+    type Value = Element;
+    fn rational(&self, value: &Rational) -> Option<Element> {
+        if value.is_one() {
+            return Some(Element::ONE);
+        }
+        Element::from_rational(value)
+    }
+    fn add(&self, a: &Element, b: &Element) -> Element {
+        *a + *b
+    }
+    fn mul(&self, a: &Element, b: &Element) -> Element {
+        *a * *b
+    }
+    fn power(&self, a: &Element, n: i32) -> Option<Element> {
+        a.integer_power(n)
+    }
+    fn unary(&self, function: Unary, a: &Element) -> Option<Element> {
+        match function {
+            // One fixed choice per radicand: equal radicands must have equal roots.
+            Unary::Sqrt => a.square_root().map(|root| {
+                let flip = field::hashed(self.root_seed, *a).representative() & 1 == 1;
+                if flip { -canonical(root).0 } else { canonical(root).0 }
+            }),
+            Unary::Sign => Some(self.sign(*a)),
+            Unary::Abs => Some(*a * self.sign(*a)),
+            Unary::Tanh => {
+                let (key, odd) = canonical(*a);
+                let value = field::hashed(self.seed ^ 0x7461_6E68, key);
+                Some(if odd { -value } else { value })
+            }
+            Unary::Exp => Some(field::hashed(self.seed ^ 0x0065_7870, *a)),
+        }
+    }
+    fn atom(&self, atom: Atom) -> Option<Element> {
+        self.values.get(&atom).copied()
+    }
+    fn cos_sin(&self, angle: &AngleSum) -> Option<(Element, Element)> {
+        let mut total = (Element::ONE, Element::ZERO);
+        for (atom, n) in angle.terms() {
+            let (c, s) = *self.angles.get(atom)?;
+            let s = if *n < 0 { -s } else { s };
+            for _ in 0..n.unsigned_abs() {
+                total = (total.0 * c - total.1 * s, total.0 * s + total.1 * c);
+            }
+        }
+        Some(total)
+    }
+}
+
+/// Exact evaluation where possible: roots and angles must happen to be rational.
+#[derive(Clone, Debug, Default)]
+pub struct RationalPoint {
+    /// Values of atoms that are not angles.
+    pub values: BTreeMap<Atom, Rational>,
+    /// Cosine and sine of angle atoms.
+    pub angles: BTreeMap<Atom, (Rational, Rational)>,
+}
+
+impl Domain for RationalPoint {
+    type Value = Rational;
+    fn rational(&self, value: &Rational) -> Option<Rational> {
+        Some(value.clone())
+    }
+    fn add(&self, a: &Rational, b: &Rational) -> Rational {
+        a + b
+    }
+    fn mul(&self, a: &Rational, b: &Rational) -> Rational {
+        a * b
+    }
+    fn power(&self, a: &Rational, n: i32) -> Option<Rational> {
+        (!a.is_zero() || n > 0).then(|| a.pow(n))
+    }
+    fn unary(&self, function: Unary, a: &Rational) -> Option<Rational> {
+        match function {
+            Unary::Sign if a.is_zero() => Some(Rational::ZERO),
+            Unary::Sign => Some(if a.is_negative() { Rational::MINUS_ONE } else { Rational::ONE }),
+            Unary::Abs => Some(a.abs()),
+            Unary::Sqrt => {
+                let big = a.to_big();
+                let (n, d) = (big.numer().sqrt(), big.denom().sqrt());
+                let root = num_rational::BigRational::new(n, d);
+                (&root * &root == big).then(|| Rational::from(root))
+            }
+            Unary::Tanh | Unary::Exp => None,
+        }
+    }
+    fn atom(&self, atom: Atom) -> Option<Rational> {
+        self.values.get(&atom).cloned()
+    }
+    fn cos_sin(&self, angle: &AngleSum) -> Option<(Rational, Rational)> {
+        let mut total = (Rational::ONE, Rational::ZERO);
+        for (atom, n) in angle.terms() {
+            let (c, s) = self.angles.get(atom)?;
+            let s = if *n < 0 { -s } else { s.clone() };
+            for _ in 0..n.unsigned_abs() {
+                total = (&(&total.0 * c) - &(&total.1 * &s), &(&total.0 * &s) + &(&total.1 * c));
+            }
+        }
+        Some(total)
+    }
+}

@@ -1,0 +1,184 @@
+//! Expressions as a hash-consed graph: equal [`ExprId`]s mean equal structure.
+//!
+//! Nodes are made only by the smart constructors of [`Graph`], which order operands, merge like terms, move rational
+//! factors and signs outwards, and know the exact sines and cosines of multiples of pi/12.
+//! Sums of sums and products of products are left nested on purpose: the recursion's shared values stay shared.
+//! Coefficients are exact rationals; no floating-point number occurs before evaluation or emission.
+
+mod angle;
+mod construct;
+mod differentiate;
+mod evaluate;
+pub mod print;
+mod rational;
+mod substitute;
+
+use std::collections::{BTreeSet, HashMap};
+
+pub use angle::AngleSum;
+pub use evaluate::{Domain, F64, FieldPoint, RationalPoint, Tape};
+pub use rational::Rational;
+
+/// Index of an expression in its [`Graph`]. Children have smaller indices than their parents.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ExprId(pub(crate) u32);
+
+impl ExprId {
+    /// Position in the graph's arena.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// A quantity that an expression does not look into.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Atom {
+    /// A constant of the model file.
+    Constant(usize),
+    /// A dynamic parameter.
+    Parameter(usize),
+    /// A base parameter, by its position in `p_min`.
+    Base(usize),
+    /// A joint coordinate, rad or m.
+    Coordinate(usize),
+    /// Its first time derivative.
+    Rate(usize),
+    /// Its second time derivative.
+    Acceleration(usize),
+    /// The force or torque that a drive carries, effects aside.
+    Load(usize),
+}
+
+/// Functions of one argument that are kept as nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Unary {
+    /// Square root.
+    Sqrt,
+    /// Sign: -1, 0 or 1.
+    Sign,
+    /// Absolute value.
+    Abs,
+    /// Hyperbolic tangent.
+    Tanh,
+    /// Exponential.
+    Exp,
+}
+
+/// One node of the graph.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Node {
+    /// A rational number.
+    Rational(Rational),
+    /// An opaque quantity.
+    Atom(Atom),
+    /// Sine of a sum of atoms with integer factors (canonical: the first factor is positive).
+    Sin(AngleSum),
+    /// Cosine of such a sum.
+    Cos(AngleSum),
+    /// Linear combination; a rational term stands as a multiple of [`Graph::ONE`].
+    ///
+    /// Either one term whose factor is not 1, or several with coprime factors of which the first is positive.
+    Sum(Vec<(ExprId, Rational)>),
+    /// Product of integer powers, never with a rational factor; a negative exponent divides.
+    Product(Vec<(ExprId, i32)>),
+    /// A function of one argument.
+    Unary(Unary, ExprId),
+}
+
+/// The arena of expressions.
+#[derive(Clone, Debug)]
+pub struct Graph {
+    nodes: Vec<Node>,
+    ids: HashMap<Node, ExprId>,
+}
+
+impl Default for Graph {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Graph {
+    /// The number 0.
+    pub const ZERO: ExprId = ExprId(0);
+    /// The number 1.
+    pub const ONE: ExprId = ExprId(1);
+
+    /// A graph that holds 0 and 1.
+    pub fn new() -> Self {
+        let mut graph = Self { nodes: Vec::new(), ids: HashMap::new() };
+        let zero = graph.intern(Node::Rational(Rational::ZERO));
+        let one = graph.intern(Node::Rational(Rational::ONE));
+        assert!(zero == Self::ZERO && one == Self::ONE);
+        graph
+    }
+
+    /// The node behind an id.
+    pub fn node(&self, id: ExprId) -> &Node {
+        &self.nodes[id.index()]
+    }
+
+    /// How many nodes were ever made.
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Always false: 0 and 1 are there from the start.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// Marks every node that `roots` are made of; `result[i]` belongs to the node of index `i`.
+    pub fn reachable(&self, roots: &[ExprId]) -> Vec<bool> {
+        let mut seen = vec![false; self.nodes.len()];
+        for root in roots {
+            seen[root.index()] = true;
+        }
+        for i in (0..self.nodes.len()).rev() {
+            if seen[i] {
+                self.for_each_child(ExprId(u32::try_from(i).expect("graph below 4G nodes")), |child| {
+                    seen[child.index()] = true;
+                });
+            }
+        }
+        seen
+    }
+
+    /// Calls `visit` for every operand of `id`.
+    pub fn for_each_child(&self, id: ExprId, mut visit: impl FnMut(ExprId)) {
+        match self.node(id) {
+            Node::Rational(_) | Node::Atom(_) | Node::Sin(_) | Node::Cos(_) => {}
+            Node::Sum(terms) => terms.iter().for_each(|(child, _)| visit(*child)),
+            Node::Product(factors) => factors.iter().for_each(|(child, _)| visit(*child)),
+            Node::Unary(_, child) => visit(*child),
+        }
+    }
+
+    /// The nodes that `roots` are made of, children first.
+    pub fn nodes_of(&self, roots: &[ExprId]) -> impl Iterator<Item = &Node> {
+        self.nodes.iter().zip(self.reachable(roots)).filter(|(_, seen)| *seen).map(|(node, _)| node)
+    }
+
+    /// The atoms on which `roots` depend, also inside sines and cosines.
+    pub fn atoms(&self, roots: &[ExprId]) -> BTreeSet<Atom> {
+        let mut atoms = BTreeSet::new();
+        for node in self.nodes_of(roots) {
+            match node {
+                Node::Atom(atom) => _ = atoms.insert(*atom),
+                Node::Sin(angle) | Node::Cos(angle) => atoms.extend(angle.atoms()),
+                _ => {}
+            }
+        }
+        atoms
+    }
+
+    fn intern(&mut self, node: Node) -> ExprId {
+        if let Some(id) = self.ids.get(&node) {
+            return *id;
+        }
+        let id = ExprId(u32::try_from(self.nodes.len()).expect("graph below 4G nodes"));
+        self.nodes.push(node.clone());
+        self.ids.insert(node, id);
+        id
+    }
+}

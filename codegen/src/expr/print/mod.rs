@@ -1,0 +1,1 @@
+//! Printers for people and for other programs.

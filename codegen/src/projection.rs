@@ -1,0 +1,255 @@
+//! From the tree back to the mechanism: reactions of the loops leave by virtual power, and the drives take over.
+//!
+//! With `y` the rates in which the loops are simplest (a passive joint's absolute turning rate where axes are
+//! parallel), the differentiated loops read `J_p y_p + J_a y_a = 0`; then `tau_z = tau_a + G' tau_p` with
+//! `G = -J_p^-1 J_a`, and the drives' forces follow from `(d l / d z)' f = tau_z`.
+
+use modelmill_spec::{DriveKind, Mechanism};
+
+use crate::DeriveError;
+use crate::closure::{self, Closure};
+use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational, Unary};
+use crate::linear;
+use crate::tree::Tree;
+
+/// Kinematics of a drive.
+#[derive(Clone, Debug)]
+pub(crate) struct DriveMotion {
+    /// Its length or angle, and the first and second time derivative.
+    pub(crate) coordinate: ExprId,
+    pub(crate) rate: ExprId,
+    pub(crate) acceleration: ExprId,
+}
+
+/// Everything that loops and drives contribute.
+#[derive(Clone, Debug)]
+pub(crate) struct Projection {
+    pub(crate) active: Vec<usize>,
+    pub(crate) passive: Vec<usize>,
+    pub(crate) closures: Vec<Closure>,
+    /// Rate and acceleration of each passive coordinate, in the order of `passive`.
+    pub(crate) passive_rates: Vec<ExprId>,
+    pub(crate) passive_accelerations: Vec<ExprId>,
+    /// Residuals of the loops that are independent, and their derivatives by the passive coordinates.
+    pub(crate) residual: Vec<ExprId>,
+    pub(crate) residual_jacobian: Vec<Vec<ExprId>>,
+    /// Per drive.
+    pub(crate) drives: Vec<DriveMotion>,
+    /// `drive_jacobian[d][a]`: derivative of the drive's length by the active coordinate.
+    pub(crate) drive_jacobian: Vec<Vec<ExprId>>,
+    /// What must not vanish.
+    pub(crate) determinants: Vec<ExprId>,
+    /// `rates_of[i]`: rate of coordinate `i` as an integer combination of the `y`.
+    rates_of: Vec<Vec<i64>>,
+    /// `d y_p / d z_a`
+    transmission: Vec<Vec<ExprId>>,
+}
+
+impl Projection {
+    pub(crate) fn new(graph: &mut Graph, mechanism: &Mechanism, tree: &Tree) -> Result<Self, DeriveError> {
+        let n = mechanism.coordinates.len();
+        let (passive, active): (Vec<usize>, Vec<usize>) = (0..n).partition(|i| mechanism.coordinates[*i].passive);
+        let closures = closure::closures(graph, mechanism, tree)?;
+        let residual: Vec<ExprId> = closures.iter().flat_map(|c| c.residual.iter().copied()).collect();
+        let residual = independent(graph, &residual)?;
+        if residual.len() != passive.len() {
+            return Err(DeriveError::LoopCount { equations: residual.len(), passive: passive.len() });
+        }
+        let rates_of = rate_map(tree, &passive, n);
+        let by_coordinate: Vec<Vec<ExprId>> =
+            (0..n).map(|i| graph.differentiate(&residual, Atom::Coordinate(i))).collect();
+        let in_y = |graph: &mut Graph, by_coordinate: &[Vec<ExprId>], row: usize, j: usize| {
+            let terms: Vec<_> = (0..n)
+                .filter(|i| rates_of[*i][j] != 0)
+                .map(|i| (by_coordinate[i][row], Rational::integer(rates_of[i][j])))
+                .collect();
+            graph.sum(&terms)
+        };
+        let pick = |graph: &mut Graph, columns: &[usize]| -> Vec<Vec<ExprId>> {
+            (0..residual.len()).map(|r| columns.iter().map(|j| in_y(graph, &by_coordinate, r, *j)).collect()).collect()
+        };
+        let (loop_p, loop_a) = (pick(graph, &passive), pick(graph, &active));
+        // Right-hand sides: the active columns, then what the accelerations see besides.
+        let drift = Self::drift(graph, &residual);
+        let rhs: Vec<Vec<ExprId>> = loop_a
+            .iter()
+            .zip(&drift)
+            .map(|(row, drift)| {
+                let mut row: Vec<ExprId> = row.iter().map(|x| graph.neg(*x)).collect();
+                row.push(graph.neg(*drift));
+                row
+            })
+            .collect();
+        let solution = linear::solve(graph, &loop_p, &rhs, "the loops for the passive rates")?;
+        let transmission: Vec<Vec<ExprId>> = solution.values.iter().map(|row| row[..active.len()].to_vec()).collect();
+        let residual_jacobian = (0..residual.len())
+            .map(|r| passive.iter().map(|p| by_coordinate[*p][r]).collect())
+            .collect();
+        let mut projection = Self {
+            active,
+            passive,
+            closures,
+            passive_rates: Vec::new(),
+            passive_accelerations: Vec::new(),
+            residual,
+            residual_jacobian,
+            drives: Vec::new(),
+            drive_jacobian: Vec::new(),
+            determinants: solution.determinants.clone(),
+            rates_of,
+            transmission,
+        };
+        projection.passive_rates = projection.passive_motion(graph, Atom::Rate, None);
+        let drift: Vec<ExprId> = solution.values.iter().map(|row| row.last().copied().unwrap_or(Graph::ZERO)).collect();
+        projection.passive_accelerations = projection.passive_motion(graph, Atom::Acceleration, Some(&drift));
+        projection.add_drives(graph, mechanism, tree)?;
+        Ok(projection)
+    }
+
+    /// Second time derivative of the residuals without the accelerations.
+    fn drift(graph: &mut Graph, residual: &[ExprId]) -> Vec<ExprId> {
+        let velocity = graph.time_derivative(residual);
+        let only_rates = |graph: &mut Graph, atom: Atom| match atom {
+            Atom::Coordinate(i) => graph.atom(Atom::Rate(i)),
+            _ => Graph::ZERO,
+        };
+        graph.directional(&velocity, only_rates)
+    }
+
+    /// Rates or accelerations of the passive coordinates from the active ones.
+    fn passive_motion(&self, graph: &mut Graph, order: fn(usize) -> Atom, drift: Option<&[ExprId]>) -> Vec<ExprId> {
+        let n = self.rates_of.len();
+        let mut y = vec![Graph::ZERO; n];
+        for a in &self.active {
+            y[*a] = graph.atom(order(*a));
+        }
+        for (k, p) in self.passive.iter().enumerate() {
+            let mut terms: Vec<ExprId> =
+                self.active.iter().enumerate().map(|(j, a)| graph.mul(self.transmission[k][j], y[*a])).collect();
+            terms.extend(drift.map(|d| d[k]));
+            y[*p] = graph.add_all(&terms);
+        }
+        self.passive
+            .iter()
+            .map(|p| {
+                let terms: Vec<_> =
+                    (0..n).map(|j| (y[j], Rational::integer(self.rates_of[*p][j]))).collect();
+                graph.sum(&terms)
+            })
+            .collect()
+    }
+
+    /// Generalised forces of all coordinates, turned into those of the `y` and projected on the active ones.
+    fn project(&self, graph: &mut Graph, forces: &[ExprId]) -> Vec<ExprId> {
+        let n = self.rates_of.len();
+        let in_y: Vec<ExprId> = (0..n)
+            .map(|j| {
+                let terms: Vec<_> = (0..n)
+                    .filter(|i| self.rates_of[*i][j] != 0)
+                    .map(|i| (forces[i], Rational::integer(self.rates_of[i][j])))
+                    .collect();
+                graph.sum(&terms)
+            })
+            .collect();
+        self.active
+            .iter()
+            .enumerate()
+            .map(|(j, a)| {
+                let mut terms = vec![in_y[*a]];
+                for (k, p) in self.passive.iter().enumerate() {
+                    terms.push(graph.mul(self.transmission[k][j], in_y[*p]));
+                }
+                graph.add_all(&terms)
+            })
+            .collect()
+    }
+
+    /// Forces of the drives that balance generalised forces of all coordinates (open tree).
+    pub(crate) fn drive_forces(&self, graph: &mut Graph, forces: &[ExprId]) -> Result<Vec<ExprId>, DeriveError> {
+        let projected = self.project(graph, forces);
+        let n = projected.len();
+        let transposed: Vec<Vec<ExprId>> = (0..n).map(|a| (0..n).map(|d| self.drive_jacobian[d][a]).collect()).collect();
+        let rhs: Vec<Vec<ExprId>> = projected.into_iter().map(|x| vec![x]).collect();
+        let solution = linear::solve(graph, &transposed, &rhs, "the drives' Jacobian for the drives' forces")?;
+        Ok(solution.values.into_iter().map(|row| row[0]).collect())
+    }
+
+    fn add_drives(&mut self, graph: &mut Graph, mechanism: &Mechanism, tree: &Tree) -> Result<(), DeriveError> {
+        let n = mechanism.coordinates.len();
+        for drive in &mechanism.drives {
+            let coordinate = match drive.kind {
+                DriveKind::Joint(i) => graph.atom(Atom::Coordinate(i.0)),
+                DriveKind::Linear { from, to } => {
+                    let from = closure::position_in_base(graph, mechanism, tree, from.0)?;
+                    let to = closure::position_in_base(graph, mechanism, tree, to.0)?;
+                    let along = graph.sub_vectors(&to, &from);
+                    let square = graph.dot(&along, &along);
+                    graph.unary(Unary::Sqrt, square)
+                }
+            };
+            let by_coordinate: Vec<ExprId> =
+                (0..n).map(|i| graph.differentiate(&[coordinate], Atom::Coordinate(i))[0]).collect();
+            let row = self.project(graph, &by_coordinate);
+            let mut rate_terms = Vec::new();
+            for (a, slope) in self.active.iter().zip(&row) {
+                let rate = graph.atom(Atom::Rate(*a));
+                rate_terms.push(graph.mul(*slope, rate));
+            }
+            let rate = graph.add_all(&rate_terms);
+            let tree_rate = graph.time_derivative(&[coordinate]);
+            let acceleration = graph.time_derivative(&tree_rate)[0];
+            self.drives.push(DriveMotion { coordinate, rate, acceleration });
+            self.drive_jacobian.push(row);
+        }
+        let n = self.active.len();
+        if self.drives.len() != n {
+            return Err(DeriveError::DriveCount { drives: self.drives.len(), freedoms: n });
+        }
+        let identity: Vec<Vec<ExprId>> =
+            (0..n).map(|i| (0..n).map(|j| if i == j { Graph::ONE } else { Graph::ZERO }).collect()).collect();
+        let solution = linear::solve(graph, &self.drive_jacobian, &identity, "the drives' Jacobian")?;
+        self.determinants.extend(solution.determinants);
+        Ok(())
+    }
+}
+
+/// How every coordinate's rate follows from the rates `y`: for a passive revolute joint `y` is the absolute rate of its
+/// link about the axes that are parallel to its own.
+fn rate_map(tree: &Tree, passive: &[usize], n: usize) -> Vec<Vec<i64>> {
+    let mut absolute: Vec<AngleSum> = Vec::new();
+    for link in &tree.links {
+        let parallel = link.pre.iter().all(|turn| turn.axis == modelmill_spec::Axis::Z);
+        let below = link.parent.filter(|_| parallel).map_or(AngleSum::NONE, |p| absolute[p].clone());
+        absolute.push(below.plus(&link.joint.sum, 1));
+    }
+    let mut rates_of: Vec<Vec<i64>> =
+        (0..n).map(|i| (0..n).map(|j| i64::from(i == j)).collect()).collect();
+    let mut done = Vec::new();
+    for (link, sum) in tree.links.iter().zip(&absolute) {
+        let [(p, sign @ (1 | -1))] = link.turns[..] else { continue };
+        if !passive.contains(&p) || done.contains(&p) {
+            continue;
+        }
+        // q_p = sign (y_p - rest), where the rest consists of coordinates further up.
+        let mut row = vec![0; n];
+        row[p] = i64::from(sign);
+        for (atom, factor) in sum.terms() {
+            if let Atom::Coordinate(i) = atom
+                && *i != p
+            {
+                for j in 0..n {
+                    row[j] -= i64::from(sign) * i64::from(*factor) * rates_of[*i][j];
+                }
+            }
+        }
+        rates_of[p] = row;
+        done.push(p);
+    }
+    rates_of
+}
+
+/// The residuals without those that are constant combinations of others (a planar loop seen in a tilted frame).
+fn independent(graph: &Graph, residual: &[ExprId]) -> Result<Vec<ExprId>, DeriveError> {
+    let columns = crate::reduce::independent_functions(graph, residual)?;
+    Ok(columns.into_iter().map(|i| residual[i]).collect())
+}

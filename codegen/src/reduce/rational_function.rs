@@ -1,0 +1,177 @@
+//! Rational functions of the model's constants: the factors a_k of eq. (6).
+
+use std::collections::BTreeMap;
+
+use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Rational};
+use crate::field::Element;
+
+/// What a factor may depend on: a constant, or the cosine or sine of a constant angle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Variable {
+    /// A constant of the model file.
+    Constant(usize),
+    /// Cosine of a constant angle.
+    Cos(usize),
+    /// Sine of a constant angle; its powers above the first are written with the cosine.
+    Sin(usize),
+    /// Square root of a small integer, from a sine or cosine of a multiple of pi/12.
+    Root(i64),
+}
+
+impl Variable {
+    /// Its value at a point of the field.
+    pub(crate) fn value(self, point: &FieldPoint) -> Option<Element> {
+        match self {
+            Self::Constant(i) => point.values.get(&Atom::Constant(i)).copied(),
+            Self::Cos(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.0),
+            Self::Sin(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.1),
+            Self::Root(n) => crate::expr::Domain::unary(point, crate::expr::Unary::Sqrt, &Element::from_i64(n)),
+        }
+    }
+
+    /// Its node in the graph.
+    pub fn expression(self, graph: &mut Graph) -> ExprId {
+        match self {
+            Self::Constant(i) => graph.atom(Atom::Constant(i)),
+            Self::Cos(i) => graph.cos_sin(&AngleSum::new([(Atom::Constant(i), 1)]), 0).0,
+            Self::Sin(i) => graph.cos_sin(&AngleSum::new([(Atom::Constant(i), 1)]), 0).1,
+            Self::Root(n) => {
+                let radicand = graph.integer(n);
+                graph.unary(crate::expr::Unary::Sqrt, radicand)
+            }
+        }
+    }
+}
+
+/// A product of powers of variables, sorted, without zero exponents.
+pub type Powers = Vec<(Variable, u32)>;
+
+/// A polynomial with rational coefficients, none of them zero.
+pub type Polynomial = BTreeMap<Powers, Rational>;
+
+/// A quotient of two polynomials in the constants, in lowest terms up to common factors of several terms.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RationalFunction {
+    /// Numerator; empty for 0.
+    pub numerator: Polynomial,
+    /// Denominator with coprime integer coefficients, the first of them positive.
+    pub denominator: Polynomial,
+}
+
+impl RationalFunction {
+    /// A number.
+    pub fn constant(value: Rational) -> Self {
+        let one = BTreeMap::from([(Powers::new(), Rational::ONE)]);
+        let numerator = if value.is_zero() { BTreeMap::new() } else { BTreeMap::from([(Powers::new(), value)]) };
+        Self { numerator, denominator: one }
+    }
+
+    /// Normalises a quotient; the denominator must not be zero.
+    pub(crate) fn new(mut numerator: Polynomial, mut denominator: Polynomial) -> Self {
+        assert!(!denominator.is_empty(), "a denominator is not zero");
+        if numerator.is_empty() {
+            return Self::constant(Rational::ZERO);
+        }
+        let common = denominator
+            .keys()
+            .chain(numerator.keys())
+            .map(|powers| powers.iter().copied().collect::<BTreeMap<_, _>>())
+            .reduce(|a, b| {
+                a.into_iter().filter_map(|(v, n)| b.get(&v).map(|m| (v, n.min(*m)))).collect()
+            })
+            .unwrap_or_default();
+        let strip = |p: Polynomial| -> Polynomial {
+            p.into_iter()
+                .map(|(powers, k)| {
+                    let rest = powers
+                        .into_iter()
+                        .map(|(v, n)| (v, n - common.get(&v).copied().unwrap_or(0)))
+                        .filter(|(_, n)| *n > 0)
+                        .collect();
+                    (rest, k)
+                })
+                .collect()
+        };
+        (numerator, denominator) = (strip(numerator), strip(denominator));
+        let mut content = denominator.values().fold(Rational::ZERO, |c, k| c.content_with(k));
+        if denominator.values().next_back().is_some_and(Rational::is_negative) {
+            content = -&content;
+        }
+        let inverse = content.recip();
+        for k in numerator.values_mut().chain(denominator.values_mut()) {
+            *k = &*k * &inverse;
+        }
+        Self { numerator, denominator }
+    }
+
+    /// Whether it is 0.
+    pub fn is_zero(&self) -> bool {
+        self.numerator.is_empty()
+    }
+
+    /// The number, if it is one.
+    pub fn as_constant(&self) -> Option<Rational> {
+        if self.is_zero() {
+            return Some(Rational::ZERO);
+        }
+        match (self.numerator.len(), self.numerator.get(&Powers::new()), self.denominator.get(&Powers::new())) {
+            (1, Some(n), Some(d)) if self.denominator.len() == 1 => Some(n * &d.recip()),
+            _ => None,
+        }
+    }
+
+    /// Its value at a point of the field; `None` where the denominator vanishes.
+    pub(crate) fn value(&self, point: &FieldPoint) -> Option<Element> {
+        let denominator = polynomial_value(&self.denominator, point)?.inverse()?;
+        Some(polynomial_value(&self.numerator, point)? * denominator)
+    }
+
+    /// Its value for constants in floating point, by index.
+    pub fn value_f64(&self, constants: &[f64]) -> f64 {
+        let evaluate = |p: &Polynomial| -> f64 {
+            p.iter()
+                .map(|(powers, k)| {
+                    powers.iter().fold(k.to_f64(), |product, (v, n)| {
+                        let value = match v {
+                            Variable::Constant(i) => constants[*i],
+                            Variable::Cos(i) => constants[*i].cos(),
+                            Variable::Sin(i) => constants[*i].sin(),
+                            Variable::Root(r) => (*r as f64).sqrt(),
+                        };
+                        product * value.powi(i32::try_from(*n).unwrap_or(i32::MAX))
+                    })
+                })
+                .sum()
+        };
+        evaluate(&self.numerator) / evaluate(&self.denominator)
+    }
+
+    /// As an expression of the graph.
+    pub fn expression(&self, graph: &mut Graph) -> ExprId {
+        let mut build = |p: &Polynomial| {
+            let terms: Vec<_> = p
+                .iter()
+                .map(|(powers, k)| {
+                    let factors: Vec<_> = powers
+                        .iter()
+                        .map(|(v, n)| (v.expression(graph), i32::try_from(*n).expect("a small exponent")))
+                        .collect();
+                    (graph.product(&factors), k.clone())
+                })
+                .collect();
+            graph.sum(&terms)
+        };
+        let (n, d) = (build(&self.numerator), build(&self.denominator));
+        graph.div(n, d)
+    }
+}
+
+pub(crate) fn monomial_value(powers: &Powers, point: &FieldPoint) -> Option<Element> {
+    powers.iter().try_fold(Element::ONE, |product, (v, n)| Some(product * v.value(point)?.power(u64::from(*n))))
+}
+
+fn polynomial_value(p: &Polynomial, point: &FieldPoint) -> Option<Element> {
+    p.iter().try_fold(Element::ZERO, |sum, (powers, k)| {
+        Some(sum + Element::from_rational(k)? * monomial_value(powers, point)?)
+    })
+}

@@ -1,0 +1,190 @@
+//! The tree of links: every frame of the model file as one or more links whose joint turns about or slides along
+//! their own z axis, as in the modified Denavit-Hartenberg convention (Khalil and Kleinfinger 1986).
+//!
+//! Loops are cut here; they come back in `closure`.
+
+use modelmill_spec::{Axis, FrameIdx, Mechanism, Step};
+
+use crate::DeriveError;
+use crate::exact;
+use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational};
+use crate::vector::{self, Turn, Vector, push_turn};
+
+/// A rigid frame that moves relative to its parent about or along its own z axis, or not at all.
+#[derive(Clone, Debug)]
+pub(crate) struct Link {
+    /// The link it hangs on; `None` for the base.
+    pub(crate) parent: Option<usize>,
+    /// The fixed rotation from the parent, before the joint.
+    pub(crate) pre: Vec<Turn>,
+    /// The joint's rotation about z, with any fixed offset.
+    pub(crate) joint: Turn,
+    /// Position of the origin in the parent's frame.
+    pub(crate) position: Vector,
+    /// Coordinates that turn it, with their integer factors.
+    pub(crate) turns: Vec<(usize, i32)>,
+    /// Coordinates that slide it along z, with their factors.
+    pub(crate) slides: Vec<(usize, Rational)>,
+}
+
+/// All links; parents come before their children.
+#[derive(Clone, Debug)]
+pub(crate) struct Tree {
+    pub(crate) links: Vec<Link>,
+    /// The link that carries each frame of the file; `None` for the base.
+    pub(crate) of_frame: Vec<Option<usize>>,
+}
+
+impl Tree {
+    pub(crate) fn new(graph: &mut Graph, mechanism: &Mechanism) -> Result<Self, DeriveError> {
+        let mut tree = Self { links: Vec::new(), of_frame: vec![None] };
+        for frame in &mechanism.frames[1..] {
+            let mut builder = Builder::new(tree.of_frame[frame.parent.0]);
+            for step in &frame.steps {
+                builder.step(graph, &mut tree.links, step)?;
+            }
+            let link = builder.finish(&mut tree.links);
+            tree.of_frame.push(Some(link));
+        }
+        Ok(tree)
+    }
+
+    pub(crate) fn link_of(&self, frame: FrameIdx) -> Option<usize> {
+        self.of_frame[frame.0]
+    }
+
+    /// The links from just below the base down to `link`.
+    pub(crate) fn path(&self, link: Option<usize>) -> Vec<usize> {
+        let mut path = Vec::new();
+        let mut next = link;
+        while let Some(i) = next {
+            path.push(i);
+            next = self.links[i].parent;
+        }
+        path.reverse();
+        path
+    }
+
+    /// Components in the parent's frame of a vector given in the link's frame.
+    pub(crate) fn to_parent(&self, graph: &mut Graph, link: usize, v: &Vector) -> Vector {
+        let link = &self.links[link];
+        let mut v = graph.turn_out(&link.joint, v);
+        for turn in link.pre.iter().rev() {
+            v = graph.turn_out(turn, &v);
+        }
+        v
+    }
+
+    /// Components in the link's frame of a vector given in the parent's frame.
+    pub(crate) fn to_link(&self, graph: &mut Graph, link: usize, v: &Vector) -> Vector {
+        let link = &self.links[link];
+        let mut v = *v;
+        for turn in &link.pre {
+            v = graph.turn_in(turn, &v);
+        }
+        graph.turn_in(&link.joint, &v)
+    }
+}
+
+/// Collects elementary steps into links: a link ends where a step would no longer commute with its joint.
+struct Builder {
+    parent: Option<usize>,
+    pre: Vec<Turn>,
+    position: Vector,
+    joint: Turn,
+    turns: Vec<(usize, i32)>,
+    slides: Vec<(usize, Rational)>,
+}
+
+const NO_TURN: Turn = Turn { axis: Axis::Z, sum: AngleSum::NONE, pi12: 0 };
+
+impl Builder {
+    fn new(parent: Option<usize>) -> Self {
+        Self { parent, pre: Vec::new(), position: vector::ZERO, joint: NO_TURN, turns: Vec::new(), slides: Vec::new() }
+    }
+
+    fn has_joint(&self) -> bool {
+        !self.turns.is_empty() || !self.slides.is_empty()
+    }
+
+    fn step(&mut self, graph: &mut Graph, links: &mut Vec<Link>, step: &Step) -> Result<(), DeriveError> {
+        match step {
+            Step::Rotate(axis, angle) => {
+                let (sum, pi12) = exact::angle_sum(angle);
+                let turns: Vec<(usize, i32)> = sum
+                    .terms()
+                    .iter()
+                    .filter_map(|(atom, n)| if let Atom::Coordinate(i) = atom { Some((*i, *n)) } else { None })
+                    .collect();
+                let turn = Turn { axis: *axis, sum, pi12 };
+                self.about_z(graph, links, *axis, !turns.is_empty(), |builder, _, axis| {
+                    if turns.is_empty() && !builder.has_joint() {
+                        push_turn(&mut builder.pre, &Turn { axis, ..turn.clone() });
+                    } else {
+                        builder.joint.sum = builder.joint.sum.plus(&turn.sum, 1);
+                        builder.joint.pi12 = (builder.joint.pi12 + turn.pi12).rem_euclid(24);
+                        builder.turns.extend(&turns);
+                    }
+                });
+            }
+            Step::Translate(axis, length) => {
+                let value = exact::length(graph, length)?;
+                let slides: Vec<(usize, Rational)> =
+                    length.coordinates.iter().map(|(c, k)| (c.0, Rational::from(k.clone()))).collect();
+                self.about_z(graph, links, *axis, !slides.is_empty(), |builder, graph, axis| {
+                    let mut along = vector::ZERO;
+                    along[axis as usize] = value;
+                    for turn in builder.pre.iter().rev() {
+                        along = graph.turn_out(turn, &along);
+                    }
+                    builder.position = graph.add_vectors(&[builder.position, along]);
+                    builder.slides.extend(slides.iter().cloned());
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Applies a step with its axis brought to z if it moves, on a new link if it cannot join the present one.
+    fn about_z(
+        &mut self,
+        graph: &mut Graph,
+        links: &mut Vec<Link>,
+        axis: Axis,
+        moves: bool,
+        apply: impl Fn(&mut Self, &mut Graph, Axis),
+    ) {
+        if self.has_joint() && axis != Axis::Z {
+            self.close(links);
+        }
+        if !moves || axis == Axis::Z {
+            apply(self, graph, axis);
+            return;
+        }
+        // A = Ry(pi/2) takes z to x, A = Rx(-pi/2) takes z to y; motion about x is A (motion about z) A^-1.
+        let (about, pi12) = if axis == Axis::X { (Axis::Y, 6) } else { (Axis::X, -6) };
+        let turn = |pi12| Turn { axis: about, sum: AngleSum::NONE, pi12 };
+        push_turn(&mut self.pre, &turn(pi12));
+        apply(self, graph, Axis::Z);
+        self.close(links);
+        push_turn(&mut self.pre, &turn(-pi12));
+    }
+
+    fn close(&mut self, links: &mut Vec<Link>) {
+        let fresh = Self::new(Some(links.len()));
+        let done = std::mem::replace(self, fresh);
+        links.push(Link {
+            parent: done.parent,
+            pre: done.pre,
+            joint: done.joint,
+            position: done.position,
+            turns: done.turns,
+            slides: done.slides,
+        });
+    }
+
+    fn finish(mut self, links: &mut Vec<Link>) -> usize {
+        self.close(links);
+        links.len() - 1
+    }
+}

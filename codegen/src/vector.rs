@@ -1,0 +1,101 @@
+//! Vectors of three expressions and elementary rotations.
+
+use modelmill_spec::Axis;
+
+use crate::expr::{AngleSum, ExprId, Graph, Rational};
+
+/// Three components.
+pub(crate) type Vector = [ExprId; 3];
+
+/// The zero vector.
+pub(crate) const ZERO: Vector = [Graph::ZERO; 3];
+
+/// A rotation by `sum + pi12 * pi/12` about an axis of the frame reached so far.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Turn {
+    pub(crate) axis: Axis,
+    pub(crate) sum: AngleSum,
+    pub(crate) pi12: i32,
+}
+
+impl Turn {
+    /// Whether it is the identity, seen from its form.
+    pub(crate) fn is_identity(&self) -> bool {
+        self.sum.is_empty() && self.pi12.rem_euclid(24) == 0
+    }
+}
+
+/// Appends a turn to a product of turns, merging neighbours about the same axis.
+pub(crate) fn push_turn(turns: &mut Vec<Turn>, turn: &Turn) {
+    if turn.is_identity() {
+        return;
+    }
+    match turns.last_mut() {
+        Some(last) if last.axis == turn.axis => {
+            last.sum = last.sum.plus(&turn.sum, 1);
+            last.pi12 = (last.pi12 + turn.pi12).rem_euclid(24);
+            if last.is_identity() {
+                turns.pop();
+            }
+        }
+        _ => turns.push(turn.clone()),
+    }
+}
+
+impl Graph {
+    pub(crate) fn add_vectors(&mut self, vectors: &[Vector]) -> Vector {
+        std::array::from_fn(|i| {
+            let terms: Vec<_> = vectors.iter().map(|v| v[i]).collect();
+            self.add_all(&terms)
+        })
+    }
+
+    pub(crate) fn sub_vectors(&mut self, a: &Vector, b: &Vector) -> Vector {
+        std::array::from_fn(|i| self.sub(a[i], b[i]))
+    }
+
+    pub(crate) fn scale_vector(&mut self, k: ExprId, v: &Vector) -> Vector {
+        std::array::from_fn(|i| self.mul(k, v[i]))
+    }
+
+    pub(crate) fn dot(&mut self, a: &Vector, b: &Vector) -> ExprId {
+        let terms = [0, 1, 2].map(|i| self.mul(a[i], b[i]));
+        self.add_all(&terms)
+    }
+
+    pub(crate) fn cross(&mut self, a: &Vector, b: &Vector) -> Vector {
+        std::array::from_fn(|i| {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            let (x, y) = (self.mul(a[j], b[k]), self.mul(a[k], b[j]));
+            self.sub(x, y)
+        })
+    }
+
+    /// Components, in the outer frame, of a vector given in the turned frame.
+    pub(crate) fn turn_out(&mut self, turn: &Turn, v: &Vector) -> Vector {
+        self.turn_by(turn, v, false)
+    }
+
+    /// Components, in the turned frame, of a vector given in the outer frame.
+    pub(crate) fn turn_in(&mut self, turn: &Turn, v: &Vector) -> Vector {
+        self.turn_by(turn, v, true)
+    }
+
+    fn turn_by(&mut self, turn: &Turn, v: &Vector, inverse: bool) -> Vector {
+        let (c, s) = self.cos_sin(&turn.sum, turn.pi12);
+        let s = if inverse { self.neg(s) } else { s };
+        let axis = turn.axis as usize;
+        let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+        let mut out = *v;
+        let products = [(c, v[i]), (s, v[j]), (s, v[i]), (c, v[j])].map(|(a, b)| self.mul(a, b));
+        out[i] = self.sub(products[0], products[1]);
+        out[j] = self.add(products[2], products[3]);
+        out
+    }
+
+    /// Linear combination with rational factors.
+    pub(crate) fn combine(&mut self, terms: impl IntoIterator<Item = (ExprId, Rational)>) -> ExprId {
+        let terms: Vec<_> = terms.into_iter().collect();
+        self.sum(&terms)
+    }
+}
