@@ -45,7 +45,13 @@ pub struct Preparation {
 
 impl Default for Preparation {
     fn default() -> Self {
-        Self { cutoff_hz: None, order: 4, trim: None, decimate: 1, source: Source::RecordedFirst }
+        Self {
+            cutoff_hz: None,
+            order: 4,
+            trim: None,
+            decimate: 1,
+            source: Source::RecordedFirst,
+        }
     }
 }
 
@@ -53,7 +59,13 @@ impl Preparation {
     /// The recipe of the EMPS reference: order 4 at 100 Hz, the first 49 samples dropped,
     /// decimation by 10.
     pub fn emps() -> Self {
-        Self { cutoff_hz: Some(100.0), trim: Some((49, 0)), decimate: 10, source: Source::Positions, ..Self::default() }
+        Self {
+            cutoff_hz: Some(100.0),
+            trim: Some((49, 0)),
+            decimate: 10,
+            source: Source::Positions,
+            ..Self::default()
+        }
     }
 }
 
@@ -100,7 +112,12 @@ pub struct Prepared {
 /// Filters positions at `cutoff_hz` (Butterworth of `order`, zero phase) and takes central
 /// differences twice on the true `time`, s.
 /// Fails when the cut-off does not suit the sampling rate or there are too few samples.
-pub fn prepare(time: &[f64], positions: &[f64], cutoff_hz: f64, order: usize) -> Result<Prepared, FilterError> {
+pub fn prepare(
+    time: &[f64],
+    positions: &[f64],
+    cutoff_hz: f64,
+    order: usize,
+) -> Result<Prepared, FilterError> {
     let q = LowPass::butterworth(order, cutoff_hz, mean_rate(time))?.zero_phase(positions)?;
     let qd = differentiate(time, &q);
     let qdd = differentiate(time, &qd);
@@ -128,7 +145,10 @@ pub fn choose_cutoff(positions: &[f64], rate_hz: f64, order: usize) -> Option<f6
     if positions.len() < 32 {
         return None;
     }
-    let difference: Vec<f64> = positions.windows(3).map(|w| (w[2] - 2.0 * w[1] + w[0]) * rate_hz * rate_hz).collect();
+    let difference: Vec<f64> = positions
+        .windows(3)
+        .map(|w| (w[2] - 2.0 * w[1] + w[0]) * rate_hz * rate_hz)
+        .collect();
     let power = hann_power(&difference);
     let n = power.len();
     let frequency = |k: usize| 0.5 * rate_hz * k as f64 / (n - 1) as f64;
@@ -144,7 +164,11 @@ pub fn choose_cutoff(positions: &[f64], rate_hz: f64, order: usize) -> Option<f6
     let signal: Vec<f64> = (0..n)
         .map(|k| {
             let noise = level * shape(k);
-            if power[k] > 4.0 * noise { power[k] - noise } else { 0.0 }
+            if power[k] > 4.0 * noise {
+                power[k] - noise
+            } else {
+                0.0
+            }
         })
         .collect();
     if signal.iter().all(|s| *s == 0.0) {
@@ -187,27 +211,52 @@ mod tests {
     fn the_chosen_cutoff_is_nearly_the_best_there_is() {
         let rate = 250.0;
         let time: Vec<f64> = (0..3645).map(|k| f64::from(k) / rate).collect();
-        let harmonics: Vec<(f64, f64, f64)> =
-            (1..=7).map(|h| (f64::from(h) * 2.0 * PI / 7.29, 0.2 / f64::from(h), 0.7 * f64::from(h * h))).collect();
+        let harmonics: Vec<(f64, f64, f64)> = (1..=7)
+            .map(|h| {
+                (
+                    f64::from(h) * 2.0 * PI / 7.29,
+                    0.2 / f64::from(h),
+                    0.7 * f64::from(h * h),
+                )
+            })
+            .collect();
         for sigma in [1e-3, 4e-6, 1e-8] {
             let mut noise = Noise::new(5);
-            let truth =
-                |t: f64| -> f64 { harmonics.iter().map(|(w, a, phase)| -a * w * w * (w * t + phase).sin()).sum() };
+            let truth = |t: f64| -> f64 {
+                harmonics
+                    .iter()
+                    .map(|(w, a, phase)| -a * w * w * (w * t + phase).sin())
+                    .sum()
+            };
             let positions: Vec<f64> = time
                 .iter()
                 .map(|t| {
-                    harmonics.iter().map(|(w, a, phase)| a * (w * t + phase).sin()).sum::<f64>()
+                    harmonics
+                        .iter()
+                        .map(|(w, a, phase)| a * (w * t + phase).sin())
+                        .sum::<f64>()
                         + sigma * noise.normal()
                 })
                 .collect();
             let error = |cutoff: f64| {
                 let qdd = prepare(&time, &positions, cutoff, 4).unwrap().qdd;
                 let inner = 400..3245;
-                (inner.clone().map(|i| (qdd[i] - truth(time[i])).powi(2)).sum::<f64>() / inner.len() as f64).sqrt()
+                (inner
+                    .clone()
+                    .map(|i| (qdd[i] - truth(time[i])).powi(2))
+                    .sum::<f64>()
+                    / inner.len() as f64)
+                    .sqrt()
             };
             let chosen = choose_cutoff(&positions, rate, 4).unwrap();
-            let best = (0..60).map(|i| error(0.6 * 1.09_f64.powi(i))).fold(f64::INFINITY, f64::min);
-            assert!(error(chosen) < 1.6 * best, "sigma {sigma}: {chosen} Hz gives {} not {best}", error(chosen));
+            let best = (0..60)
+                .map(|i| error(0.6 * 1.09_f64.powi(i)))
+                .fold(f64::INFINITY, f64::min);
+            assert!(
+                error(chosen) < 1.6 * best,
+                "sigma {sigma}: {chosen} Hz gives {} not {best}",
+                error(chosen)
+            );
         }
     }
 

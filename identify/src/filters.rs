@@ -58,7 +58,10 @@ impl fmt::Display for FilterError {
                 rate_hz / 2.0
             ),
             Self::OrderOutOfRange { order } => {
-                write!(f, "a filter of order {order} was asked for; choose an order from 1 to {MAX_ORDER} (4 is usual)")
+                write!(
+                    f,
+                    "a filter of order {order} was asked for; choose an order from 1 to {MAX_ORDER} (4 is usual)"
+                )
             }
             Self::FactorOutOfRange { factor } => write!(
                 f,
@@ -70,7 +73,10 @@ impl fmt::Display for FilterError {
                  use a longer recording or a lower filter order"
             ),
             Self::Shape { have, per_sample } => {
-                write!(f, "a table of {have} numbers does not divide into samples of {per_sample} numbers each")
+                write!(
+                    f,
+                    "a table of {have} numbers does not divide into samples of {per_sample} numbers each"
+                )
             }
         }
     }
@@ -124,23 +130,39 @@ impl LowPass {
     /// Chebyshev's filter of the first kind: `ripple_db` of ripple up to `cutoff_hz`, and steeper
     /// beyond it than Butterworth's.
     /// Fails as [`LowPass::butterworth`] does; `ripple_db` must be positive.
-    pub fn chebyshev1(order: usize, ripple_db: f64, cutoff_hz: f64, rate_hz: f64) -> Result<Self, FilterError> {
+    pub fn chebyshev1(
+        order: usize,
+        ripple_db: f64,
+        cutoff_hz: f64,
+        rate_hz: f64,
+    ) -> Result<Self, FilterError> {
         check_order(order)?;
         let warped = warp(cutoff_hz, rate_hz)?;
         let epsilon = (10.0_f64.powf(ripple_db / 10.0) - 1.0).sqrt();
         let mu = (1.0 / epsilon).asinh() / order as f64;
         let poles = (0..order.div_ceil(2)).map(|k| {
             let angle = PI * (2 * k + 1) as f64 / (2 * order) as f64;
-            (-mu.sinh() * angle.sin() * warped, mu.cosh() * angle.cos() * warped)
+            (
+                -mu.sinh() * angle.sin() * warped,
+                mu.cosh() * angle.cos() * warped,
+            )
         });
         // An even order starts at the bottom of the ripple.
-        let dc = if order.is_multiple_of(2) { 1.0 / epsilon.hypot(1.0) } else { 1.0 };
+        let dc = if order.is_multiple_of(2) {
+            1.0 / epsilon.hypot(1.0)
+        } else {
+            1.0
+        };
         Ok(Self::from_upper_poles(order, poles, dc))
     }
 
     /// Sections from the analogue poles `(re, im >= 0)`, one of each conjugate pair, by the
     /// bilinear transform `s = (z - 1)/(z + 1)`; all zeros lie at `z = -1`.
-    fn from_upper_poles(order: usize, poles: impl Iterator<Item = (f64, f64)>, dc_gain: f64) -> Self {
+    fn from_upper_poles(
+        order: usize,
+        poles: impl Iterator<Item = (f64, f64)>,
+        dc_gain: f64,
+    ) -> Self {
         let mut sections: Vec<Section> = poles
             .enumerate()
             .map(|(k, (re, im))| {
@@ -148,14 +170,20 @@ impl LowPass {
                 if is_real {
                     let pole = (1.0 + re) / (1.0 - re);
                     let gain = (1.0 - pole) / 2.0;
-                    Section { b: [gain, gain, 0.0], a: [-pole, 0.0] }
+                    Section {
+                        b: [gain, gain, 0.0],
+                        a: [-pole, 0.0],
+                    }
                 } else {
                     let denominator = (1.0 - re).powi(2) + im * im;
                     let a1 = -2.0 * (1.0 - re * re - im * im) / denominator;
                     let a2 = ((1.0 + re).powi(2) + im * im) / denominator;
                     // 1 + a1 + a2, without the cancellation that a low cut-off would bring.
                     let gain = (re * re + im * im) / denominator;
-                    Section { b: [gain, 2.0 * gain, gain], a: [a1, a2] }
+                    Section {
+                        b: [gain, 2.0 * gain, gain],
+                        a: [a1, a2],
+                    }
                 }
             })
             .collect();
@@ -176,7 +204,8 @@ impl LowPass {
     pub fn gain(&self, frequency_hz: f64, rate_hz: f64) -> f64 {
         let (sin1, cos1) = (2.0 * PI * frequency_hz / rate_hz).sin_cos();
         let (sin2, cos2) = (4.0 * PI * frequency_hz / rate_hz).sin_cos();
-        let magnitude = |c0: f64, c1: f64, c2: f64| (c0 + c1 * cos1 + c2 * cos2).hypot(c1 * sin1 + c2 * sin2);
+        let magnitude =
+            |c0: f64, c1: f64, c2: f64| (c0 + c1 * cos1 + c2 * cos2).hypot(c1 * sin1 + c2 * sin2);
         self.sections
             .iter()
             .map(|s| magnitude(s.b[0], s.b[1], s.b[2]) / magnitude(1.0, s.a[0], s.a[1]))
@@ -191,7 +220,10 @@ impl LowPass {
         let pad = self.padding();
         let n = signal.len();
         if n <= pad {
-            return Err(FilterError::TooShort { have: n, need: pad + 1 });
+            return Err(FilterError::TooShort {
+                have: n,
+                need: pad + 1,
+            });
         }
         let mut extended = Vec::with_capacity(n + 2 * pad);
         extended.extend((1..=pad).rev().map(|i| 2.0 * signal[0] - signal[i]));
@@ -223,13 +255,21 @@ impl LowPass {
 }
 
 fn check_order(order: usize) -> Result<(), FilterError> {
-    if (1..=MAX_ORDER).contains(&order) { Ok(()) } else { Err(FilterError::OrderOutOfRange { order }) }
+    if (1..=MAX_ORDER).contains(&order) {
+        Ok(())
+    } else {
+        Err(FilterError::OrderOutOfRange { order })
+    }
 }
 
 /// The analogue frequency that the bilinear transform maps onto the cut-off.
 fn warp(cutoff_hz: f64, rate_hz: f64) -> Result<f64, FilterError> {
     let inside = rate_hz.is_finite() && cutoff_hz > 0.0 && cutoff_hz < rate_hz / 2.0;
-    if inside { Ok((PI * cutoff_hz / rate_hz).tan()) } else { Err(FilterError::CutoffOutOfRange { cutoff_hz, rate_hz }) }
+    if inside {
+        Ok((PI * cutoff_hz / rate_hz).tan())
+    } else {
+        Err(FilterError::CutoffOutOfRange { cutoff_hz, rate_hz })
+    }
 }
 
 /// The low-pass that [`decimate`] uses: Chebyshev 1, order 8, 0.05 dB, up to 0.8 of the new
@@ -254,7 +294,11 @@ pub fn decimate(signal: &[f64], factor: usize) -> Result<Vec<f64>, FilterError> 
         0 => Err(FilterError::FactorOutOfRange { factor }),
         1 => Ok(signal.to_vec()),
         _ if factor >= signal.len() => Err(FilterError::FactorOutOfRange { factor }),
-        _ => Ok(anti_alias(factor)?.zero_phase(signal)?.into_iter().step_by(factor).collect()),
+        _ => Ok(anti_alias(factor)?
+            .zero_phase(signal)?
+            .into_iter()
+            .step_by(factor)
+            .collect()),
     }
 }
 
@@ -269,7 +313,10 @@ pub fn decimate_time(time: &[f64], factor: usize) -> Vec<f64> {
 /// Fails as [`decimate`] does, and when the length is no multiple of `width`.
 pub fn decimate_table(table: &[f64], width: usize, factor: usize) -> Result<Vec<f64>, FilterError> {
     if width == 0 || !table.len().is_multiple_of(width) {
-        return Err(FilterError::Shape { have: table.len(), per_sample: width });
+        return Err(FilterError::Shape {
+            have: table.len(),
+            per_sample: width,
+        });
     }
     if factor == 1 {
         return Ok(table.to_vec());

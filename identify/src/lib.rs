@@ -1,8 +1,46 @@
+//! Recordings held against a model: measured columns and a regressor go in; base parameters with
+//! honest uncertainty, error figures and the places where the error lives come out.
+//!
+//! The crate takes numbers and knows nothing of how a regressor is made. The pipeline:
+//!
+//! 1. [`Recording::read`] - CSV into named columns; every fault has its line and its remedy.
+//! 2. [`Recording::states_with`] - coordinates with derivatives ([`derivatives`], [`filters`]) and
+//!    forces, as a [`Run`]; the caller evaluates its regressor along it, rows interleaved per
+//!    sample (`row = sample * n_channels + channel`), and applies [`filters::decimate_table`] to
+//!    regressor and force where the run asks for it.
+//! 3. [`LeastSquares`] - eq. (12) from a stream of rows; [`deviations::autocorrelated`] - what
+//!    the result is worth.
+//! 4. [`figures`] and [`locate`] - how far the model is off, and where.
+//! 5. [`FitFile`] - the result on disk and back.
+//!
+//! Beside it, [`numeric_rank`]: eq. (9) on given values, and the numeric fallback reduction.
+
+pub mod base_fit;
 pub mod derivatives;
+pub mod deviations;
+pub mod figures;
 pub mod filters;
+pub mod least_squares;
+pub mod locate;
 mod notes;
+pub mod numeric_rank;
+mod recording;
+mod recording_error;
+mod run;
 mod spectrum;
 #[cfg(test)]
 mod test_noise;
+mod undetermined;
+
+pub use base_fit::{FitFile, FitFileError, FitParameter, ParameterInfo};
+pub use derivatives::Preparation;
+pub use deviations::Deviations;
+pub use figures::{ChannelFigures, Comparison, Figures, FiguresError};
 pub use filters::FilterError;
+pub use least_squares::{LeastSquares, LeastSquaresError, Solution};
+pub use locate::{LocateOptions, Region};
 pub use notes::{Note, Severity};
+pub use recording::{NotFinite, ReadOptions, Recording};
+pub use recording_error::{Fault, RecordingError};
+pub use run::{PreparedAs, Run};
+pub use undetermined::Direction;

@@ -25,25 +25,39 @@ pub struct Note {
 impl Note {
     /// A remark for the record.
     pub fn info(says: impl Into<String>) -> Self {
-        Self { severity: Severity::Info, says: says.into() }
+        Self {
+            severity: Severity::Info,
+            says: says.into(),
+        }
     }
 
     /// A remark that asks for attention.
     pub fn warning(says: impl Into<String>) -> Self {
-        Self { severity: Severity::Warning, says: says.into() }
+        Self {
+            severity: Severity::Warning,
+            says: says.into(),
+        }
     }
 }
 
 /// The candidate that is spelt most like `wanted`, if any comes close enough to be a likely slip.
-pub(crate) fn nearest<'a>(wanted: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub(crate) fn nearest<'a>(
+    wanted: &str,
+    candidates: impl IntoIterator<Item = &'a str>,
+) -> Option<&'a str> {
     let lower = wanted.to_lowercase();
     candidates
         .into_iter()
         .map(|candidate| {
             let other = candidate.to_lowercase();
             // A name with a unit behind it (`t_s` for `t`) is a likely meaning as well.
-            let extends = other.starts_with(&format!("{lower}_")) || (lower.len() > 2 && other.starts_with(&lower));
-            let distance = if extends { 1 } else { edit_distance(&lower, &other) };
+            let extends = other.starts_with(&format!("{lower}_"))
+                || (lower.len() > 2 && other.starts_with(&lower));
+            let distance = if extends {
+                1
+            } else {
+                edit_distance(&lower, &other)
+            };
             (distance, candidate)
         })
         .filter(|(distance, _)| *distance <= 1.max(wanted.chars().count() / 3))

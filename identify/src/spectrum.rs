@@ -20,7 +20,9 @@ pub(crate) fn hann_power(signal: &[f64]) -> Vec<f64> {
         re[i] = (value - mean) * (PI * (i as f64 + 0.5) / n as f64).sin().powi(2);
     }
     transform(&mut re, &mut im);
-    (0..=padded / 2).map(|k| re[k] * re[k] + im[k] * im[k]).collect()
+    (0..=padded / 2)
+        .map(|k| re[k] * re[k] + im[k] * im[k])
+        .collect()
 }
 
 /// Discrete Fourier transform in place; the length must be a power of two.
@@ -28,7 +30,11 @@ fn transform(re: &mut [f64], im: &mut [f64]) {
     let n = re.len();
     let bits = n.trailing_zeros();
     for i in 0..n {
-        let j = if bits == 0 { 0 } else { i.reverse_bits() >> (usize::BITS - bits) };
+        let j = if bits == 0 {
+            0
+        } else {
+            i.reverse_bits() >> (usize::BITS - bits)
+        };
         if j > i {
             re.swap(i, j);
             im.swap(i, j);
@@ -36,7 +42,9 @@ fn transform(re: &mut [f64], im: &mut [f64]) {
     }
     let mut half = 1;
     while half < n {
-        let twiddles: Vec<(f64, f64)> = (0..half).map(|k| (-PI * k as f64 / half as f64).sin_cos()).collect();
+        let twiddles: Vec<(f64, f64)> = (0..half)
+            .map(|k| (-PI * k as f64 / half as f64).sin_cos())
+            .collect();
         for start in (0..n).step_by(2 * half) {
             for (k, (sin, cos)) in twiddles.iter().enumerate() {
                 let (a, b) = (start + k, start + k + half);
@@ -69,9 +77,13 @@ mod tests {
 
     #[test]
     fn a_tone_peaks_at_its_frequency() {
-        let tone: Vec<f64> = (0..1024).map(|i| 3.0 + (2.0 * PI * 0.125 * f64::from(i)).sin()).collect();
+        let tone: Vec<f64> = (0..1024)
+            .map(|i| 3.0 + (2.0 * PI * 0.125 * f64::from(i)).sin())
+            .collect();
         let power = hann_power(&tone);
-        let peak = (0..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b])).unwrap();
+        let peak = (0..power.len())
+            .max_by(|a, b| power[*a].total_cmp(&power[*b]))
+            .unwrap();
         assert_eq!(peak, 128);
     }
 }

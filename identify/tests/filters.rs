@@ -10,7 +10,8 @@ fn signal() -> Vec<f64> {
     (0..120_u32)
         .map(|i| {
             let k = f64::from(i);
-            (0.11 * k).sin() + 0.3 * (1.7 * k + 0.4).cos() + 0.01 * k - if i % 7 == 3 { 0.2 } else { 0.0 }
+            (0.11 * k).sin() + 0.3 * (1.7 * k + 0.4).cos() + 0.01 * k
+                - if i % 7 == 3 { 0.2 } else { 0.0 }
         })
         .collect()
 }
@@ -35,14 +36,21 @@ fn zero_phase_butterworth_agrees_with_scipy() {
         (1, 5.0, 250.0, tables::BUTTER1_5_OF_250),
         (4, 0.8, 1000.0, tables::BUTTER4_SLOW),
     ] {
-        let filtered = LowPass::butterworth(order, cutoff, rate).unwrap().zero_phase(&signal()).unwrap();
+        let filtered = LowPass::butterworth(order, cutoff, rate)
+            .unwrap()
+            .zero_phase(&signal())
+            .unwrap();
         check(&picked(&filtered), &expected, 1e-9);
     }
 }
 
 #[test]
 fn decimation_agrees_with_scipy() {
-    check(&decimate(&signal(), 10).unwrap(), &tables::DECIMATED_10, 1e-9);
+    check(
+        &decimate(&signal(), 10).unwrap(),
+        &tables::DECIMATED_10,
+        1e-9,
+    );
     check(&decimate(&signal(), 3).unwrap(), &tables::DECIMATED_3, 1e-9);
 }
 
@@ -59,8 +67,14 @@ fn a_table_is_decimated_column_by_column() {
 
 #[test]
 fn differences_over_uneven_times_agree_with_numpy() {
-    let time: Vec<f64> = (0..120).map(|k| 0.004 * f64::from(k) + 0.0007 * f64::from(k).sin()).collect();
-    check(&picked(&differentiate(&time, &signal())), &tables::GRADIENT_UNEVEN, 1e-9);
+    let time: Vec<f64> = (0..120)
+        .map(|k| 0.004 * f64::from(k) + 0.0007 * f64::from(k).sin())
+        .collect();
+    check(
+        &picked(&differentiate(&time, &signal())),
+        &tables::GRADIENT_UNEVEN,
+        1e-9,
+    );
 }
 
 #[test]
@@ -68,9 +82,15 @@ fn a_design_has_the_gain_it_promises() {
     for order in 1..=8 {
         let filter = LowPass::butterworth(order, 30.0, 250.0).unwrap();
         assert!((filter.gain(0.0, 250.0) - 1.0).abs() < 1e-12);
-        assert!((filter.gain(30.0, 250.0) - 0.5_f64.sqrt()).abs() < 1e-12, "order {order}");
+        assert!(
+            (filter.gain(30.0, 250.0) - 0.5_f64.sqrt()).abs() < 1e-12,
+            "order {order}"
+        );
         let filter = LowPass::chebyshev1(order, 0.5, 30.0, 250.0).unwrap();
-        assert!((filter.gain(30.0, 250.0) - 10.0_f64.powf(-0.5 / 20.0)).abs() < 1e-12, "order {order}");
+        assert!(
+            (filter.gain(30.0, 250.0) - 10.0_f64.powf(-0.5 / 20.0)).abs() < 1e-12,
+            "order {order}"
+        );
     }
 }
 

@@ -1,0 +1,365 @@
+//! The result of an identification as a file: what `identify --json` prints, and what
+//! `--parameters FIT.json` reads back.
+
+use std::fmt;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::deviations::Deviations;
+use crate::figures::Figures;
+use crate::least_squares::Solution;
+use crate::notes::{Note, nearest};
+use crate::recording_error::list;
+
+/// A base parameter as the model describes it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterInfo {
+    /// Its name, such as `p1_min`.
+    pub name: String,
+    /// Its expression in the physical parameters.
+    pub expression: String,
+    /// Its unit.
+    pub unit: String,
+    /// Its value from the model file's nominal values, where all of them are given.
+    pub nominal: Option<f64>,
+}
+
+/// A base parameter with its identified value.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FitParameter {
+    /// Its name, such as `p1_min`.
+    pub name: String,
+    /// Its expression in the physical parameters.
+    pub expression: String,
+    /// The identified value; the nominal one (or 0) where the recording does not determine it.
+    pub value: f64,
+    /// Standard deviation allowing for autocorrelated residuals; `null` where the recording does
+    /// not determine the parameter.
+    pub std: Option<f64>,
+    /// Standard deviation for independent residuals, for comparison only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub classical_std: Option<f64>,
+    /// Unit of the values.
+    pub unit: String,
+    /// The value that the model file's nominal values give.
+    pub nominal: Option<f64>,
+}
+
+/// An identification: the JSON of `identify`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FitFile {
+    /// Name of the model.
+    pub model: String,
+    /// Samples that the fit was made from, each of all channels.
+    pub samples: usize,
+    /// Condition number of the regressor (2-norm); `null` when its rank is deficient.
+    pub condition_number: Option<f64>,
+    /// The same for columns of norm 1.
+    #[serde(default)]
+    pub scaled_condition_number: Option<f64>,
+    /// The base parameters, in the order of the regressor's columns.
+    pub parameters: Vec<FitParameter>,
+    /// What the recording does not determine, one sentence for each direction.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub undetermined: Vec<String>,
+    /// Error figures on the recordings of the fit.
+    pub fit: Figures,
+    /// Error figures on the recordings of the check, if any.
+    pub check: Option<Figures>,
+    /// Remarks on the data.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub data: Vec<Note>,
+}
+
+/// Why a fit file cannot be used.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitFileError {
+    /// The file as the user named it.
+    pub file: String,
+    /// What is wrong.
+    pub fault: FitFault,
+}
+
+/// The kinds of faults of a fit file.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum FitFault {
+    /// The file cannot be opened or read.
+    Unreadable {
+        /// The operating system's words.
+        reason: String,
+    },
+    /// The text is not the JSON of `identify`.
+    NotAFit {
+        /// Line of the fault.
+        line: usize,
+        /// Column of the fault.
+        column: usize,
+        /// What is wrong there.
+        reason: String,
+    },
+    /// A parameter of the model is not in the file.
+    MissingParameter {
+        /// The parameter.
+        name: String,
+        /// The closest name in the file.
+        nearest: Option<String>,
+        /// The names in the file.
+        present: Vec<String>,
+    },
+    /// The file holds parameters that the model does not have.
+    UnknownParameters {
+        /// Those parameters.
+        names: Vec<String>,
+    },
+    /// The file holds a parameter twice.
+    DuplicateParameter {
+        /// The parameter.
+        name: String,
+    },
+    /// A parameter has the same name but stands for another expression.
+    OtherExpression {
+        /// The parameter.
+        name: String,
+        /// The expression in the file.
+        file: String,
+        /// The expression of the model.
+        model: String,
+    },
+}
+
+impl fmt::Display for FitFileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let file = &self.file;
+        match &self.fault {
+            FitFault::Unreadable { reason } => {
+                write!(
+                    f,
+                    "{file}: the fit cannot be read: {reason}; make it with `modelmill identify ... --json > {file}`"
+                )
+            }
+            FitFault::NotAFit {
+                line,
+                column,
+                reason,
+            } => write!(
+                f,
+                "{file}, line {line}, column {column}: this is not the JSON that `modelmill identify --json` prints: \
+                 {reason}"
+            ),
+            FitFault::MissingParameter {
+                name,
+                nearest,
+                present,
+            } => {
+                write!(
+                    f,
+                    "{file}: the model's parameter `{name}` is not in the fit"
+                )?;
+                if let Some(nearest) = nearest {
+                    write!(f, " (the closest is `{nearest}`)")?;
+                }
+                write!(
+                    f,
+                    ", which holds {}; identify this model again",
+                    list(present)
+                )
+            }
+            FitFault::UnknownParameters { names } => write!(
+                f,
+                "{file}: the fit holds {}, which the model does not have; identify this model again",
+                list(names)
+            ),
+            FitFault::DuplicateParameter { name } => {
+                write!(f, "{file}: the fit holds `{name}` twice; remove one")
+            }
+            FitFault::OtherExpression {
+                name,
+                file: theirs,
+                model,
+            } => write!(
+                f,
+                "{file}: `{name}` is `{theirs}` in the fit but `{model}` in the model; \
+                 the fit belongs to another model or to an earlier state of it: identify again"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for FitFileError {}
+
+/// The parameters of a fit file from the model's description, the solution and its deviations,
+/// all in the order of the regressor's columns (asserted to be of one length).
+pub fn fit_parameters(
+    infos: &[ParameterInfo],
+    solution: &Solution,
+    deviations: &Deviations,
+) -> Vec<FitParameter> {
+    assert_eq!(
+        infos.len(),
+        solution.values.len(),
+        "one description per column"
+    );
+    assert_eq!(
+        infos.len(),
+        deviations.std.len(),
+        "one deviation per column"
+    );
+    let finite = |value: f64| value.is_finite().then_some(value);
+    infos
+        .iter()
+        .enumerate()
+        .map(|(i, info)| FitParameter {
+            name: info.name.clone(),
+            expression: info.expression.clone(),
+            value: solution.values[i],
+            std: finite(deviations.std[i]),
+            classical_std: finite(solution.classical_std[i]),
+            unit: info.unit.clone(),
+            nominal: info.nominal,
+        })
+        .collect()
+}
+
+impl FitFile {
+    /// Reads a fit; fails when the file cannot be read or is something else.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, FitFileError> {
+        let path = path.as_ref();
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|error| FitFileError {
+            file: file.clone(),
+            fault: FitFault::Unreadable {
+                reason: error.to_string(),
+            },
+        })?;
+        Self::parse(&text, &file)
+    }
+
+    /// Reads a fit from its text; `file` is what messages call it.
+    pub fn parse(text: &str, file: &str) -> Result<Self, FitFileError> {
+        serde_json::from_str(text).map_err(|error| {
+            let full = error.to_string();
+            let reason = full.split(" at line ").next().unwrap_or(&full).to_owned();
+            let fault = FitFault::NotAFit {
+                line: error.line(),
+                column: error.column(),
+                reason,
+            };
+            FitFileError {
+                file: file.to_owned(),
+                fault,
+            }
+        })
+    }
+
+    /// The values for a model's base parameters, `(name, expression)` in the model's order.
+    /// `file` is what messages call the fit.
+    /// Fails when the parameters of the file are not exactly these.
+    pub fn values_for(&self, model: &[(&str, &str)], file: &str) -> Result<Vec<f64>, FitFileError> {
+        let fail = |fault| FitFileError {
+            file: file.to_owned(),
+            fault,
+        };
+        for (i, parameter) in self.parameters.iter().enumerate() {
+            if self.parameters[..i]
+                .iter()
+                .any(|other| other.name == parameter.name)
+            {
+                return Err(fail(FitFault::DuplicateParameter {
+                    name: parameter.name.clone(),
+                }));
+            }
+        }
+        let mut values = Vec::with_capacity(model.len());
+        for (name, expression) in model {
+            let Some(parameter) = self
+                .parameters
+                .iter()
+                .find(|parameter| parameter.name == *name)
+            else {
+                let present: Vec<String> = self.parameters.iter().map(|p| p.name.clone()).collect();
+                return Err(fail(FitFault::MissingParameter {
+                    name: (*name).to_owned(),
+                    nearest: nearest(name, present.iter().map(String::as_str)).map(str::to_owned),
+                    present,
+                }));
+            };
+            if parameter.expression != *expression {
+                return Err(fail(FitFault::OtherExpression {
+                    name: parameter.name.clone(),
+                    file: parameter.expression.clone(),
+                    model: (*expression).to_owned(),
+                }));
+            }
+            values.push(parameter.value);
+        }
+        let known = |name: &str| model.iter().any(|(ours, _)| *ours == name);
+        let unknown: Vec<String> = self
+            .parameters
+            .iter()
+            .map(|p| p.name.clone())
+            .filter(|name| !known(name))
+            .collect();
+        if unknown.is_empty() {
+            Ok(values)
+        } else {
+            Err(fail(FitFault::UnknownParameters { names: unknown }))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = r#"{"model": "axis", "samples": 10, "condition_number": 2.0,
+        "parameters": [
+            {"name": "p1_min", "expression": "m", "value": 95.1, "std": 0.2, "unit": "kg", "nominal": 90.0},
+            {"name": "p2_min", "expression": "fv", "value": 203.5, "std": null, "unit": "N s/m", "nominal": null}],
+        "fit": {"nrms": 0.04, "rms": 1.0, "samples": 10,
+            "channels": {"axis": {"nrms": 0.04, "mean_relative": 0.1, "max_abs": 3.0, "rms": 1.0, "zero_measured": 0}}},
+        "check": null}"#;
+
+    #[test]
+    fn a_fit_survives_writing_and_reading() {
+        let fit = FitFile::parse(TEXT, "fit.json").unwrap();
+        let again =
+            FitFile::parse(&serde_json::to_string_pretty(&fit).unwrap(), "fit.json").unwrap();
+        assert_eq!(fit, again);
+        assert_eq!(
+            fit.values_for(&[("p2_min", "fv"), ("p1_min", "m")], "fit.json")
+                .unwrap(),
+            [203.5, 95.1]
+        );
+    }
+
+    #[test]
+    fn a_fit_of_another_model_is_refused_with_the_reason() {
+        let fit = FitFile::parse(TEXT, "fit.json").unwrap();
+        let says =
+            |model: &[(&str, &str)]| fit.values_for(model, "fit.json").unwrap_err().to_string();
+        assert_eq!(
+            says(&[("p1_min", "m"), ("p3_min", "fc"), ("p2_min", "fv")]),
+            "fit.json: the model's parameter `p3_min` is not in the fit (the closest is `p1_min`), \
+             which holds `p1_min`, `p2_min`; identify this model again"
+        );
+        assert!(says(&[("p1_min", "m")]).contains("holds `p2_min`, which the model does not have"));
+        assert!(
+            says(&[("p1_min", "m + d"), ("p2_min", "fv")])
+                .contains("`m` in the fit but `m + d` in the model")
+        );
+        let broken = FitFile::parse(&TEXT.replace("\"fit\"", "\"fits\""), "fit.json")
+            .unwrap_err()
+            .to_string();
+        assert!(
+            broken.contains("line") && broken.contains("missing field `fit`"),
+            "{broken}"
+        );
+        let absent = FitFile::read("no/such/fit.json").unwrap_err().to_string();
+        assert!(
+            absent.contains("no/such/fit.json") && absent.contains("modelmill identify"),
+            "{absent}"
+        );
+    }
+}

@@ -1,0 +1,629 @@
+//! Least squares, eq. (12) of the paper: `p_min = argmin |W p - y|`, from a stream of rows.
+//!
+//! Rows go in block by block and are reduced at once by Householder reflections to the upper
+//! triangle `[R | Q'y]` with the residual norm in its corner, so the memory needed does not
+//! depend on the number of samples and the normal equations, which would square the condition
+//! number, are never formed.
+//! Sources: G. H. Golub, "Numerical methods for solving linear least squares problems", Numer.
+//! Math. 7 (1965); J. Demmel et al., "Communication-optimal parallel and sequential QR and LU
+//! factorizations", SIAM J. Sci. Comput. 34 (2012) for the sequential tall-skinny form;
+//! A. van der Sluis (1969) for scaling columns to equal norm.
+
+use std::fmt;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::undetermined::{Direction, null_directions};
+
+/// Why a regression cannot be set up or solved.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum LeastSquaresError {
+    /// The regressor has no columns.
+    NoParameters,
+    /// Rows and measured values do not fit together.
+    Shape {
+        /// Numbers of the regressor given.
+        regressor: usize,
+        /// Measured values given.
+        measured: usize,
+        /// Columns of the regressor.
+        columns: usize,
+    },
+    /// A block does not hold whole samples of all channels.
+    Channels {
+        /// Rows of the block.
+        rows: usize,
+        /// Rows per sample.
+        channels: usize,
+    },
+    /// A number of the regressor or of the measured values is NaN or infinite.
+    NotFinite {
+        /// Row among all that were given, from 0.
+        row: usize,
+        /// Column of the regressor; `None` for the measured value.
+        column: Option<usize>,
+    },
+    /// No rows were given.
+    NoRows,
+    /// The list of nominal values has another length than the parameters.
+    NominalLength {
+        /// Values given.
+        have: usize,
+        /// Parameters.
+        expected: usize,
+    },
+    /// The singular value iteration did not converge; only extreme numbers can cause it.
+    NoConvergence,
+    /// The second pass over the rows did not show the rows of the first.
+    PassesDiffer {
+        /// Rows of the first pass.
+        first: usize,
+        /// Rows of this pass.
+        now: usize,
+    },
+}
+
+impl fmt::Display for LeastSquaresError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoParameters => f.write_str("there is no parameter to identify; the regressor has no columns"),
+            Self::Shape { regressor, measured, columns } => write!(
+                f,
+                "{regressor} numbers of the regressor do not make {measured} rows of {columns} columns"
+            ),
+            Self::Channels { rows, channels } => {
+                write!(f, "{rows} rows are not whole samples of {channels} channels; give whole samples in each block")
+            }
+            Self::NotFinite { row, column: Some(column) } => write!(
+                f,
+                "column {column} of the regressor is not finite in row {row}; \
+                 is the mechanism out of reach or singular there?"
+            ),
+            Self::NotFinite { row, column: None } => write!(f, "the measured value of row {row} is not finite"),
+            Self::NoRows => f.write_str("there are no samples to identify from"),
+            Self::NominalLength { have, expected } => {
+                write!(f, "{have} nominal values were given for {expected} parameters")
+            }
+            Self::NoConvergence => f.write_str(
+                "the singular values do not converge; the numbers of the regressor differ too much in size",
+            ),
+            Self::PassesDiffer { first, now } => write!(
+                f,
+                "the second pass showed {now} rows where the first showed {first}; show the same rows in all passes"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for LeastSquaresError {}
+
+/// Rows that are reduced together; a block of seven columns then fits the fastest cache.
+const BLOCK_ROWS: usize = 256;
+
+/// Singular values of the column-scaled regressor below this fraction of the largest one count
+/// as zero. Rounding leaves about 1e-15; what is larger is information, however weak, and the
+/// standard deviations say how weak.
+pub const RANK_TOLERANCE: f64 = 1e-11;
+
+/// A regression that takes its rows block by block.
+///
+/// ```
+/// use modelmill_identify::LeastSquares;
+/// let mut regression = LeastSquares::new(2);
+/// // Two columns, row by row: the constant and the time.
+/// regression.add_rows(&[1.0, 0.0, 1.0, 1.0, 1.0, 2.0], &[1.0, 3.0, 5.0])?;
+/// let solution = regression.solve()?;
+/// assert!((solution.values[1] - 2.0).abs() < 1e-12);
+/// # Ok::<(), modelmill_identify::LeastSquaresError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct LeastSquares {
+    n_parameters: usize,
+    rows: usize,
+    /// `(n + 1) x (n + 1)`, row-major upper triangle `[R, Q'y; 0, +-|residual|]`.
+    triangle: Vec<f64>,
+    /// `n + 1` columns of `BLOCK_ROWS`, filled up to `pending`.
+    block: Vec<f64>,
+    pending: usize,
+}
+
+impl LeastSquares {
+    /// A regression for `n_parameters` parameters, without rows yet.
+    pub fn new(n_parameters: usize) -> Self {
+        let width = n_parameters + 1;
+        Self {
+            n_parameters,
+            rows: 0,
+            triangle: vec![0.0; width * width],
+            block: vec![0.0; width * BLOCK_ROWS],
+            pending: 0,
+        }
+    }
+
+    /// Number of parameters.
+    pub fn n_parameters(&self) -> usize {
+        self.n_parameters
+    }
+
+    /// Rows taken so far.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Takes rows: `regressor[row * n_parameters + column]` and `measured[row]`.
+    /// To weigh a row, scale it and its measured value.
+    /// Fails when the lengths do not fit or a number is not finite; nothing is taken then.
+    pub fn add_rows(
+        &mut self,
+        regressor: &[f64],
+        measured: &[f64],
+    ) -> Result<(), LeastSquaresError> {
+        let n = self.n_parameters;
+        check_rows(regressor, measured, n, self.rows)?;
+        for (row, y) in regressor.chunks_exact(n).zip(measured) {
+            for (column, value) in row.iter().enumerate() {
+                self.block[column * BLOCK_ROWS + self.pending] = *value;
+            }
+            self.block[n * BLOCK_ROWS + self.pending] = *y;
+            self.pending += 1;
+            if self.pending == BLOCK_ROWS {
+                self.reduce_block();
+            }
+        }
+        self.rows += measured.len();
+        Ok(())
+    }
+
+    /// Folds in another regression for the same parameters, e.g. one that ran on another core.
+    /// Fails when the numbers of parameters differ.
+    pub fn merge(&mut self, mut other: Self) -> Result<(), LeastSquaresError> {
+        let n = self.n_parameters;
+        if other.n_parameters != n {
+            return Err(LeastSquaresError::NominalLength {
+                have: other.n_parameters,
+                expected: n,
+            });
+        }
+        other.reduce_block();
+        let rows = self.rows + other.rows;
+        for row in other.triangle.chunks_exact(n + 1) {
+            self.add_rows(&row[..n], &row[n..])?;
+        }
+        self.rows = rows;
+        Ok(())
+    }
+
+    /// Householder reflections that fold the pending rows into the triangle.
+    fn reduce_block(&mut self) {
+        let width = self.n_parameters + 1;
+        let m = self.pending;
+        for k in 0..width {
+            let (head, tail) = self.block.split_at_mut((k + 1) * BLOCK_ROWS);
+            let pivot = &head[k * BLOCK_ROWS..k * BLOCK_ROWS + m];
+            let below = dot(pivot, pivot);
+            if below == 0.0 {
+                continue;
+            }
+            let alpha = self.triangle[k * width + k];
+            let beta = -(alpha * alpha + below).sqrt().copysign(alpha);
+            // The reflection is 1 - tau v v' with v = (1, pivot / v0).
+            let v0 = alpha - beta;
+            let tau = -v0 / beta;
+            self.triangle[k * width + k] = beta;
+            for (j, column) in (k + 1..width).zip(tail.chunks_exact_mut(BLOCK_ROWS)) {
+                let column = &mut column[..m];
+                let sum = tau * (self.triangle[k * width + j] + dot(pivot, column) / v0);
+                self.triangle[k * width + j] -= sum;
+                subtract_scaled(column, sum / v0, pivot);
+            }
+        }
+        self.pending = 0;
+    }
+
+    /// The triangle `R` of the regressor, `n x n`: same singular values, same column norms and
+    /// same dependencies as the stacked regressor.
+    pub fn triangle(&self) -> DMatrix<f64> {
+        let mut complete = self.clone();
+        complete.reduce_block();
+        let n = self.n_parameters;
+        DMatrix::from_fn(n, n, |i, j| complete.triangle[i * (n + 1) + j])
+    }
+
+    /// The least-squares solution. Where the rows do not determine all parameters, the
+    /// undetermined directions keep the value 0 (in columns of equal norm: the shortest
+    /// solution), and [`Solution::undetermined`] names them.
+    /// Fails when there are no rows or no parameters.
+    pub fn solve(&self) -> Result<Solution, LeastSquaresError> {
+        self.solve_near(&vec![0.0; self.n_parameters])
+    }
+
+    /// [`LeastSquares::solve`], but undetermined directions stay at `nominal`. Determined
+    /// parameters do not depend on `nominal`.
+    pub fn solve_near(&self, nominal: &[f64]) -> Result<Solution, LeastSquaresError> {
+        let n = self.n_parameters;
+        if n == 0 {
+            return Err(LeastSquaresError::NoParameters);
+        }
+        if nominal.len() != n {
+            return Err(LeastSquaresError::NominalLength {
+                have: nominal.len(),
+                expected: n,
+            });
+        }
+        if self.rows == 0 {
+            return Err(LeastSquaresError::NoRows);
+        }
+        let mut complete = self.clone();
+        complete.reduce_block();
+        solve_triangle(&complete, nominal)
+    }
+}
+
+/// Checks one block of rows; `before` rows came earlier.
+pub(crate) fn check_rows(
+    regressor: &[f64],
+    measured: &[f64],
+    columns: usize,
+    before: usize,
+) -> Result<(), LeastSquaresError> {
+    if columns == 0 {
+        return Err(LeastSquaresError::NoParameters);
+    }
+    if regressor.len() != measured.len() * columns {
+        return Err(LeastSquaresError::Shape {
+            regressor: regressor.len(),
+            measured: measured.len(),
+            columns,
+        });
+    }
+    // A sum is not finite when a summand is not; the place is looked for only then.
+    let all_finite = |values: &[f64]| (0.0 * values.iter().sum::<f64>()).is_finite();
+    if !all_finite(regressor)
+        && let Some(i) = regressor.iter().position(|value| !value.is_finite())
+    {
+        return Err(LeastSquaresError::NotFinite {
+            row: before + i / columns,
+            column: Some(i % columns),
+        });
+    }
+    if !all_finite(measured)
+        && let Some(i) = measured.iter().position(|value| !value.is_finite())
+    {
+        return Err(LeastSquaresError::NotFinite {
+            row: before + i,
+            column: None,
+        });
+    }
+    Ok(())
+}
+
+/// What a regression found. Lists are in the order of the regressor's columns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    /// Parameters, in the units of measured value per unit of the column.
+    pub values: Vec<f64>,
+    /// Standard deviations under the classical assumption of independent residuals of equal
+    /// variance, which recordings hardly ever meet; infinite for what is not determined, NaN when
+    /// there are no more rows than parameters. See [`crate::deviations`] for honest ones.
+    pub classical_std: Vec<f64>,
+    /// Ratio of the largest to the smallest singular value of the regressor (2-norm); infinite
+    /// when the rank is deficient.
+    pub condition_number: f64,
+    /// The same after scaling all columns to norm 1, hence free of units.
+    pub scaled_condition_number: f64,
+    /// `|W p - y|`, 2-norm.
+    pub residual_norm: f64,
+    /// `|y|`, 2-norm.
+    pub measured_norm: f64,
+    /// Rows of the regressor.
+    pub rows: usize,
+    /// Numeric rank of the column-scaled regressor.
+    pub rank: usize,
+    /// Which parameters the rows determine.
+    pub determined: Vec<bool>,
+    /// Directions along which parameters may change without any effect on the rows;
+    /// `n - rank` of them.
+    pub undetermined: Vec<Direction>,
+    /// Pseudo-inverse of `R`, so that `(W'W)^+ = r_inverse * r_inverse'`.
+    pub(crate) r_inverse: DMatrix<f64>,
+}
+
+impl Solution {
+    /// `(W'W)^+`, the classical covariance for residuals of variance 1.
+    pub fn unit_covariance(&self) -> DMatrix<f64> {
+        &self.r_inverse * self.r_inverse.transpose()
+    }
+
+    /// Variance of the residuals with the degrees of freedom taken off; NaN without any left.
+    pub fn residual_variance(&self) -> f64 {
+        match self.rows.saturating_sub(self.rank) {
+            0 => f64::NAN,
+            freedom => self.residual_norm.powi(2) / freedom as f64,
+        }
+    }
+
+    /// One sentence for each undetermined direction, with the parameters' names.
+    ///
+    /// ```
+    /// # use modelmill_identify::LeastSquares;
+    /// let mut regression = LeastSquares::new(2);
+    /// regression.add_rows(&[1.0, 2.0, 3.0, 6.0], &[1.0, 3.0])?;
+    /// let names = ["a".to_owned(), "b".to_owned()];
+    /// let says = regression.solve()?.says_undetermined(&names);
+    /// assert_eq!(says, ["only a combination of a and b is determined: a + 1 with b - 0.5 changes nothing"]);
+    /// # Ok::<(), modelmill_identify::LeastSquaresError>(())
+    /// ```
+    pub fn says_undetermined(&self, names: &[String]) -> Vec<String> {
+        self.undetermined
+            .iter()
+            .map(|direction| direction.says(names))
+            .collect()
+    }
+}
+
+fn solve_triangle(
+    regression: &LeastSquares,
+    nominal: &[f64],
+) -> Result<Solution, LeastSquaresError> {
+    let n = regression.n_parameters;
+    let width = n + 1;
+    let r = DMatrix::from_fn(n, n, |i, j| regression.triangle[i * width + j]);
+    let qty = DVector::from_fn(n, |i, _| regression.triangle[i * width + n]);
+    let corner = regression.triangle[n * width + n];
+    let norms: Vec<f64> = (0..n)
+        .map(|j| {
+            if r.column(j).norm() > 0.0 {
+                r.column(j).norm()
+            } else {
+                1.0
+            }
+        })
+        .collect();
+    let scaled = DMatrix::from_fn(n, n, |i, j| r[(i, j)] / norms[j]);
+    let svd = nalgebra::SVD::try_new(scaled, true, true, f64::EPSILON, 10_000)
+        .ok_or(LeastSquaresError::NoConvergence)?;
+    let (Some(u), Some(vt)) = (&svd.u, &svd.v_t) else {
+        return Err(LeastSquaresError::NoConvergence);
+    };
+    let s = &svd.singular_values;
+    let largest = s.max();
+    let kept: Vec<usize> = (0..n)
+        .filter(|&i| s[i] > RANK_TOLERANCE * largest)
+        .collect();
+    let rank = kept.len();
+    let r_inverse = if rank == n {
+        // Back substitution keeps the small parameters accurate.
+        r.clone()
+            .solve_upper_triangular(&DMatrix::identity(n, n))
+            .ok_or(LeastSquaresError::NoConvergence)?
+    } else {
+        DMatrix::from_fn(n, n, |i, j| {
+            kept.iter()
+                .map(|&k| vt[(k, i)] * u[(j, k)] / s[k])
+                .sum::<f64>()
+                / norms[i]
+        })
+    };
+    let dropped: Vec<usize> = (0..n).filter(|i| !kept.contains(i)).collect();
+    let null_space = DMatrix::from_fn(dropped.len(), n, |i, j| vt[(dropped[i], j)]);
+    let (determined, undetermined) = null_directions(&null_space, &norms);
+    let start = DVector::from_column_slice(nominal);
+    let misfit = &qty - &r * &start;
+    let values: DVector<f64> = if rank == n {
+        r.solve_upper_triangular(&qty)
+            .ok_or(LeastSquaresError::NoConvergence)?
+    } else {
+        start + &r_inverse * &misfit
+    };
+    let left_over = &qty - &r * &values;
+    let residual_norm = left_over.norm().hypot(corner);
+    let ratio = |values: &DVector<f64>| {
+        if rank == n {
+            values.max() / values.min()
+        } else {
+            f64::INFINITY
+        }
+    };
+    let plain = r
+        .clone()
+        .try_svd(false, false, f64::EPSILON, 10_000)
+        .ok_or(LeastSquaresError::NoConvergence)?;
+    let mut solution = Solution {
+        values: values.iter().copied().collect(),
+        classical_std: Vec::new(),
+        condition_number: ratio(&plain.singular_values),
+        scaled_condition_number: ratio(s),
+        residual_norm,
+        measured_norm: qty.norm().hypot(corner),
+        rows: regression.rows,
+        rank,
+        determined,
+        undetermined,
+        r_inverse,
+    };
+    let variance = solution.residual_variance();
+    solution.classical_std = (0..n)
+        .map(|i| match solution.determined[i] {
+            true => variance.sqrt() * solution.r_inverse.row(i).norm(),
+            false => f64::INFINITY,
+        })
+        .collect();
+    Ok(solution)
+}
+
+/// Dot product in eight independent sums, which the compiler turns into vector instructions.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a8
+        .remainder()
+        .iter()
+        .zip(b8.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
+    for (x, y) in a8.zip(b8) {
+        for lane in 0..8 {
+            sums[lane] += x[lane] * y[lane];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
+fn subtract_scaled(target: &mut [f64], factor: f64, source: &[f64]) {
+    for (t, s) in target.iter_mut().zip(source) {
+        *t -= factor * s;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_noise::Noise;
+
+    #[track_caller]
+    fn near(actual: f64, expected: f64, relative: f64) {
+        assert!(
+            (actual - expected).abs() <= relative * expected.abs().max(1e-300),
+            "{actual} instead of {expected}"
+        );
+    }
+
+    /// 1 to degree 6 in 1000 points, in one go and in odd pieces, against nalgebra's own QR.
+    #[test]
+    fn streaming_equals_a_dense_solution() {
+        let mut noise = Noise::new(1);
+        let (n, rows) = (7, 1003);
+        let w = DMatrix::from_fn(rows, n, |i, j| {
+            (i as f64 / 500.0 - 1.0).powi(i32::try_from(j).unwrap())
+        });
+        let y = DVector::from_fn(rows, |i, _| (i as f64 / 100.0).sin() + 0.1 * noise.normal());
+        let flat: Vec<f64> = w.transpose().iter().copied().collect();
+        let mut pieces = LeastSquares::new(n);
+        let mut done = 0;
+        for size in [1, 2, 300, 5, 255, 256, 184] {
+            pieces
+                .add_rows(
+                    &flat[done * n..(done + size) * n],
+                    &y.as_slice()[done..done + size],
+                )
+                .unwrap();
+            done += size;
+        }
+        assert_eq!(done, rows);
+        let dense = w.clone().svd(true, true).solve(&y, 0.0).unwrap();
+        let solution = pieces.solve().unwrap();
+        for j in 0..n {
+            near(solution.values[j], dense[j], 1e-11);
+        }
+        near(solution.residual_norm, (&w * &dense - &y).norm(), 1e-12);
+        near(solution.measured_norm, y.norm(), 1e-12);
+        let s = w.clone().svd(false, false).singular_values;
+        near(solution.condition_number, s.max() / s.min(), 1e-10);
+        let covariance = (w.transpose() * &w).try_inverse().unwrap();
+        let variance = (&w * &dense - &y).norm_squared() / (rows - n) as f64;
+        for j in 0..n {
+            near(
+                solution.classical_std[j],
+                (variance * covariance[(j, j)]).sqrt(),
+                1e-9,
+            );
+        }
+        let mut halves = LeastSquares::new(n);
+        let mut second = LeastSquares::new(n);
+        halves
+            .add_rows(&flat[..401 * n], &y.as_slice()[..401])
+            .unwrap();
+        second
+            .add_rows(&flat[401 * n..], &y.as_slice()[401..])
+            .unwrap();
+        halves.merge(second).unwrap();
+        assert_eq!(halves.rows(), rows);
+        near(halves.solve().unwrap().values[3], dense[3], 1e-11);
+    }
+
+    /// The normal equations lose everything at a condition number of 1e8; the QR must not.
+    #[test]
+    fn an_ill_conditioned_problem_keeps_its_digits() {
+        let mut regression = LeastSquares::new(2);
+        for i in 0..1000 {
+            let t = f64::from(i) / 1000.0;
+            let row = [1.0, 1.0 + 1e-8 * t];
+            regression
+                .add_rows(&row, &[3.0 * row[0] - 2.0 * row[1]])
+                .unwrap();
+        }
+        let solution = regression.solve().unwrap();
+        near(solution.values[0], 3.0, 1e-6);
+        near(solution.values[1], -2.0, 1e-6);
+        assert_eq!(solution.rank, 2);
+    }
+
+    #[test]
+    fn what_is_not_determined_is_named_and_stays_nominal() {
+        let mut regression = LeastSquares::new(4);
+        for i in 0..200 {
+            let t = f64::from(i);
+            let (a, b) = ((0.1 * t).sin(), (0.23 * t).cos());
+            // Columns: a, b, 2 a - or so they say - and nothing at all.
+            regression
+                .add_rows(&[a, b, 2.0 * a, 0.0], &[7.0 * a + 5.0 * b])
+                .unwrap();
+        }
+        let nominal = [1.0, 1.0, 1.0, 1.0];
+        let solution = regression.solve_near(&nominal).unwrap();
+        assert_eq!(solution.rank, 2);
+        assert_eq!(solution.determined, [false, true, false, false]);
+        near(solution.values[1], 5.0, 1e-12);
+        near(solution.values[0] + 2.0 * solution.values[2], 7.0, 1e-12);
+        near(solution.values[3], 1.0, 1e-12);
+        assert!(solution.classical_std[0].is_infinite() && solution.classical_std[1].is_finite());
+        assert!(solution.condition_number.is_infinite());
+        let names: Vec<String> = ["p1", "p2", "p3", "p4"].map(str::to_owned).into();
+        let mut says = solution.says_undetermined(&names);
+        says.sort();
+        assert_eq!(
+            says,
+            [
+                "only a combination of p1 and p3 is determined: p1 + 1 with p3 - 0.5 changes nothing",
+                "p4 has no effect on these samples"
+            ]
+        );
+    }
+
+    #[test]
+    fn faulty_input_is_an_error_and_takes_nothing() {
+        let mut regression = LeastSquares::new(2);
+        assert_eq!(regression.solve().unwrap_err(), LeastSquaresError::NoRows);
+        assert!(regression.add_rows(&[1.0, 2.0, 3.0], &[1.0]).is_err());
+        let error = regression
+            .add_rows(&[1.0, 2.0, 3.0, f64::NAN], &[1.0, 2.0])
+            .unwrap_err();
+        assert_eq!(
+            error,
+            LeastSquaresError::NotFinite {
+                row: 1,
+                column: Some(1)
+            }
+        );
+        let error = regression
+            .add_rows(&[1.0, 2.0], &[f64::INFINITY])
+            .unwrap_err();
+        assert_eq!(
+            error,
+            LeastSquaresError::NotFinite {
+                row: 0,
+                column: None
+            }
+        );
+        assert_eq!(regression.rows(), 0);
+        assert_eq!(
+            LeastSquares::new(0).solve().unwrap_err(),
+            LeastSquaresError::NoParameters
+        );
+        regression.add_rows(&[1.0, 2.0], &[1.0]).unwrap();
+        let single = regression.solve().unwrap();
+        assert_eq!(single.rank, 1);
+        assert!(single.residual_variance().is_nan() || single.residual_norm < 1e-12);
+    }
+}

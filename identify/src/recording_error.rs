@@ -1,0 +1,332 @@
+//! What can be wrong with a recording, each with the place, what was expected and what to do.
+
+use std::fmt;
+
+use crate::filters::FilterError;
+
+/// A fault of a recording. Its `Display` names the file, the line and the column where they are
+/// known, and ends with what to do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordingError {
+    /// The file as the user named it, or a word for a stream.
+    pub file: String,
+    /// What is wrong.
+    pub fault: Fault,
+}
+
+/// The kinds of faults of a recording. Lines count from 1 with the header.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Fault {
+    /// The file cannot be opened or read.
+    Unreadable {
+        /// The operating system's words.
+        reason: String,
+    },
+    /// The file has no bytes, or only white space.
+    Empty,
+    /// A header, but no sample.
+    NoSamples,
+    /// The file is not CSV text: another known format or other bytes.
+    NotCsv {
+        /// What it looks like.
+        looks_like: &'static str,
+    },
+    /// The first line holds numbers where column names are expected.
+    NoHeader,
+    /// The separator cannot be told from the first line.
+    UnclearSeparator {
+        /// The first line, shortened.
+        header: String,
+    },
+    /// A column has no name.
+    UnnamedColumn {
+        /// Its place, from 1.
+        place: usize,
+    },
+    /// Two columns have the same name.
+    DuplicateColumn {
+        /// The name.
+        name: String,
+        /// Places of the first two that have it, from 1.
+        places: [usize; 2],
+        /// Whether a renaming brought this about.
+        by_renaming: bool,
+    },
+    /// A renaming is given twice for the same name.
+    DuplicateRenaming {
+        /// The name in question.
+        name: String,
+    },
+    /// A line has another number of fields than the header.
+    RaggedLine {
+        /// The line.
+        line: u64,
+        /// Fields there.
+        have: usize,
+        /// Fields of the header.
+        expected: usize,
+    },
+    /// A column that is needed is not there.
+    MissingColumn {
+        /// The name that was looked for.
+        name: String,
+        /// The closest name that is there.
+        nearest: Option<String>,
+        /// All names that are there.
+        present: Vec<String>,
+        /// Whether the name comes from a renaming (`theirs`).
+        by_renaming: bool,
+    },
+    /// A needed column holds text that is no number.
+    NotANumber {
+        /// The column.
+        column: String,
+        /// The first such line.
+        line: u64,
+        /// The text there.
+        text: String,
+        /// How many fields of the column are concerned.
+        count: usize,
+    },
+    /// A needed column holds NaN, infinite or empty fields.
+    NotFinite {
+        /// The column.
+        column: String,
+        /// The first such line.
+        line: u64,
+        /// The text there.
+        text: String,
+        /// How many fields of the column are concerned.
+        count: usize,
+    },
+    /// The measured force of a drive is needed and not there.
+    MissingForce {
+        /// The drives without a column.
+        drives: Vec<String>,
+    },
+    /// Time does not increase.
+    TimeNotIncreasing {
+        /// The line.
+        line: u64,
+        /// Time before, s.
+        previous: f64,
+        /// Time there, s.
+        here: f64,
+    },
+    /// Too few samples for what is asked.
+    TooFewSamples {
+        /// Samples there are.
+        have: usize,
+        /// Samples there must be.
+        need: usize,
+        /// What they are needed for.
+        purpose: &'static str,
+    },
+    /// The filter that was asked for does not suit the recording.
+    Filter {
+        /// The coordinate that was being prepared.
+        column: String,
+        /// The filter's complaint.
+        error: FilterError,
+    },
+}
+
+impl fmt::Display for RecordingError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let file = &self.file;
+        match self.fault.line() {
+            Some(line) => write!(f, "{file}, line {line}: {}", self.fault),
+            None => write!(f, "{file}: {}", self.fault),
+        }
+    }
+}
+
+impl std::error::Error for RecordingError {}
+
+impl Fault {
+    /// The line concerned, where there is one.
+    pub fn line(&self) -> Option<u64> {
+        match self {
+            Self::RaggedLine { line, .. }
+            | Self::NotANumber { line, .. }
+            | Self::NotFinite { line, .. }
+            | Self::TimeNotIncreasing { line, .. } => Some(*line),
+            Self::NoHeader | Self::UnclearSeparator { .. } => Some(1),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unreadable { reason } => {
+                write!(
+                    f,
+                    "the recording cannot be read: {reason}; check the path and the permissions"
+                )
+            }
+            Self::Empty => f.write_str(
+                "the recording is empty; a header line and one line per sample are expected",
+            ),
+            Self::NoSamples => f.write_str(
+                "there is a header but no sample; one line of numbers per sample is expected",
+            ),
+            Self::NotCsv { looks_like } => write!(
+                f,
+                "this looks like {looks_like}, not like CSV text; export it as UTF-8 CSV with a header"
+            ),
+            Self::NoHeader => f.write_str(
+                "the first line holds numbers, but column names are expected there; \
+                 put a line such as `t,theta1,spindle_left` on top",
+            ),
+            Self::UnclearSeparator { header } => write!(
+                f,
+                "it cannot be told what separates the columns of `{header}`; \
+                 use a comma (or `;` or a tab) throughout and a point for decimals"
+            ),
+            Self::UnnamedColumn { place } => {
+                write!(
+                    f,
+                    "column {place} has no name; name it, or remove a separator at the end of the lines"
+                )
+            }
+            Self::DuplicateColumn {
+                name,
+                places: [a, b],
+                by_renaming,
+            } => {
+                write!(f, "columns {a} and {b} are both called `{name}`; ")?;
+                if *by_renaming {
+                    f.write_str("a renaming brings this about: leave it out, or rename the other column too")
+                } else {
+                    f.write_str("give every column a name of its own")
+                }
+            }
+            Self::DuplicateRenaming { name } => {
+                write!(
+                    f,
+                    "`{name}` is renamed twice; give each name and each column one renaming (`--map ours=theirs`)"
+                )
+            }
+            Self::RaggedLine { have, expected, .. } => write!(
+                f,
+                "{have} fields where the header has {expected}; complete or remove the line"
+            ),
+            Self::MissingColumn {
+                name,
+                nearest,
+                present,
+                by_renaming,
+            } => {
+                if *by_renaming {
+                    write!(
+                        f,
+                        "a renaming asks for the column `{name}`, which is not there"
+                    )?;
+                } else {
+                    write!(f, "there is no column `{name}`")?;
+                }
+                if let Some(nearest) = nearest {
+                    write!(f, "; is `{nearest}` meant?")?;
+                }
+                write!(f, " The columns are: {}.", list(present))?;
+                if *by_renaming {
+                    f.write_str(" Renamings read `--map ours=theirs`.")
+                } else {
+                    write!(
+                        f,
+                        " Map one onto it with `--map {name}={}`.",
+                        nearest.as_deref().unwrap_or("THEIRS")
+                    )
+                }
+            }
+            Self::NotANumber {
+                column,
+                text,
+                count,
+                ..
+            } => {
+                write!(
+                    f,
+                    "column `{column}` holds `{text}` where a number is expected"
+                )?;
+                others(f, *count, "fields of the column are no numbers")?;
+                if looks_like_decimal_comma(text) {
+                    f.write_str("; write decimals with a point")
+                } else {
+                    f.write_str("; correct or remove it")
+                }
+            }
+            Self::NotFinite {
+                column,
+                text,
+                count,
+                ..
+            } => {
+                if text.is_empty() {
+                    write!(f, "column `{column}` is empty where a number is expected")?;
+                } else {
+                    write!(
+                        f,
+                        "column `{column}` holds `{text}` where a finite number is expected"
+                    )?;
+                }
+                others(f, *count, "fields of the column are not finite or empty")?;
+                f.write_str("; repair the recording, or ask for such samples to be left out (they are counted)")
+            }
+            Self::MissingForce { drives } => write!(
+                f,
+                "the measured force of {} is needed, but there is no such column; \
+                 map one onto it with `--map {}=THEIRS`",
+                list(drives),
+                drives.first().map_or("DRIVE", String::as_str)
+            ),
+            Self::TimeNotIncreasing { previous, here, .. } => write!(
+                f,
+                "time goes from {previous} s to {here} s, but must increase from sample to sample; \
+                 remove repeated samples, or split the file where the clock was reset"
+            ),
+            Self::TooFewSamples {
+                have,
+                need,
+                purpose,
+            } => {
+                write!(
+                    f,
+                    "{have} samples are too few for {purpose}, which takes at least {need}; use a longer recording"
+                )
+            }
+            Self::Filter { column, error } => write!(f, "`{column}` cannot be filtered: {error}"),
+        }
+    }
+}
+
+/// Says how many other fields share the fault.
+fn others(f: &mut fmt::Formatter<'_>, count: usize, what: &str) -> fmt::Result {
+    if count > 1 {
+        write!(f, " ({count} {what})")
+    } else {
+        Ok(())
+    }
+}
+
+fn looks_like_decimal_comma(text: &str) -> bool {
+    text.matches(',').count() == 1 && text.replace(',', ".").parse::<f64>().is_ok()
+}
+
+/// Names in backquotes; a long list is cut short with its length said.
+pub(crate) fn list(names: &[String]) -> String {
+    const SHOWN: usize = 40;
+    let shown: Vec<String> = names
+        .iter()
+        .take(SHOWN)
+        .map(|name| format!("`{name}`"))
+        .collect();
+    if names.len() > SHOWN {
+        format!("{} and {} more", shown.join(", "), names.len() - SHOWN)
+    } else {
+        shown.join(", ")
+    }
+}

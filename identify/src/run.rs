@@ -1,0 +1,353 @@
+//! From a recording to states: times, coordinates with their derivatives, and drive forces.
+//!
+//! Derivatives that the file lacks are prepared by [`crate::derivatives`]; every choice that is
+//! made on the way is written into the notes.
+
+use serde::{Deserialize, Serialize};
+
+use crate::derivatives::{Preparation, Source, choose_cutoff, differentiate, mean_rate, prepare};
+use crate::filters::LowPass;
+use crate::notes::Note;
+use crate::recording::Recording;
+use crate::recording_error::{Fault, RecordingError, list};
+
+/// States along a run, ready for the regressor. All columns have the length of `time`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// What messages call the recording.
+    pub file: String,
+    /// Times, s.
+    pub time: Vec<f64>,
+    /// `q[coordinate][sample]`, rad or m.
+    pub q: Vec<Vec<f64>>,
+    /// `qd[coordinate][sample]`, rad/s or m/s.
+    pub qd: Vec<Vec<f64>>,
+    /// `qdd[coordinate][sample]`, rad/s^2 or m/s^2.
+    pub qdd: Vec<Vec<f64>>,
+    /// `force[drive][sample]`, N or N m, in the order of the drives that were asked for; `None`
+    /// when the file lacks the force of any drive. See [`Run::measured`].
+    pub force: Option<Vec<Vec<f64>>>,
+    /// Drives whose force the file lacks.
+    pub missing_force: Vec<String>,
+    /// What was done to the recording.
+    pub prepared: PreparedAs,
+    /// What the user should know, the recording's own notes included.
+    pub notes: Vec<Note>,
+}
+
+/// What was done on the way from the recording to the states.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct PreparedAs {
+    /// Cut-off of the low-pass, Hz, when anything was filtered.
+    pub cutoff_hz: Option<f64>,
+    /// Whether the cut-off was chosen from the signal rather than given.
+    pub cutoff_chosen: bool,
+    /// Coordinates whose rates or accelerations were prepared.
+    pub coordinates: Vec<String>,
+    /// Samples dropped at the start and at the end.
+    pub trimmed: (usize, usize),
+    /// The parallel decimation that the regression is to apply to the columns of the regressor
+    /// and to the forces ([`crate::filters::decimate_table`]); the columns here are not decimated.
+    pub decimate: usize,
+}
+
+impl Recording {
+    /// States of the given coordinates and forces of the given drives, with the default
+    /// [`Preparation`]: columns `t`, `NAME`, `NAME_d`, `NAME_dd` and the drive's name.
+    pub fn states(&self, coordinates: &[String], drives: &[String]) -> Result<Run, RecordingError> {
+        self.states_with(coordinates, drives, &Preparation::default())
+    }
+
+    /// [`Recording::states`] with another preparation.
+    ///
+    /// Fails when a column is missing or unusable, when time does not increase, or when the
+    /// recording is too short for the filter.
+    /// Forces may be missing: `evaluate` needs none.
+    pub fn states_with(
+        &self,
+        coordinates: &[String],
+        drives: &[String],
+        preparation: &Preparation,
+    ) -> Result<Run, RecordingError> {
+        let time = self.column("t")?;
+        let mut notes = self.notes().to_vec();
+        self.check_time(time, &mut notes)?;
+        let missing_force: Vec<String> = drives
+            .iter()
+            .filter(|drive| !self.has(drive))
+            .cloned()
+            .collect();
+        let force = if missing_force.is_empty() {
+            let columns: Result<Vec<Vec<f64>>, _> = drives
+                .iter()
+                .map(|drive| self.column(drive).map(<[f64]>::to_vec))
+                .collect();
+            Some(columns?)
+        } else {
+            notes.push(Note::info(format!(
+                "{} holds no measured force of {}.",
+                self.file(),
+                list(&missing_force)
+            )));
+            None
+        };
+        let columns: Result<Vec<Recorded<'_>>, _> = coordinates
+            .iter()
+            .map(|name| self.recorded(name, preparation.source))
+            .collect();
+        let columns = columns?;
+        let mut prepared = PreparedAs {
+            decimate: preparation.decimate,
+            ..PreparedAs::default()
+        };
+        let states = self.prepare_states(time, &columns, preparation, &mut prepared, &mut notes)?;
+        prepared.trimmed = preparation.trim.unwrap_or(prepared.trimmed);
+        let mut run = Run {
+            file: self.file().to_owned(),
+            time: time.to_vec(),
+            q: Vec::new(),
+            qd: Vec::new(),
+            qdd: Vec::new(),
+            force,
+            missing_force,
+            prepared,
+            notes,
+        };
+        for [q, qd, qdd] in states {
+            run.q.push(q);
+            run.qd.push(qd);
+            run.qdd.push(qdd);
+        }
+        self.trim(&mut run)?;
+        self.note_standstill(coordinates, &mut run);
+        Ok(run)
+    }
+
+    fn recorded(&self, name: &str, source: Source) -> Result<Recorded<'_>, RecordingError> {
+        let optional = |suffix: &str| {
+            let derivative = format!("{name}{suffix}");
+            let wanted = source == Source::RecordedFirst && self.has(&derivative);
+            wanted.then(|| self.column(&derivative)).transpose()
+        };
+        Ok(Recorded {
+            name: name.to_owned(),
+            q: self.column(name)?,
+            qd: optional("_d")?,
+            qdd: optional("_dd")?,
+        })
+    }
+
+    /// Time must increase; uneven steps and gaps are worth a note.
+    fn check_time(&self, time: &[f64], notes: &mut Vec<Note>) -> Result<(), RecordingError> {
+        if let Some(i) = time.windows(2).position(|w| w[1] <= w[0]) {
+            let line = self.line(i + 1).unwrap_or(0);
+            return Err(self.fault(Fault::TimeNotIncreasing {
+                line,
+                previous: time[i],
+                here: time[i + 1],
+            }));
+        }
+        let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
+        if steps.is_empty() {
+            return Ok(());
+        }
+        let middle = steps.len() / 2;
+        let median = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let shortest = steps.iter().copied().fold(f64::INFINITY, f64::min);
+        let longest = steps.iter().copied().fold(0.0, f64::max);
+        let gaps = steps.iter().filter(|step| **step > 1.5 * median).count();
+        if gaps > 0 {
+            let first = time
+                .windows(2)
+                .position(|w| w[1] - w[0] > 1.5 * median)
+                .unwrap_or(0);
+            notes.push(Note::warning(format!(
+                "{} has {gaps} gaps: steps up to {longest:.6} s where {median:.6} s is usual, the first after line {}. \
+                 Derivatives and filters bridge them as they are.",
+                self.file(),
+                self.line(first).unwrap_or(0)
+            )));
+        } else if longest - shortest > 0.01 * median {
+            notes.push(Note::warning(format!(
+                "The steps of {} are uneven, from {shortest:.6} s to {longest:.6} s; \
+                 differences use the true times, the low-pass takes the steps as even.",
+                self.file()
+            )));
+        }
+        Ok(())
+    }
+
+    fn prepare_states(
+        &self,
+        time: &[f64],
+        columns: &[Recorded<'_>],
+        preparation: &Preparation,
+        prepared: &mut PreparedAs,
+        notes: &mut Vec<Note>,
+    ) -> Result<Vec<[Vec<f64>; 3]>, RecordingError> {
+        let incomplete: Vec<&Recorded<'_>> = columns.iter().filter(|c| !c.is_complete()).collect();
+        if incomplete.is_empty() {
+            return Ok(columns.iter().filter_map(Recorded::complete).collect());
+        }
+        prepared.coordinates = incomplete.iter().map(|c| c.name.clone()).collect();
+        let order = preparation.order;
+        let rate = mean_rate(time);
+        let design = |cutoff: f64| {
+            LowPass::butterworth(order, cutoff, rate).map_err(|error| {
+                self.fault(Fault::Filter {
+                    column: prepared.coordinates.join(", "),
+                    error,
+                })
+            })
+        };
+        let need = design(rate / 4.0)?.padding() + 1;
+        if time.len() < need {
+            return Err(self.fault(Fault::TooFewSamples {
+                have: time.len(),
+                need,
+                purpose: "preparing derivatives from positions",
+            }));
+        }
+        // One cut-off for all coordinates keeps loops consistent: the highest that any one needs.
+        let chosen = || {
+            let cutoffs = incomplete
+                .iter()
+                .filter_map(|c| choose_cutoff(c.q, rate, order));
+            cutoffs.fold(None, |highest: Option<f64>, c| {
+                Some(highest.map_or(c, |h| h.max(c)))
+            })
+        };
+        let cutoff = preparation.cutoff_hz.or_else(chosen).unwrap_or(0.1 * rate);
+        design(cutoff)?;
+        prepared.cutoff_hz = Some(cutoff);
+        prepared.cutoff_chosen = preparation.cutoff_hz.is_none();
+        let period = ((rate / cutoff).ceil() as usize).max(1);
+        prepared.trimmed = (period, period);
+        notes.push(Note::info(format!(
+            "Derivatives of {} in {} are prepared: Butterworth of order {order} at {cutoff:.4} Hz{}, zero phase, \
+             then central differences.",
+            list(&prepared.coordinates),
+            self.file(),
+            if prepared.cutoff_chosen { " (chosen from the signal)" } else { "" },
+        )));
+        columns
+            .iter()
+            .map(|column| {
+                column.prepare(time, cutoff, order).map_err(|error| {
+                    self.fault(Fault::Filter {
+                        column: column.name.clone(),
+                        error,
+                    })
+                })
+            })
+            .collect()
+    }
+
+    fn trim(&self, run: &mut Run) -> Result<(), RecordingError> {
+        let (start, end) = run.prepared.trimmed;
+        let have = run.time.len();
+        if have < start.saturating_add(end).saturating_add(1) {
+            return Err(self.fault(Fault::TooFewSamples {
+                have,
+                need: start.saturating_add(end).saturating_add(1),
+                purpose: "dropping the filter's transients at both ends",
+            }));
+        }
+        if start + end == 0 {
+            return Ok(());
+        }
+        let cut = |column: &mut Vec<f64>| {
+            column.truncate(have - end);
+            column.drain(..start);
+        };
+        cut(&mut run.time);
+        let forces = run.force.iter_mut().flatten();
+        for column in run
+            .q
+            .iter_mut()
+            .chain(&mut run.qd)
+            .chain(&mut run.qdd)
+            .chain(forces)
+        {
+            cut(column);
+        }
+        run.notes.push(Note::info(format!(
+            "The first {start} and the last {end} of {have} samples of {} are dropped (transients of the filter).",
+            self.file()
+        )));
+        Ok(())
+    }
+
+    fn note_standstill(&self, coordinates: &[String], run: &mut Run) {
+        for (name, q) in coordinates.iter().zip(&run.q) {
+            if q.len() > 1 && q.iter().all(|value| *value == q[0]) {
+                run.notes.push(Note::warning(format!(
+                    "`{name}` does not move in {}: what depends on its motion cannot be identified.",
+                    self.file()
+                )));
+            }
+        }
+    }
+}
+
+impl Run {
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.time.len()
+    }
+
+    /// The measured forces, `force[drive][sample]`; fails when the file lacks any of them.
+    pub fn measured(&self) -> Result<&[Vec<f64>], RecordingError> {
+        self.force.as_deref().ok_or_else(|| RecordingError {
+            file: self.file.clone(),
+            fault: Fault::MissingForce {
+                drives: self.missing_force.clone(),
+            },
+        })
+    }
+
+    /// The measured forces interleaved per sample, `[sample * n_drives + drive]`, as the rows of
+    /// the regression are; fails when the file lacks any of them.
+    pub fn measured_interleaved(&self) -> Result<Vec<f64>, RecordingError> {
+        let force = self.measured()?;
+        Ok((0..self.samples())
+            .flat_map(|sample| force.iter().map(move |channel| channel[sample]))
+            .collect())
+    }
+}
+
+/// What the file holds of a coordinate.
+struct Recorded<'a> {
+    name: String,
+    q: &'a [f64],
+    qd: Option<&'a [f64]>,
+    qdd: Option<&'a [f64]>,
+}
+
+impl Recorded<'_> {
+    fn is_complete(&self) -> bool {
+        self.qd.is_some() && self.qdd.is_some()
+    }
+
+    fn complete(&self) -> Option<[Vec<f64>; 3]> {
+        Some([self.q.to_vec(), self.qd?.to_vec(), self.qdd?.to_vec()])
+    }
+
+    /// What is recorded is kept; what is missing is derived from the nearest that is there.
+    fn prepare(
+        &self,
+        time: &[f64],
+        cutoff: f64,
+        order: usize,
+    ) -> Result<[Vec<f64>; 3], crate::FilterError> {
+        if let Some(complete) = self.complete() {
+            return Ok(complete);
+        }
+        if let Some(qd) = self.qd {
+            let smooth = LowPass::butterworth(order, cutoff, mean_rate(time))?.zero_phase(qd)?;
+            return Ok([self.q.to_vec(), qd.to_vec(), differentiate(time, &smooth)]);
+        }
+        let all = prepare(time, self.q, cutoff, order)?;
+        Ok([all.q, all.qd, self.qdd.map_or(all.qdd, <[f64]>::to_vec)])
+    }
+}

@@ -1,0 +1,102 @@
+//! What a recording does not determine: a null space goes in, readable directions come out.
+
+use nalgebra::DMatrix;
+
+/// A change of the parameters that changes no row of the regressor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Direction {
+    /// `(parameter, change)`; the first has change 1, the others are ordered by parameter.
+    pub changes: Vec<(usize, f64)>,
+}
+
+impl Direction {
+    /// One sentence with the parameters' names; a parameter beyond the list is called `#index`.
+    pub fn says(&self, names: &[String]) -> String {
+        let name = |i: usize| names.get(i).cloned().unwrap_or_else(|| format!("#{i}"));
+        let list: Vec<String> = self.changes.iter().map(|(i, _)| name(*i)).collect();
+        match list.as_slice() {
+            [] => String::new(),
+            [alone] => format!("{alone} has no effect on these samples"),
+            [others @ .., last] => {
+                let changes: Vec<String> = self
+                    .changes
+                    .iter()
+                    .map(|(i, change)| {
+                        let sign = if *change < 0.0 { '-' } else { '+' };
+                        format!("{} {sign} {}", name(*i), short(change.abs()))
+                    })
+                    .collect();
+                format!(
+                    "only a combination of {} and {last} is determined: {} changes nothing",
+                    others.join(", "),
+                    changes.join(" with ")
+                )
+            }
+        }
+    }
+}
+
+/// Four significant digits without trailing zeros.
+fn short(value: f64) -> String {
+    let scientific = format!("{value:.3e}");
+    scientific
+        .parse::<f64>()
+        .map_or(scientific, |rounded| format!("{rounded}"))
+}
+
+/// Entries of unit null vectors below this are rounding.
+const PARTICIPATES: f64 = 1e-6;
+
+/// Which parameters take part in no null vector, and a sparse basis of the null space.
+///
+/// `null_space` holds one unit vector per row, in columns scaled by `norms`; elimination with
+/// complete pivoting makes each direction start with a parameter that no other one contains.
+pub(crate) fn null_directions(
+    null_space: &DMatrix<f64>,
+    norms: &[f64],
+) -> (Vec<bool>, Vec<Direction>) {
+    let n = norms.len();
+    let determined = (0..n)
+        .map(|j| null_space.column(j).norm() <= PARTICIPATES)
+        .collect();
+    let mut basis = null_space.clone();
+    let mut pivots: Vec<usize> = Vec::new();
+    for step in 0..basis.nrows() {
+        let mut best = (0.0, step, 0);
+        for i in step..basis.nrows() {
+            for j in 0..n {
+                // Entries that are equal but for rounding must not decide by it: the first wins.
+                if basis[(i, j)].abs() > best.0 * (1.0 + 1e-9) {
+                    best = (basis[(i, j)].abs(), i, j);
+                }
+            }
+        }
+        let (size, row, column) = best;
+        if size <= PARTICIPATES {
+            break;
+        }
+        basis.swap_rows(step, row);
+        let pivot = basis[(step, column)];
+        basis.row_mut(step).unscale_mut(pivot);
+        for i in (0..basis.nrows()).filter(|i| *i != step) {
+            let factor = basis[(i, column)];
+            for j in 0..n {
+                basis[(i, j)] -= factor * basis[(step, j)];
+            }
+        }
+        pivots.push(column);
+    }
+    let directions = pivots
+        .iter()
+        .enumerate()
+        .map(|(i, &pivot)| {
+            let others = (0..n)
+                .filter(|&j| j != pivot && basis[(i, j)].abs() > PARTICIPATES)
+                .map(|j| (j, basis[(i, j)] * norms[pivot] / norms[j]));
+            Direction {
+                changes: std::iter::once((pivot, 1.0)).chain(others).collect(),
+            }
+        })
+        .collect();
+    (determined, directions)
+}
