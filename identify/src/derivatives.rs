@@ -33,8 +33,9 @@ pub struct Preparation {
     pub cutoff_hz: Option<f64>,
     /// Order of the Butterworth filter in one direction.
     pub order: usize,
-    /// Samples dropped at the start and at the end; when absent, one period of the cut-off at
-    /// both ends if anything was filtered, and none otherwise.
+    /// Samples dropped at the start and at the end; when absent, three periods of the
+    /// cut-off at both ends if anything was filtered (the transient falls tenfold in each, and
+    /// reaches 0.1 % of the acceleration), at most a sixth of the recording; none otherwise.
     pub trim: Option<(usize, usize)>,
     /// Every how many samples one is kept, after the parallel filter on all columns of the
     /// regressor and on the force; 1 keeps all.
@@ -57,11 +58,13 @@ impl Default for Preparation {
 
 impl Preparation {
     /// The recipe of the EMPS reference: order 4 at 100 Hz, the first 49 samples dropped,
-    /// decimation by 10.
+    /// decimation by 10. As many are dropped at the end, where differences are one-sided: with
+    /// one or two bad accelerations left there the error rises from 4.04 to 4.3 %, while any
+    /// number from 5 on gives the same.
     pub fn emps() -> Self {
         Self {
             cutoff_hz: Some(100.0),
-            trim: Some((49, 0)),
+            trim: Some((49, 49)),
             decimate: 10,
             source: Source::Positions,
             ..Self::default()
@@ -132,15 +135,16 @@ pub fn mean_rate(time: &[f64]) -> f64 {
     }
 }
 
-/// The cut-off, Hz, that promises the smallest mean square error of the acceleration, for
+/// The cut-off, Hz, that promises nearly the smallest mean square error of the acceleration, for
 /// positions sampled at `rate_hz`; `None` when the positions hold no motion above their noise.
 ///
 /// The spectrum of the raw second differences is signal plus noise. White noise of the position
 /// has the known shape `(2 sin(pi f/rate) rate)^4` there; its level is the median over the upper
 /// quarter of the band. A cut-off then costs the signal it takes, `(1 - H)^2 (P - N)`, and the
-/// noise it leaves, `H^2 N`, where `H` is the gain of the filter run both ways; the sum over all
-/// frequencies is smallest at the cut-off returned (the trade-off of a Wiener filter, restricted
-/// to Butterworth's shape).
+/// noise it leaves, `H^2 N`, where `H` is the gain of the filter run both ways (the trade-off of a
+/// Wiener filter, restricted to Butterworth's shape). A low cut-off loses more samples at the
+/// ends, so the highest one is returned whose expected error is within a quarter of the smallest,
+/// or below 0.1 % of the acceleration.
 pub fn choose_cutoff(positions: &[f64], rate_hz: f64, order: usize) -> Option<f64> {
     if positions.len() < 32 {
         return None;
@@ -160,11 +164,12 @@ pub fn choose_cutoff(positions: &[f64], rate_hz: f64, order: usize) -> Option<f6
     upper.sort_by(f64::total_cmp);
     // The median of an exponentially distributed periodogram is ln 2 of its mean.
     let level = upper[upper.len() / 2] / std::f64::consts::LN_2;
-    // Periodogram bins above four times the noise are signal; the rest is taken for noise.
+    // Chance lifts one bin in three million above fifteen times the noise. A lower bar would let
+    // bins of noise through, whose share in the acceleration is huge at high frequencies.
     let signal: Vec<f64> = (0..n)
         .map(|k| {
             let noise = level * shape(k);
-            if power[k] > 4.0 * noise {
+            if power[k] > 15.0 * noise {
                 power[k] - noise
             } else {
                 0.0
@@ -176,7 +181,7 @@ pub fn choose_cutoff(positions: &[f64], rate_hz: f64, order: usize) -> Option<f6
     }
     let lowest = 4.0 * rate_hz / positions.len() as f64;
     let steps = 96;
-    (0..=steps)
+    let costs: Vec<(f64, f64)> = (0..=steps)
         .map(|i| lowest * (0.45 * rate_hz / lowest).powf(f64::from(i) / f64::from(steps)))
         .filter_map(|cutoff| {
             let filter = LowPass::butterworth(order, cutoff, rate_hz).ok()?;
@@ -188,8 +193,17 @@ pub fn choose_cutoff(positions: &[f64], rate_hz: f64, order: usize) -> Option<f6
                 .sum();
             Some((cutoff, cost))
         })
-        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .collect();
+    let smallest = costs
+        .iter()
+        .map(|(_, cost)| *cost)
+        .fold(f64::INFINITY, f64::min);
+    let bearable = (1.25_f64.powi(2) * smallest).max(1e-6 * signal.iter().sum::<f64>());
+    costs
+        .into_iter()
+        .filter(|(_, cost)| *cost <= bearable)
         .map(|(cutoff, _)| cutoff)
+        .reduce(f64::max)
 }
 
 #[cfg(test)]
@@ -248,12 +262,14 @@ mod tests {
                     / inner.len() as f64)
                     .sqrt()
             };
+            let size =
+                (time.iter().map(|t| truth(*t).powi(2)).sum::<f64>() / time.len() as f64).sqrt();
             let chosen = choose_cutoff(&positions, rate, 4).unwrap();
             let best = (0..60)
                 .map(|i| error(0.6 * 1.09_f64.powi(i)))
                 .fold(f64::INFINITY, f64::min);
             assert!(
-                error(chosen) < 1.6 * best,
+                error(chosen) < (1.6 * best).max(1.5e-3 * size),
                 "sigma {sigma}: {chosen} Hz gives {} not {best}",
                 error(chosen)
             );

@@ -148,7 +148,17 @@ pub fn autocorrelated<E: From<LeastSquaresError>>(
 
 /// Newey and West's number of lags that the bandwidth is estimated from (Bartlett's kernel).
 fn lags_for_bandwidth(samples: usize) -> usize {
-    ((4.0 * (samples as f64 / 100.0).powf(2.0 / 9.0)) as usize).clamp(1, samples.max(2) - 1)
+    whole(4.0 * (samples as f64 / 100.0).powf(2.0 / 9.0)).clamp(1, samples.max(2) - 1)
+}
+
+/// The whole part of a small positive number.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "bandwidths are far below 2^53"
+)]
+fn whole(value: f64) -> usize {
+    value.max(0.0) as usize
 }
 
 /// The automatic bandwidth from the lag products of the influences, prewhitened on paper.
@@ -172,7 +182,7 @@ fn bandwidth(memory: &LagProducts, whitening: &[f64], lags: usize, samples: usiz
         power += s0 * s0;
     }
     let alpha = if power > 0.0 { curvature / power } else { 0.0 };
-    let automatic = (1.1447 * (alpha * samples as f64).cbrt()) as usize;
+    let automatic = whole(1.1447 * (alpha * samples as f64).cbrt());
     automatic.max(lags + 1).min((samples / 10).max(1))
 }
 

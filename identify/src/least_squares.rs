@@ -444,9 +444,12 @@ fn solve_triangle(
     };
     let variance = solution.residual_variance();
     solution.classical_std = (0..n)
-        .map(|i| match solution.determined[i] {
-            true => variance.sqrt() * solution.r_inverse.row(i).norm(),
-            false => f64::INFINITY,
+        .map(|i| {
+            if solution.determined[i] {
+                variance.sqrt() * solution.r_inverse.row(i).norm()
+            } else {
+                f64::INFINITY
+            }
         })
         .collect();
     Ok(solution)

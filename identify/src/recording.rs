@@ -207,25 +207,31 @@ fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<Recordin
             "The columns of {file} are separated by {name}."
         )));
     }
+    let lines_of_text = EvenLines::new(Cursor::new(first_lines).chain(stream));
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(separator)
         .flexible(true)
         .trim(csv::Trim::All)
-        .from_reader(Cursor::new(first_lines).chain(stream));
+        .from_reader(lines_of_text);
     let theirs: Vec<String> = reader
         .headers()
         .map_err(unreadable)?
         .iter()
         .map(str::to_owned)
         .collect();
-    let names = rename(check_names(theirs)?, &options.renames)?;
+    let names = {
+        check_names(&theirs)?;
+        rename(&theirs, &options.renames)?
+    };
     let mut columns: Vec<Column> = vec![Column::default(); names.len()];
     let mut lines = Vec::new();
     let mut left_out = Vec::new();
     let mut record = csv::ByteRecord::new();
     let mut sample = Vec::with_capacity(names.len());
     while reader.read_byte_record(&mut record).map_err(unreadable)? {
-        let line = record.position().map_or(0, csv::Position::line);
+        // The reader stands behind the line's end here; where it began, blank lines are not
+        // passed over yet.
+        let line = reader.position().line() - 1;
         if record.len() != names.len() {
             return Err(Fault::RaggedLine {
                 line,
@@ -318,6 +324,55 @@ impl Column {
     }
 }
 
+/// The same text with LF at the end of every line, the last one included, so that the lines of
+/// records can be told: the CSV reader counts a line only when it meets its LF.
+struct EvenLines<R> {
+    inner: R,
+    last: u8,
+    ended: bool,
+}
+
+impl<R: Read> EvenLines<R> {
+    fn new(inner: R) -> Self {
+        Self {
+            inner,
+            last: b'\n',
+            ended: false,
+        }
+    }
+}
+
+impl<R: Read> Read for EvenLines<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if buffer.is_empty() || self.ended {
+            return Ok(0);
+        }
+        loop {
+            let have = self.inner.read(buffer)?;
+            if have == 0 {
+                self.ended = true;
+                if self.last == b'\n' {
+                    return Ok(0);
+                }
+                buffer[0] = b'\n';
+                return Ok(1);
+            }
+            let mut kept = 0;
+            for i in 0..have {
+                if buffer[i] != b'\r' {
+                    buffer[kept] = buffer[i];
+                    kept += 1;
+                }
+            }
+            // Zero would mean the end of the text.
+            if kept > 0 {
+                self.last = buffer[kept - 1];
+                return Ok(kept);
+            }
+        }
+    }
+}
+
 /// The header as text without its byte order mark, and the bytes to read again, from the header on.
 fn read_header(stream: &mut impl BufRead) -> Result<(String, Vec<u8>), Fault> {
     let mut bytes = Vec::new();
@@ -338,6 +393,9 @@ fn read_header(stream: &mut impl BufRead) -> Result<(String, Vec<u8>), Fault> {
         [0x1F, 0x8B, ..] => Some("a gzip archive"),
         [b'M', b'A', b'T', b'L', b'A', b'B', ..] => Some("a MATLAB file"),
         _ if bytes.contains(&0) => Some("binary data"),
+        line if line.trim_ascii().contains(&b'\r') => {
+            Some("text with lone carriage returns as line ends")
+        }
         _ if bytes.len() as u64 == LONGEST_HEADER => Some("a file without lines"),
         _ => None,
     };
@@ -384,14 +442,13 @@ fn find_separator(header: &str) -> Result<u8, Fault> {
     }
 }
 
-fn check_names(names: Vec<String>) -> Result<Vec<String>, Fault> {
+fn check_names(names: &[String]) -> Result<(), Fault> {
     for (i, name) in names.iter().enumerate() {
         if name.is_empty() {
             return Err(Fault::UnnamedColumn { place: i + 1 });
         }
     }
-    find_duplicate(&names, false)?;
-    Ok(names)
+    find_duplicate(names, false)
 }
 
 fn find_duplicate(names: &[String], by_renaming: bool) -> Result<(), Fault> {
@@ -408,8 +465,8 @@ fn find_duplicate(names: &[String], by_renaming: bool) -> Result<(), Fault> {
     Ok(())
 }
 
-fn rename(names: Vec<String>, renames: &[(String, String)]) -> Result<Vec<String>, Fault> {
-    let mut renamed = names.clone();
+fn rename(names: &[String], renames: &[(String, String)]) -> Result<Vec<String>, Fault> {
+    let mut renamed = names.to_vec();
     for (i, (ours, theirs)) in renames.iter().enumerate() {
         if renames[..i].iter().any(|(o, t)| o == ours || t == theirs) {
             let twice_ours = renames[..i].iter().any(|(o, _)| o == ours);

@@ -159,6 +159,7 @@ impl Fault {
 }
 
 impl fmt::Display for Fault {
+    #[allow(clippy::too_many_lines, reason = "one arm per fault, each a sentence")]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unreadable { reason } => {

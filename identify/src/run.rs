@@ -221,8 +221,7 @@ impl Recording {
         design(cutoff)?;
         prepared.cutoff_hz = Some(cutoff);
         prepared.cutoff_chosen = preparation.cutoff_hz.is_none();
-        let period = ((rate / cutoff).ceil() as usize).max(1);
-        prepared.trimmed = (period, period);
+        prepared.trimmed = self.transients(rate / cutoff, time.len(), preparation, notes);
         notes.push(Note::info(format!(
             "Derivatives of {} in {} are prepared: Butterworth of order {order} at {cutoff:.4} Hz{}, zero phase, \
              then central differences.",
@@ -241,6 +240,28 @@ impl Recording {
                 })
             })
             .collect()
+    }
+
+    /// Samples that the filter's transients spoil at both ends, `period` being that of the cut-off
+    /// in samples.
+    fn transients(
+        &self,
+        period: f64,
+        samples: usize,
+        preparation: &Preparation,
+        notes: &mut Vec<Note>,
+    ) -> (usize, usize) {
+        let most = samples / 6;
+        let spoilt = (1..most).find(|count| *count as f64 >= 3.0 * period);
+        if spoilt.is_none() && preparation.trim.is_none() {
+            notes.push(Note::warning(format!(
+                "{} is short for its cut-off: the filter's transients reach beyond the samples dropped at the ends; \
+                 use a longer recording or a higher cut-off.",
+                self.file()
+            )));
+        }
+        let count = spoilt.unwrap_or(most);
+        (count, count)
     }
 
     fn trim(&self, run: &mut Run) -> Result<(), RecordingError> {
@@ -280,7 +301,12 @@ impl Recording {
 
     fn note_standstill(&self, coordinates: &[String], run: &mut Run) {
         for (name, q) in coordinates.iter().zip(&run.q) {
-            if q.len() > 1 && q.iter().all(|value| *value == q[0]) {
+            let (low, high) = q
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+                    (l.min(*v), h.max(*v))
+                });
+            if q.len() > 1 && high <= low {
                 run.notes.push(Note::warning(format!(
                     "`{name}` does not move in {}: what depends on its motion cannot be identified.",
                     self.file()

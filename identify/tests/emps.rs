@@ -91,8 +91,8 @@ fn the_published_parameters_come_out() {
     let Some(folder) = data() else { return };
     let run = read(folder.join("emps_train.csv"));
     let train = regression(&run);
-    assert_eq!(train.force.len(), 2480);
-    assert_eq!(train.time.len(), 2480);
+    assert_eq!(train.force.len(), 2475);
+    assert_eq!(train.time.len(), 2475);
     let mut fit = LeastSquares::new(4);
     fit.add_rows(&train.regressor, &train.force)
         .expect("finite rows");

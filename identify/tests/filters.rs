@@ -3,6 +3,7 @@
 use modelmill_identify::derivatives::differentiate;
 use modelmill_identify::filters::{LowPass, decimate, decimate_table};
 
+#[allow(clippy::unreadable_literal, reason = "numbers as numpy prints them")]
 #[path = "reference/filter_tables.rs"]
 mod tables;
 

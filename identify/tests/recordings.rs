@@ -1,6 +1,8 @@
 //! Recordings as users have them: faulty ones get an answer with the place and the remedy, sound
 //! ones give the states they hold.
 
+use std::fmt::Write as _;
+
 use modelmill_identify::derivatives::Source;
 use modelmill_identify::{
     Fault, NotFinite, Preparation, ReadOptions, Recording, RecordingError, Severity,
@@ -212,7 +214,7 @@ fn marks_line_ends_and_separators_of_other_programs() {
         "\u{feff}t,q\r\n0,1\r\n0.1,2\r\n",
         "t;q\n0;1\n0.1;2\n",
         "t\tq\n0\t1\n0.1\t2",
-        "\"t\" , \"q\"\n 0 , 1 \n+1e-1, 2.0\n\n",
+        "\"t\",\"q\"\n 0 , 1 \n+1e-1, 2.0\n\n",
     ] {
         let recording = read(text).unwrap();
         assert_eq!(
@@ -286,7 +288,7 @@ fn sine(columns: &[&str]) -> Recording {
                 "q_dd" => -16.0 * (4.0 * t).sin(),
                 _ => 1.0,
             };
-            text += &format!(",{value}");
+            write!(text, ",{value}").unwrap();
         }
         text.push('\n');
     }

@@ -1,4 +1,4 @@
-//! Made by make_filter_tables.py with scipy 1.17.1; not edited by hand.
+//! Made by `make_filter_tables.py` with scipy 1.17.1; not edited by hand.
 /// Samples that the full-rate tables hold.
 pub(crate) const PICKS: [usize; 8] = [0, 1, 2, 17, 60, 101, 118, 119];
 /// filtfilt, Butterworth order 4, 100 Hz at 1 kHz.

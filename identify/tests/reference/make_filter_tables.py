@@ -20,7 +20,7 @@ def table(name, doc, values):
     print("];")
 
 
-print(f"//! Made by make_filter_tables.py with scipy {scipy.__version__}; not edited by hand.")
+print(f"//! Made by `make_filter_tables.py` with scipy {scipy.__version__}; not edited by hand.")
 f = float
 picks = [0, 1, 2, 17, 60, 101, 118, 119]
 print(f"/// Samples that the full-rate tables hold.\npub(crate) const PICKS: [usize; {len(picks)}] = {picks};")
