@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::deviations::Deviations;
 use crate::figures::Figures;
-use crate::least_squares::Solution;
 use crate::notes::{Note, nearest};
 use crate::recording_error::list;
+use crate::solution::Solution;
 
 /// A base parameter as the model describes it.
 #[derive(Debug, Clone, PartialEq)]

@@ -24,7 +24,8 @@ use std::collections::VecDeque;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::least_squares::{LeastSquaresError, Solution, check_rows};
+use crate::least_squares::{LeastSquaresError, check_rows};
+use crate::solution::Solution;
 
 /// Uncertainty of a solution. Lists are in the order of the regressor's columns.
 #[derive(Debug, Clone, PartialEq)]

@@ -401,3 +401,54 @@ fn short_and_still_recordings_get_an_answer() {
     );
     assert!(still.qd[0].iter().all(|v| v.abs() < 1e-9));
 }
+
+/// Ten thousand mutilated recordings: an answer each, no panic.
+#[test]
+fn mutilated_recordings_get_an_answer() {
+    let sound = b"\xEF\xBB\xBFt,q,drive\r\n0,1,2\r\n0.1,1.5,2e3\r\n0.2,-1,\"3\"\r\n0.3,NaN,inf\r\n"
+        .to_vec();
+    let pieces: [&[u8]; 12] = [
+        b",", b";", b"\t", b"\r", b"\n", b"\"", b"NaN", b"1e400", b"-", b"\0", b"\xFF", b"t",
+    ];
+    let mut seed = 1_u64;
+    let mut draw = |bound: usize| {
+        seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        usize::try_from(seed >> 33).expect("31 bits") % bound
+    };
+    let mut read_well = 0;
+    for _ in 0..10_000 {
+        let mut bytes = sound.clone();
+        for _ in 0..=draw(4) {
+            let place = draw(bytes.len());
+            match draw(3) {
+                0 => drop(bytes.splice(place..place, pieces[draw(pieces.len())].iter().copied())),
+                1 => drop(bytes.drain(place..(place + 1 + draw(6)).min(bytes.len()))),
+                _ => bytes.truncate(place + 1),
+            }
+            if bytes.is_empty() {
+                bytes.push(b't');
+            }
+        }
+        let not_finite = if draw(2) == 0 {
+            NotFinite::Refuse
+        } else {
+            NotFinite::LeaveOut
+        };
+        let options = ReadOptions {
+            renames: Vec::new(),
+            not_finite,
+        };
+        match Recording::from_reader(bytes.as_slice(), "run.csv", &options) {
+            Ok(recording) => {
+                read_well += 1;
+                let _ = recording
+                    .states(&names(&["q"]), &names(&["drive"]))
+                    .map_err(|error| error.to_string());
+            }
+            Err(error) => assert!(error.to_string().len() > 30),
+        }
+    }
+    assert!(read_well > 100);
+}
