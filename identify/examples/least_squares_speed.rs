@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             (0..blocks).try_for_each(|_| visit(&w, &y))
         })?;
         let second = start.elapsed().as_secs_f64();
-        let rate = |seconds: f64| (blocks * 512) as f64 / seconds / 1e6;
+        let rate = |seconds: f64| f64::from(blocks * 512) / seconds / 1e6;
         println!(
             "{parameters} parameters, {channels} channels: {:.2} million samples/s, deviations {:.2} million samples/s",
             rate(first),

@@ -144,7 +144,7 @@ pub fn mean_rate(time: &[f64]) -> f64 {
 /// noise it leaves, `H^2 N`, where `H` is the gain of the filter run both ways (the trade-off of a
 /// Wiener filter, restricted to Butterworth's shape). A low cut-off loses more samples at the
 /// ends, so the highest one is returned whose expected error is within a quarter of the smallest,
-/// or below 0.1 % of the acceleration.
+/// or below 0.1 % of the acceleration; never above a fifth of the sampling rate.
 pub fn choose_cutoff(positions: &[f64], rate_hz: f64, order: usize) -> Option<f64> {
     if positions.len() < 32 {
         return None;
@@ -180,9 +180,11 @@ pub fn choose_cutoff(positions: &[f64], rate_hz: f64, order: usize) -> Option<f6
         return None;
     }
     let lowest = 4.0 * rate_hz / positions.len() as f64;
+    // Beyond a fifth of the rate, central differences take more than the filter leaves.
+    let highest = 0.2 * rate_hz;
     let steps = 96;
     let costs: Vec<(f64, f64)> = (0..=steps)
-        .map(|i| lowest * (0.45 * rate_hz / lowest).powf(f64::from(i) / f64::from(steps)))
+        .map(|i| lowest * (highest / lowest).powf(f64::from(i) / f64::from(steps)))
         .filter_map(|cutoff| {
             let filter = LowPass::butterworth(order, cutoff, rate_hz).ok()?;
             let cost: f64 = (1..n)
