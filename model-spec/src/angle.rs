@@ -1,0 +1,297 @@
+//! Angles and lengths of joints: expressions of a special shape, which the symbolic kernel needs.
+//!
+//! An angle is an integer combination of angle symbols plus a multiple of pi/12; a length is linear in prismatic
+//! coordinates. What has another shape is reported with the shape that was expected.
+
+use std::collections::BTreeMap;
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{One, Signed, ToPrimitive, Zero};
+
+use crate::diagnostic::{Diagnostic, Log};
+use crate::exact::{Angle, Exact, Length, Symbol};
+use crate::formula::{Ast, AstKind, Formula};
+use crate::scope::{Scope, Sort, Wanted};
+use crate::unit::Dimension;
+
+/// Largest integer factor of an angle's symbol.
+const LARGEST_FACTOR: i32 = 16;
+const SYMBOLS: [Sort; 2] = [Sort::Constant, Sort::Coordinate];
+
+/// Reads an angle over constants (unit rad) and coordinates.
+pub(crate) fn angle(formula: &Formula, scope: &Scope, log: &mut Log) -> Option<Angle> {
+    let before = log.n_errors();
+    let wanted = Wanted {
+        sorts: &SYMBOLS,
+        dimension: Dimension::ONE,
+        what: "this angle",
+    };
+    // Unknown names and pure clashes of units are found first; then only the shape is left to look at.
+    check_angle_symbols(&formula.ast, scope, log);
+    if log.n_errors() > before {
+        // The names that are no angles at all are reported by now; add the unknown ones.
+        let mut rest = Log::default();
+        if scope.walk(&formula.ast, &SYMBOLS, &mut rest).is_none() {
+            for found in rest.finish() {
+                log.push(found);
+            }
+        }
+        return None;
+    }
+    scope.resolve(formula, wanted, log)?;
+    let mut sum = AngleSum::default();
+    collect_angle(&formula.ast, &BigRational::one(), scope, &mut sum, log)?;
+    let twelve = BigRational::from_integer(BigInt::from(12));
+    if !(&sum.pi * &twelve).is_integer() {
+        log.push(
+            Diagnostic::error(
+                formula.ast.span,
+                "the fixed part of this angle is no multiple of pi/12",
+            )
+            .label("expected for example `pi/2`, `-pi/6` or `5*pi/12`")
+            .help("declare any other angle as a constant with unit `rad` and use its name"),
+        );
+        return None;
+    }
+    // Full turns are no difference.
+    let two = BigRational::from_integer(BigInt::from(2));
+    let turns = (&sum.pi / &two).round();
+    let mut pi = sum.pi - turns * &two;
+    if pi == -BigRational::one() {
+        pi = BigRational::one();
+    }
+    let mut terms = Vec::new();
+    for (symbol, factor) in sum.terms {
+        let whole = factor.is_integer().then(|| factor.to_i32()).flatten();
+        match whole {
+            Some(0) => {}
+            Some(factor) if factor.abs() <= LARGEST_FACTOR => terms.push((symbol, factor)),
+            _ => {
+                log.push(
+                    Diagnostic::error(
+                        formula.ast.span,
+                        "this angle has a factor that is no small integer",
+                    )
+                    .label(format!(
+                        "expected integer multiples, at most {LARGEST_FACTOR}, of angles"
+                    ))
+                    .help("halves of an angle: make the half the coordinate, and the whole twice of it"),
+                );
+                return None;
+            }
+        }
+    }
+    Some(Angle { pi, terms })
+}
+
+/// Reports symbols that are pure numbers or lengths where angles must stand.
+fn check_angle_symbols(ast: &Ast, scope: &Scope, log: &mut Log) {
+    match &ast.kind {
+        AstKind::Name(name) => {
+            if let Some(meaning) = scope.get(name)
+                && meaning.sort == Sort::Constant
+                && meaning.unit != "rad"
+                && meaning.dimension.is_some()
+            {
+                meaning.used.set(true);
+                let diagnostic = Diagnostic::error(ast.span, format!("`{name}` is no angle"))
+                    .label(format!("its unit is `{}`, expected `rad`", meaning.unit));
+                log.push(match meaning.declared {
+                    Some(declared) => diagnostic.related(declared, "defined here"),
+                    None => diagnostic,
+                });
+            }
+        }
+        AstKind::Sum(inner) | AstKind::Product(inner) => {
+            for one in inner {
+                check_angle_symbols(one, scope, log);
+            }
+        }
+        AstKind::Quotient(above, below) => {
+            check_angle_symbols(above, scope, log);
+            check_angle_symbols(below, scope, log);
+        }
+        AstKind::Negative(inner) | AstKind::Power(inner, _) | AstKind::Apply(_, inner) => {
+            check_angle_symbols(inner, scope, log);
+        }
+        AstKind::Rational(_) | AstKind::Pi => {}
+    }
+}
+
+#[derive(Default)]
+struct AngleSum {
+    pi: BigRational,
+    terms: BTreeMap<Symbol, BigRational>,
+}
+
+fn collect_angle(
+    ast: &Ast,
+    factor: &BigRational,
+    scope: &Scope,
+    sum: &mut AngleSum,
+    log: &mut Log,
+) -> Option<()> {
+    match &ast.kind {
+        AstKind::Rational(value) if value.is_zero() => Some(()),
+        AstKind::Rational(_) => {
+            log.push(
+                Diagnostic::error(ast.span, "an angle cannot be a bare number")
+                    .label("expected a multiple of `pi`, such as `pi/2`")
+                    .help("declare any other angle as a constant with unit `rad` and use its name"),
+            );
+            None
+        }
+        AstKind::Pi => {
+            sum.pi += factor;
+            Some(())
+        }
+        AstKind::Name(name) => {
+            let meaning = scope.get(name)?;
+            let Exact::Symbol(symbol) = meaning.exact else {
+                return None;
+            };
+            *sum.terms.entry(symbol).or_default() += factor;
+            Some(())
+        }
+        AstKind::Sum(terms) => {
+            let mut fine = true;
+            for term in terms {
+                fine &= collect_angle(term, factor, scope, sum, log).is_some();
+            }
+            fine.then_some(())
+        }
+        AstKind::Negative(inner) => collect_angle(inner, &-factor, scope, sum, log),
+        AstKind::Product(factors) => {
+            let (numbers, rest): (Vec<&Ast>, Vec<&Ast>) = factors
+                .iter()
+                .partition(|one| matches!(one.kind, AstKind::Rational(_)));
+            let mut scaled = factor.clone();
+            for number in numbers {
+                if let AstKind::Rational(value) = &number.kind {
+                    scaled *= value;
+                }
+            }
+            match rest.as_slice() {
+                [only] => collect_angle(only, &scaled, scope, sum, log),
+                _ => bad_shape(ast, log),
+            }
+        }
+        _ => bad_shape(ast, log),
+    }
+}
+
+fn bad_shape(ast: &Ast, log: &mut Log) -> Option<()> {
+    log.push(
+        Diagnostic::error(ast.span, "an angle cannot be computed like this")
+            .label("expected a sum of integer multiples of angles and of `pi/12`")
+            .help("for example `theta1 - 2*gamma + pi/2`"),
+    );
+    None
+}
+
+/// Reads a length that is linear in coordinates.
+pub(crate) fn length(
+    formula: &Formula,
+    scope: &Scope,
+    what: &str,
+    log: &mut Log,
+) -> Option<Length> {
+    let wanted = Wanted {
+        sorts: &SYMBOLS,
+        dimension: Dimension::LENGTH,
+        what,
+    };
+    let exact = scope.resolve(formula, wanted, log)?;
+    let mut offset = Vec::new();
+    let mut coordinates: BTreeMap<_, BigRational> = BTreeMap::new();
+    if !split_length(&exact, &BigRational::one(), &mut offset, &mut coordinates) {
+        log.push(
+            Diagnostic::error(
+                formula.ast.span,
+                "a joint's length must be linear in its coordinates",
+            )
+            .label("expected for example `q3`, or `d3 + 2*q3`"),
+        );
+        return None;
+    }
+    coordinates.retain(|_, factor| !factor.is_zero());
+    let offset = match offset.len() {
+        0 => Exact::zero(),
+        1 => offset.swap_remove(0),
+        _ => Exact::Sum(offset),
+    };
+    Some(Length {
+        offset,
+        coordinates: coordinates.into_iter().collect(),
+    })
+}
+
+fn split_length(
+    exact: &Exact,
+    factor: &BigRational,
+    offset: &mut Vec<Exact>,
+    coordinates: &mut BTreeMap<crate::CoordinateIdx, BigRational>,
+) -> bool {
+    if !exact.mentions(&|symbol| matches!(symbol, Symbol::Coordinate(_))) {
+        if !exact.is_zero() {
+            offset.push(scaled(exact, factor));
+        }
+        return true;
+    }
+    match exact {
+        Exact::Symbol(Symbol::Coordinate(coordinate)) => {
+            *coordinates.entry(*coordinate).or_default() += factor;
+            true
+        }
+        Exact::Sum(terms) => terms
+            .iter()
+            .all(|term| split_length(term, factor, offset, coordinates)),
+        Exact::Negative(inner) => split_length(inner, &-factor, offset, coordinates),
+        Exact::Product(factors) => {
+            let mut scale = factor.clone();
+            let mut rest = None;
+            for one in factors {
+                match one {
+                    Exact::Rational(value) => scale *= value,
+                    _ if rest.is_none() => rest = Some(one),
+                    _ => return false,
+                }
+            }
+            rest.is_none_or(|one| split_length(one, &scale, offset, coordinates))
+        }
+        _ => false,
+    }
+}
+
+/// A rational multiple of an expression, in its plainest form.
+fn scaled(exact: &Exact, factor: &BigRational) -> Exact {
+    if factor.is_one() {
+        return exact.clone();
+    }
+    match exact {
+        Exact::Rational(value) => Exact::Rational(value * factor),
+        _ if (-factor).is_one() => Exact::Negative(Box::new(exact.clone())),
+        _ if factor.is_negative() => Exact::Negative(Box::new(scaled(exact, &-factor))),
+        _ => Exact::Product(vec![Exact::Rational(factor.clone()), exact.clone()]),
+    }
+}
+
+/// The value of an expression that holds only numbers, as a rational; `None` where it holds anything else.
+pub(crate) fn rational(ast: &Ast) -> Option<BigRational> {
+    match &ast.kind {
+        AstKind::Rational(value) => Some(value.clone()),
+        AstKind::Sum(terms) => terms.iter().map(rational).sum(),
+        AstKind::Product(factors) => factors.iter().map(rational).product(),
+        AstKind::Negative(inner) => rational(inner).map(|value| -value),
+        AstKind::Quotient(above, below) => {
+            let (above, below) = (rational(above)?, rational(below)?);
+            (!below.is_zero()).then(|| above / below)
+        }
+        AstKind::Power(base, exponent) => {
+            let base = rational(base)?;
+            (*exponent >= 0 || !base.is_zero()).then(|| num_traits::Pow::pow(base, *exponent))
+        }
+        AstKind::Pi | AstKind::Name(_) | AstKind::Apply(..) => None,
+    }
+}

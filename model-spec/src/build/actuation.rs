@@ -1,0 +1,307 @@
+//! Loops, drives and the columns of recordings.
+
+use std::collections::BTreeMap;
+
+use crate::build::Places;
+use crate::build::bodies::check_unique;
+use crate::build::frames::{Points, twice};
+use crate::build::symbols::Symbols;
+use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::exact::{CoordinateIdx, Exact, Symbol};
+use crate::mechanism::{Drive, DriveKind, Loop};
+use crate::record::Name;
+use crate::schema::ModelEntry;
+use crate::scope::Sort;
+use crate::suggest;
+
+/// Most loops of a mechanism.
+const MOST_LOOPS: usize = 60;
+
+/// Reads the loops.
+pub(super) fn loops(
+    model: &ModelEntry,
+    points: &Points,
+    places: &mut Places,
+    log: &mut Log,
+) -> Vec<Loop> {
+    let entries = model
+        .loops
+        .as_ref()
+        .map_or(&[][..], |list| list.entries.as_slice());
+    check_unique(
+        "loop",
+        entries.iter().filter_map(|entry| entry.name.as_ref()),
+        log,
+    );
+    if let Some(entry) = entries.get(MOST_LOOPS) {
+        log.push(
+            Diagnostic::error(entry.span, "there are too many loops")
+                .label(format!("at most {MOST_LOOPS}")),
+        );
+    }
+    let mut loops = Vec::new();
+    for entry in entries.iter().take(MOST_LOOPS) {
+        let Some(joins) = &entry.joins else { continue };
+        let [first, second] = joins.entries.as_slice() else {
+            log.push(
+                Diagnostic::error(
+                    joins.span,
+                    format!("a loop joins two points, not {}", joins.entries.len()),
+                )
+                .label("expected the names of two points")
+                .help("write one `[[loop]]` for each pair"),
+            );
+            continue;
+        };
+        let (Some(one), Some(other)) = (points.find(first, log), points.find(second, log)) else {
+            continue;
+        };
+        if points.points[one.0].frame == points.points[other.0].frame {
+            log.push(
+                Diagnostic::error(joins.span, "these two points are fixed to the same frame")
+                    .label("a loop closes between two chains of frames"),
+            );
+            continue;
+        }
+        places.loops.push(joins.span);
+        loops.push(Loop {
+            name: entry.name.as_ref().map_or_else(
+                || format!("{}_{}", first.text, second.text),
+                |name| name.text.clone(),
+            ),
+            joins: [one, other],
+        });
+    }
+    loops
+}
+
+/// Reads the drives; there must be one per active coordinate.
+pub(super) fn drives(
+    model: &ModelEntry,
+    symbols: &Symbols,
+    points: &Points,
+    places: &mut Places,
+    log: &mut Log,
+) -> Vec<Drive> {
+    let entries = model
+        .drive
+        .as_ref()
+        .map_or(&[][..], |list| list.entries.as_slice());
+    let before = log.n_errors();
+    let mut drives: Vec<Drive> = Vec::new();
+    for entry in entries {
+        let kind = match (&entry.joint, &entry.linear) {
+            (Some(joint), None) => coordinate(joint, symbols, log).map(DriveKind::Joint),
+            (None, Some(linear)) => {
+                let from = linear.from.as_ref().and_then(|name| points.find(name, log));
+                let to = linear.to.as_ref().and_then(|name| points.find(name, log));
+                from.zip(to)
+                    .map(|(from, to)| DriveKind::Linear { from, to })
+            }
+            _ if log.syntax_broken => None,
+            _ => {
+                log.push(
+                    Diagnostic::error(entry.span, "this drive does not say what it drives")
+                        .label("expected either `joint` or `linear`")
+                        .help("for example `joint = \"q1\"`, or `linear = { from = \"B\", to = \"A\" }`"),
+                );
+                None
+            }
+        };
+        let Some(name) = &entry.name else { continue };
+        if let Some(first) = drives.iter().position(|drive| drive.name == name.text) {
+            log.push(twice("drive", name, places.drives[first]));
+            continue;
+        }
+        if let Some(DriveKind::Joint(joint)) = kind
+            && let Some(first) = drives
+                .iter()
+                .position(|drive| drive.kind == DriveKind::Joint(joint))
+        {
+            log.push(
+                Diagnostic::error(
+                    name.span,
+                    format!("two drives act on `{}`", symbols.coordinates[joint.0].name),
+                )
+                .label("the second one")
+                .related(places.drives[first], "the first one"),
+            );
+        }
+        places.drives.push(name.span);
+        drives.push(Drive {
+            name: name.text.clone(),
+            kind: kind.unwrap_or(DriveKind::Joint(CoordinateIdx(0))),
+        });
+    }
+    if log.n_errors() == before && !log.syntax_broken {
+        check_number(model, symbols, &drives, places, log);
+    }
+    drives
+}
+
+fn check_number(
+    model: &ModelEntry,
+    symbols: &Symbols,
+    drives: &[Drive],
+    places: &Places,
+    log: &mut Log,
+) {
+    let n_active = symbols
+        .coordinates
+        .iter()
+        .filter(|coordinate| !coordinate.passive)
+        .count();
+    let n_declared = model
+        .coordinates
+        .as_ref()
+        .map_or(0, |table| table.entries.len());
+    if drives.len() == n_active || n_declared != symbols.coordinates.len() {
+        return;
+    }
+    let span = if drives.len() > n_active {
+        places.drives.get(n_active).copied()
+    } else {
+        // The first coordinate that no drive holds directly is as good a place as any.
+        symbols
+            .coordinates
+            .iter()
+            .enumerate()
+            .find(|(i, coordinate)| {
+                !coordinate.passive
+                    && !drives
+                        .iter()
+                        .any(|drive| drive.kind == DriveKind::Joint(CoordinateIdx(*i)))
+            })
+            .and_then(|(i, _)| places.coordinates.get(i).copied())
+    };
+    let degrees = |n: usize| format!("{n} degree{} of freedom", if n == 1 { "" } else { "s" });
+    let count = |n: usize| format!("{n} drive{}", if n == 1 { "" } else { "s" });
+    log.push(
+        Diagnostic::error(
+            span.unwrap_or(model.span),
+            format!("{} for {}", count(drives.len()), degrees(n_active)),
+        )
+        .label(if drives.len() > n_active {
+            "this drive is one too many"
+        } else {
+            "no drive is left for this coordinate"
+        })
+        .help("each coordinate that is not `passive` is a degree of freedom and needs one drive")
+        .help(if drives.len() > n_active {
+            "delete a drive, or make another coordinate active"
+        } else {
+            "add a `[[drive]]`; if the loops settle this coordinate, mark it `passive = true`"
+        }),
+    );
+}
+
+fn coordinate(name: &Name, symbols: &Symbols, log: &mut Log) -> Option<CoordinateIdx> {
+    let meaning = symbols
+        .scope
+        .look_up(&name.text, name.span, &[Sort::Coordinate], log)?;
+    match meaning.exact {
+        Exact::Symbol(Symbol::Coordinate(idx)) => Some(idx),
+        _ => None,
+    }
+}
+
+/// Drives, coordinates and points are places of effects and columns of recordings: their names must differ.
+pub(super) fn check_place_names(model: &ModelEntry, log: &mut Log) {
+    let mut seen: BTreeMap<&str, (&str, Span)> = BTreeMap::new();
+    let coordinates = model
+        .coordinates
+        .iter()
+        .flat_map(|table| &table.entries)
+        .map(|(key, _)| ("coordinate", key.name.as_str(), key.span));
+    let drives = model
+        .drive
+        .iter()
+        .flat_map(|list| &list.entries)
+        .filter_map(|entry| entry.name.as_ref())
+        .map(|name| ("drive", name.text.as_str(), name.span));
+    let points = model
+        .point
+        .iter()
+        .flat_map(|list| &list.entries)
+        .filter_map(|entry| entry.name.as_ref())
+        .map(|name| ("point", name.text.as_str(), name.span));
+    let all: Vec<(&str, &str, Span)> = coordinates.chain(drives).chain(points).collect();
+    for &(what, name, span) in &all {
+        match seen.get(name) {
+            Some(&(first, first_span)) if first != what => log.push(
+                Diagnostic::error(span, format!("`{name}` names a {first} and a {what}"))
+                    .label(format!("the {what}"))
+                    .related(first_span, format!("the {first}"))
+                    .help("effects and recordings tell them apart by name; rename one of the two"),
+            ),
+            Some(_) => {}
+            None => {
+                seen.insert(name, (what, span));
+            }
+        }
+    }
+    for &(what, name, span) in all.iter().filter(|(what, ..)| *what != "point") {
+        let stem = name.strip_suffix("_dd").or_else(|| name.strip_suffix("_d"));
+        if let Some(stem) = stem
+            && let Some((first, first_span)) = seen.get(stem)
+            && *first == "coordinate"
+        {
+            log.push(
+                Diagnostic::error(
+                    span,
+                    format!("the {what} `{name}` reads like a derivative of `{stem}`"),
+                )
+                .label("recordings name derivatives with `_d` and `_dd`")
+                .related(*first_span, "this coordinate")
+                .help("choose another name"),
+            );
+        }
+    }
+}
+
+/// Reads how recordings name their columns.
+pub(super) fn recording(
+    model: &ModelEntry,
+    symbols: &Symbols,
+    drives: &[Drive],
+    log: &mut Log,
+) -> Vec<(String, String)> {
+    let Some(columns) = model
+        .recording
+        .as_ref()
+        .and_then(|entry| entry.columns.as_ref())
+    else {
+        return Vec::new();
+    };
+    let mut known = vec!["t".to_owned()];
+    for coordinate in &symbols.coordinates {
+        let name = &coordinate.name;
+        known.extend([name.clone(), format!("{name}_d"), format!("{name}_dd")]);
+    }
+    known.extend(drives.iter().map(|drive| drive.name.clone()));
+    let mut pairs: Vec<(String, String)> = Vec::new();
+    for (key, theirs) in &columns.entries {
+        if !known.contains(&key.name) {
+            if !log.is_full() {
+                log.push(
+                    Diagnostic::error(key.span, format!("unknown column `{}`", key.name))
+                        .label("expected `t`, a coordinate, with `_d` or `_dd` for its derivatives, or a drive")
+                        .help_if(suggest::advice(
+                            &key.name,
+                            "columns",
+                            known.iter().map(String::as_str),
+                        )),
+                );
+            }
+            continue;
+        }
+        if theirs.text.trim().is_empty() {
+            log.push(
+                Diagnostic::error(theirs.span, "this column name is empty")
+                    .label("expected the column's name in the recordings"),
+            );
+        }
+        pairs.push((key.name.clone(), theirs.text.clone()));
+    }
+    pairs
+}

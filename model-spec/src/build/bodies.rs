@@ -1,0 +1,326 @@
+//! Parts and lumped masses: what has inertia.
+
+use num_rational::BigRational;
+use num_traits::One;
+
+use crate::angle::rational;
+use crate::build::frames::{Points, Tree, twice};
+use crate::build::symbols::{LINEAR, Symbols, explicit, shorthand, vector};
+use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::exact::{Exact, Symbol};
+use crate::formula::Formula;
+use crate::mechanism::{FrameIdx, Inertial, LumpedMass, Part};
+use crate::record::Name;
+use crate::schema::{LinearEntry, LumpedMassEntry, ModelEntry, PartEntry, Spot, Vector};
+use crate::scope::{Sort, Wanted};
+use crate::unit::Dimension;
+
+const SORTS: [Sort; 2] = [Sort::Constant, Sort::Parameter];
+
+/// Reads the parts.
+pub(super) fn parts(
+    model: &ModelEntry,
+    symbols: &Symbols,
+    tree: &Tree,
+    log: &mut Log,
+) -> Vec<Part> {
+    let entries = model.part.iter().flat_map(|list| &list.entries);
+    check_unique(
+        "part",
+        entries.clone().filter_map(|entry| entry.name.as_ref()),
+        log,
+    );
+    entries
+        .map(|entry| {
+            let frame = entry.on.as_ref().and_then(|on| tree.find(on, log));
+            let frame = frame.unwrap_or(FrameIdx(0));
+            Part {
+                name: entry.name.as_ref().map_or_else(
+                    || tree.frames[frame.0].name.clone(),
+                    |name| name.text.clone(),
+                ),
+                frame,
+                inertial: inertial(entry, symbols, log),
+            }
+        })
+        .collect()
+}
+
+/// Reports names that occur twice in a list.
+pub(super) fn check_unique<'a>(what: &str, names: impl Iterator<Item = &'a Name>, log: &mut Log) {
+    let mut seen = std::collections::BTreeMap::new();
+    for name in names {
+        if let Some(first) = seen.insert(&name.text, name.span) {
+            log.push(twice(what, name, first));
+        }
+    }
+}
+
+fn inertial(entry: &PartEntry, symbols: &Symbols, log: &mut Log) -> Inertial {
+    let about_centre = entry.mass.is_some() || entry.centre.is_some() || entry.inertia.is_some();
+    if let Some(linear) = &entry.linear {
+        if about_centre {
+            log.push(
+                Diagnostic::error(linear.span, "this part is described in two ways")
+                    .label("expected either `linear`, or `mass`, `centre` and `inertia`"),
+            );
+        }
+        return linear_inertial(linear, symbols, log);
+    }
+    if !about_centre && !log.syntax_broken {
+        log.push(
+            Diagnostic::error(entry.span, "this part has neither mass nor inertia")
+                .label("expected `mass`, `centre` and `inertia`, or `linear`")
+                .help("for example `mass = \"m1\"`, `centre = [\"dc1\", 0, 0]`, `inertia = { zz = \"Ic12\" }`; or `linear = { planar = \"1\" }`"),
+        );
+    }
+    let inertia = entry.inertia.as_ref();
+    let entries = [
+        inertia.and_then(|inertia| inertia.xx.as_ref()),
+        inertia.and_then(|inertia| inertia.xy.as_ref()),
+        inertia.and_then(|inertia| inertia.xz.as_ref()),
+        inertia.and_then(|inertia| inertia.yy.as_ref()),
+        inertia.and_then(|inertia| inertia.yz.as_ref()),
+        inertia.and_then(|inertia| inertia.zz.as_ref()),
+    ];
+    Inertial::AboutCentre {
+        mass: quantity(entry.mass.as_ref(), symbols, Dimension::MASS, "a mass", log),
+        centre: position(entry.centre.as_ref(), symbols, "a centre of mass", log),
+        inertia: entries
+            .map(|entry| quantity(entry, symbols, Dimension::INERTIA, "an inertia", log)),
+    }
+}
+
+fn linear_inertial(linear: &LinearEntry, symbols: &Symbols, log: &mut Log) -> Inertial {
+    if let (Some(_), Some(planar)) = (&linear.all, &linear.planar) {
+        log.push(
+            Diagnostic::error(
+                planar.span,
+                "a body is either planar or has all ten parameters",
+            )
+            .label("expected only one of `all` and `planar`"),
+        );
+    }
+    let short = shorthand(linear);
+    let entry = |symbol: &str, dimension: Dimension, log: &mut Log| {
+        if let Some(formula) = explicit(linear, symbol) {
+            let what = format!("{symbol} of a part");
+            return quantity(Some(formula), symbols, dimension, &what, log);
+        }
+        let Some((suffix, _)) = short.filter(|(_, members)| members.contains(&symbol)) else {
+            return Exact::zero();
+        };
+        let name = format!("{symbol}{}", suffix.text);
+        // Declared above; where that failed, the fault is reported already.
+        let Some(meaning) = symbols.scope.get(&name) else {
+            return Exact::zero();
+        };
+        meaning.used.set(true);
+        meaning.exact.clone()
+    };
+    let mut values = LINEAR.map(|(symbol, dimension)| entry(symbol, dimension, log));
+    let mut take = |i: usize| std::mem::replace(&mut values[i], Exact::zero());
+    Inertial::Linear {
+        inertia: std::array::from_fn(&mut take),
+        first_moment: std::array::from_fn(|i| take(i + 6)),
+        mass: take(9),
+    }
+}
+
+/// An expression over constants and parameters, polynomial in the parameters; zero where absent or faulty.
+fn quantity(
+    formula: Option<&Formula>,
+    symbols: &Symbols,
+    dimension: Dimension,
+    what: &str,
+    log: &mut Log,
+) -> Exact {
+    let Some(formula) = formula else {
+        return Exact::zero();
+    };
+    let wanted = Wanted {
+        sorts: &SORTS,
+        dimension,
+        what,
+    };
+    let Some(exact) = symbols.scope.resolve(formula, wanted, log) else {
+        return Exact::zero();
+    };
+    check_polynomial(&exact, formula.ast.span, log);
+    exact
+}
+
+fn position(
+    vector_entry: Option<&Vector>,
+    symbols: &Symbols,
+    what: &str,
+    log: &mut Log,
+) -> [Exact; 3] {
+    let Some(entry) = vector_entry else {
+        return std::array::from_fn(|_| Exact::zero());
+    };
+    let wanted = Wanted {
+        sorts: &SORTS,
+        dimension: Dimension::LENGTH,
+        what,
+    };
+    let position = vector(entry, &symbols.scope, wanted, log);
+    for (exact, formula) in position.iter().zip(&entry.entries) {
+        if let Some(formula) = formula {
+            check_polynomial(exact, formula.ast.span, log);
+        }
+    }
+    position
+}
+
+fn check_polynomial(exact: &Exact, span: Span, log: &mut Log) {
+    if !is_polynomial(exact) {
+        log.push(
+            Diagnostic::error(span, "this is not a polynomial in the parameters")
+                .label("parameters may be added and multiplied, with constant factors")
+                .help("a quantity by which something is divided is a constant: declare it in `[constants]`"),
+        );
+    }
+}
+
+fn is_polynomial(exact: &Exact) -> bool {
+    let free = |exact: &Exact| !exact.mentions(&|symbol| matches!(symbol, Symbol::Parameter(_)));
+    match exact {
+        Exact::Rational(_) | Exact::Pi | Exact::Symbol(_) => true,
+        Exact::Sum(inner) | Exact::Product(inner) => inner.iter().all(is_polynomial),
+        Exact::Negative(inner) => is_polynomial(inner),
+        Exact::Quotient(above, below) => is_polynomial(above) && free(below),
+        Exact::Power(base, exponent) => {
+            if *exponent >= 0 {
+                is_polynomial(base)
+            } else {
+                free(base)
+            }
+        }
+        Exact::Apply(_, inner) => free(inner),
+    }
+}
+
+/// Reads the lumped masses.
+pub(super) fn lumped_masses(
+    model: &ModelEntry,
+    symbols: &Symbols,
+    tree: &Tree,
+    points: &Points,
+    log: &mut Log,
+) -> Vec<LumpedMass> {
+    let entries = model.lumped_mass.iter().flat_map(|list| &list.entries);
+    check_unique(
+        "lumped mass",
+        entries.clone().filter_map(|entry| entry.name.as_ref()),
+        log,
+    );
+    entries
+        .map(|entry| lumped_mass(entry, symbols, tree, points, log))
+        .collect()
+}
+
+fn lumped_mass(
+    entry: &LumpedMassEntry,
+    symbols: &Symbols,
+    tree: &Tree,
+    points: &Points,
+    log: &mut Log,
+) -> LumpedMass {
+    let spots = [&entry.at, &entry.force_at, &entry.moment_at];
+    let named = spots.iter().find_map(|spot| match spot {
+        Some(Spot::Point(name)) => points.get(&name.text),
+        _ => None,
+    });
+    let frame = match (&entry.on, named) {
+        (Some(on), _) => tree.find(on, log).unwrap_or(FrameIdx(0)),
+        (None, Some(point)) => points.points[point.0].frame,
+        (None, None) => {
+            if !log.syntax_broken
+                && !spots
+                    .iter()
+                    .any(|spot| matches!(spot, Some(Spot::Point(_))))
+            {
+                log.push(
+                    Diagnostic::error(entry.span, "this lumped mass sits on no frame")
+                        .label("expected `on`, the name of a frame, beside a position")
+                        .help("add `on = \"...\"`, or name a point in `at`"),
+                );
+            }
+            FrameIdx(0)
+        }
+    };
+    let lacking = match (&entry.at, &entry.force_at, &entry.moment_at) {
+        (None, None, None) => Some("at"),
+        (None, None, Some(_)) => Some("force_at"),
+        (None, Some(_), None) => Some("moment_at"),
+        _ => None,
+    };
+    if let Some(key) = lacking.filter(|_| !log.syntax_broken) {
+        log.push(
+            Diagnostic::error(entry.span, "this lumped mass has no place")
+                .label(format!("expected `{key}`, the name of a point or a vector"))
+                .help("`at` serves both balances; `force_at` and `moment_at` differ from it where they are given"),
+        );
+    }
+    let force_at = entry.force_at.as_ref().or(entry.at.as_ref());
+    let moment_at = entry.moment_at.as_ref().or(entry.at.as_ref());
+    LumpedMass {
+        mass: quantity(entry.mass.as_ref(), symbols, Dimension::MASS, "a mass", log),
+        share: share(entry.share.as_ref(), log),
+        frame,
+        force_at: spot(force_at, frame, symbols, tree, points, log),
+        moment_at: spot(moment_at, frame, symbols, tree, points, log),
+    }
+}
+
+fn share(formula: Option<&Formula>, log: &mut Log) -> BigRational {
+    let Some(formula) = formula else {
+        return BigRational::one();
+    };
+    rational(&formula.ast).unwrap_or_else(|| {
+        log.push(
+            Diagnostic::error(formula.ast.span, "a share must be a rational number")
+                .label("expected for example `1/2`")
+                .help("put other factors into `mass`, such as `mass = \"k*m4\"`"),
+        );
+        BigRational::one()
+    })
+}
+
+fn spot(
+    spot: Option<&Spot>,
+    frame: FrameIdx,
+    symbols: &Symbols,
+    tree: &Tree,
+    points: &Points,
+    log: &mut Log,
+) -> [Exact; 3] {
+    let nowhere = || std::array::from_fn(|_| Exact::zero());
+    let Some(spot) = spot else {
+        return nowhere();
+    };
+    match spot {
+        Spot::Vector(vector) => position(Some(vector), symbols, "the place of a mass", log),
+        Spot::Point(name) => {
+            let Some(idx) = points.find(name, log) else {
+                return nowhere();
+            };
+            let point = &points.points[idx.0];
+            if point.frame != frame {
+                log.push(
+                    Diagnostic::error(
+                        spot.span(),
+                        format!(
+                            "the point `{}` is not fixed to this mass's frame",
+                            name.text
+                        ),
+                    )
+                    .label(format!("it is on `{}`", tree.frames[point.frame.0].name))
+                    .help("name a point on the same frame, or give the position as a vector"),
+                );
+            }
+            point.at.clone()
+        }
+    }
+}

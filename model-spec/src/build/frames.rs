@@ -1,0 +1,487 @@
+//! Frames, in any order in the file, as a tree whose parents come first; and the points on them.
+
+use std::collections::BTreeMap;
+
+use num_traits::One;
+
+use crate::angle::{angle, length};
+use crate::build::Places;
+use crate::build::symbols::{Symbols, vector};
+use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::exact::{Angle, Exact, Length};
+use crate::formula::Formula;
+use crate::mechanism::{Axis, Convention, Frame, FrameIdx, Point, PointIdx, Step};
+use crate::record::Name;
+use crate::schema::{AxisName, DhEntry, FrameEntry, JointEntry, ModelEntry, TransformEntry};
+use crate::scope::{Scope, Sort, Wanted};
+use crate::suggest;
+use crate::unit::Dimension;
+
+/// The frames with their names.
+pub(super) struct Tree {
+    pub(super) frames: Vec<Frame>,
+    names: BTreeMap<String, FrameIdx>,
+}
+
+impl Tree {
+    /// Looks a frame up; an unknown name is reported.
+    pub(super) fn find(&self, name: &Name, log: &mut Log) -> Option<FrameIdx> {
+        let found = self.names.get(&name.text).copied();
+        if found.is_none() && !log.is_full() {
+            log.push(
+                Diagnostic::error(name.span, format!("unknown frame `{}`", name.text))
+                    .label("expected the name of a frame, or `base`")
+                    .help_if(suggest::advice(
+                        &name.text,
+                        "frames",
+                        self.names.keys().map(String::as_str),
+                    )),
+            );
+        }
+        found
+    }
+}
+
+/// Reads the frames and sorts them so that parents come first.
+pub(super) fn frames(
+    model: &ModelEntry,
+    symbols: &Symbols,
+    places: &mut Places,
+    log: &mut Log,
+) -> Tree {
+    let entries: Vec<&FrameEntry> = model.frame.iter().flat_map(|list| &list.entries).collect();
+    let mut by_name: BTreeMap<&str, usize> = BTreeMap::new();
+    for (i, entry) in entries.iter().enumerate() {
+        let Some(name) = &entry.name else { continue };
+        if name.text == "base" {
+            log.push(
+                Diagnostic::error(name.span, "`base` is the frame that is there already")
+                    .label("expected another name"),
+            );
+        } else if let Some(first) = by_name.get(name.text.as_str()) {
+            let first_span = entries[*first]
+                .name
+                .as_ref()
+                .map_or(name.span, |name| name.span);
+            log.push(twice("frame", name, first_span));
+        } else {
+            by_name.insert(&name.text, i);
+        }
+    }
+    let mut tree = Tree {
+        frames: vec![Frame {
+            name: "base".to_owned(),
+            parent: FrameIdx(0),
+            steps: Vec::new(),
+            convention: Convention::Base,
+        }],
+        names: BTreeMap::from([("base".to_owned(), FrameIdx(0))]),
+    };
+    places.frames.push(None);
+    let order = parents_first(&entries, &by_name, log);
+    for i in order {
+        let entry = entries[i];
+        let Some(name) = &entry.name else { continue };
+        let parent = entry
+            .on
+            .as_ref()
+            .and_then(|on| tree.names.get(&on.text).copied())
+            .unwrap_or(FrameIdx(0));
+        let (steps, convention) = placement(entry, symbols, log);
+        tree.names
+            .insert(name.text.clone(), FrameIdx(tree.frames.len()));
+        tree.frames.push(Frame {
+            name: name.text.clone(),
+            parent,
+            steps,
+            convention,
+        });
+        places.frames.push(Some(name.span));
+    }
+    tree
+}
+
+/// `S1` is defined twice.
+pub(super) fn twice(what: &str, name: &Name, first: Span) -> Diagnostic {
+    Diagnostic::error(
+        name.span,
+        format!("the {what} `{}` is defined twice", name.text),
+    )
+    .label("defined again here")
+    .related(first, "first defined here")
+    .help("rename one of the two, or delete it")
+}
+
+/// Indices of the entries, parents first; unknown parents and cycles are reported and hung on the base.
+fn parents_first(
+    entries: &[&FrameEntry],
+    by_name: &BTreeMap<&str, usize>,
+    log: &mut Log,
+) -> Vec<usize> {
+    #[derive(Clone, Copy, PartialEq)]
+    enum Mark {
+        New,
+        OnPath,
+        Done,
+    }
+    let mut marks = vec![Mark::New; entries.len()];
+    let mut order = Vec::new();
+    for start in by_name_order(entries, by_name) {
+        let mut path = Vec::new();
+        let mut at = start;
+        loop {
+            if marks[at] == Mark::Done {
+                break;
+            }
+            if marks[at] == Mark::OnPath {
+                report_cycle(entries, &path, at, log);
+                break;
+            }
+            marks[at] = Mark::OnPath;
+            path.push(at);
+            let Some(on) = &entries[at].on else { break };
+            if on.text == "base" {
+                break;
+            }
+            let Some(&parent) = by_name.get(on.text.as_str()) else {
+                if !log.is_full() {
+                    let known = by_name.keys().copied().chain(["base"]);
+                    log.push(
+                        Diagnostic::error(on.span, format!("unknown frame `{}`", on.text))
+                            .label("expected the name of a frame, or `base`")
+                            .help_if(suggest::advice(&on.text, "frames", known)),
+                    );
+                }
+                break;
+            };
+            at = parent;
+        }
+        for done in path.into_iter().rev() {
+            marks[done] = Mark::Done;
+            order.push(done);
+        }
+    }
+    order
+}
+
+/// The entries that own their names, in the order of the file.
+fn by_name_order(entries: &[&FrameEntry], by_name: &BTreeMap<&str, usize>) -> Vec<usize> {
+    (0..entries.len())
+        .filter(|i| {
+            entries[*i]
+                .name
+                .as_ref()
+                .is_some_and(|name| by_name.get(name.text.as_str()) == Some(i))
+        })
+        .collect()
+}
+
+fn report_cycle(entries: &[&FrameEntry], path: &[usize], at: usize, log: &mut Log) {
+    let from = path.iter().position(|&one| one == at).unwrap_or(0);
+    let names: Vec<&str> = path[from..]
+        .iter()
+        .chain([&at])
+        .filter_map(|&one| entries[one].name.as_ref())
+        .map(|name| name.text.as_str())
+        .collect();
+    let span = entries[at]
+        .on
+        .as_ref()
+        .map_or(entries[at].span, |on| on.span);
+    log.push(
+        Diagnostic::error(span, "these frames hang on one another in a circle")
+            .label(if names.len() > 12 {
+                format!("a circle of {} frames", names.len() - 1)
+            } else {
+                names.join(" on ")
+            })
+            .help("every chain of frames must end on `base`; close kinematic loops by `[[loop]]` instead"),
+    );
+}
+
+/// The steps of a frame from its parent.
+fn placement(entry: &FrameEntry, symbols: &Symbols, log: &mut Log) -> (Vec<Step>, Convention) {
+    let name_span = entry.name.as_ref().map_or(entry.span, |name| name.span);
+    let n_ways = usize::from(entry.modified_dh.is_some())
+        + usize::from(entry.standard_dh.is_some())
+        + usize::from(entry.transform.is_some() || entry.joint.is_some());
+    if n_ways != 1 && !log.syntax_broken {
+        log.push(
+            Diagnostic::error(
+                name_span,
+                if n_ways == 0 {
+                    "this frame is placed nowhere"
+                } else {
+                    "this frame is placed in more than one way"
+                },
+            )
+            .label("expected one of `modified_dh`, `standard_dh`, `transform` (with or without `joint`)")
+            .help("for example `modified_dh = { a = \"d1\", theta = \"theta1\" }`"),
+        );
+    }
+    if let Some(dh) = &entry.modified_dh {
+        let row = dh_row(dh, symbols, log);
+        let steps = vec![
+            Step::Rotate(Axis::X, row.alpha),
+            Step::Translate(Axis::X, row.a),
+            Step::Rotate(Axis::Z, row.theta),
+            Step::Translate(Axis::Z, row.d),
+        ];
+        (without_zeros(steps), Convention::ModifiedDh(row.texts))
+    } else if let Some(dh) = &entry.standard_dh {
+        let row = dh_row(dh, symbols, log);
+        let steps = vec![
+            Step::Rotate(Axis::Z, row.theta),
+            Step::Translate(Axis::Z, row.d),
+            Step::Translate(Axis::X, row.a),
+            Step::Rotate(Axis::X, row.alpha),
+        ];
+        (without_zeros(steps), Convention::StandardDh(row.texts))
+    } else {
+        let mut steps = Vec::new();
+        let mut text = Vec::new();
+        if let Some(transform) = &entry.transform {
+            transform_steps(transform, symbols, &mut steps, &mut text, log);
+        }
+        if let Some(joint) = &entry.joint {
+            joint_step(joint, symbols, &mut steps, &mut text, log);
+        }
+        (without_zeros(steps), Convention::Transform(text.join(" ")))
+    }
+}
+
+struct DhRow {
+    a: Length,
+    alpha: Angle,
+    d: Length,
+    theta: Angle,
+    texts: [String; 4],
+}
+
+fn dh_row(dh: &DhEntry, symbols: &Symbols, log: &mut Log) -> DhRow {
+    let text = |formula: &Option<Formula>| {
+        formula
+            .as_ref()
+            .map_or_else(|| "0".to_owned(), |formula| formula.text.clone())
+    };
+    DhRow {
+        a: length_or_zero(dh.a.as_ref(), symbols, "`a` of a frame", log),
+        alpha: angle_or_zero(dh.alpha.as_ref(), symbols, log),
+        d: length_or_zero(dh.d.as_ref(), symbols, "`d` of a frame", log),
+        theta: angle_or_zero(dh.theta.as_ref(), symbols, log),
+        texts: [text(&dh.a), text(&dh.alpha), text(&dh.d), text(&dh.theta)],
+    }
+}
+
+fn length_or_zero(
+    formula: Option<&Formula>,
+    symbols: &Symbols,
+    what: &str,
+    log: &mut Log,
+) -> Length {
+    formula
+        .and_then(|formula| length(formula, &symbols.scope, what, log))
+        .unwrap_or_else(|| Length {
+            offset: Exact::zero(),
+            coordinates: Vec::new(),
+        })
+}
+
+fn angle_or_zero(formula: Option<&Formula>, symbols: &Symbols, log: &mut Log) -> Angle {
+    formula
+        .and_then(|formula| angle(formula, &symbols.scope, log))
+        .unwrap_or_else(Angle::zero)
+}
+
+fn transform_steps(
+    transform: &TransformEntry,
+    symbols: &Symbols,
+    steps: &mut Vec<Step>,
+    text: &mut Vec<String>,
+    log: &mut Log,
+) {
+    let entry = |vector: &Option<crate::schema::Vector>, i: usize| {
+        vector
+            .as_ref()
+            .and_then(|vector| vector.entries.get(i)?.clone())
+    };
+    let shown = |vector: &Option<crate::schema::Vector>| {
+        (0..3)
+            .map(|i| entry(vector, i).map_or_else(|| "0".to_owned(), |formula| formula.text))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    if transform.xyz.is_some() {
+        text.push(format!("xyz({})", shown(&transform.xyz)));
+    }
+    if transform.rpy.is_some() {
+        text.push(format!("rpy({})", shown(&transform.rpy)));
+    }
+    for (i, axis) in [Axis::X, Axis::Y, Axis::Z].into_iter().enumerate() {
+        let along = entry(&transform.xyz, i);
+        let along = length_or_zero(along.as_ref(), symbols, "a position", log);
+        if let Some(formula) = entry(&transform.xyz, i).filter(|_| !along.coordinates.is_empty()) {
+            log.push(fixed(&formula, "prismatic"));
+        }
+        steps.push(Step::Translate(axis, along));
+    }
+    for (i, axis) in [(2, Axis::Z), (1, Axis::Y), (0, Axis::X)] {
+        let about = entry(&transform.rpy, i);
+        let about = angle_or_zero(about.as_ref(), symbols, log);
+        let moves = about
+            .terms
+            .iter()
+            .any(|(symbol, _)| matches!(symbol, crate::Symbol::Coordinate(_)));
+        if let Some(formula) = entry(&transform.rpy, i).filter(|_| moves) {
+            log.push(fixed(&formula, "revolute"));
+        }
+        steps.push(Step::Rotate(axis, about));
+    }
+}
+
+fn fixed(formula: &Formula, motion: &str) -> Diagnostic {
+    Diagnostic::error(
+        formula.ast.span,
+        "a transform is fixed, this one would move",
+    )
+    .label("expected an expression without coordinates")
+    .help(format!(
+        "put the coordinate into `joint = {{ {motion} = \"...\" }}`"
+    ))
+}
+
+fn joint_step(
+    joint: &JointEntry,
+    symbols: &Symbols,
+    steps: &mut Vec<Step>,
+    text: &mut Vec<String>,
+    log: &mut Log,
+) {
+    let (axis, minus, shown) = match joint.axis.unwrap_or(AxisName::Z) {
+        AxisName::X => (Axis::X, false, "x"),
+        AxisName::Y => (Axis::Y, false, "y"),
+        AxisName::Z => (Axis::Z, false, "z"),
+        AxisName::MinusX => (Axis::X, true, "-x"),
+        AxisName::MinusY => (Axis::Y, true, "-y"),
+        AxisName::MinusZ => (Axis::Z, true, "-z"),
+    };
+    match (&joint.revolute, &joint.prismatic) {
+        (Some(formula), None) => {
+            let mut about = angle_or_zero(Some(formula), symbols, log);
+            if minus {
+                if !about.pi.is_one() {
+                    about.pi = -about.pi; // Half a turn is the same either way.
+                }
+                for term in &mut about.terms {
+                    term.1 = -term.1;
+                }
+            }
+            text.push(format!("revolute({}, {shown})", formula.text));
+            steps.push(Step::Rotate(axis, about));
+        }
+        (None, Some(formula)) => {
+            let mut along = length_or_zero(Some(formula), symbols, "a joint's length", log);
+            if minus {
+                along.offset = match along.offset {
+                    Exact::Rational(value) => Exact::Rational(-value),
+                    other => Exact::Negative(Box::new(other)),
+                };
+                for term in &mut along.coordinates {
+                    term.1 = -term.1.clone();
+                }
+            }
+            text.push(format!("prismatic({}, {shown})", formula.text));
+            steps.push(Step::Translate(axis, along));
+        }
+        _ if log.syntax_broken => {}
+        _ => log.push(
+            Diagnostic::error(joint.span, "this joint does not say how it moves")
+                .label("expected either `revolute` or `prismatic`")
+                .help("for example `joint = { revolute = \"q1\", axis = \"z\" }`; leave `joint` away where nothing moves"),
+        ),
+    }
+}
+
+fn without_zeros(steps: Vec<Step>) -> Vec<Step> {
+    steps
+        .into_iter()
+        .filter(|step| match step {
+            Step::Rotate(_, angle) => !angle.is_zero(),
+            Step::Translate(_, length) => !length.is_zero(),
+        })
+        .collect()
+}
+
+/// The points with their names.
+pub(super) struct Points {
+    pub(super) points: Vec<Point>,
+    names: BTreeMap<String, PointIdx>,
+}
+
+impl Points {
+    /// Looks a point up; an unknown name is reported.
+    pub(super) fn find(&self, name: &Name, log: &mut Log) -> Option<PointIdx> {
+        let found = self.get(&name.text);
+        if found.is_none() && !log.is_full() {
+            log.push(
+                Diagnostic::error(name.span, format!("unknown point `{}`", name.text))
+                    .label("expected the name of a point")
+                    .help_if(suggest::advice(&name.text, "points", self.names())),
+            );
+        }
+        found
+    }
+
+    /// The point of a name.
+    pub(super) fn get(&self, name: &str) -> Option<PointIdx> {
+        self.names.get(name).copied()
+    }
+
+    /// The names of all points.
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> + Clone {
+        self.names.keys().map(String::as_str)
+    }
+}
+
+/// Reads the points.
+pub(super) fn points(
+    model: &ModelEntry,
+    scope: &Scope,
+    tree: &Tree,
+    places: &mut Places,
+    log: &mut Log,
+) -> Points {
+    let mut points = Points {
+        points: Vec::new(),
+        names: BTreeMap::new(),
+    };
+    for entry in model.point.iter().flat_map(|list| &list.entries) {
+        let frame = entry.on.as_ref().and_then(|on| tree.find(on, log));
+        let at = entry.at.as_ref().map_or_else(
+            || std::array::from_fn(|_| Exact::zero()),
+            |at| {
+                let wanted = Wanted {
+                    sorts: &[Sort::Constant],
+                    dimension: Dimension::LENGTH,
+                    what: "the position of a point",
+                };
+                vector(at, scope, wanted, log)
+            },
+        );
+        let Some(name) = &entry.name else { continue };
+        if let Some(first) = points.names.get(&name.text) {
+            log.push(twice("point", name, places.points[first.0]));
+            continue;
+        }
+        points
+            .names
+            .insert(name.text.clone(), PointIdx(points.points.len()));
+        places.points.push(name.span);
+        points.points.push(Point {
+            name: name.text.clone(),
+            frame: frame.unwrap_or(FrameIdx(0)),
+            at,
+        });
+    }
+    points
+}

@@ -1,0 +1,98 @@
+//! From the tables of a file to the mechanism that they mean.
+//!
+//! Every stage reports all faults that it finds and goes on with what is sound; a name whose definition is faulty
+//! counts as known, so that one fault is reported once.
+
+mod actuation;
+mod bodies;
+mod effects;
+mod frames;
+mod symbols;
+
+use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::kinds::{EffectKind, describe, library_entries};
+use crate::mechanism::{Mechanism, Recording};
+use crate::pose;
+use crate::schema::ModelEntry;
+
+/// The places of what a mechanism holds, by index, for findings about its pose.
+#[derive(Debug, Default)]
+pub(crate) struct Places {
+    pub(crate) whole: Option<Span>,
+    pub(crate) frames: Vec<Option<Span>>,
+    pub(crate) points: Vec<Span>,
+    pub(crate) loops: Vec<Span>,
+    pub(crate) drives: Vec<Span>,
+    pub(crate) coordinates: Vec<Span>,
+}
+
+/// Builds the mechanism, if there are no errors, and the kinds of effects that its file may use.
+pub(crate) fn build(model: &ModelEntry, log: &mut Log) -> (Option<Mechanism>, Vec<EffectKind>) {
+    check_schema(model, log);
+    let mut places = Places {
+        whole: Some(model.span),
+        ..Places::default()
+    };
+    let mut symbols = symbols::declare(model, &mut places, log);
+    let gravity = symbols::gravity(model, &symbols.scope, log);
+    let tree = frames::frames(model, &symbols, &mut places, log);
+    let points = frames::points(model, &symbols.scope, &tree, &mut places, log);
+    let parts = bodies::parts(model, &symbols, &tree, log);
+    let lumped_masses = bodies::lumped_masses(model, &symbols, &tree, &points, log);
+    let loops = actuation::loops(model, &points, &mut places, log);
+    let drives = actuation::drives(model, &symbols, &points, &mut places, log);
+    let own_kinds = model
+        .effect_kind
+        .as_ref()
+        .map_or(&[][..], |list| list.entries.as_slice());
+    let effects = effects::effects(model, own_kinds, &mut symbols, &drives, &points, log);
+    let retain = effects::retain(model, &symbols, log);
+    let columns = actuation::recording(model, &symbols, &drives, log);
+    actuation::check_place_names(model, log);
+    if log.n_errors() == 0 {
+        symbols::warn_of_unused(&symbols, log);
+    }
+    let kinds = library_entries()
+        .iter()
+        .map(|entry| describe(entry, false))
+        .chain(own_kinds.iter().map(|entry| describe(entry, true)))
+        .collect();
+    let Some(name) = model.name.as_ref().filter(|_| log.n_errors() == 0) else {
+        return (None, kinds);
+    };
+    let mut mechanism = Mechanism {
+        name: name.text.clone(),
+        title: model.title.as_ref().map(|title| title.text.clone()),
+        gravity,
+        constants: symbols.constants,
+        parameters: symbols.parameters,
+        coordinates: symbols.coordinates,
+        frames: tree.frames,
+        points: points.points,
+        parts,
+        lumped_masses,
+        loops,
+        drives,
+        effects,
+        retain,
+        recording: Recording { columns },
+    };
+    pose::check(&mut mechanism, &places, log);
+    ((log.n_errors() == 0).then_some(mechanism), kinds)
+}
+
+#[allow(clippy::float_cmp)] // The version is an integer, and only that one is known.
+fn check_schema(model: &ModelEntry, log: &mut Log) {
+    if let Some(schema) = model.schema
+        && schema.value != 1.0
+    {
+        log.push(
+            Diagnostic::error(
+                schema.span,
+                format!("file format {} is not known", schema.value),
+            )
+            .label("expected 1")
+            .help("a newer modelmill may read this file; this one reads `schema = 1`"),
+        );
+    }
+}

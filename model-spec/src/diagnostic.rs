@@ -1,0 +1,313 @@
+//! Diagnostics: what is wrong with a model file, where, what was expected and what to do about it.
+//!
+//! Findings go in, text as rustc prints it comes out.
+
+use std::path::PathBuf;
+
+use annotate_snippets::renderer::DecorStyle;
+use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
+
+/// How many diagnostics are kept; a file with more has one cause behind them.
+const MOST_DIAGNOSTICS: usize = 100;
+/// Lines longer than this are named by their position and not printed.
+const LONGEST_PRINTED_LINE: usize = 400;
+
+/// A stretch of bytes in one of the files read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Span {
+    /// Index into [`Sources::files`].
+    pub file: usize,
+    /// First byte.
+    pub start: usize,
+    /// One past the last byte.
+    pub end: usize,
+}
+
+/// How grave a finding is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Severity {
+    /// The file has no meaning until this is mended.
+    Error,
+    /// The file has a meaning, though perhaps not the one intended.
+    Warning,
+}
+
+/// One finding about a model file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// Error or warning.
+    pub severity: Severity,
+    /// What is wrong, in one line.
+    pub message: String,
+    /// Where; absent if a file could not be read at all.
+    pub span: Option<Span>,
+    /// What was expected there; may be empty.
+    pub label: String,
+    /// Another place that explains the finding, such as a first definition.
+    pub related: Option<(Span, String)>,
+    /// What to do, one sentence each.
+    pub help: Vec<String>,
+}
+
+impl Diagnostic {
+    /// An error at a place.
+    pub(crate) fn error(span: Span, message: impl Into<String>) -> Self {
+        Self {
+            severity: Severity::Error,
+            message: message.into(),
+            span: Some(span),
+            label: String::new(),
+            related: None,
+            help: Vec::new(),
+        }
+    }
+
+    /// A warning at a place.
+    pub(crate) fn warning(span: Span, message: impl Into<String>) -> Self {
+        Self {
+            severity: Severity::Warning,
+            ..Self::error(span, message)
+        }
+    }
+
+    /// Says what was expected at the marked text.
+    #[must_use]
+    pub(crate) fn label(mut self, label: impl Into<String>) -> Self {
+        self.label = label.into();
+        self
+    }
+
+    /// Points at a second place.
+    #[must_use]
+    pub(crate) fn related(mut self, span: Span, label: impl Into<String>) -> Self {
+        self.related = Some((span, label.into()));
+        self
+    }
+
+    /// Says what to do.
+    #[must_use]
+    pub(crate) fn help(mut self, help: impl Into<String>) -> Self {
+        self.help.push(help.into());
+        self
+    }
+
+    /// Says what to do, if there is something to say.
+    #[must_use]
+    pub(crate) fn help_if(mut self, help: Option<String>) -> Self {
+        self.help.extend(help);
+        self
+    }
+}
+
+/// One file that was read.
+#[derive(Clone, Debug)]
+pub struct SourceFile {
+    /// The path as the user gave it, or as `extends` leads to it.
+    pub path: PathBuf,
+    /// Its text.
+    pub text: String,
+}
+
+/// The files that a model was read from, the model's own first.
+#[derive(Clone, Debug, Default)]
+pub struct Sources {
+    /// The files in the order in which they were read.
+    pub files: Vec<SourceFile>,
+}
+
+impl Sources {
+    /// The paths of all files, for `cargo:rerun-if-changed`.
+    pub fn paths(&self) -> impl Iterator<Item = &std::path::Path> {
+        self.files.iter().map(|file| file.path.as_path())
+    }
+
+    /// Line and column of a place, both counted from one, the column in characters.
+    pub fn line_and_column(&self, span: Span) -> (usize, usize) {
+        let Some(file) = self.files.get(span.file) else {
+            return (1, 1);
+        };
+        let before = &file.text[..floor_boundary(&file.text, span.start)];
+        let line = before.matches('\n').count() + 1;
+        let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
+        (line, column)
+    }
+}
+
+/// Collects findings while a file is read.
+#[derive(Debug, Default)]
+pub(crate) struct Log {
+    diagnostics: Vec<Diagnostic>,
+    n_errors: usize,
+    n_left_off: usize,
+    /// Set while the text itself is broken: what is missing then is no news.
+    pub(crate) syntax_broken: bool,
+}
+
+impl Log {
+    /// Takes a finding.
+    pub(crate) fn push(&mut self, diagnostic: Diagnostic) {
+        if diagnostic.severity == Severity::Error {
+            self.n_errors += 1;
+        }
+        if self.diagnostics.contains(&diagnostic) {
+            return;
+        }
+        if self.diagnostics.len() < MOST_DIAGNOSTICS {
+            self.diagnostics.push(diagnostic);
+        } else {
+            self.n_left_off += 1;
+        }
+    }
+
+    /// True once there are so many findings that it is not worth working out good advice for more.
+    pub(crate) fn is_full(&self) -> bool {
+        self.diagnostics.len() >= MOST_DIAGNOSTICS
+    }
+
+    /// Number of errors so far.
+    pub(crate) fn n_errors(&self) -> usize {
+        self.n_errors
+    }
+
+    /// All findings in the order of their places.
+    pub(crate) fn finish(mut self) -> Vec<Diagnostic> {
+        self.diagnostics
+            .sort_by_key(|found| found.span.map(|span| (span.file, span.start)));
+        if self.n_left_off > 0 {
+            self.diagnostics.push(Diagnostic {
+                severity: if self.n_errors > 0 {
+                    Severity::Error
+                } else {
+                    Severity::Warning
+                },
+                message: format!(
+                    "{} more findings are not shown; mend the first ones and look again",
+                    self.n_left_off
+                ),
+                span: None,
+                label: String::new(),
+                related: None,
+                help: Vec::new(),
+            });
+        }
+        self.diagnostics
+    }
+}
+
+/// Renders findings one below the other, with the text they mean.
+pub(crate) fn render(diagnostics: &[Diagnostic], sources: &Sources, color: bool) -> String {
+    let renderer = if color {
+        Renderer::styled()
+    } else {
+        Renderer::plain()
+    }
+    .decor_style(DecorStyle::Ascii);
+    let mut text = String::new();
+    for diagnostic in diagnostics {
+        text.push_str(&render_one(diagnostic, sources, &renderer));
+        text.push_str("\n\n");
+    }
+    text.truncate(text.trim_end().len());
+    text.push('\n');
+    text
+}
+
+fn render_one(diagnostic: &Diagnostic, sources: &Sources, renderer: &Renderer) -> String {
+    let level = match diagnostic.severity {
+        Severity::Error => Level::ERROR,
+        Severity::Warning => Level::WARNING,
+    };
+    let mut group = Group::with_title(level.primary_title(diagnostic.message.as_str()));
+    if let Some(span) = diagnostic.span {
+        let label = Some(diagnostic.label.as_str()).filter(|label| !label.is_empty());
+        match diagnostic.related.as_ref() {
+            Some((other, text)) if other.file == span.file => {
+                group = place(
+                    group,
+                    sources,
+                    &[(span, label, true), (*other, Some(text), false)],
+                );
+            }
+            Some((other, text)) => {
+                group = place(group, sources, &[(span, label, true)]);
+                group = place(group, sources, &[(*other, Some(text), false)]);
+            }
+            None => group = place(group, sources, &[(span, label, true)]),
+        }
+    }
+    for help in &diagnostic.help {
+        group = group.element(Level::HELP.message(help.as_str()));
+    }
+    renderer.render(&[group])
+}
+
+/// Adds the marked lines of one file to a group; long lines are named, not shown.
+fn place<'a>(
+    group: Group<'a>,
+    sources: &'a Sources,
+    marks: &[(Span, Option<&'a str>, bool)],
+) -> Group<'a> {
+    let Some(file) = marks
+        .first()
+        .and_then(|mark| sources.files.get(mark.0.file))
+    else {
+        return group;
+    };
+    let text = file.text.as_str();
+    let path = file.path.to_string_lossy().replace('\\', "/");
+    let first = marks.iter().map(|mark| mark.0.start).min().unwrap_or(0);
+    let last = marks.iter().map(|mark| mark.0.end).max().unwrap_or(0);
+    let start = line_start(text, first);
+    let end = line_end(text, last);
+    let window = &text[start..end];
+    if window.lines().any(|line| line.len() > LONGEST_PRINTED_LINE)
+        || window.len() > 200 * LONGEST_PRINTED_LINE
+    {
+        let (line, column) = sources.line_and_column(marks[0].0);
+        let mut group = group.element(Origin::path(path).line(line).char_column(column));
+        if let Some(label) = marks[0].1 {
+            group = group.element(Level::NOTE.message(label));
+        }
+        return group;
+    }
+    let line = text[..start].matches('\n').count() + 1;
+    let mut snippet = Snippet::source(window).line_start(line).path(path);
+    for &(span, label, primary) in marks {
+        let kind = if primary {
+            AnnotationKind::Primary
+        } else {
+            AnnotationKind::Context
+        };
+        let from = floor_boundary(text, span.start).clamp(start, end);
+        let to = ceil_boundary(text, span.end).clamp(from, end);
+        snippet = snippet.annotation(kind.span(from - start..to - start).label(label));
+    }
+    group.element(snippet)
+}
+
+fn line_start(text: &str, at: usize) -> usize {
+    text[..floor_boundary(text, at)]
+        .rfind('\n')
+        .map_or(0, |found| found + 1)
+}
+
+fn line_end(text: &str, at: usize) -> usize {
+    let at = ceil_boundary(text, at);
+    text[at..].find('\n').map_or(text.len(), |found| at + found)
+}
+
+fn floor_boundary(text: &str, at: usize) -> usize {
+    let mut at = at.min(text.len());
+    while !text.is_char_boundary(at) {
+        at -= 1;
+    }
+    at
+}
+
+fn ceil_boundary(text: &str, at: usize) -> usize {
+    let mut at = at.min(text.len());
+    while !text.is_char_boundary(at) {
+        at += 1;
+    }
+    at
+}

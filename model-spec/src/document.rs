@@ -1,0 +1,195 @@
+//! One TOML text as a tree whose every value and key knows its place.
+
+use toml::de::{DeTable, DeValue};
+
+use crate::diagnostic::{Diagnostic, Log, Span};
+
+/// Files larger than this are refused unread.
+pub(crate) const LARGEST_FILE: usize = 4 << 20;
+/// Names, paths and texts are cut to this length in messages.
+const LONGEST_QUOTE: usize = 60;
+
+/// A value with its place.
+#[derive(Clone, Debug)]
+pub(crate) struct Node {
+    pub(crate) span: Span,
+    pub(crate) value: Value,
+}
+
+/// What a place of the file holds.
+#[derive(Clone, Debug)]
+pub(crate) enum Value {
+    /// A string; `inner` is the byte where its content starts, if it stands there without escapes.
+    Text { text: String, inner: Option<usize> },
+    /// An integer or a decimal, as written.
+    Number { text: String, is_integer: bool },
+    /// `true` or `false`.
+    Boolean(bool),
+    /// A date or time, for which a model has no use.
+    Datetime,
+    /// A list.
+    Array(Vec<Node>),
+    /// Keys with values, in the order of the file.
+    Table(Table),
+}
+
+/// Keys with values, in the order of the file.
+pub(crate) type Table = Vec<(Key, Node)>;
+
+/// A key with its place.
+#[derive(Clone, Debug)]
+pub(crate) struct Key {
+    pub(crate) name: String,
+    pub(crate) span: Span,
+}
+
+impl Node {
+    /// What kind of value this is, for messages.
+    pub(crate) fn kind(&self) -> &'static str {
+        match &self.value {
+            Value::Text { .. } => "a string",
+            Value::Number {
+                is_integer: true, ..
+            } => "an integer",
+            Value::Number { .. } => "a number",
+            Value::Boolean(_) => "a boolean",
+            Value::Datetime => "a date",
+            Value::Array(_) => "an array",
+            Value::Table(_) => "a table",
+        }
+    }
+}
+
+/// Finds a key of a table.
+pub(crate) fn get<'a>(table: &'a Table, name: &str) -> Option<&'a (Key, Node)> {
+    table.iter().find(|(key, _)| key.name == name)
+}
+
+/// A user's text, cut so that a message stays readable.
+pub(crate) fn quote(text: &str) -> String {
+    if text.chars().count() <= LONGEST_QUOTE {
+        return text.to_owned();
+    }
+    let mut cut: String = text.chars().take(LONGEST_QUOTE).collect();
+    cut.push_str("...");
+    cut
+}
+
+/// Parses a file; syntax errors go to the log, and what could be understood comes back.
+pub(crate) fn parse(text: &str, file: usize, log: &mut Log) -> Table {
+    let whole = Span {
+        file,
+        start: 0,
+        end: 0,
+    };
+    if text.len() > LARGEST_FILE {
+        log.syntax_broken = true;
+        log.push(
+            Diagnostic::error(
+                whole,
+                format!("the file has {} bytes, which is too large", text.len()),
+            )
+            .label(format!("a model file has at most {LARGEST_FILE} bytes"))
+            .help("model files hold a mechanism; recordings belong into CSV files"),
+        );
+        return Table::new();
+    }
+    let (root, errors) = DeTable::parse_recoverable(text);
+    for error in &errors {
+        log.syntax_broken = true;
+        let span = error.span().map_or(whole, |range| Span {
+            file,
+            start: range.start.min(text.len()),
+            end: range.end.min(text.len()).max(range.start.min(text.len())),
+        });
+        log.push(syntax_error(span, error.message()));
+        if log.is_full() {
+            break;
+        }
+    }
+    table(root.into_inner(), text, file)
+}
+
+fn syntax_error(span: Span, message: &str) -> Diagnostic {
+    let help = if message.contains("recurs") {
+        "nest arrays and tables at most 80 deep; a model needs four levels"
+    } else if message.contains("duplicate key") {
+        "each name may be defined once; rename or delete one of the two"
+    } else if message.contains("string") || message.contains("quote") {
+        "expressions and names stand in quotes: `a = \"2*d1\"`"
+    } else {
+        "see https://toml.io for the syntax of TOML"
+    };
+    Diagnostic::error(span, format!("this is not TOML: {}", quote(message)))
+        .label(message.split(", expected ").nth(1).map_or_else(
+            || "here".to_owned(),
+            |expected| format!("expected {}", quote(expected)),
+        ))
+        .help(help)
+}
+
+fn table(table: DeTable<'_>, text: &str, file: usize) -> Table {
+    table
+        .into_iter()
+        .map(|(key, value)| {
+            let span = Span {
+                file,
+                start: key.span().start,
+                end: key.span().end,
+            };
+            let name = key.into_inner().into_owned();
+            (Key { name, span }, node(value, text, file))
+        })
+        .collect()
+}
+
+fn node(value: toml::Spanned<DeValue<'_>>, text: &str, file: usize) -> Node {
+    let range = value.span();
+    let span = Span {
+        file,
+        start: range.start,
+        end: range.end,
+    };
+    let value = match value.into_inner() {
+        DeValue::String(string) => {
+            let inner = [1, 3, 4]
+                .into_iter()
+                .map(|skip| range.start + skip)
+                .find(|&at| {
+                    text.get(at..at + string.len())
+                        .is_some_and(|found| found == string)
+                });
+            Value::Text {
+                text: string.into_owned(),
+                inner,
+            }
+        }
+        DeValue::Integer(integer) => {
+            let digits = integer.as_str();
+            let text = if integer.radix() == 10 {
+                digits.to_owned()
+            } else {
+                i128::from_str_radix(digits, integer.radix())
+                    .map_or_else(|_| digits.to_owned(), |value| value.to_string())
+            };
+            Value::Number {
+                text,
+                is_integer: true,
+            }
+        }
+        DeValue::Float(float) => Value::Number {
+            text: float.as_str().to_owned(),
+            is_integer: false,
+        },
+        DeValue::Boolean(value) => Value::Boolean(value),
+        DeValue::Datetime(_) => Value::Datetime,
+        DeValue::Array(array) => Value::Array(
+            array
+                .into_iter()
+                .map(|entry| node(entry, text, file))
+                .collect(),
+        ),
+        DeValue::Table(inner) => Value::Table(table(inner, text, file)),
+    };
+    Node { span, value }
+}

@@ -1,0 +1,260 @@
+//! Reads a model file and those that it extends, and makes the mechanism that they describe.
+
+use std::path::{Path, PathBuf};
+
+use crate::build::build;
+use crate::diagnostic::{self, Diagnostic, Log, Severity, SourceFile, Sources, Span};
+use crate::document::{self, LARGEST_FILE, Table, Value, get, quote};
+use crate::kinds::EffectKind;
+use crate::mechanism::Mechanism;
+use crate::merge::merge;
+use crate::schema::ModelEntry;
+
+/// Longest chain of variants.
+const LONGEST_CHAIN: usize = 8;
+
+/// A model file that was read and found sound.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// What the file describes.
+    pub mechanism: Mechanism,
+    /// What may not be intended, such as names that nothing uses.
+    pub warnings: Vec<Diagnostic>,
+    /// The files that were read.
+    pub sources: Sources,
+    /// The kinds of effects that the file may use: the library's, then its own.
+    pub kinds: Vec<EffectKind>,
+}
+
+impl Loaded {
+    /// The warnings as text, with the places they mean; empty if there are none.
+    pub fn render(&self, color: bool) -> String {
+        if self.warnings.is_empty() {
+            return String::new();
+        }
+        diagnostic::render(&self.warnings, &self.sources, color)
+    }
+}
+
+/// A model file that has no meaning, and why.
+#[derive(Clone, Debug)]
+pub struct Failure {
+    /// All findings, errors and warnings, in the order of the file.
+    pub diagnostics: Vec<Diagnostic>,
+    /// The files that were read.
+    pub sources: Sources,
+}
+
+impl Failure {
+    /// The findings as text, with the places they mean and what to do.
+    pub fn render(&self, color: bool) -> String {
+        diagnostic::render(&self.diagnostics, &self.sources, color)
+    }
+}
+
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.render(false))
+    }
+}
+
+impl std::error::Error for Failure {}
+
+/// Reads a model file from disk, and those that it extends.
+///
+/// Fails with every finding about the files, each with its place.
+pub fn load_file(path: &Path) -> Result<Loaded, Failure> {
+    let mut read = |path: &Path| -> std::io::Result<String> {
+        if std::fs::metadata(path)?.len() > LARGEST_FILE as u64 {
+            return Err(std::io::Error::other(format!(
+                "it is larger than {LARGEST_FILE} bytes"
+            )));
+        }
+        std::fs::read_to_string(path)
+    };
+    match read(path) {
+        Ok(text) => load(&path.to_string_lossy(), &text, &mut read),
+        Err(error) => Err(Failure {
+            diagnostics: vec![Diagnostic {
+                severity: Severity::Error,
+                message: format!("cannot read `{}`: {error}", path.display()),
+                span: None,
+                label: String::new(),
+                related: None,
+                help: vec![
+                    "give the path of a model file, such as `models/two_link.toml`".to_owned(),
+                ],
+            }],
+            sources: Sources::default(),
+        }),
+    }
+}
+
+/// Reads a model from its text; `read` fetches the files that it extends.
+///
+/// `path_name` is what messages call the file, and paths in `extends` are relative to its folder.
+///
+/// ```
+/// let text = r#"
+///     schema = 1
+///     name = "pendulum"
+///     gravity = [0, "-g", 0]
+///     constants = { g = { value = 9.81, unit = "m/s^2" } }
+///     coordinates = { q = {} }
+///     frame = [{ name = "arm", on = "base", modified_dh = { theta = "q" } }]
+///     part = [{ on = "arm", linear = { planar = "1" } }]
+///     drive = [{ name = "motor", joint = "q" }]
+/// "#;
+/// let loaded = modelmill_spec::load("pendulum.toml", text, &mut |_| unreachable!()).unwrap();
+/// let names: Vec<_> = loaded.mechanism.parameters.iter().map(|p| p.name.as_str()).collect();
+/// assert_eq!(names, ["ZZ1", "MX1", "MY1", "M1"]);
+///
+/// let failure = modelmill_spec::load("p.toml", &text.replace("\"q\" }", "\"p\" }"), &mut |_| unreachable!());
+/// assert!(failure.unwrap_err().render(false).contains("did you mean `q`?"));
+/// ```
+pub fn load(
+    path_name: &str,
+    text: &str,
+    read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
+) -> Result<Loaded, Failure> {
+    let mut log = Log::default();
+    let mut sources = Sources::default();
+    let table = read_chain(path_name, text, read, &mut sources, &mut log);
+    let whole = Span {
+        file: 0,
+        start: 0,
+        end: 0,
+    };
+    let model = ModelEntry::from_table(&table, whole, &mut log);
+    let (mechanism, kinds) = if log.syntax_broken {
+        // Names that a broken line would define would all be reported as unknown.
+        (None, Vec::new())
+    } else {
+        build(&model, &mut log)
+    };
+    let mut diagnostics = log.finish();
+    match mechanism {
+        Some(mechanism) => Ok(Loaded {
+            mechanism,
+            warnings: diagnostics,
+            sources,
+            kinds,
+        }),
+        None => {
+            diagnostics.sort_by_key(|found| found.severity);
+            Err(Failure {
+                diagnostics,
+                sources,
+            })
+        }
+    }
+}
+
+/// Reads a file and those that it extends, and merges them, the variant over its base.
+fn read_chain(
+    path_name: &str,
+    text: &str,
+    read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
+    sources: &mut Sources,
+    log: &mut Log,
+) -> Table {
+    let mut tables = Vec::new();
+    let mut path = PathBuf::from(path_name);
+    let mut text = text.to_owned();
+    loop {
+        let file = sources.files.len();
+        let table = document::parse(&text, file, log);
+        sources.files.push(SourceFile {
+            path: path.clone(),
+            text,
+        });
+        let next = extended(&table, &path, sources, read, log);
+        tables.push(table);
+        match next {
+            Some((next_path, next_text)) => {
+                path = next_path;
+                text = next_text;
+            }
+            None => break,
+        }
+    }
+    let mut merged = tables.pop().unwrap_or_default();
+    while let Some(variant) = tables.pop() {
+        merged = merge(merged, variant, log);
+    }
+    merged
+}
+
+/// The file that this one extends, if any.
+fn extended(
+    table: &Table,
+    path: &Path,
+    sources: &Sources,
+    read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
+    log: &mut Log,
+) -> Option<(PathBuf, String)> {
+    let (_, node) = get(table, "extends")?;
+    let Value::Text { text: target, .. } = &node.value else {
+        // The merge drops a base's own keys, so the type must be looked at here.
+        if !sources.files.is_empty() && sources.files.len() > 1 {
+            log.push(
+                Diagnostic::error(node.span, "`extends` is no path")
+                    .label("expected a path in quotes"),
+            );
+        }
+        return None;
+    };
+    let next = tidy(&path.parent().unwrap_or(Path::new("")).join(target));
+    let mut fault = |message: String, label: &str, help: &str| {
+        log.push(
+            Diagnostic::error(node.span, message)
+                .label(label)
+                .help(help),
+        );
+        // What the missing file would define is not reported as unknown.
+        log.syntax_broken = true;
+    };
+    if sources.files.iter().any(|file| tidy(&file.path) == next) {
+        fault(
+            "these files extend one another in a circle".to_owned(),
+            "this file is being read already",
+            "a variant extends a file that does not depend on it",
+        );
+        return None;
+    }
+    if sources.files.len() >= LONGEST_CHAIN {
+        fault(
+            "this chain of variants is too long".to_owned(),
+            "one file too many",
+            &format!("at most {LONGEST_CHAIN} files extend one another"),
+        );
+        return None;
+    }
+    match read(&next) {
+        Ok(text) => Some((next, text)),
+        Err(error) => {
+            fault(
+                format!("cannot read `{}`: {error}", quote(&next.to_string_lossy())),
+                "expected the path of a model file, relative to this one",
+                "check the path; it starts from the folder of the file that names it",
+            );
+            None
+        }
+    }
+}
+
+/// Drops `.` and resolves `..` by name, so that one file has one path.
+fn tidy(path: &Path) -> PathBuf {
+    use std::path::Component;
+    let mut parts: Vec<Component<'_>> = Vec::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir if matches!(parts.last(), Some(Component::Normal(_))) => {
+                parts.pop();
+            }
+            part => parts.push(part),
+        }
+    }
+    parts.into_iter().collect()
+}

@@ -1,0 +1,88 @@
+//! The little linear algebra that checks of a pose need: rank and least squares of small dense matrices.
+
+/// A dense matrix by rows.
+pub(crate) type Rows = Vec<Vec<f64>>;
+
+/// The numeric rank: pivots above `tolerance` times the largest entry, by elimination with full pivoting.
+pub(crate) fn rank(rows: &Rows, tolerance: f64) -> usize {
+    let mut rows = rows.clone();
+    let n_columns = rows.first().map_or(0, Vec::len);
+    let largest = rows
+        .iter()
+        .flatten()
+        .fold(0.0_f64, |most, entry| most.max(entry.abs()));
+    if largest == 0.0 || !largest.is_finite() {
+        return 0;
+    }
+    let mut used = vec![false; n_columns];
+    let mut rank = 0;
+    while rank < rows.len() {
+        let mut pivot = (rank, 0, 0.0);
+        for (i, row) in rows.iter().enumerate().skip(rank) {
+            for (j, entry) in row.iter().enumerate() {
+                if !used[j] && entry.abs() > pivot.2 {
+                    pivot = (i, j, entry.abs());
+                }
+            }
+        }
+        let (i, j, size) = pivot;
+        if size <= tolerance * largest {
+            break;
+        }
+        rows.swap(rank, i);
+        used[j] = true;
+        let (done, rest) = rows.split_at_mut(rank + 1);
+        let pivot_row = &done[rank];
+        for row in rest {
+            let factor = row[j] / pivot_row[j];
+            if factor != 0.0 {
+                for (entry, above) in row.iter_mut().zip(pivot_row) {
+                    *entry -= factor * above;
+                }
+                row[j] = 0.0;
+            }
+        }
+        rank += 1;
+    }
+    rank
+}
+
+/// Solves the normal equations `(JᵀJ + damping) x = Jᵀ r` by elimination; `None` where they are singular.
+pub(crate) fn least_squares(jacobian: &Rows, residual: &[f64], damping: f64) -> Option<Vec<f64>> {
+    let n = jacobian.first()?.len();
+    let mut matrix = vec![vec![0.0; n + 1]; n];
+    for (row, r) in jacobian.iter().zip(residual) {
+        for i in 0..n {
+            if row[i] == 0.0 {
+                continue;
+            }
+            for j in 0..n {
+                matrix[i][j] += row[i] * row[j];
+            }
+            matrix[i][n] += row[i] * r;
+        }
+    }
+    for (i, row) in matrix.iter_mut().enumerate() {
+        row[i] += damping;
+    }
+    for k in 0..n {
+        let best = (k..n).max_by(|&i, &j| matrix[i][k].abs().total_cmp(&matrix[j][k].abs()))?;
+        if matrix[best][k] == 0.0 || !matrix[best][k].is_finite() {
+            return None;
+        }
+        matrix.swap(k, best);
+        let (done, rest) = matrix.split_at_mut(k + 1);
+        for row in rest {
+            let factor = row[k] / done[k][k];
+            for (entry, above) in row.iter_mut().zip(&done[k]).skip(k) {
+                *entry -= factor * above;
+            }
+        }
+    }
+    let mut x = vec![0.0; n];
+    for k in (0..n).rev() {
+        let known: f64 = (k + 1..n).map(|j| matrix[k][j] * x[j]).sum();
+        x[k] = (matrix[k][n] - known) / matrix[k][k];
+    }
+    x.iter().all(|entry| entry.is_finite()).then_some(x)
+}

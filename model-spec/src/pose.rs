@@ -1,0 +1,541 @@
+//! The mechanism at its nominal pose: do the loops close there, do they settle the passive coordinates,
+//! and can the drives hold it?
+//!
+//! A mechanism goes in, its passive coordinates come out refined until the loops close, by Gauss-Newton steps
+//! damped after Levenberg and Marquardt.
+
+use crate::build::Places;
+use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::exact::{CoordinateIdx, Symbol};
+use crate::mechanism::{Axis, DriveKind, Mechanism, Motion, PointIdx, Step};
+use crate::numeric::{Rows, least_squares, rank};
+
+/// Passive angles may move this far, in rad, before it counts as another assembly.
+const FARTHEST_TURN: f64 = 0.5;
+/// Loops must close to this, relative to the size of the mechanism.
+const CLOSED: f64 = 1e-9;
+/// Pivots below this, relative to the largest, count as zero.
+const SINGULAR: f64 = 1e-8;
+
+type Vec3 = [f64; 3];
+
+/// One motion on the way from the base to a frame.
+struct Moved {
+    coordinate: CoordinateIdx,
+    factor: f64,
+    motion: Motion,
+    axis: Vec3,
+    origin: Vec3,
+}
+
+struct FramePose {
+    rotation: [Vec3; 3],
+    origin: Vec3,
+    own: Vec<Moved>,
+}
+
+/// Checks the nominal pose and refines the passive coordinates there.
+pub(crate) fn check(mechanism: &mut Mechanism, places: &Places, log: &mut Log) {
+    if !check_finite(mechanism, places, log) {
+        return;
+    }
+    if close_loops(mechanism, places, log) && check_passive(mechanism, places, log) {
+        check_drives(mechanism, places, log);
+    }
+}
+
+/// Poses of all frames at the nominal values.
+fn frame_poses(mechanism: &Mechanism) -> Vec<FramePose> {
+    let value = |symbol: Symbol| mechanism.symbol_nominal(symbol);
+    let mut poses: Vec<FramePose> = Vec::with_capacity(mechanism.frames.len());
+    for (i, frame) in mechanism.frames.iter().enumerate() {
+        let (mut rotation, mut origin) = if i == 0 {
+            (
+                [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+                [0.0; 3],
+            )
+        } else {
+            let parent = &poses[frame.parent.0];
+            (parent.rotation, parent.origin)
+        };
+        let mut own = Vec::new();
+        for step in &frame.steps {
+            match step {
+                Step::Rotate(axis, angle) => {
+                    let direction = column(&rotation, *axis);
+                    for &(symbol, factor) in &angle.terms {
+                        if let Symbol::Coordinate(coordinate) = symbol {
+                            own.push(Moved {
+                                coordinate,
+                                factor: f64::from(factor),
+                                motion: Motion::Revolute,
+                                axis: direction,
+                                origin,
+                            });
+                        }
+                    }
+                    rotate(&mut rotation, *axis, angle.evaluate(&value));
+                }
+                Step::Translate(axis, length) => {
+                    let direction = column(&rotation, *axis);
+                    for (coordinate, factor) in &length.coordinates {
+                        own.push(Moved {
+                            coordinate: *coordinate,
+                            factor: crate::print::to_f64(factor),
+                            motion: Motion::Prismatic,
+                            axis: direction,
+                            origin,
+                        });
+                    }
+                    let distance = length.evaluate(&value);
+                    for k in 0..3 {
+                        origin[k] += distance * direction[k];
+                    }
+                }
+            }
+        }
+        poses.push(FramePose {
+            rotation,
+            origin,
+            own,
+        });
+    }
+    poses
+}
+
+fn column(rotation: &[Vec3; 3], axis: Axis) -> Vec3 {
+    let j = match axis {
+        Axis::X => 0,
+        Axis::Y => 1,
+        Axis::Z => 2,
+    };
+    [rotation[0][j], rotation[1][j], rotation[2][j]]
+}
+
+/// Multiplies from the right by an elementary rotation.
+fn rotate(rotation: &mut [Vec3; 3], axis: Axis, angle: f64) {
+    let (sin, cos) = angle.sin_cos();
+    let (j, k) = match axis {
+        Axis::X => (1, 2),
+        Axis::Y => (2, 0),
+        Axis::Z => (0, 1),
+    };
+    for row in rotation {
+        let (first, second) = (row[j], row[k]);
+        row[j] = first * cos + second * sin;
+        row[k] = second * cos - first * sin;
+    }
+}
+
+fn position(mechanism: &Mechanism, poses: &[FramePose], point: PointIdx) -> Vec3 {
+    let value = |symbol: Symbol| mechanism.symbol_nominal(symbol);
+    let point = &mechanism.points[point.0];
+    let pose = &poses[point.frame.0];
+    let local = [0, 1, 2].map(|k| point.at[k].evaluate(&value));
+    std::array::from_fn(|k| {
+        pose.origin[k] + (0..3).map(|j| pose.rotation[k][j] * local[j]).sum::<f64>()
+    })
+}
+
+/// Derivative of a point's position by each coordinate: three rows.
+fn jacobian(
+    mechanism: &Mechanism,
+    poses: &[FramePose],
+    point: PointIdx,
+    at: Vec3,
+) -> [Vec<f64>; 3] {
+    let mut rows = [0, 1, 2].map(|_| vec![0.0; mechanism.coordinates.len()]);
+    let mut frame = mechanism.points[point.0].frame.0;
+    while frame != 0 {
+        for moved in &poses[frame].own {
+            let velocity = match moved.motion {
+                Motion::Prismatic => moved.axis,
+                Motion::Revolute => {
+                    let arm: Vec3 = std::array::from_fn(|k| at[k] - moved.origin[k]);
+                    cross(moved.axis, arm)
+                }
+            };
+            for k in 0..3 {
+                rows[k][moved.coordinate.0] += moved.factor * velocity[k];
+            }
+        }
+        frame = mechanism.frames[frame].parent.0;
+    }
+    rows
+}
+
+fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// Gaps of all loops, the derivative of the gaps, and the size of the mechanism.
+struct Gaps {
+    gaps: Vec<f64>,
+    rows: Rows,
+    size: f64,
+}
+
+fn gaps(mechanism: &Mechanism) -> Gaps {
+    let poses = frame_poses(mechanism);
+    let mut found = Gaps {
+        gaps: Vec::new(),
+        rows: Vec::new(),
+        size: 0.0,
+    };
+    for closed in &mechanism.loops {
+        let [one, other] = closed.joins.map(|point| position(mechanism, &poses, point));
+        let left = jacobian(mechanism, &poses, closed.joins[0], one);
+        let right = jacobian(mechanism, &poses, closed.joins[1], other);
+        for k in 0..3 {
+            found.gaps.push(one[k] - other[k]);
+            found
+                .rows
+                .push(left[k].iter().zip(&right[k]).map(|(a, b)| a - b).collect());
+            found.size = found.size.max(one[k].abs()).max(other[k].abs());
+        }
+    }
+    for pose in &poses {
+        found.size = pose
+            .origin
+            .iter()
+            .fold(found.size, |size, x| size.max(x.abs()));
+    }
+    found
+}
+
+fn norm(values: &[f64]) -> f64 {
+    values.iter().map(|value| value * value).sum::<f64>().sqrt()
+}
+
+/// Columns of the passive coordinates, or of the others.
+fn columns(mechanism: &Mechanism, rows: &Rows, passive: bool) -> Rows {
+    rows.iter()
+        .map(|row| {
+            row.iter()
+                .zip(&mechanism.coordinates)
+                .filter(|(_, coordinate)| coordinate.passive == passive)
+                .map(|(entry, _)| *entry)
+                .collect()
+        })
+        .collect()
+}
+
+/// Reports lengths and positions that have no finite value, such as the root of a negative number.
+fn check_finite(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
+    let before = log.n_errors();
+    let value = |symbol: Symbol| mechanism.symbol_nominal(symbol);
+    let mut report = |span: Option<Span>, what: &str| {
+        if let Some(span) = span {
+            log.push(
+                Diagnostic::error(span, format!("{what} has no finite value"))
+                    .label("with the constants of this file")
+                    .help("look for a division by zero, the root of a negative number, or a value that is far too large"),
+            );
+        }
+    };
+    for (i, frame) in mechanism.frames.iter().enumerate() {
+        let finite = frame.steps.iter().all(|step| match step {
+            Step::Rotate(_, angle) => angle.evaluate(&value).is_finite(),
+            Step::Translate(_, length) => length.evaluate(&value).abs() < 1e100,
+        });
+        if !finite {
+            report(
+                places.frames.get(i).copied().flatten(),
+                "the place of this frame",
+            );
+        }
+    }
+    for (i, point) in mechanism.points.iter().enumerate() {
+        if point
+            .at
+            .iter()
+            .any(|at| at.evaluate(&value).abs() > 1e100 || at.evaluate(&value).is_nan())
+        {
+            report(places.points.get(i).copied(), "the position of this point");
+        }
+    }
+    if mechanism
+        .gravity
+        .iter()
+        .any(|entry| !entry.evaluate(&value).is_finite())
+    {
+        report(places.whole, "gravity");
+    }
+    log.n_errors() == before
+}
+
+/// Moves the passive coordinates until the loops close; false if they do not, or only far away.
+fn close_loops(mechanism: &mut Mechanism, places: &Places, log: &mut Log) -> bool {
+    if mechanism.loops.is_empty() {
+        return true;
+    }
+    let passive: Vec<usize> = (0..mechanism.coordinates.len())
+        .filter(|&i| mechanism.coordinates[i].passive)
+        .collect();
+    let given: Vec<f64> = passive
+        .iter()
+        .map(|&i| mechanism.coordinates[i].nominal)
+        .collect();
+    let at_start = gaps(mechanism);
+    let size = at_start.size.max(1e-6);
+    let mut now = at_start;
+    let mut damping = 1e-9;
+    for _ in 0..100 {
+        if norm(&now.gaps) <= 1e-14 * size || passive.is_empty() {
+            break;
+        }
+        let rows = columns(mechanism, &now.rows, true);
+        let Some(step) = least_squares(&rows, &now.gaps, damping * size * size) else {
+            damping = f64::max(damping * 10.0, 1e-12);
+            continue;
+        };
+        let before: Vec<f64> = passive
+            .iter()
+            .map(|&i| mechanism.coordinates[i].nominal)
+            .collect();
+        for (&i, change) in passive.iter().zip(&step) {
+            mechanism.coordinates[i].nominal -= change;
+        }
+        let next = gaps(mechanism);
+        if norm(&next.gaps) < norm(&now.gaps) {
+            now = next;
+            damping *= 0.1;
+        } else {
+            for (&i, value) in passive.iter().zip(before) {
+                mechanism.coordinates[i].nominal = value;
+            }
+            damping *= 10.0;
+            if damping > 1e3 {
+                break;
+            }
+        }
+    }
+    let mut closes = true;
+    for (i, closed) in mechanism.loops.iter().enumerate() {
+        let gap = norm(&now.gaps[3 * i..3 * i + 3]);
+        // A gap that is no number is no closed loop either.
+        if gap <= CLOSED * size {
+            continue;
+        }
+        closes = false;
+        let [one, other] = closed
+            .joins
+            .map(|point| mechanism.points[point.0].name.as_str());
+        log.push(
+            Diagnostic::error(
+                places.loops[i],
+                format!("the loop `{}` does not close at the nominal pose", closed.name),
+            )
+            .label(format!("`{one}` and `{other}` stay {gap:.3} m apart"))
+            .help("check the lengths, and the nominal values of the coordinates of both chains")
+            .help("the values of passive coordinates are only a start: they are moved until the loops close, those of active ones stay"),
+        );
+    }
+    closes && check_same_assembly(mechanism, &passive, &given, size, places, log)
+}
+
+fn check_same_assembly(
+    mechanism: &Mechanism,
+    passive: &[usize],
+    given: &[f64],
+    size: f64,
+    places: &Places,
+    log: &mut Log,
+) -> bool {
+    let mut fine = true;
+    for (&i, given) in passive.iter().zip(given) {
+        let coordinate = &mechanism.coordinates[i];
+        let (farthest, unit) = match coordinate.motion {
+            Motion::Revolute => (FARTHEST_TURN, "rad"),
+            Motion::Prismatic => (0.3 * size, "m"),
+        };
+        let way = (coordinate.nominal - given).abs();
+        if way <= farthest {
+            continue;
+        }
+        fine = false;
+        log.push(
+            Diagnostic::error(
+                places.coordinates[i],
+                format!("the loops do not close near the nominal value of `{}`", coordinate.name),
+            )
+            .label(format!(
+                "given {given}, but the loops close at {:.4}, {way:.2} {unit} away",
+                coordinate.nominal
+            ))
+            .help("the nominal values choose among the ways to assemble the mechanism, so they must be near the one that is meant")
+            .help(format!(
+                "if that is the assembly you mean, write `{} = {{ nominal = {:.4}, passive = true }}`",
+                coordinate.name, coordinate.nominal
+            )),
+        );
+    }
+    fine
+}
+
+/// The loops must settle the passive coordinates, and nothing else.
+fn check_passive(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
+    let passive: Vec<usize> = (0..mechanism.coordinates.len())
+        .filter(|&i| mechanism.coordinates[i].passive)
+        .collect();
+    if mechanism.loops.is_empty() && passive.is_empty() {
+        return true;
+    }
+    let rows = gaps(mechanism).rows;
+    let settled = rank(&columns(mechanism, &rows, true), SINGULAR);
+    let equations = rank(&rows, SINGULAR);
+    let plural = |n: usize, one: &str| format!("{n} {one}{}", if n == 1 { "" } else { "s" });
+    if equations > passive.len() {
+        log.push(
+            Diagnostic::error(
+                places.loops[0],
+                format!(
+                    "the loops tie {}, but {} passive",
+                    plural(equations, "coordinate"),
+                    if passive.len() == 1 {
+                        "1 is".to_owned()
+                    } else {
+                        format!("{} are", passive.len())
+                    }
+                ),
+            )
+            .label(format!(
+                "{} are independent at the nominal pose",
+                plural(equations, "loop equation")
+            ))
+            .help(format!(
+                "mark {} more as `passive = true`, or give the mechanism another joint",
+                plural(equations - passive.len(), "coordinate")
+            )),
+        );
+        return false;
+    }
+    if settled == passive.len() {
+        return true;
+    }
+    // Name one that is left over: without it the others still have the same rank.
+    let left_over = passive.iter().enumerate().rev().find(|(k, _)| {
+        let mut without = columns(mechanism, &rows, true);
+        for row in &mut without {
+            row.remove(*k);
+        }
+        rank(&without, SINGULAR) == settled
+    });
+    let i = left_over.map_or(passive[0], |(_, &i)| i);
+    let diagnostic = Diagnostic::error(
+        places.coordinates[i],
+        format!(
+            "the loops do not settle `{}`",
+            mechanism.coordinates[i].name
+        ),
+    );
+    log.push(if equations > settled {
+        diagnostic
+            .label("at the nominal pose this passive coordinate is free to move")
+            .help("the nominal pose is singular: choose another one, or make other coordinates passive")
+    } else {
+        diagnostic
+            .label(format!(
+                "{} for {}",
+                plural(equations, "independent loop equation"),
+                plural(passive.len(), "passive coordinate")
+            ))
+            .help("close another loop, or drive this coordinate and drop `passive`")
+    });
+    false
+}
+
+/// The drives must move with the degrees of freedom, one to one, at the nominal pose.
+fn check_drives(mechanism: &Mechanism, places: &Places, log: &mut Log) {
+    let found = gaps(mechanism);
+    let poses = frame_poses(mechanism);
+    let mut rates: Rows = Vec::new();
+    for (i, drive) in mechanism.drives.iter().enumerate() {
+        let mut row = vec![0.0; mechanism.coordinates.len()];
+        match drive.kind {
+            DriveKind::Joint(coordinate) => row[coordinate.0] = 1.0,
+            DriveKind::Linear { from, to } => {
+                let (start, end) = (
+                    position(mechanism, &poses, from),
+                    position(mechanism, &poses, to),
+                );
+                let along: Vec3 = std::array::from_fn(|k| end[k] - start[k]);
+                let length = norm(&along);
+                if length.is_nan() || length <= 1e-12 * found.size {
+                    log.push(
+                        Diagnostic::error(
+                            places.drives[i],
+                            format!(
+                                "the drive `{}` has no length at the nominal pose",
+                                drive.name
+                            ),
+                        )
+                        .label("its two points coincide there, so its force has no direction"),
+                    );
+                    return;
+                }
+                let tail = jacobian(mechanism, &poses, from, start);
+                let head = jacobian(mechanism, &poses, to, end);
+                for k in 0..3 {
+                    for (j, entry) in row.iter_mut().enumerate() {
+                        *entry += along[k] / length * (head[k][j] - tail[k][j]);
+                    }
+                }
+            }
+        }
+        rates.push(row);
+    }
+    // Rates of the passive coordinates follow from those of the active ones.
+    let dependent = columns(mechanism, &found.rows, true);
+    let independent = columns(mechanism, &found.rows, false);
+    let direct = columns(mechanism, &rates, false);
+    let through = columns(mechanism, &rates, true);
+    let n_active = direct.first().map_or(0, Vec::len);
+    let mut total = direct;
+    for j in 0..n_active {
+        if dependent.first().is_none_or(Vec::is_empty) {
+            break;
+        }
+        let driven: Vec<f64> = independent.iter().map(|row| -row[j]).collect();
+        let Some(passive_rates) = least_squares(&dependent, &driven, 0.0) else {
+            return;
+        };
+        for (row, through) in total.iter_mut().zip(&through) {
+            row[j] += through
+                .iter()
+                .zip(&passive_rates)
+                .map(|(a, b)| a * b)
+                .sum::<f64>();
+        }
+    }
+    // Lengths and angles mix in one matrix; scale each row so that neither drowns.
+    for row in &mut total {
+        let size = norm(row);
+        if size > 0.0 {
+            for entry in row {
+                *entry /= size;
+            }
+        }
+    }
+    let held = rank(&total, 1e-7);
+    if held < n_active {
+        let weakest = total
+            .iter()
+            .position(|row| norm(row) == 0.0)
+            .unwrap_or_else(|| mechanism.drives.len().saturating_sub(1));
+        if let Some(span) = places.drives.get(weakest) {
+            log.push(
+                Diagnostic::error(
+                    *span,
+                    format!("the drives hold only {held} of {n_active} degrees of freedom at the nominal pose"),
+                )
+                .label("moving this one changes nothing that the other drives do not hold already")
+                .help("choose a nominal pose away from this singularity, or drive another coordinate"),
+            );
+        }
+    }
+}

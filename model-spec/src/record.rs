@@ -1,0 +1,530 @@
+//! How types of the schema read themselves from a file, and how they describe themselves to editors.
+//!
+//! One declaration by [`record!`] gives the struct, its reader (which reports every fault and goes on)
+//! and its JSON Schema, so that the three cannot drift apart.
+
+use std::borrow::Cow;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+
+use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::document::{Key, Node, Table, Value, get, quote};
+use crate::suggest;
+
+/// Most entries of one list or table.
+const MOST_ENTRIES: usize = 1000;
+/// Words that mean something in expressions and so name nothing else.
+const RESERVED: [&str; 14] = [
+    "pi",
+    "sin",
+    "cos",
+    "sqrt",
+    "abs",
+    "sign",
+    "tanh",
+    "exp",
+    "base",
+    "coordinate",
+    "rate",
+    "acceleration",
+    "load",
+    "t",
+];
+
+/// A type of the schema.
+pub(crate) trait Read: Sized {
+    /// What a place of this type holds, for messages: `a string`.
+    const EXPECTED: &'static str;
+    /// An example of it as TOML.
+    const EXAMPLE: &'static str;
+
+    /// Reads a value; a fault goes to the log and gives `None`.
+    fn read(node: &Node, log: &mut Log) -> Option<Self>;
+}
+
+/// Reports a value of the wrong type.
+pub(crate) fn wrong_type<T: Read>(node: &Node, log: &mut Log) -> Option<T> {
+    log.push(
+        Diagnostic::error(
+            node.span,
+            format!("{} stands where it does not belong", node.kind()),
+        )
+        .label(format!("expected {}", T::EXPECTED))
+        .help(format!("for example `{}`", T::EXAMPLE)),
+    );
+    None
+}
+
+/// Declares a table of the schema: a struct whose fields are all optional once read (faults are reported, not fatal),
+/// its reader and its JSON Schema.
+macro_rules! record {
+    (
+        $(#[doc = $about:literal])*
+        $name:ident = $title:literal {
+            $( $(#[doc = $doc:literal])* $key:literal $field:ident: $need:ident $type:ty, )*
+        }
+    ) => {
+        $(#[doc = $about])*
+        #[derive(Clone, Debug)]
+        #[allow(dead_code)] // Remarks, for example, are there for people and for the schema.
+        pub(crate) struct $name {
+            /// The place of the table.
+            pub(crate) span: $crate::diagnostic::Span,
+            $( $(#[doc = $doc])* pub(crate) $field: Option<$type>, )*
+        }
+
+        impl $name {
+            /// The keys of the table.
+            pub(crate) const KEYS: &'static [&'static str] = &[$($key),*];
+
+            /// Reads a table; every fault is reported, and what is sound comes back.
+            pub(crate) fn from_table(
+                table: &$crate::document::Table,
+                span: $crate::diagnostic::Span,
+                log: &mut $crate::diagnostic::Log,
+            ) -> Self {
+                $crate::record::check_keys(table, Self::KEYS, $title, log);
+                Self {
+                    span,
+                    $( $field: $crate::record::field::<$type>(
+                        table, $key, $crate::record::need!($need), $title, span, log), )*
+                }
+            }
+        }
+
+        impl $crate::record::Read for $name {
+            const EXPECTED: &'static str = concat!("a table: ", $title);
+            const EXAMPLE: &'static str = concat!("{ ", $crate::record::first!($($key),*), " = ... }");
+
+            fn read(node: &$crate::document::Node, log: &mut $crate::diagnostic::Log) -> Option<Self> {
+                let $crate::document::Value::Table(table) = &node.value else {
+                    return $crate::record::wrong_type::<Self>(node, log);
+                };
+                Some(Self::from_table(table, node.span, log))
+            }
+        }
+
+        impl schemars::JsonSchema for $name {
+            fn schema_name() -> std::borrow::Cow<'static, str> {
+                stringify!($name).trim_end_matches("Entry").to_owned().into()
+            }
+
+            fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+                let mut properties = serde_json::Map::new();
+                let mut required: Vec<&str> = Vec::new();
+                $(
+                    let schema = $crate::record::described(
+                        generator.subschema_for::<$type>(), concat!($($doc, "\n"),*));
+                    properties.insert($key.to_owned(), schema);
+                    if $crate::record::need!($need) {
+                        required.push($key);
+                    }
+                )*
+                schemars::json_schema!({
+                    "description": $crate::record::tidy(concat!($($about, "\n"),*)),
+                    "type": "object",
+                    "properties": properties,
+                    "required": required,
+                    "additionalProperties": false,
+                })
+            }
+        }
+    };
+}
+macro_rules! need {
+    (required) => {
+        true
+    };
+    (optional) => {
+        false
+    };
+}
+macro_rules! first {
+    ($first:literal $(, $rest:literal)*) => {
+        $first
+    };
+}
+pub(crate) use {first, need, record};
+
+/// Reads one field of a table.
+pub(crate) fn field<T: Read>(
+    table: &Table,
+    key: &str,
+    required: bool,
+    title: &str,
+    span: Span,
+    log: &mut Log,
+) -> Option<T> {
+    if let Some((_, node)) = get(table, key) {
+        return T::read(node, log);
+    }
+    if required && !log.syntax_broken {
+        log.push(
+            Diagnostic::error(span, format!("{title} lacks `{key}`"))
+                .label(format!("expected `{key}`, {}", T::EXPECTED))
+                .help(format!("add `{key} = {}`", T::EXAMPLE)),
+        );
+    }
+    None
+}
+
+/// Reports keys that a table does not have.
+pub(crate) fn check_keys(table: &Table, known: &[&str], title: &str, log: &mut Log) {
+    for (key, _) in table {
+        if known.contains(&key.name.as_str()) || log.is_full() {
+            continue;
+        }
+        log.push(
+            Diagnostic::error(key.span, format!("unknown key `{}`", quote(&key.name)))
+                .label(format!("{title} has no such key"))
+                .help_if(suggest::advice(&key.name, "keys", known.iter().copied())),
+        );
+    }
+}
+
+/// Adds a description to a schema, also to a reference.
+pub(crate) fn described(mut schema: Schema, text: &str) -> serde_json::Value {
+    if !text.trim().is_empty() {
+        schema.insert("description".to_owned(), tidy(text).into());
+    }
+    schema.to_value()
+}
+
+/// Joins the lines of a doc comment.
+pub(crate) fn tidy(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// A name, where it is defined or where it is used.
+#[derive(Clone, Debug)]
+pub(crate) struct Name {
+    pub(crate) text: String,
+    pub(crate) span: Span,
+}
+
+impl Read for Name {
+    const EXPECTED: &'static str = "a name in quotes";
+    const EXAMPLE: &'static str = "\"S1\"";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        let Value::Text { text, .. } = &node.value else {
+            return wrong_type::<Self>(node, log);
+        };
+        check_name(text, node.span, log).then(|| Self {
+            text: text.clone(),
+            span: node.span,
+        })
+    }
+}
+
+/// Reports a name that is no identifier.
+fn check_name(text: &str, span: Span, log: &mut Log) -> bool {
+    let fine = text.len() <= 60
+        && text.starts_with(|first: char| first.is_ascii_alphabetic())
+        && text
+            .chars()
+            .all(|found| found.is_ascii_alphanumeric() || found == '_');
+    if !fine {
+        log.push(
+            Diagnostic::error(span, format!("`{}` cannot be a name", quote(text)))
+                .label("expected a letter, then letters, digits and `_`, at most 60"),
+        );
+    }
+    fine
+}
+
+/// Reports a name that is taken by the language of expressions.
+pub(crate) fn check_not_reserved(text: &str, span: Span, log: &mut Log) -> bool {
+    let reserved = RESERVED.contains(&text);
+    if reserved {
+        log.push(
+            Diagnostic::error(span, format!("`{text}` cannot name anything new"))
+                .label("this word has a meaning of its own in model files")
+                .help(format!("call it `{text}_1`, for example")),
+        );
+    }
+    !reserved
+}
+
+impl JsonSchema for Name {
+    fn schema_name() -> Cow<'static, str> {
+        "Name".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "description": "A name: a letter, then letters, digits and underscores.",
+            "type": "string",
+            "pattern": "^[A-Za-z][A-Za-z0-9_]*$",
+            "maxLength": 60,
+        })
+    }
+}
+
+/// Free text.
+#[derive(Clone, Debug)]
+pub(crate) struct Text {
+    pub(crate) text: String,
+    pub(crate) span: Span,
+}
+
+impl Read for Text {
+    const EXPECTED: &'static str = "a text in quotes";
+    const EXAMPLE: &'static str = "\"...\"";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        let Value::Text { text, .. } = &node.value else {
+            return wrong_type::<Self>(node, log);
+        };
+        if text.len() > 4000 {
+            log.push(
+                Diagnostic::error(node.span, "this text is too long")
+                    .label("at most 4000 characters"),
+            );
+            return None;
+        }
+        Some(Self {
+            text: text.clone(),
+            span: node.span,
+        })
+    }
+}
+
+impl JsonSchema for Text {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Text".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "string" })
+    }
+}
+
+/// A finite number.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Number {
+    pub(crate) value: f64,
+    pub(crate) span: Span,
+}
+
+impl Read for Number {
+    const EXPECTED: &'static str = "a number";
+    const EXAMPLE: &'static str = "0.25";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        let Value::Number { text, .. } = &node.value else {
+            return wrong_type::<Self>(node, log);
+        };
+        match text.parse::<f64>() {
+            Ok(value) if value.is_finite() => Some(Self {
+                value,
+                span: node.span,
+            }),
+            _ => {
+                log.push(
+                    Diagnostic::error(node.span, format!("`{}` is not finite", quote(text)))
+                        .label("expected a finite number")
+                        .help("nothing in a mechanism is infinite; leave the entry away if it is not known"),
+                );
+                None
+            }
+        }
+    }
+}
+
+impl JsonSchema for Number {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Number".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "number" })
+    }
+}
+
+/// Yes or no.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Flag(pub(crate) bool);
+
+impl Read for Flag {
+    const EXPECTED: &'static str = "`true` or `false`";
+    const EXAMPLE: &'static str = "true";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        let Value::Boolean(value) = node.value else {
+            return wrong_type::<Self>(node, log);
+        };
+        Some(Self(value))
+    }
+}
+
+impl JsonSchema for Flag {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Flag".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "boolean" })
+    }
+}
+
+/// A list; faulty entries are left out once they are reported.
+#[derive(Clone, Debug)]
+pub(crate) struct List<T> {
+    pub(crate) entries: Vec<T>,
+    pub(crate) span: Span,
+}
+
+impl<T: Read> Read for List<T> {
+    const EXPECTED: &'static str = "a list";
+    const EXAMPLE: &'static str = "[ ... ]";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        let Value::Array(array) = &node.value else {
+            log.push(
+                Diagnostic::error(
+                    node.span,
+                    format!("{} stands where it does not belong", node.kind()),
+                )
+                .label(format!("expected a list, each entry {}", T::EXPECTED))
+                .help("lists of tables are headed by double brackets, `[[frame]]`; short ones stand in `[ ]`"),
+            );
+            return None;
+        };
+        if too_many(array.len(), node.span, log) {
+            return None;
+        }
+        Some(Self {
+            entries: array
+                .iter()
+                .filter_map(|entry| T::read(entry, log))
+                .collect(),
+            span: node.span,
+        })
+    }
+}
+
+fn too_many(n: usize, span: Span, log: &mut Log) -> bool {
+    if n > MOST_ENTRIES {
+        log.push(
+            Diagnostic::error(span, format!("there are {n} entries here"))
+                .label(format!("at most {MOST_ENTRIES}")),
+        );
+    }
+    n > MOST_ENTRIES
+}
+
+impl<T: JsonSchema> JsonSchema for List<T> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        format!("ListOf{}", T::schema_name()).into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "array", "items": generator.subschema_for::<T>() })
+    }
+}
+
+/// One entry, or a list of them.
+#[derive(Clone, Debug)]
+pub(crate) struct OneOrMany<T> {
+    pub(crate) entries: Vec<T>,
+    pub(crate) span: Span,
+}
+
+impl<T: Read> Read for OneOrMany<T> {
+    const EXPECTED: &'static str = T::EXPECTED;
+    const EXAMPLE: &'static str = T::EXAMPLE;
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        if let Value::Array(_) = node.value {
+            let list = List::<T>::read(node, log)?;
+            return Some(Self {
+                entries: list.entries,
+                span: list.span,
+            });
+        }
+        Some(Self {
+            entries: vec![T::read(node, log)?],
+            span: node.span,
+        })
+    }
+}
+
+impl<T: JsonSchema> JsonSchema for OneOrMany<T> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        format!("OneOrMany{}", T::schema_name()).into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let one = generator.subschema_for::<T>();
+        json_schema!({ "anyOf": [one, { "type": "array", "minItems": 1, "items": one }] })
+    }
+}
+
+/// Entries under names of the author's choice, in the order of the file.
+#[derive(Clone, Debug)]
+pub(crate) struct Named<T> {
+    pub(crate) entries: Vec<(Key, T)>,
+}
+
+impl<T: Read> Read for Named<T> {
+    const EXPECTED: &'static str = "a table of names";
+    const EXAMPLE: &'static str = "{ name = ... }";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        let Value::Table(table) = &node.value else {
+            return wrong_type::<Self>(node, log);
+        };
+        if too_many(table.len(), node.span, log) {
+            return None;
+        }
+        Some(Self {
+            entries: table
+                .iter()
+                .filter_map(|(key, entry)| {
+                    let fine = check_name(&key.name, key.span, log);
+                    let entry = T::read(entry, log)?;
+                    fine.then(|| (key.clone(), entry))
+                })
+                .collect(),
+        })
+    }
+}
+
+impl<T: JsonSchema> JsonSchema for Named<T> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        format!("Named{}", T::schema_name()).into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "type": "object",
+            "propertyNames": { "pattern": "^[A-Za-z][A-Za-z0-9_]*$" },
+            "additionalProperties": generator.subschema_for::<T>(),
+        })
+    }
+}

@@ -1,0 +1,69 @@
+//! The nearest known name to a misspelt one.
+
+/// Longer names are not compared: the table of distances grows with the square.
+const LONGEST_COMPARED: usize = 60;
+
+/// The candidate nearest to `name`, if it is near enough to be meant.
+pub(crate) fn nearest<'a>(
+    name: &str,
+    candidates: impl IntoIterator<Item = &'a str>,
+) -> Option<&'a str> {
+    if name.len() > LONGEST_COMPARED {
+        return None;
+    }
+    let allowed = (name.chars().count() / 3).clamp(1, 4);
+    candidates
+        .into_iter()
+        .filter(|candidate| candidate.len() <= LONGEST_COMPARED)
+        .map(|candidate| (distance(name, candidate), candidate))
+        .filter(|&(steps, candidate)| steps <= allowed && steps < candidate.chars().count().max(2))
+        .min_by_key(|&(steps, candidate)| (steps, candidate.len()))
+        .map(|(_, candidate)| candidate)
+}
+
+/// `did you mean ...?` for the nearest candidate, or the whole list if it is short.
+pub(crate) fn advice<'a>(
+    name: &str,
+    what: &str,
+    candidates: impl IntoIterator<Item = &'a str> + Clone,
+) -> Option<String> {
+    if let Some(found) = nearest(name, candidates.clone()) {
+        return Some(format!("did you mean `{found}`?"));
+    }
+    let mut all: Vec<&str> = candidates.into_iter().collect();
+    if all.is_empty() {
+        return Some(format!("the file declares no {what}"));
+    }
+    let n = all.len();
+    all.truncate(16);
+    let list = all
+        .iter()
+        .map(|one| format!("`{one}`"))
+        .collect::<Vec<_>>()
+        .join(", ");
+    let more = if n > all.len() { ", ..." } else { "" };
+    Some(format!("known {what}: {list}{more}"))
+}
+
+/// Number of insertions, deletions, substitutions and swaps of neighbours between two names; case counts half.
+fn distance(one: &str, other: &str) -> usize {
+    let one: Vec<char> = one.chars().collect();
+    let other: Vec<char> = other.chars().collect();
+    let mut before_last: Vec<usize> = Vec::new();
+    let mut last: Vec<usize> = (0..=other.len()).collect();
+    for i in 1..=one.len() {
+        let mut row = vec![i];
+        for j in 1..=other.len() {
+            let same = one[i - 1].eq_ignore_ascii_case(&other[j - 1]);
+            let mut best = (last[j - 1] + usize::from(!same))
+                .min(last[j] + 1)
+                .min(row[j - 1] + 1);
+            if i > 1 && j > 1 && one[i - 1] == other[j - 2] && one[i - 2] == other[j - 1] {
+                best = best.min(before_last[j - 2] + 1);
+            }
+            row.push(best);
+        }
+        before_last = std::mem::replace(&mut last, row);
+    }
+    last[other.len()]
+}

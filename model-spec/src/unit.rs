@@ -1,0 +1,326 @@
+//! Units and their algebra: `"kg m^2"`, `"N s/m"` become powers of kg, m, s and A.
+//!
+//! Only coherent SI units are known, so that no factor ever enters; rad counts as 1.
+
+use std::borrow::Cow;
+
+use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::document::{Node, Value, quote};
+use crate::record::Read;
+use crate::suggest;
+
+/// Twice the exponents of kg, m, s, A; twice, so that square roots stay whole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct Dimension([i32; 4]);
+
+/// The base of the algebra and the units derived from it, as single exponents of kg, m, s, A.
+const UNITS: [(&str, [i32; 4]); 17] = [
+    ("1", [0, 0, 0, 0]),
+    ("rad", [0, 0, 0, 0]),
+    ("kg", [1, 0, 0, 0]),
+    ("m", [0, 1, 0, 0]),
+    ("s", [0, 0, 1, 0]),
+    ("A", [0, 0, 0, 1]),
+    ("N", [1, 1, -2, 0]),
+    ("J", [1, 2, -2, 0]),
+    ("W", [1, 2, -3, 0]),
+    ("V", [1, 2, -3, -1]),
+    ("Hz", [0, 0, -1, 0]),
+    ("Pa", [1, -1, -2, 0]),
+    ("C", [0, 0, 1, 1]),
+    ("F", [-1, -2, 4, 2]),
+    ("Ohm", [1, 2, -3, -2]),
+    ("H", [1, 2, -2, -2]),
+    ("T", [1, 0, -2, -1]),
+];
+
+/// Units that people write and that would need a factor.
+const FOREIGN: [(&str, &str); 14] = [
+    ("mm", "m"),
+    ("cm", "m"),
+    ("km", "m"),
+    ("g", "kg"),
+    ("t", "kg"),
+    ("deg", "rad"),
+    ("rpm", "rad/s"),
+    ("min", "s"),
+    ("ms", "s"),
+    ("h", "s"),
+    ("kN", "N"),
+    ("Nm", "N m"),
+    ("Nmm", "N m"),
+    ("lb", "kg"),
+];
+
+/// How common dimensions are printed, and what people call them.
+const PRINTED: [(&str, [i32; 4], &str); 18] = [
+    ("1", [0, 0, 0, 0], "a pure number or an angle"),
+    ("m", [0, 1, 0, 0], "a length"),
+    ("m^2", [0, 2, 0, 0], "an area"),
+    ("kg", [1, 0, 0, 0], "a mass"),
+    ("s", [0, 0, 1, 0], "a time"),
+    ("1/s", [0, 0, -1, 0], "an angular rate"),
+    ("1/s^2", [0, 0, -2, 0], "an angular acceleration"),
+    ("m/s", [0, 1, -1, 0], "a velocity"),
+    ("m/s^2", [0, 1, -2, 0], "an acceleration"),
+    ("kg m", [1, 1, 0, 0], "a first moment of mass"),
+    ("kg m^2", [1, 2, 0, 0], "a moment of inertia"),
+    ("N", [1, 1, -2, 0], "a force"),
+    ("N m", [1, 2, -2, 0], "a torque"),
+    ("N/m", [1, 0, -2, 0], "a stiffness"),
+    ("N s/m", [1, 0, -1, 0], "a viscous friction"),
+    ("N m s", [1, 2, -1, 0], "a viscous friction"),
+    ("V", [1, 2, -3, -1], "a voltage"),
+    ("A", [0, 0, 0, 1], "a current"),
+];
+
+impl Dimension {
+    pub(crate) const ONE: Self = Self::new([0, 0, 0, 0]);
+    pub(crate) const LENGTH: Self = Self::new([0, 1, 0, 0]);
+    pub(crate) const MASS: Self = Self::new([1, 0, 0, 0]);
+    pub(crate) const FIRST_MOMENT: Self = Self::new([1, 1, 0, 0]);
+    pub(crate) const INERTIA: Self = Self::new([1, 2, 0, 0]);
+    pub(crate) const ACCELERATION: Self = Self::new([0, 1, -2, 0]);
+    pub(crate) const FORCE: Self = Self::new([1, 1, -2, 0]);
+    pub(crate) const TORQUE: Self = Self::new([1, 2, -2, 0]);
+    pub(crate) const VELOCITY: Self = Self::new([0, 1, -1, 0]);
+    pub(crate) const RATE: Self = Self::new([0, 0, -1, 0]);
+    pub(crate) const ANGULAR_ACCELERATION: Self = Self::new([0, 0, -2, 0]);
+
+    const fn new(single: [i32; 4]) -> Self {
+        Self([2 * single[0], 2 * single[1], 2 * single[2], 2 * single[3]])
+    }
+
+    pub(crate) fn times(self, other: Self) -> Self {
+        Self(std::array::from_fn(|i| {
+            self.0[i].saturating_add(other.0[i])
+        }))
+    }
+
+    pub(crate) fn over(self, other: Self) -> Self {
+        Self(std::array::from_fn(|i| {
+            self.0[i].saturating_sub(other.0[i])
+        }))
+    }
+
+    pub(crate) fn power(self, exponent: i32) -> Self {
+        Self(self.0.map(|one| one.saturating_mul(exponent)))
+    }
+
+    /// The square root, if the doubled exponents allow it.
+    pub(crate) fn square_root(self) -> Option<Self> {
+        self.0
+            .iter()
+            .all(|one| one % 2 == 0)
+            .then(|| Self(self.0.map(|one| one / 2)))
+    }
+
+    /// What people call it, with its unit: `a length (m)`.
+    pub(crate) fn describe(self) -> String {
+        PRINTED
+            .iter()
+            .find(|(_, single, _)| Self::new(*single) == self)
+            .map_or_else(
+                || format!("a quantity in {self}"),
+                |(unit, _, name)| {
+                    if *unit == "1" {
+                        (*name).to_owned()
+                    } else {
+                        format!("{name} ({unit})")
+                    }
+                },
+            )
+    }
+}
+
+impl std::fmt::Display for Dimension {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some((unit, _, _)) = PRINTED
+            .iter()
+            .find(|(_, single, _)| Self::new(*single) == *self)
+        {
+            return f.write_str(unit);
+        }
+        let mut blank = "";
+        for (name, twice) in ["kg", "m", "s", "A"].iter().zip(self.0) {
+            if twice == 0 {
+                continue;
+            }
+            write!(f, "{blank}{name}")?;
+            if twice % 2 != 0 {
+                write!(f, "^({twice}/2)")?;
+            } else if twice != 2 {
+                write!(f, "^{}", twice / 2)?;
+            }
+            blank = " ";
+        }
+        Ok(())
+    }
+}
+
+/// A unit of the file.
+#[derive(Clone, Debug)]
+pub(crate) struct Unit {
+    /// As the author wrote it, blanks tidied.
+    pub(crate) text: String,
+    pub(crate) dimension: Dimension,
+}
+
+impl Unit {
+    /// True for an angle, which may stand in sines and cosines.
+    pub(crate) fn is_angle(&self) -> bool {
+        self.text == "rad"
+    }
+}
+
+impl Read for Unit {
+    const EXPECTED: &'static str = "a unit in quotes";
+    const EXAMPLE: &'static str = "\"kg m^2\"";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        let Value::Text { text, inner } = &node.value else {
+            return crate::record::wrong_type::<Self>(node, log);
+        };
+        match parse(text) {
+            Ok(dimension) => Some(Self {
+                text: text.split_whitespace().collect::<Vec<_>>().join(" "),
+                dimension,
+            }),
+            Err(fault) => {
+                let span = inner.map_or(node.span, |inner| Span {
+                    file: node.span.file,
+                    start: inner + fault.start,
+                    end: inner + fault.end,
+                });
+                let found = &text[fault.start..fault.end];
+                let mut diagnostic = Diagnostic::error(span, fault.message).label(
+                    "expected SI units such as `kg`, `m`, `rad`, `kg m^2`, `N s/m`, `m/s^2`, or `1`",
+                );
+                if let Some((_, si)) = FOREIGN.iter().find(|(foreign, _)| *foreign == found) {
+                    diagnostic = diagnostic.help(format!(
+                        "write `{si}` and convert the value; modelmill uses SI units without prefixes"
+                    ));
+                } else if let Some(near) =
+                    suggest::nearest(found, UNITS.iter().map(|(name, _)| *name))
+                {
+                    diagnostic = diagnostic.help(format!("did you mean `{near}`?"));
+                }
+                log.push(diagnostic);
+                None
+            }
+        }
+    }
+}
+
+impl schemars::JsonSchema for Unit {
+    fn schema_name() -> Cow<'static, str> {
+        "Unit".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({
+            "description": "An SI unit such as \"kg\", \"m\", \"rad\", \"kg m^2\", \"N s/m\", \"m/s^2\", or \"1\" for a pure number.",
+            "type": "string",
+            "examples": ["m", "rad", "kg", "kg m", "kg m^2", "N s/m", "N m s/rad", "m/s^2", "1"],
+        })
+    }
+}
+
+/// A stretch of the unit's text that has no meaning.
+struct Fault {
+    start: usize,
+    end: usize,
+    message: String,
+}
+
+/// Products by blanks or `*`; after one `/` comes a single unit or a bracket.
+fn parse(text: &str) -> Result<Dimension, Fault> {
+    let whole = |message: &str| Fault {
+        start: 0,
+        end: text.len(),
+        message: message.to_owned(),
+    };
+    if text.len() > 100 {
+        return Err(whole("this unit is too long"));
+    }
+    if text.trim().is_empty() {
+        return Err(whole("this unit is empty"));
+    }
+    let (above, below) = match text.split_once('/') {
+        Some((above, below)) => (above, Some(below)),
+        None => (text, None),
+    };
+    let mut dimension = factors(above, 0)?.0;
+    if let Some(below) = below {
+        let offset = above.len() + 1;
+        let trimmed = below.trim();
+        let bracket = trimmed
+            .strip_prefix('(')
+            .and_then(|rest| rest.strip_suffix(')'));
+        let (divisor, n_factors) = if let Some(inner) = bracket {
+            let skip = below.find('(').unwrap_or(0) + 1;
+            (factors(inner, offset + skip)?.0, 1)
+        } else {
+            factors(below, offset)?
+        };
+        if n_factors != 1 {
+            return Err(Fault {
+                start: offset,
+                end: text.len(),
+                message: "it is not clear what this unit divides by".to_owned(),
+            });
+        }
+        dimension = dimension.over(divisor);
+    }
+    Ok(dimension)
+}
+
+fn factors(text: &str, offset: usize) -> Result<(Dimension, usize), Fault> {
+    let mut dimension = Dimension::ONE;
+    let mut n_factors = 0;
+    let mut at = 0;
+    while at < text.len() {
+        let rest = &text[at..];
+        let blanks = rest
+            .find(|found: char| !found.is_whitespace() && found != '*' && found != '\u{b7}')
+            .unwrap_or(rest.len());
+        at += blanks;
+        let rest = &text[at..];
+        if rest.is_empty() {
+            break;
+        }
+        let end = rest
+            .find(|found: char| found.is_whitespace() || found == '*' || found == '\u{b7}')
+            .unwrap_or(rest.len());
+        let word = &rest[..end];
+        let (name, exponent) = match word.split_once('^') {
+            Some((name, exponent)) => (name, exponent.parse::<i32>().ok()),
+            None => (word, Some(1)),
+        };
+        let fault = |message: String, length: usize| Fault {
+            start: offset + at,
+            end: offset + at + length,
+            message,
+        };
+        let Some((_, single)) = UNITS.iter().find(|(unit, _)| *unit == name) else {
+            return Err(fault(format!("unknown unit `{}`", quote(name)), name.len()));
+        };
+        let Some(exponent) = exponent.filter(|exponent| exponent.abs() <= 9) else {
+            return Err(fault(
+                format!("this exponent of `{name}` is not allowed"),
+                word.len(),
+            ));
+        };
+        dimension = dimension.times(Dimension::new(*single).power(exponent));
+        n_factors += 1;
+        at += end;
+    }
+    if n_factors == 0 {
+        return Err(Fault {
+            start: offset,
+            end: offset + text.len(),
+            message: "a unit is missing here".to_owned(),
+        });
+    }
+    Ok((dimension, n_factors))
+}
