@@ -41,7 +41,10 @@ fn stretches(tree: &Tree, links: &[usize], start: &[Turn], at: &Vector) -> Vec<S
     let mut path = Vec::new();
     for &i in links {
         let link = &tree.links[i];
-        path.push(Stretch { turns: turns.clone(), vector: link.position });
+        path.push(Stretch {
+            turns: turns.clone(),
+            vector: link.position,
+        });
         for turn in link.pre.iter().chain([&link.joint]) {
             push_turn(&mut turns, turn);
         }
@@ -87,7 +90,11 @@ pub(crate) fn position_in_base(
 }
 
 /// The closure of every loop of the mechanism.
-pub(crate) fn closures(graph: &mut Graph, mechanism: &Mechanism, tree: &Tree) -> Result<Vec<Closure>, DeriveError> {
+pub(crate) fn closures(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    tree: &Tree,
+) -> Result<Vec<Closure>, DeriveError> {
     mechanism
         .loops
         .iter()
@@ -103,7 +110,11 @@ pub(crate) fn closures(graph: &mut Graph, mechanism: &Mechanism, tree: &Tree) ->
             let back: Vec<Turn> = into
                 .iter()
                 .rev()
-                .map(|t| Turn { axis: t.axis, sum: AngleSum::NONE.plus(&t.sum, -1), pi12: -t.pi12 })
+                .map(|t| Turn {
+                    axis: t.axis,
+                    sum: AngleSum::NONE.plus(&t.sum, -1),
+                    pi12: -t.pi12,
+                })
                 .collect();
             let (at_a, at_b) = (point_at(graph, a)?, point_at(graph, b)?);
             let mut path = stretches(tree, pa, &back, &at_a);
@@ -140,7 +151,11 @@ fn close(graph: &mut Graph, name: String, path: &[Stretch]) -> Closure {
         if let Some(legs) = &mut chain
             && vector[..2] != [Graph::ZERO; 2]
         {
-            legs.push(Leg { angle, pi12, vector: [vector[0], vector[1]] });
+            legs.push(Leg {
+                angle,
+                pi12,
+                vector: [vector[0], vector[1]],
+            });
         }
     }
     if total[2] != Graph::ZERO {
@@ -148,11 +163,25 @@ fn close(graph: &mut Graph, name: String, path: &[Stretch]) -> Closure {
     }
     let residual: Vec<ExprId> = total.into_iter().filter(|r| *r != Graph::ZERO).collect();
     let coordinates = coordinates_of(graph, &residual);
-    Closure { name, residual, chain, coordinates }
+    Closure {
+        name,
+        residual,
+        chain,
+        coordinates,
+    }
 }
 
 /// Coordinates on which some expressions depend.
 pub(crate) fn coordinates_of(graph: &Graph, roots: &[ExprId]) -> Vec<usize> {
     let atoms = graph.atoms(roots);
-    atoms.into_iter().filter_map(|atom| if let Atom::Coordinate(i) = atom { Some(i) } else { None }).collect()
+    atoms
+        .into_iter()
+        .filter_map(|atom| {
+            if let Atom::Coordinate(i) = atom {
+                Some(i)
+            } else {
+                None
+            }
+        })
+        .collect()
 }

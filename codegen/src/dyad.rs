@@ -38,7 +38,12 @@ struct Group {
 /// Solves `closure` for the coordinates `unknown` (one or two); every other coordinate is known.
 ///
 /// `positive` chooses the sign of the square root. Returns `None` where no closed form of this family applies.
-pub(crate) fn solve(graph: &mut Graph, closure: &Closure, unknown: &[usize], positive: bool) -> Option<Solved> {
+pub(crate) fn solve(
+    graph: &mut Graph,
+    closure: &Closure,
+    unknown: &[usize],
+    positive: bool,
+) -> Option<Solved> {
     let legs = closure.chain.as_ref()?;
     let mut known = [Graph::ZERO; 2];
     let mut groups: Vec<Group> = Vec::new();
@@ -65,11 +70,25 @@ pub(crate) fn solve(graph: &mut Graph, closure: &Closure, unknown: &[usize], pos
         match groups.iter_mut().find(|g| g.unknown == inside) {
             Some(group) => {
                 let v = turned(graph, leg, &group.angle);
-                group.vector = [graph.add(group.vector[0], v[0]), graph.add(group.vector[1], v[1])];
+                group.vector = [
+                    graph.add(group.vector[0], v[0]),
+                    graph.add(group.vector[1], v[1]),
+                ];
             }
             None => {
-                let v = turned(graph, &Leg { angle: AngleSum::NONE, ..leg.clone() }, &AngleSum::NONE);
-                groups.push(Group { unknown: inside, angle: leg.angle.clone(), vector: v });
+                let v = turned(
+                    graph,
+                    &Leg {
+                        angle: AngleSum::NONE,
+                        ..leg.clone()
+                    },
+                    &AngleSum::NONE,
+                );
+                groups.push(Group {
+                    unknown: inside,
+                    angle: leg.angle.clone(),
+                    vector: v,
+                });
             }
         }
     }
@@ -120,7 +139,10 @@ fn turned(graph: &mut Graph, leg: &Leg, reference: &AngleSum) -> [ExprId; 2] {
 
 fn turn(graph: &mut Graph, [c, s]: [ExprId; 2], [x, y]: [ExprId; 2]) -> [ExprId; 2] {
     let products = [(c, x), (s, y), (s, x), (c, y)].map(|(a, b)| graph.mul(a, b));
-    [graph.sub(products[0], products[1]), graph.add(products[2], products[3])]
+    [
+        graph.sub(products[0], products[1]),
+        graph.add(products[2], products[3]),
+    ]
 }
 
 fn dot(graph: &mut Graph, a: [ExprId; 2], b: [ExprId; 2]) -> ExprId {
@@ -134,7 +156,12 @@ fn cross(graph: &mut Graph, a: [ExprId; 2], b: [ExprId; 2]) -> ExprId {
 }
 
 /// Cosine and sine of the angle that turns `arm` into `v`; both have the same length.
-fn direction(graph: &mut Graph, v: [ExprId; 2], arm: [ExprId; 2], arm_squared: ExprId) -> [ExprId; 2] {
+fn direction(
+    graph: &mut Graph,
+    v: [ExprId; 2],
+    arm: [ExprId; 2],
+    arm_squared: ExprId,
+) -> [ExprId; 2] {
     if arm[1] == Graph::ZERO {
         return v.map(|x| graph.div(x, arm[0]));
     }
@@ -184,7 +211,10 @@ fn two_circles(
     Some(Solved {
         angles: vec![
             (first.angle.clone(), direction(graph, v1, first.vector, aa)),
-            (second.angle.clone(), direction(graph, v2, second.vector, bb)),
+            (
+                second.angle.clone(),
+                direction(graph, v2, second.vector, bb),
+            ),
         ],
         lengths: Vec::new(),
         root: Some(Root { radicand, witness }),
@@ -206,7 +236,11 @@ fn circle_and_line(
         let (one, two) = (dot(graph, x, y), dot(graph, u, v));
         graph.sub(one, two)
     };
-    let (p, q, r) = (gap(k1, k1, a1, a1), gap(k0, k1, a0, a1), gap(k0, k0, a0, a0));
+    let (p, q, r) = (
+        gap(k1, k1, a1, a1),
+        gap(k0, k1, a0, a1),
+        gap(k0, k0, a0, a0),
+    );
     let at = graph.atom(Atom::Coordinate(slide));
     let (value, root) = if p == Graph::ZERO {
         // Equal directions of sliding: the equation is linear.
@@ -234,7 +268,11 @@ fn circle_and_line(
     let arm = put(graph, a0, a1);
     let arm_squared = dot(graph, arm, arm);
     let angles = vec![(group.angle.clone(), direction(graph, v, arm, arm_squared))];
-    Some(Solved { angles, lengths: vec![(slide, value)], root })
+    Some(Solved {
+        angles,
+        lengths: vec![(slide, value)],
+        root,
+    })
 }
 
 /// `k0 + s a + t b = 0`
@@ -247,11 +285,19 @@ fn two_lines(graph: &mut Graph, known: [ExprId; 2], first: usize, second: usize)
     }
     let (s, t) = (cross(graph, b, k0), cross(graph, k0, a));
     let (s, t) = (graph.div(s, determinant), graph.div(t, determinant));
-    Some(Solved { angles: Vec::new(), lengths: vec![(first, s), (second, t)], root: None })
+    Some(Solved {
+        angles: Vec::new(),
+        lengths: vec![(first, s), (second, t)],
+        root: None,
+    })
 }
 
 /// Splits a vector into what does not depend on a coordinate and its factor; `None` if it is not linear in it.
-fn linear(graph: &mut Graph, v: [ExprId; 2], coordinate: usize) -> Option<([ExprId; 2], [ExprId; 2])> {
+fn linear(
+    graph: &mut Graph,
+    v: [ExprId; 2],
+    coordinate: usize,
+) -> Option<([ExprId; 2], [ExprId; 2])> {
     let slope = graph.differentiate(&v, Atom::Coordinate(coordinate));
     if depends(graph, &slope, coordinate) {
         return None;

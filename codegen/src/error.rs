@@ -68,7 +68,10 @@ pub enum DeriveError {
 
 impl DeriveError {
     pub(crate) fn unsupported(why: &'static str, expression: &Exact) -> Self {
-        Self::Unsupported { why, expression: format!("{expression:?}") }
+        Self::Unsupported {
+            why,
+            expression: format!("{expression:?}"),
+        }
     }
 }
 
@@ -81,14 +84,20 @@ impl fmt::Display for DeriveError {
                 "{what} are singular at every pose; check that the passive coordinates can move the loops shut and that every drive moves something"
             ),
             Self::TooLarge { what, size, limit } => {
-                write!(f, "{what} make a coupled system of {size} unknowns; at most {limit} can be solved in symbols")
+                write!(
+                    f,
+                    "{what} make a coupled system of {size} unknowns; at most {limit} can be solved in symbols"
+                )
             }
             Self::LoopCount { equations, passive } => write!(
                 f,
                 "the loops give {equations} independent equations for {passive} passive coordinates; mark as many coordinates passive as there are equations"
             ),
             Self::DriveCount { drives, freedoms } => {
-                write!(f, "{drives} drives for {freedoms} degrees of freedom; there must be one drive for each")
+                write!(
+                    f,
+                    "{drives} drives for {freedoms} degrees of freedom; there must be one drive for each"
+                )
             }
             Self::LoopsNotSampled { loops } => write!(
                 f,
@@ -96,14 +105,21 @@ impl fmt::Display for DeriveError {
                 loops.join(", ")
             ),
             Self::NoPointFound { draws } => {
-                write!(f, "no pose that closes the loops was found in {draws} draws; the loops may contradict each other")
+                write!(
+                    f,
+                    "no pose that closes the loops was found in {draws} draws; the loops may contradict each other"
+                )
             }
             Self::FactorNotRecovered { product, retained } => write!(
                 f,
                 "the factor between the columns of {product} and {retained} is no rational function of the constants of reasonable size"
             ),
-            Self::RankChanged => f.write_str("the rank differs between random constants; this is a fault of the program"),
-            Self::NotConfirmed => f.write_str("the reduction failed its own proof; this is a fault of the program"),
+            Self::RankChanged => f.write_str(
+                "the rank differs between random constants; this is a fault of the program",
+            ),
+            Self::NotConfirmed => {
+                f.write_str("the reduction failed its own proof; this is a fault of the program")
+            }
         }
     }
 }

@@ -27,7 +27,9 @@ impl Monomial {
     }
 
     fn written_out(&self) -> impl Iterator<Item = usize> {
-        self.0.iter().flat_map(|(p, n)| std::iter::repeat_n(*p, *n as usize))
+        self.0
+            .iter()
+            .flat_map(|(p, n)| std::iter::repeat_n(*p, *n as usize))
     }
 
     /// As infix text: `m1*dc1^2`.
@@ -40,7 +42,11 @@ impl Monomial {
             .iter()
             .map(|(p, n)| {
                 let name = &mechanism.parameters[*p].name;
-                if *n == 1 { name.clone() } else { format!("{name}^{n}") }
+                if *n == 1 {
+                    name.clone()
+                } else {
+                    format!("{name}^{n}")
+                }
             })
             .collect();
         factors.join("*")
@@ -48,7 +54,10 @@ impl Monomial {
 
     /// Its value for given parameters.
     pub fn value(&self, parameters: &[f64]) -> f64 {
-        self.0.iter().map(|(p, n)| parameters[*p].powi(i32::try_from(*n).unwrap_or(i32::MAX))).product()
+        self.0
+            .iter()
+            .map(|(p, n)| parameters[*p].powi(i32::try_from(*n).unwrap_or(i32::MAX)))
+            .product()
     }
 }
 
@@ -92,7 +101,12 @@ impl Polynomial {
     }
 
     pub(crate) fn scaled(&self, factor: &Rational, graph: &mut Graph) -> Self {
-        Self(self.0.iter().map(|(m, v)| (m.clone(), graph.scale(*v, factor))).collect())
+        Self(
+            self.0
+                .iter()
+                .map(|(m, v)| (m.clone(), graph.scale(*v, factor)))
+                .collect(),
+        )
     }
 
     pub(crate) fn times(&self, other: &Self, graph: &mut Graph) -> Self {
@@ -111,10 +125,17 @@ impl Polynomial {
 pub(crate) fn angle_sum(angle: &Angle) -> (AngleSum, i32) {
     let twelfths = Rational::from(angle.pi.clone());
     let twelfths = &twelfths * &Rational::integer(12);
-    assert!(twelfths.is_integer(), "a validated angle's fixed part is a multiple of pi/12, not pi * {}", angle.pi);
+    assert!(
+        twelfths.is_integer(),
+        "a validated angle's fixed part is a multiple of pi/12, not pi * {}",
+        angle.pi
+    );
     let pi12 = twelfths.to_big().to_integer() % num_bigint::BigInt::from(24);
     let terms = angle.terms.iter().map(|(symbol, n)| (atom(*symbol), *n));
-    (AngleSum::new(terms), pi12.to_i32().expect("a remainder modulo 24 fits"))
+    (
+        AngleSum::new(terms),
+        pi12.to_i32().expect("a remainder modulo 24 fits"),
+    )
 }
 
 fn atom(symbol: Symbol) -> Atom {
@@ -130,7 +151,10 @@ fn atom(symbol: Symbol) -> Atom {
 pub(crate) fn length(graph: &mut Graph, length: &Length) -> Result<ExprId, DeriveError> {
     let mut terms = vec![(expression(graph, &length.offset)?, Rational::ONE)];
     for (coordinate, factor) in &length.coordinates {
-        terms.push((graph.atom(Atom::Coordinate(coordinate.0)), Rational::from(factor.clone())));
+        terms.push((
+            graph.atom(Atom::Coordinate(coordinate.0)),
+            Rational::from(factor.clone()),
+        ));
     }
     Ok(graph.sum(&terms))
 }
@@ -149,8 +173,13 @@ pub(crate) fn expression_at(
     let polynomial = polynomial_at(graph, exact, place)?;
     match polynomial.0.len() {
         0 => Ok(Graph::ZERO),
-        1 if polynomial.0.contains_key(&Monomial::default()) => Ok(polynomial.0[&Monomial::default()]),
-        _ => Err(DeriveError::unsupported("a dynamic parameter stands where only constants may", exact)),
+        1 if polynomial.0.contains_key(&Monomial::default()) => {
+            Ok(polynomial.0[&Monomial::default()])
+        }
+        _ => Err(DeriveError::unsupported(
+            "a dynamic parameter stands where only constants may",
+            exact,
+        )),
     }
 }
 
@@ -165,14 +194,26 @@ fn polynomial_at(
     place: &dyn Fn(PlaceQuantity) -> Option<ExprId>,
 ) -> Result<Polynomial, DeriveError> {
     Ok(match exact {
-        Exact::Rational(value) => Polynomial::constant(graph.rational(Rational::from(value.clone()))),
-        Exact::Pi => {
-            return Err(DeriveError::unsupported("pi may stand only inside an angle, sin or cos", exact));
+        Exact::Rational(value) => {
+            Polynomial::constant(graph.rational(Rational::from(value.clone())))
         }
-        Exact::Symbol(Symbol::Parameter(i)) => Polynomial(BTreeMap::from([(Monomial(vec![(i.0, 1)]), Graph::ONE)])),
+        Exact::Pi => {
+            return Err(DeriveError::unsupported(
+                "pi may stand only inside an angle, sin or cos",
+                exact,
+            ));
+        }
+        Exact::Symbol(Symbol::Parameter(i)) => {
+            Polynomial(BTreeMap::from([(Monomial(vec![(i.0, 1)]), Graph::ONE)]))
+        }
         Exact::Symbol(Symbol::Place(quantity)) => match place(*quantity) {
             Some(value) => Polynomial::constant(value),
-            None => return Err(DeriveError::unsupported("a quantity of a place stands outside an effect", exact)),
+            None => {
+                return Err(DeriveError::unsupported(
+                    "a quantity of a place stands outside an effect",
+                    exact,
+                ));
+            }
         },
         Exact::Symbol(symbol) => Polynomial::constant(graph.atom(atom(*symbol))),
         Exact::Sum(operands) => {
@@ -209,7 +250,9 @@ fn polynomial_at(
         }
         Exact::Power(a, n) => {
             let base = polynomial_at(graph, a, place)?;
-            (0..*n).fold(Polynomial::constant(Graph::ONE), |total, _| total.times(&base, graph))
+            (0..*n).fold(Polynomial::constant(Graph::ONE), |total, _| {
+                total.times(&base, graph)
+            })
         }
         Exact::Apply(function @ (Function::Sin | Function::Cos), a) => {
             let mut angle = AngleParts::default();
@@ -240,7 +283,12 @@ struct AngleParts {
 }
 
 impl AngleParts {
-    fn collect(&mut self, exact: &Exact, factor: &Rational, whole: &Exact) -> Result<(), DeriveError> {
+    fn collect(
+        &mut self,
+        exact: &Exact,
+        factor: &Rational,
+        whole: &Exact,
+    ) -> Result<(), DeriveError> {
         match exact {
             Exact::Rational(value) if Rational::from(value.clone()).is_zero() => {}
             Exact::Pi => self.pi = &self.pi + factor,
@@ -282,11 +330,18 @@ impl AngleParts {
 
     fn finish(self, whole: &Exact) -> Result<(AngleSum, i32), DeriveError> {
         let twelfths = &self.pi * &Rational::integer(12);
-        let pi12 = twelfths.as_small().filter(|(_, d)| *d == 1).map(|(n, _)| n.rem_euclid(24));
+        let pi12 = twelfths
+            .as_small()
+            .filter(|(_, d)| *d == 1)
+            .map(|(n, _)| n.rem_euclid(24));
         let atoms: Option<Vec<_>> = self
             .atoms
             .iter()
-            .map(|(a, k)| k.as_small().filter(|(_, d)| *d == 1).and_then(|(n, _)| Some((*a, i32::try_from(n).ok()?))))
+            .map(|(a, k)| {
+                k.as_small()
+                    .filter(|(_, d)| *d == 1)
+                    .and_then(|(n, _)| Some((*a, i32::try_from(n).ok()?)))
+            })
             .collect();
         match (pi12.and_then(|n| i32::try_from(n).ok()), atoms) {
             (Some(pi12), Some(atoms)) => Ok((AngleSum::new(atoms), pi12)),

@@ -15,7 +15,11 @@ use crate::tree::Tree;
 pub(crate) struct InertiaByProduct(BTreeMap<Monomial, BTreeMap<usize, Inertia>>);
 
 impl InertiaByProduct {
-    pub(crate) fn new(graph: &mut Graph, mechanism: &Mechanism, tree: &Tree) -> Result<Self, DeriveError> {
+    pub(crate) fn new(
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        tree: &Tree,
+    ) -> Result<Self, DeriveError> {
         let mut by_product = Self::default();
         for part in &mechanism.parts {
             let elements = part_elements(graph, &part.inertial)?;
@@ -30,7 +34,8 @@ impl InertiaByProduct {
                 let Place::Point(point) = place else { continue };
                 let point = &mechanism.points[point.0];
                 for term in &effect.terms {
-                    let parameter = Exact::Symbol(modelmill_spec::Symbol::Parameter(term.parameter));
+                    let parameter =
+                        Exact::Symbol(modelmill_spec::Symbol::Parameter(term.parameter));
                     let lump = LumpedMass {
                         mass: Exact::Product(vec![parameter, term.expression.clone()]),
                         share: num_rational::BigRational::from_integer(1.into()),
@@ -53,11 +58,19 @@ impl InertiaByProduct {
 
     /// The inertia of each link that belongs to one product.
     pub(crate) fn of(&self, product: &Monomial) -> impl Iterator<Item = (usize, &Inertia)> {
-        self.0.get(product).into_iter().flatten().map(|(link, inertia)| (*link, inertia))
+        self.0
+            .get(product)
+            .into_iter()
+            .flatten()
+            .map(|(link, inertia)| (*link, inertia))
     }
 
     /// The inertia of each link when every product has the value that `value` gives it.
-    pub(crate) fn total(&self, graph: &mut Graph, value: impl Fn(&Monomial) -> ExprId) -> BTreeMap<usize, Inertia> {
+    pub(crate) fn total(
+        &self,
+        graph: &mut Graph,
+        value: impl Fn(&Monomial) -> ExprId,
+    ) -> BTreeMap<usize, Inertia> {
         let mut terms: BTreeMap<usize, [Vec<ExprId>; ELEMENTS]> = BTreeMap::new();
         for (product, links) in &self.0 {
             let value = value(product);
@@ -68,7 +81,10 @@ impl InertiaByProduct {
                 }
             }
         }
-        terms.into_iter().map(|(link, slots)| (link, slots.map(|slot| graph.add_all(&slot)))).collect()
+        terms
+            .into_iter()
+            .map(|(link, slots)| (link, slots.map(|slot| graph.add_all(&slot))))
+            .collect()
     }
 
     fn add(&mut self, graph: &mut Graph, link: Option<usize>, elements: [Polynomial; ELEMENTS]) {
@@ -85,10 +101,17 @@ impl InertiaByProduct {
     }
 }
 
-fn part_elements(graph: &mut Graph, inertial: &Inertial) -> Result<[Polynomial; ELEMENTS], DeriveError> {
+fn part_elements(
+    graph: &mut Graph,
+    inertial: &Inertial,
+) -> Result<[Polynomial; ELEMENTS], DeriveError> {
     let mut elements: [Polynomial; ELEMENTS] = Default::default();
     match inertial {
-        Inertial::Linear { mass, first_moment, inertia } => {
+        Inertial::Linear {
+            mass,
+            first_moment,
+            inertia,
+        } => {
             elements[Element::Mass.index()] = exact::polynomial(graph, mass)?;
             for i in 0..3 {
                 let moment = exact::polynomial(graph, &first_moment[i])?;
@@ -99,7 +122,11 @@ fn part_elements(graph: &mut Graph, inertial: &Inertial) -> Result<[Polynomial; 
                 elements[Element::Inertia(i).index()] = exact::polynomial(graph, &inertia[i])?;
             }
         }
-        Inertial::AboutCentre { mass, centre, inertia } => {
+        Inertial::AboutCentre {
+            mass,
+            centre,
+            inertia,
+        } => {
             let mass = exact::polynomial(graph, mass)?;
             let centre = polynomials(graph, centre)?;
             elements = point_elements(graph, &mass, &centre, &centre);
@@ -113,7 +140,10 @@ fn part_elements(graph: &mut Graph, inertial: &Inertial) -> Result<[Polynomial; 
     Ok(elements)
 }
 
-fn lump_elements(graph: &mut Graph, lump: &LumpedMass) -> Result<[Polynomial; ELEMENTS], DeriveError> {
+fn lump_elements(
+    graph: &mut Graph,
+    lump: &LumpedMass,
+) -> Result<[Polynomial; ELEMENTS], DeriveError> {
     let share = Rational::from(lump.share.clone());
     let mass = exact::polynomial(graph, &lump.mass)?.scaled(&share, graph);
     let force_at = polynomials(graph, &lump.force_at)?;
@@ -148,7 +178,8 @@ fn point_elements(
     };
     let squares = [second(0, 0), second(1, 1), second(2, 2)];
     let pairs = [second(0, 1), second(0, 2), second(1, 2)];
-    let mut set = |position: usize, value: Polynomial| elements[Element::Inertia(position).index()] = value;
+    let mut set =
+        |position: usize, value: Polynomial| elements[Element::Inertia(position).index()] = value;
     set(0, squares[1].plus(&squares[2], graph));
     set(3, squares[0].plus(&squares[2], graph));
     set(5, squares[0].plus(&squares[1], graph));

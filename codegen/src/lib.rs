@@ -3,12 +3,15 @@
 mod closure;
 mod dyad;
 mod error;
+mod evaluate;
 mod exact;
 pub mod expr;
 pub mod field;
 mod inertia;
 mod linear;
+mod lower;
 mod newton_euler;
+mod programs;
 mod projection;
 mod reduce;
 mod regressor;
@@ -18,7 +21,10 @@ mod vector;
 use modelmill_spec::Mechanism;
 
 pub use error::DeriveError;
+pub use evaluate::{Evaluator, PoseFault, PoseReason, States};
 pub use exact::Monomial;
+pub use lower::{Guard, Op, OperationCount, Program, Stage, ValueId};
+pub use programs::{PassivePosition, Programs};
 pub use reduce::{Dependency, RationalFunction, Reduction, Variable};
 
 use expr::Graph;
@@ -32,6 +38,8 @@ pub struct Derivation {
     pub graph: Graph,
     /// Which products are retained and how the others follow.
     pub reduction: Reduction,
+    /// Straight-line programs, ready to be emitted or evaluated.
+    pub programs: Programs,
     pub(crate) equations: Equations,
 }
 
@@ -39,6 +47,19 @@ pub struct Derivation {
 pub fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
     let mut graph = Graph::new();
     let equations = regressor::equations(&mut graph, mechanism)?;
-    let reduction = reduce::reduce(&mut graph, mechanism, &equations.projection, &equations.products, &equations.columns)?;
-    Ok(Derivation { mechanism: mechanism.clone(), graph, reduction, equations })
+    let reduction = reduce::reduce(
+        &mut graph,
+        mechanism,
+        &equations.projection,
+        &equations.products,
+        &equations.columns,
+    )?;
+    let programs = programs::programs(&mut graph, mechanism, &equations, &reduction)?;
+    Ok(Derivation {
+        mechanism: mechanism.clone(),
+        graph,
+        reduction,
+        programs,
+        equations,
+    })
 }

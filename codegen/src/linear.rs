@@ -31,18 +31,31 @@ pub(crate) fn solve(
     let mut determinants = Vec::new();
     for (rows, columns) in blocks(matrix) {
         if rows.len() != columns.len() {
-            return Err(DeriveError::Singular { what: what.to_owned() });
+            return Err(DeriveError::Singular {
+                what: what.to_owned(),
+            });
         }
         if rows.len() > LARGEST_BLOCK {
-            return Err(DeriveError::TooLarge { what: what.to_owned(), size: rows.len(), limit: LARGEST_BLOCK });
+            return Err(DeriveError::TooLarge {
+                what: what.to_owned(),
+                size: rows.len(),
+                limit: LARGEST_BLOCK,
+            });
         }
-        let block: Vec<Vec<ExprId>> =
-            rows.iter().map(|r| columns.iter().map(|c| matrix[*r][*c]).collect()).collect();
+        let block: Vec<Vec<ExprId>> = rows
+            .iter()
+            .map(|r| columns.iter().map(|c| matrix[*r][*c]).collect())
+            .collect();
         let all = (1u32 << rows.len()) - 1;
-        let mut minors = Minors { matrix: &block, known: HashMap::new() };
+        let mut minors = Minors {
+            matrix: &block,
+            known: HashMap::new(),
+        };
         let determinant = minors.minor(graph, all, all);
         if determinant == Graph::ZERO {
-            return Err(DeriveError::Singular { what: what.to_owned() });
+            return Err(DeriveError::Singular {
+                what: what.to_owned(),
+            });
         }
         let inverse = graph.pow(determinant, -1);
         if determinant.index() > 1 {
@@ -59,7 +72,11 @@ pub(crate) fn solve(
                         continue;
                     }
                     let minor = minors.minor(graph, all & !(1 << i), all & !(1 << j));
-                    let sign = if (i + j) % 2 == 0 { Rational::ONE } else { Rational::MINUS_ONE };
+                    let sign = if (i + j) % 2 == 0 {
+                        Rational::ONE
+                    } else {
+                        Rational::MINUS_ONE
+                    };
                     terms.push((graph.mul(minor, rhs[*row][k]), sign));
                 }
                 let numerator = graph.sum(&terms);
@@ -67,7 +84,10 @@ pub(crate) fn solve(
             }
         }
     }
-    Ok(Solution { values, determinants })
+    Ok(Solution {
+        values,
+        determinants,
+    })
 }
 
 /// Connected components of the matrix's pattern: sets of rows with the columns that they share.

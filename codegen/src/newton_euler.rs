@@ -64,13 +64,21 @@ impl LinkMotion {
         let mut field = [vector::ZERO; 3];
         for i in 0..3 {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            field[i][i] = graph.combine([(square[j], Rational::MINUS_ONE), (square[k], Rational::MINUS_ONE)]);
+            field[i][i] = graph.combine([
+                (square[j], Rational::MINUS_ONE),
+                (square[k], Rational::MINUS_ONE),
+            ]);
             let product = graph.mul(omega[i], omega[j]);
             // Entries (i, j) and (j, i) of [alpha]x are -alpha_k and alpha_k for cyclic i, j, k.
             field[i][j] = graph.sub(product, alpha[k]);
             field[j][i] = graph.add(product, alpha[k]);
         }
-        Self { omega, alpha, acceleration, field }
+        Self {
+            omega,
+            alpha,
+            acceleration,
+            field,
+        }
     }
 }
 
@@ -92,7 +100,10 @@ pub(crate) fn forward(graph: &mut Graph, tree: &Tree, gravity: &Vector) -> Motio
         let mut acceleration = tree.to_link(graph, i, &along);
         let integer = |n: i32| Rational::integer(i64::from(n));
         let sum = |graph: &mut Graph, atom: fn(usize) -> Atom, terms: &[(usize, Rational)]| {
-            let terms: Vec<_> = terms.iter().map(|(c, k)| (graph.atom(atom(*c)), k.clone())).collect();
+            let terms: Vec<_> = terms
+                .iter()
+                .map(|(c, k)| (graph.atom(atom(*c)), k.clone()))
+                .collect();
             graph.sum(&terms)
         };
         // R'omega_parent x z rate = (omega_y, -omega_x, 0) rate
@@ -121,7 +132,12 @@ pub(crate) fn forward(graph: &mut Graph, tree: &Tree, gravity: &Vector) -> Motio
 impl Motion {
     /// The wrench that moves an inertia along with `link`.
     pub(crate) fn wrench(&self, graph: &mut Graph, link: usize, inertia: &Inertia) -> Wrench {
-        let LinkMotion { omega, alpha, acceleration, field } = &self.links[link];
+        let LinkMotion {
+            omega,
+            alpha,
+            acceleration,
+            field,
+        } = &self.links[link];
         let element = |e: Element| inertia[e.index()];
         let force_moment = [0, 1, 2].map(|i| element(Element::ForceMoment(i)));
         let moment_moment = [0, 1, 2].map(|i| element(Element::MomentMoment(i)));
@@ -178,7 +194,9 @@ pub(crate) fn backward(
     }
     let mut rows: Vec<Vec<(ExprId, Rational)>> = vec![Vec::new(); n_coordinates];
     for i in (0..tree.links.len()).rev() {
-        let Some(Wrench { force, moment }) = total[i] else { continue };
+        let Some(Wrench { force, moment }) = total[i] else {
+            continue;
+        };
         let link = &tree.links[i];
         for (coordinate, n) in &link.turns {
             rows[*coordinate].push((moment[2], Rational::integer(i64::from(*n))));

@@ -46,18 +46,30 @@ pub(crate) struct Projection {
 }
 
 impl Projection {
-    pub(crate) fn new(graph: &mut Graph, mechanism: &Mechanism, tree: &Tree) -> Result<Self, DeriveError> {
+    pub(crate) fn new(
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        tree: &Tree,
+    ) -> Result<Self, DeriveError> {
         let n = mechanism.coordinates.len();
-        let (passive, active): (Vec<usize>, Vec<usize>) = (0..n).partition(|i| mechanism.coordinates[*i].passive);
+        let (passive, active): (Vec<usize>, Vec<usize>) =
+            (0..n).partition(|i| mechanism.coordinates[*i].passive);
         let closures = closure::closures(graph, mechanism, tree)?;
-        let residual: Vec<ExprId> = closures.iter().flat_map(|c| c.residual.iter().copied()).collect();
+        let residual: Vec<ExprId> = closures
+            .iter()
+            .flat_map(|c| c.residual.iter().copied())
+            .collect();
         let residual = independent(graph, &residual)?;
         if residual.len() != passive.len() {
-            return Err(DeriveError::LoopCount { equations: residual.len(), passive: passive.len() });
+            return Err(DeriveError::LoopCount {
+                equations: residual.len(),
+                passive: passive.len(),
+            });
         }
         let rates_of = rate_map(tree, &passive, n);
-        let by_coordinate: Vec<Vec<ExprId>> =
-            (0..n).map(|i| graph.differentiate(&residual, Atom::Coordinate(i))).collect();
+        let by_coordinate: Vec<Vec<ExprId>> = (0..n)
+            .map(|i| graph.differentiate(&residual, Atom::Coordinate(i)))
+            .collect();
         let in_y = |graph: &mut Graph, by_coordinate: &[Vec<ExprId>], row: usize, j: usize| {
             let terms: Vec<_> = (0..n)
                 .filter(|i| rates_of[*i][j] != 0)
@@ -66,7 +78,14 @@ impl Projection {
             graph.sum(&terms)
         };
         let pick = |graph: &mut Graph, columns: &[usize]| -> Vec<Vec<ExprId>> {
-            (0..residual.len()).map(|r| columns.iter().map(|j| in_y(graph, &by_coordinate, r, *j)).collect()).collect()
+            (0..residual.len())
+                .map(|r| {
+                    columns
+                        .iter()
+                        .map(|j| in_y(graph, &by_coordinate, r, *j))
+                        .collect()
+                })
+                .collect()
         };
         let (loop_p, loop_a) = (pick(graph, &passive), pick(graph, &active));
         // Right-hand sides: the active columns, then what the accelerations see besides.
@@ -81,7 +100,11 @@ impl Projection {
             })
             .collect();
         let solution = linear::solve(graph, &loop_p, &rhs, "the loops for the passive rates")?;
-        let transmission: Vec<Vec<ExprId>> = solution.values.iter().map(|row| row[..active.len()].to_vec()).collect();
+        let transmission: Vec<Vec<ExprId>> = solution
+            .values
+            .iter()
+            .map(|row| row[..active.len()].to_vec())
+            .collect();
         let residual_jacobian = (0..residual.len())
             .map(|r| passive.iter().map(|p| by_coordinate[*p][r]).collect())
             .collect();
@@ -100,8 +123,13 @@ impl Projection {
             transmission,
         };
         projection.passive_rates = projection.passive_motion(graph, Atom::Rate, None);
-        let drift: Vec<ExprId> = solution.values.iter().map(|row| row.last().copied().unwrap_or(Graph::ZERO)).collect();
-        projection.passive_accelerations = projection.passive_motion(graph, Atom::Acceleration, Some(&drift));
+        let drift: Vec<ExprId> = solution
+            .values
+            .iter()
+            .map(|row| row.last().copied().unwrap_or(Graph::ZERO))
+            .collect();
+        projection.passive_accelerations =
+            projection.passive_motion(graph, Atom::Acceleration, Some(&drift));
         projection.add_drives(graph, mechanism, tree)?;
         Ok(projection)
     }
@@ -117,23 +145,33 @@ impl Projection {
     }
 
     /// Rates or accelerations of the passive coordinates from the active ones.
-    fn passive_motion(&self, graph: &mut Graph, order: fn(usize) -> Atom, drift: Option<&[ExprId]>) -> Vec<ExprId> {
+    fn passive_motion(
+        &self,
+        graph: &mut Graph,
+        order: fn(usize) -> Atom,
+        drift: Option<&[ExprId]>,
+    ) -> Vec<ExprId> {
         let n = self.rates_of.len();
         let mut y = vec![Graph::ZERO; n];
         for a in &self.active {
             y[*a] = graph.atom(order(*a));
         }
         for (k, p) in self.passive.iter().enumerate() {
-            let mut terms: Vec<ExprId> =
-                self.active.iter().enumerate().map(|(j, a)| graph.mul(self.transmission[k][j], y[*a])).collect();
+            let mut terms: Vec<ExprId> = self
+                .active
+                .iter()
+                .enumerate()
+                .map(|(j, a)| graph.mul(self.transmission[k][j], y[*a]))
+                .collect();
             terms.extend(drift.map(|d| d[k]));
             y[*p] = graph.add_all(&terms);
         }
         self.passive
             .iter()
             .map(|p| {
-                let terms: Vec<_> =
-                    (0..n).map(|j| (y[j], Rational::integer(self.rates_of[*p][j]))).collect();
+                let terms: Vec<_> = (0..n)
+                    .map(|j| (y[j], Rational::integer(self.rates_of[*p][j])))
+                    .collect();
                 graph.sum(&terms)
             })
             .collect()
@@ -165,16 +203,32 @@ impl Projection {
     }
 
     /// Forces of the drives that balance generalised forces of all coordinates (open tree).
-    pub(crate) fn drive_forces(&self, graph: &mut Graph, forces: &[ExprId]) -> Result<Vec<ExprId>, DeriveError> {
+    pub(crate) fn drive_forces(
+        &self,
+        graph: &mut Graph,
+        forces: &[ExprId],
+    ) -> Result<Vec<ExprId>, DeriveError> {
         let projected = self.project(graph, forces);
         let n = projected.len();
-        let transposed: Vec<Vec<ExprId>> = (0..n).map(|a| (0..n).map(|d| self.drive_jacobian[d][a]).collect()).collect();
+        let transposed: Vec<Vec<ExprId>> = (0..n)
+            .map(|a| (0..n).map(|d| self.drive_jacobian[d][a]).collect())
+            .collect();
         let rhs: Vec<Vec<ExprId>> = projected.into_iter().map(|x| vec![x]).collect();
-        let solution = linear::solve(graph, &transposed, &rhs, "the drives' Jacobian for the drives' forces")?;
+        let solution = linear::solve(
+            graph,
+            &transposed,
+            &rhs,
+            "the drives' Jacobian for the drives' forces",
+        )?;
         Ok(solution.values.into_iter().map(|row| row[0]).collect())
     }
 
-    fn add_drives(&mut self, graph: &mut Graph, mechanism: &Mechanism, tree: &Tree) -> Result<(), DeriveError> {
+    fn add_drives(
+        &mut self,
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        tree: &Tree,
+    ) -> Result<(), DeriveError> {
         let n = mechanism.coordinates.len();
         for drive in &mechanism.drives {
             let coordinate = match drive.kind {
@@ -187,8 +241,9 @@ impl Projection {
                     graph.unary(Unary::Sqrt, square)
                 }
             };
-            let by_coordinate: Vec<ExprId> =
-                (0..n).map(|i| graph.differentiate(&[coordinate], Atom::Coordinate(i))[0]).collect();
+            let by_coordinate: Vec<ExprId> = (0..n)
+                .map(|i| graph.differentiate(&[coordinate], Atom::Coordinate(i))[0])
+                .collect();
             let row = self.project(graph, &by_coordinate);
             let mut rate_terms = Vec::new();
             for (a, slope) in self.active.iter().zip(&row) {
@@ -198,16 +253,33 @@ impl Projection {
             let rate = graph.add_all(&rate_terms);
             let tree_rate = graph.time_derivative(&[coordinate]);
             let acceleration = graph.time_derivative(&tree_rate)[0];
-            self.drives.push(DriveMotion { coordinate, rate, acceleration });
+            self.drives.push(DriveMotion {
+                coordinate,
+                rate,
+                acceleration,
+            });
             self.drive_jacobian.push(row);
         }
         let n = self.active.len();
         if self.drives.len() != n {
-            return Err(DeriveError::DriveCount { drives: self.drives.len(), freedoms: n });
+            return Err(DeriveError::DriveCount {
+                drives: self.drives.len(),
+                freedoms: n,
+            });
         }
-        let identity: Vec<Vec<ExprId>> =
-            (0..n).map(|i| (0..n).map(|j| if i == j { Graph::ONE } else { Graph::ZERO }).collect()).collect();
-        let solution = linear::solve(graph, &self.drive_jacobian, &identity, "the drives' Jacobian")?;
+        let identity: Vec<Vec<ExprId>> = (0..n)
+            .map(|i| {
+                (0..n)
+                    .map(|j| if i == j { Graph::ONE } else { Graph::ZERO })
+                    .collect()
+            })
+            .collect();
+        let solution = linear::solve(
+            graph,
+            &self.drive_jacobian,
+            &identity,
+            "the drives' Jacobian",
+        )?;
         self.determinants.extend(solution.determinants);
         Ok(())
     }
@@ -218,15 +290,24 @@ impl Projection {
 fn rate_map(tree: &Tree, passive: &[usize], n: usize) -> Vec<Vec<i64>> {
     let mut absolute: Vec<AngleSum> = Vec::new();
     for link in &tree.links {
-        let parallel = link.pre.iter().all(|turn| turn.axis == modelmill_spec::Axis::Z);
-        let below = link.parent.filter(|_| parallel).map_or(AngleSum::NONE, |p| absolute[p].clone());
+        let parallel = link
+            .pre
+            .iter()
+            .all(|turn| turn.axis == modelmill_spec::Axis::Z);
+        let below = link
+            .parent
+            .filter(|_| parallel)
+            .map_or(AngleSum::NONE, |p| absolute[p].clone());
         absolute.push(below.plus(&link.joint.sum, 1));
     }
-    let mut rates_of: Vec<Vec<i64>> =
-        (0..n).map(|i| (0..n).map(|j| i64::from(i == j)).collect()).collect();
+    let mut rates_of: Vec<Vec<i64>> = (0..n)
+        .map(|i| (0..n).map(|j| i64::from(i == j)).collect())
+        .collect();
     let mut done = Vec::new();
     for (link, sum) in tree.links.iter().zip(&absolute) {
-        let [(p, sign @ (1 | -1))] = link.turns[..] else { continue };
+        let [(p, sign @ (1 | -1))] = link.turns[..] else {
+            continue;
+        };
         if !passive.contains(&p) || done.contains(&p) {
             continue;
         }

@@ -25,7 +25,10 @@ pub(crate) struct Equations {
 }
 
 /// Derives the regressor of all products.
-pub(crate) fn equations(graph: &mut Graph, mechanism: &Mechanism) -> Result<Equations, DeriveError> {
+pub(crate) fn equations(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+) -> Result<Equations, DeriveError> {
     let tree = Tree::new(graph, mechanism)?;
     let gravity = [
         exact::expression(graph, &mechanism.gravity[0])?,
@@ -37,10 +40,22 @@ pub(crate) fn equations(graph: &mut Graph, mechanism: &Mechanism) -> Result<Equa
     let projection = Projection::new(graph, mechanism, &tree)?;
     let mut products: BTreeSet<Monomial> = inertia.products();
     for effect in &mechanism.effects {
-        products.extend(effect.terms.iter().map(|term| Monomial(vec![(term.parameter.0, 1)])));
+        products.extend(
+            effect
+                .terms
+                .iter()
+                .map(|term| Monomial(vec![(term.parameter.0, 1)])),
+        );
     }
     let products: Vec<Monomial> = products.into_iter().collect();
-    let mut equations = Equations { tree, motion, inertia, projection, products, columns: Vec::new() };
+    let mut equations = Equations {
+        tree,
+        motion,
+        inertia,
+        projection,
+        products,
+        columns: Vec::new(),
+    };
     for product in equations.products.clone() {
         let column = equations.column(graph, mechanism, &product)?;
         equations.columns.push(column);
@@ -56,10 +71,22 @@ impl Equations {
         mechanism: &Mechanism,
         product: &Monomial,
     ) -> Result<Vec<ExprId>, DeriveError> {
-        let bodies: Vec<_> = self.inertia.of(product).map(|(link, inertia)| (link, *inertia)).collect();
-        let wrenches: Vec<_> =
-            bodies.iter().map(|(link, inertia)| (*link, self.motion.wrench(graph, *link, inertia))).collect();
-        let value = |m: &Monomial| if m == product { Graph::ONE } else { Graph::ZERO };
+        let bodies: Vec<_> = self
+            .inertia
+            .of(product)
+            .map(|(link, inertia)| (link, *inertia))
+            .collect();
+        let wrenches: Vec<_> = bodies
+            .iter()
+            .map(|(link, inertia)| (*link, self.motion.wrench(graph, *link, inertia)))
+            .collect();
+        let value = |m: &Monomial| {
+            if m == product {
+                Graph::ONE
+            } else {
+                Graph::ZERO
+            }
+        };
         self.forces(graph, mechanism, wrenches, &value)
     }
 
@@ -71,8 +98,10 @@ impl Equations {
         value: &dyn Fn(&Monomial) -> ExprId,
     ) -> Result<Vec<ExprId>, DeriveError> {
         let inertia = self.inertia.total(graph, value);
-        let wrenches: Vec<_> =
-            inertia.iter().map(|(link, inertia)| (*link, self.motion.wrench(graph, *link, inertia))).collect();
+        let wrenches: Vec<_> = inertia
+            .iter()
+            .map(|(link, inertia)| (*link, self.motion.wrench(graph, *link, inertia)))
+            .collect();
         self.forces(graph, mechanism, wrenches, value)
     }
 
@@ -87,7 +116,11 @@ impl Equations {
         let mut on_tree = newton_euler::backward(graph, &self.tree, n, wrenches);
         let mut on_drives = vec![Graph::ZERO; mechanism.drives.len()];
         for effect in &mechanism.effects {
-            for (place, term) in effect.places.iter().flat_map(|p| effect.terms.iter().map(move |t| (p, t))) {
+            for (place, term) in effect
+                .places
+                .iter()
+                .flat_map(|p| effect.terms.iter().map(move |t| (p, t)))
+            {
                 let value = value(&Monomial(vec![(term.parameter.0, 1)]));
                 if value == Graph::ZERO {
                     continue;
@@ -103,18 +136,36 @@ impl Equations {
             }
         }
         let forces = self.projection.drive_forces(graph, &on_tree)?;
-        Ok(forces.into_iter().zip(on_drives).map(|(a, b)| graph.add(a, b)).collect())
+        Ok(forces
+            .into_iter()
+            .zip(on_drives)
+            .map(|(a, b)| graph.add(a, b))
+            .collect())
     }
 
     /// What an effect's parameter multiplies at a place.
-    fn effect_factor(&self, graph: &mut Graph, place: &Place, term: &EffectTerm) -> Result<ExprId, DeriveError> {
+    fn effect_factor(
+        &self,
+        graph: &mut Graph,
+        place: &Place,
+        term: &EffectTerm,
+    ) -> Result<ExprId, DeriveError> {
         let quantities = match place {
             Place::Drive(d) => {
                 let drive = &self.projection.drives[d.0];
-                [Some(drive.coordinate), Some(drive.rate), Some(drive.acceleration), Some(graph.atom(Atom::Load(d.0)))]
+                [
+                    Some(drive.coordinate),
+                    Some(drive.rate),
+                    Some(drive.acceleration),
+                    Some(graph.atom(Atom::Load(d.0))),
+                ]
             }
             Place::Coordinate(i) => {
-                let atoms = [Atom::Coordinate(i.0), Atom::Rate(i.0), Atom::Acceleration(i.0)];
+                let atoms = [
+                    Atom::Coordinate(i.0),
+                    Atom::Rate(i.0),
+                    Atom::Acceleration(i.0),
+                ];
                 let [q, qd, qdd] = atoms.map(|a| Some(graph.atom(a)));
                 [q, qd, qdd, None]
             }

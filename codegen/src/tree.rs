@@ -37,7 +37,10 @@ pub(crate) struct Tree {
 
 impl Tree {
     pub(crate) fn new(graph: &mut Graph, mechanism: &Mechanism) -> Result<Self, DeriveError> {
-        let mut tree = Self { links: Vec::new(), of_frame: vec![None] };
+        let mut tree = Self {
+            links: Vec::new(),
+            of_frame: vec![None],
+        };
         for frame in &mechanism.frames[1..] {
             let mut builder = Builder::new(tree.of_frame[frame.parent.0]);
             for step in &frame.steps {
@@ -96,50 +99,97 @@ struct Builder {
     slides: Vec<(usize, Rational)>,
 }
 
-const NO_TURN: Turn = Turn { axis: Axis::Z, sum: AngleSum::NONE, pi12: 0 };
+const NO_TURN: Turn = Turn {
+    axis: Axis::Z,
+    sum: AngleSum::NONE,
+    pi12: 0,
+};
 
 impl Builder {
     fn new(parent: Option<usize>) -> Self {
-        Self { parent, pre: Vec::new(), position: vector::ZERO, joint: NO_TURN, turns: Vec::new(), slides: Vec::new() }
+        Self {
+            parent,
+            pre: Vec::new(),
+            position: vector::ZERO,
+            joint: NO_TURN,
+            turns: Vec::new(),
+            slides: Vec::new(),
+        }
     }
 
     fn has_joint(&self) -> bool {
         !self.turns.is_empty() || !self.slides.is_empty()
     }
 
-    fn step(&mut self, graph: &mut Graph, links: &mut Vec<Link>, step: &Step) -> Result<(), DeriveError> {
+    fn step(
+        &mut self,
+        graph: &mut Graph,
+        links: &mut Vec<Link>,
+        step: &Step,
+    ) -> Result<(), DeriveError> {
         match step {
             Step::Rotate(axis, angle) => {
                 let (sum, pi12) = exact::angle_sum(angle);
                 let turns: Vec<(usize, i32)> = sum
                     .terms()
                     .iter()
-                    .filter_map(|(atom, n)| if let Atom::Coordinate(i) = atom { Some((*i, *n)) } else { None })
+                    .filter_map(|(atom, n)| {
+                        if let Atom::Coordinate(i) = atom {
+                            Some((*i, *n))
+                        } else {
+                            None
+                        }
+                    })
                     .collect();
-                let turn = Turn { axis: *axis, sum, pi12 };
-                self.about_z(graph, links, *axis, !turns.is_empty(), |builder, _, axis| {
-                    if turns.is_empty() && !builder.has_joint() {
-                        push_turn(&mut builder.pre, &Turn { axis, ..turn.clone() });
-                    } else {
-                        builder.joint.sum = builder.joint.sum.plus(&turn.sum, 1);
-                        builder.joint.pi12 = (builder.joint.pi12 + turn.pi12).rem_euclid(24);
-                        builder.turns.extend(&turns);
-                    }
-                });
+                let turn = Turn {
+                    axis: *axis,
+                    sum,
+                    pi12,
+                };
+                self.about_z(
+                    graph,
+                    links,
+                    *axis,
+                    !turns.is_empty(),
+                    |builder, _, axis| {
+                        if turns.is_empty() && !builder.has_joint() {
+                            push_turn(
+                                &mut builder.pre,
+                                &Turn {
+                                    axis,
+                                    ..turn.clone()
+                                },
+                            );
+                        } else {
+                            builder.joint.sum = builder.joint.sum.plus(&turn.sum, 1);
+                            builder.joint.pi12 = (builder.joint.pi12 + turn.pi12).rem_euclid(24);
+                            builder.turns.extend(&turns);
+                        }
+                    },
+                );
             }
             Step::Translate(axis, length) => {
                 let value = exact::length(graph, length)?;
-                let slides: Vec<(usize, Rational)> =
-                    length.coordinates.iter().map(|(c, k)| (c.0, Rational::from(k.clone()))).collect();
-                self.about_z(graph, links, *axis, !slides.is_empty(), |builder, graph, axis| {
-                    let mut along = vector::ZERO;
-                    along[axis as usize] = value;
-                    for turn in builder.pre.iter().rev() {
-                        along = graph.turn_out(turn, &along);
-                    }
-                    builder.position = graph.add_vectors(&[builder.position, along]);
-                    builder.slides.extend(slides.iter().cloned());
-                });
+                let slides: Vec<(usize, Rational)> = length
+                    .coordinates
+                    .iter()
+                    .map(|(c, k)| (c.0, Rational::from(k.clone())))
+                    .collect();
+                self.about_z(
+                    graph,
+                    links,
+                    *axis,
+                    !slides.is_empty(),
+                    |builder, graph, axis| {
+                        let mut along = vector::ZERO;
+                        along[axis as usize] = value;
+                        for turn in builder.pre.iter().rev() {
+                            along = graph.turn_out(turn, &along);
+                        }
+                        builder.position = graph.add_vectors(&[builder.position, along]);
+                        builder.slides.extend(slides.iter().cloned());
+                    },
+                );
             }
         }
         Ok(())
@@ -162,8 +212,16 @@ impl Builder {
             return;
         }
         // A = Ry(pi/2) takes z to x, A = Rx(-pi/2) takes z to y; motion about x is A (motion about z) A^-1.
-        let (about, pi12) = if axis == Axis::X { (Axis::Y, 6) } else { (Axis::X, -6) };
-        let turn = |pi12| Turn { axis: about, sum: AngleSum::NONE, pi12 };
+        let (about, pi12) = if axis == Axis::X {
+            (Axis::Y, 6)
+        } else {
+            (Axis::X, -6)
+        };
+        let turn = |pi12| Turn {
+            axis: about,
+            sum: AngleSum::NONE,
+            pi12,
+        };
         push_turn(&mut self.pre, &turn(pi12));
         apply(self, graph, Axis::Z);
         self.close(links);

@@ -94,7 +94,10 @@ impl Graph {
     }
 
     /// Linear combination with rational factors.
-    pub(crate) fn combine(&mut self, terms: impl IntoIterator<Item = (ExprId, Rational)>) -> ExprId {
+    pub(crate) fn combine(
+        &mut self,
+        terms: impl IntoIterator<Item = (ExprId, Rational)>,
+    ) -> ExprId {
         let terms: Vec<_> = terms.into_iter().collect();
         self.sum(&terms)
     }

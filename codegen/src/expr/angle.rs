@@ -18,7 +18,12 @@ impl AngleSum {
         for (atom, factor) in terms {
             *merged.entry(atom).or_insert(0) += factor;
         }
-        Self(merged.into_iter().filter(|(_, factor)| *factor != 0).collect())
+        Self(
+            merged
+                .into_iter()
+                .filter(|(_, factor)| *factor != 0)
+                .collect(),
+        )
     }
 
     /// The atoms with their factors.
@@ -39,7 +44,12 @@ impl AngleSum {
     /// `self + factor * other`
     #[must_use]
     pub fn plus(&self, other: &Self, factor: i32) -> Self {
-        Self::new(self.0.iter().copied().chain(other.0.iter().map(|(a, n)| (*a, n * factor))))
+        Self::new(
+            self.0
+                .iter()
+                .copied()
+                .chain(other.0.iter().map(|(a, n)| (*a, n * factor))),
+        )
     }
 }
 
@@ -51,7 +61,11 @@ impl Graph {
             return (cd, sd);
         }
         let negative = sum.0[0].1 < 0;
-        let canonical = if negative { AngleSum::default().plus(sum, -1) } else { sum.clone() };
+        let canonical = if negative {
+            AngleSum::default().plus(sum, -1)
+        } else {
+            sum.clone()
+        };
         let c = self.intern(Node::Cos(canonical.clone()));
         let mut s = self.intern(Node::Sin(canonical));
         if negative {

@@ -84,7 +84,10 @@ impl Graph {
     pub fn product(&mut self, factors: &[(ExprId, i32)]) -> ExprId {
         let mut scale = Rational::ONE;
         let mut flat: Vec<(ExprId, i32)> = Vec::with_capacity(factors.len());
-        let push = |flat: &mut Vec<(ExprId, i32)>, base: ExprId, n: i32| match flat.iter_mut().find(|f| f.0 == base) {
+        let push = |flat: &mut Vec<(ExprId, i32)>, base: ExprId, n: i32| match flat
+            .iter_mut()
+            .find(|f| f.0 == base)
+        {
             Some(found) => found.1 += n,
             None => flat.push((base, n)),
         };
@@ -140,7 +143,8 @@ impl Graph {
             match function {
                 Unary::Sqrt if value.is_zero() || value.is_one() => return a,
                 Unary::Sign => {
-                    let sign = i64::from(!value.is_zero()) * if value.is_negative() { -1 } else { 1 };
+                    let sign =
+                        i64::from(!value.is_zero()) * if value.is_negative() { -1 } else { 1 };
                     return self.integer(sign);
                 }
                 Unary::Abs => return self.rational(value.abs()),
@@ -154,7 +158,11 @@ impl Graph {
             Unary::Sign | Unary::Tanh | Unary::Abs if k.is_negative() => {
                 let positive = self.neg(a);
                 let value = self.unary(function, positive);
-                if function == Unary::Abs { value } else { self.neg(value) }
+                if function == Unary::Abs {
+                    value
+                } else {
+                    self.neg(value)
+                }
             }
             Unary::Sign if !k.is_one() => self.unary(Unary::Sign, base),
             Unary::Abs if !k.is_one() => {
@@ -209,7 +217,9 @@ impl Graph {
         if flat[0].0 == Self::ONE {
             flat.rotate_left(1);
         }
-        let mut content = flat.iter().fold(Rational::ZERO, |content, (_, k)| content.content_with(k));
+        let mut content = flat
+            .iter()
+            .fold(Rational::ZERO, |content, (_, k)| content.content_with(k));
         if flat[0].1.is_negative() {
             content = -&content;
         }
@@ -230,18 +240,29 @@ impl Graph {
             _ => None,
         };
         for (i, (id, factor)) in flat.iter().enumerate() {
-            let Some(inner) = inner_terms(*id) else { continue };
+            let Some(inner) = inner_terms(*id) else {
+                continue;
+            };
             let cancels = inner.iter().any(|(base, k)| {
                 let k = k * factor;
-                flat.iter().enumerate().filter(|(j, _)| *j != i).any(|(_, (other, m))| {
-                    let opposite = |m: &Rational| (m + &k).is_zero();
-                    (other == base && opposite(m))
-                        || inner_terms(*other)
-                            .is_some_and(|t| t.iter().any(|(b, x)| b == base && opposite(&(x * m))))
-                })
+                flat.iter()
+                    .enumerate()
+                    .filter(|(j, _)| *j != i)
+                    .any(|(_, (other, m))| {
+                        let opposite = |m: &Rational| (m + &k).is_zero();
+                        (other == base && opposite(m))
+                            || inner_terms(*other).is_some_and(|t| {
+                                t.iter().any(|(b, x)| b == base && opposite(&(x * m)))
+                            })
+                    })
             });
             if cancels {
-                let mut opened: Vec<_> = flat.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, t)| t.clone()).collect();
+                let mut opened: Vec<_> = flat
+                    .iter()
+                    .enumerate()
+                    .filter(|(j, _)| *j != i)
+                    .map(|(_, t)| t.clone())
+                    .collect();
                 for (base, k) in inner {
                     merge(&mut opened, *base, &(k * factor));
                 }

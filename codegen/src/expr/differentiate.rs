@@ -7,7 +7,10 @@ use super::{Atom, ExprId, Graph, Node, Rational, Unary};
 impl Graph {
     /// Partial derivative of each root by `atom`. The sign function counts as constant.
     pub fn differentiate(&mut self, roots: &[ExprId], atom: Atom) -> Vec<ExprId> {
-        self.directional(roots, |_, a| if a == atom { Graph::ONE } else { Graph::ZERO })
+        self.directional(
+            roots,
+            |_, a| if a == atom { Graph::ONE } else { Graph::ZERO },
+        )
     }
 
     /// Time derivative of each root: coordinates turn into rates, rates into accelerations; all else stands still.
@@ -20,7 +23,11 @@ impl Graph {
     }
 
     /// Derivative of each root along a direction that gives every atom its speed.
-    pub fn directional(&mut self, roots: &[ExprId], mut speed: impl FnMut(&mut Graph, Atom) -> ExprId) -> Vec<ExprId> {
+    pub fn directional(
+        &mut self,
+        roots: &[ExprId],
+        mut speed: impl FnMut(&mut Graph, Atom) -> ExprId,
+    ) -> Vec<ExprId> {
         let needed = self.reachable(roots);
         let mut derivative: BTreeMap<ExprId, ExprId> = BTreeMap::new();
         for (i, needed) in needed.into_iter().enumerate() {
@@ -43,7 +50,10 @@ impl Graph {
                     self.mul(outer, rate)
                 }
                 Node::Sum(terms) => {
-                    let terms: Vec<_> = terms.into_iter().map(|(child, k)| (derivative[&child], k)).collect();
+                    let terms: Vec<_> = terms
+                        .into_iter()
+                        .map(|(child, k)| (derivative[&child], k))
+                        .collect();
                     self.sum(&terms)
                 }
                 Node::Product(factors) => {

@@ -52,7 +52,12 @@ impl Tape {
                 steps.push((id, graph.node(id).clone()));
             }
         }
-        Self { steps, roots: roots.to_vec(), positions, operands }
+        Self {
+            steps,
+            roots: roots.to_vec(),
+            positions,
+            operands,
+        }
     }
 
     /// How many nodes it evaluates.
@@ -78,8 +83,11 @@ impl Tape {
                     let mut total: Option<D::Value> = None;
                     for ((_, factor), operand) in terms.iter().zip(operands) {
                         let value = &values[*operand];
-                        let term =
-                            if factor.is_one() { value.clone() } else { domain.mul(&domain.rational(factor)?, value) };
+                        let term = if factor.is_one() {
+                            value.clone()
+                        } else {
+                            domain.mul(&domain.rational(factor)?, value)
+                        };
                         total = Some(match total {
                             Some(sum) => domain.add(&sum, &term),
                             None => term,
@@ -91,7 +99,11 @@ impl Tape {
                     let mut total: Option<D::Value> = None;
                     for ((_, n), operand) in factors.iter().zip(operands) {
                         let value = &values[*operand];
-                        let factor = if *n == 1 { value.clone() } else { domain.power(value, *n)? };
+                        let factor = if *n == 1 {
+                            value.clone()
+                        } else {
+                            domain.power(value, *n)?
+                        };
                         total = Some(match total {
                             Some(product) => domain.mul(&product, &factor),
                             None => factor,
@@ -103,7 +115,12 @@ impl Tape {
             };
             values.push(value);
         }
-        Some(self.roots.iter().map(|root| values[self.positions[root]].clone()).collect())
+        Some(
+            self.roots
+                .iter()
+                .map(|root| values[self.positions[root]].clone())
+                .collect(),
+        )
     }
 }
 
@@ -140,7 +157,11 @@ impl<F: Fn(Atom) -> f64> Domain for F64<F> {
         Some((self.0)(atom))
     }
     fn cos_sin(&self, angle: &AngleSum) -> Option<(f64, f64)> {
-        let total: f64 = angle.terms().iter().map(|(atom, n)| f64::from(*n) * (self.0)(*atom)).sum();
+        let total: f64 = angle
+            .terms()
+            .iter()
+            .map(|(atom, n)| f64::from(*n) * (self.0)(*atom))
+            .sum();
         Some((total.cos(), total.sin()))
     }
 }
@@ -164,7 +185,11 @@ pub struct FieldPoint {
 impl FieldPoint {
     fn sign(&self, a: Element) -> Element {
         let (key, odd) = canonical(a);
-        let value = if field::hashed(self.seed, key).representative() & 1 == 0 { Element::ONE } else { -Element::ONE };
+        let value = if field::hashed(self.seed, key).representative() & 1 == 0 {
+            Element::ONE
+        } else {
+            -Element::ONE
+        };
         if a == Element::ZERO {
             Element::ZERO
         } else if odd {
@@ -202,7 +227,11 @@ impl Domain for FieldPoint {
             // One fixed choice per radicand: equal radicands must have equal roots.
             Unary::Sqrt => a.square_root().map(|root| {
                 let flip = field::hashed(self.root_seed, *a).representative() & 1 == 1;
-                if flip { -canonical(root).0 } else { canonical(root).0 }
+                if flip {
+                    -canonical(root).0
+                } else {
+                    canonical(root).0
+                }
             }),
             Unary::Sign => Some(self.sign(*a)),
             Unary::Abs => Some(*a * self.sign(*a)),
@@ -256,7 +285,11 @@ impl Domain for RationalPoint {
     fn unary(&self, function: Unary, a: &Rational) -> Option<Rational> {
         match function {
             Unary::Sign if a.is_zero() => Some(Rational::ZERO),
-            Unary::Sign => Some(if a.is_negative() { Rational::MINUS_ONE } else { Rational::ONE }),
+            Unary::Sign => Some(if a.is_negative() {
+                Rational::MINUS_ONE
+            } else {
+                Rational::ONE
+            }),
             Unary::Abs => Some(a.abs()),
             Unary::Sqrt => {
                 let big = a.to_big();
@@ -276,7 +309,10 @@ impl Domain for RationalPoint {
             let (c, s) = self.angles.get(atom)?;
             let s = if *n < 0 { -s } else { s.clone() };
             for _ in 0..n.unsigned_abs() {
-                total = (&(&total.0 * c) - &(&total.1 * &s), &(&total.0 * &s) + &(&total.1 * c));
+                total = (
+                    &(&total.0 * c) - &(&total.1 * &s),
+                    &(&total.0 * &s) + &(&total.1 * c),
+                );
             }
         }
         Some(total)

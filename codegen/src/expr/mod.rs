@@ -85,6 +85,13 @@ pub enum Node {
     Unary(Unary, ExprId),
 }
 
+impl Node {
+    /// Whether it is a sum or a product.
+    pub(crate) fn is_open(&self) -> bool {
+        matches!(self, Self::Sum(_) | Self::Product(_))
+    }
+}
+
 /// The arena of expressions.
 #[derive(Clone, Debug)]
 pub struct Graph {
@@ -106,7 +113,10 @@ impl Graph {
 
     /// A graph that holds 0 and 1.
     pub fn new() -> Self {
-        let mut graph = Self { nodes: Vec::new(), ids: HashMap::new() };
+        let mut graph = Self {
+            nodes: Vec::new(),
+            ids: HashMap::new(),
+        };
         let zero = graph.intern(Node::Rational(Rational::ZERO));
         let one = graph.intern(Node::Rational(Rational::ONE));
         assert!(zero == Self::ZERO && one == Self::ONE);
@@ -136,9 +146,12 @@ impl Graph {
         }
         for i in (0..self.nodes.len()).rev() {
             if seen[i] {
-                self.for_each_child(ExprId(u32::try_from(i).expect("graph below 4G nodes")), |child| {
-                    seen[child.index()] = true;
-                });
+                self.for_each_child(
+                    ExprId(u32::try_from(i).expect("graph below 4G nodes")),
+                    |child| {
+                        seen[child.index()] = true;
+                    },
+                );
             }
         }
         seen
@@ -156,7 +169,11 @@ impl Graph {
 
     /// The nodes that `roots` are made of, children first.
     pub fn nodes_of(&self, roots: &[ExprId]) -> impl Iterator<Item = &Node> {
-        self.nodes.iter().zip(self.reachable(roots)).filter(|(_, seen)| *seen).map(|(node, _)| node)
+        self.nodes
+            .iter()
+            .zip(self.reachable(roots))
+            .filter(|(_, seen)| *seen)
+            .map(|(node, _)| node)
     }
 
     /// The atoms on which `roots` depend, also inside sines and cosines.

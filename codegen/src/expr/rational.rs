@@ -53,7 +53,10 @@ impl Rational {
         let d = denominator.unsigned_abs() / common;
         match (i64::try_from(n), i64::try_from(d)) {
             (Ok(n), Ok(d)) => Self(Repr::Small(sign * n, d)),
-            _ => Self::from(BigRational::new(BigInt::from(numerator), BigInt::from(denominator))),
+            _ => Self::from(BigRational::new(
+                BigInt::from(numerator),
+                BigInt::from(denominator),
+            )),
         }
     }
 
@@ -102,7 +105,11 @@ impl Rational {
     /// Absolute value.
     #[must_use]
     pub fn abs(&self) -> Self {
-        if self.is_negative() { -self } else { self.clone() }
+        if self.is_negative() {
+            -self
+        } else {
+            self.clone()
+        }
     }
 
     /// One over it; it must not be zero.
@@ -120,7 +127,11 @@ impl Rational {
         if self.is_one() {
             return self.clone();
         }
-        let base = if exponent < 0 { self.recip() } else { self.clone() };
+        let base = if exponent < 0 {
+            self.recip()
+        } else {
+            self.clone()
+        };
         (0..exponent.unsigned_abs()).fold(Self::ONE, |product, _| &product * &base)
     }
 
@@ -130,7 +141,10 @@ impl Rational {
         if let (Repr::Small(a, b), Repr::Small(c, d)) = (&self.0, &other.0) {
             // gcd(a/b, c/d) = gcd(a d, c b) / (b d)
             let (b, d) = (u128::from(b.unsigned_abs()), u128::from(d.unsigned_abs()));
-            let n = gcd(u128::from(a.unsigned_abs()) * d, u128::from(c.unsigned_abs()) * b);
+            let n = gcd(
+                u128::from(a.unsigned_abs()) * d,
+                u128::from(c.unsigned_abs()) * b,
+            );
             let m = b * d;
             let common = gcd(n, m).max(1);
             if let (Ok(n), Ok(m)) = (i64::try_from(n / common), i64::try_from(m / common)) {
@@ -180,9 +194,16 @@ impl Add for &Rational {
     type Output = Rational;
     fn add(self, other: Self) -> Rational {
         match (&self.0, &other.0) {
-            (Repr::Small(a, 1), Repr::Small(c, 1)) => Rational::from_wide(i128::from(*a) + i128::from(*c), 1),
+            (Repr::Small(a, 1), Repr::Small(c, 1)) => {
+                Rational::from_wide(i128::from(*a) + i128::from(*c), 1)
+            }
             (Repr::Small(a, b), Repr::Small(c, d)) => {
-                let (a, b, c, d) = (i128::from(*a), i128::from(*b), i128::from(*c), i128::from(*d));
+                let (a, b, c, d) = (
+                    i128::from(*a),
+                    i128::from(*b),
+                    i128::from(*c),
+                    i128::from(*d),
+                );
                 Rational::from_wide(a * d + c * b, b * d)
             }
             _ => Rational::from(self.to_big() + other.to_big()),
@@ -201,9 +222,10 @@ impl Mul for &Rational {
     type Output = Rational;
     fn mul(self, other: Self) -> Rational {
         match (&self.0, &other.0) {
-            (Repr::Small(a, b), Repr::Small(c, d)) => {
-                Rational::from_wide(i128::from(*a) * i128::from(*c), i128::from(*b) * i128::from(*d))
-            }
+            (Repr::Small(a, b), Repr::Small(c, d)) => Rational::from_wide(
+                i128::from(*a) * i128::from(*c),
+                i128::from(*b) * i128::from(*d),
+            ),
             _ => Rational::from(self.to_big() * other.to_big()),
         }
     }

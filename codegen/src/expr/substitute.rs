@@ -6,7 +6,11 @@ use super::{ExprId, Graph, Node};
 
 impl Graph {
     /// Rewrites each root with every key of `replacements` put by its value, at once (values are not rewritten).
-    pub fn substitute(&mut self, roots: &[ExprId], replacements: &BTreeMap<ExprId, ExprId>) -> Vec<ExprId> {
+    pub fn substitute(
+        &mut self,
+        roots: &[ExprId],
+        replacements: &BTreeMap<ExprId, ExprId>,
+    ) -> Vec<ExprId> {
         if replacements.is_empty() {
             return roots.to_vec();
         }
@@ -20,11 +24,19 @@ impl Graph {
             } else {
                 match self.node(id) {
                     Node::Sum(terms) if terms.iter().any(|(c, _)| rewritten[c.index()] != *c) => {
-                        let terms: Vec<_> = terms.iter().map(|(c, k)| (rewritten[c.index()], k.clone())).collect();
+                        let terms: Vec<_> = terms
+                            .iter()
+                            .map(|(c, k)| (rewritten[c.index()], k.clone()))
+                            .collect();
                         self.sum(&terms)
                     }
-                    Node::Product(factors) if factors.iter().any(|(c, _)| rewritten[c.index()] != *c) => {
-                        let factors: Vec<_> = factors.iter().map(|(c, n)| (rewritten[c.index()], *n)).collect();
+                    Node::Product(factors)
+                        if factors.iter().any(|(c, _)| rewritten[c.index()] != *c) =>
+                    {
+                        let factors: Vec<_> = factors
+                            .iter()
+                            .map(|(c, n)| (rewritten[c.index()], *n))
+                            .collect();
                         self.product(&factors)
                     }
                     Node::Unary(function, child) if rewritten[child.index()] != *child => {

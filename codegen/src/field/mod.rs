@@ -38,12 +38,22 @@ impl Element {
     pub fn from_rational(value: &Rational) -> Option<Self> {
         if let Some((n, d)) = value.as_small() {
             let n = Self::from_i64(n);
-            return if d == 1 { Some(n) } else { Some(n * Self::from_i64(d).inverse()?) };
+            return if d == 1 {
+                Some(n)
+            } else {
+                Some(n * Self::from_i64(d).inverse()?)
+            };
         }
         let big = value.to_big();
         let reduce = |n: &BigInt| {
-            let magnitude = (n.abs() % BigInt::from(MODULUS)).to_u64().expect("a remainder fits");
-            if n.is_negative() { -Self(magnitude) } else { Self(magnitude) }
+            let magnitude = (n.abs() % BigInt::from(MODULUS))
+                .to_u64()
+                .expect("a remainder fits");
+            if n.is_negative() {
+                -Self(magnitude)
+            } else {
+                Self(magnitude)
+            }
         };
         Some(reduce(big.numer()) * reduce(big.denom()).inverse()?)
     }
@@ -75,7 +85,9 @@ impl Element {
             (r0, r1) = (r1, r0 - q * r1);
             (t0, t1) = (t1, t0 - q * t1);
         }
-        u64::try_from(t0.rem_euclid(i128::from(MODULUS))).ok().map(Self)
+        u64::try_from(t0.rem_euclid(i128::from(MODULUS)))
+            .ok()
+            .map(Self)
     }
 
     /// Integer power; `None` for a negative power of 0.
@@ -105,7 +117,10 @@ impl Element {
             return None;
         }
         let (n, d) = if t1 < 0 { (-r1, -t1) } else { (r1, t1) };
-        Some(Rational::new(i64::try_from(n).ok()?, i64::try_from(d).ok()?))
+        Some(Rational::new(
+            i64::try_from(n).ok()?,
+            i64::try_from(d).ok()?,
+        ))
     }
 }
 
@@ -114,7 +129,10 @@ fn reduce(x: u128) -> Element {
     const EXCESS: u128 = (1 << 61) - MODULUS as u128;
     let x = (x & MASK) + (x >> 61) * EXCESS;
     let x = (x & MASK) + (x >> 61) * EXCESS;
-    #[expect(clippy::cast_possible_truncation, reason = "below 2^62 after two folds")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "below 2^62 after two folds"
+    )]
     let x = x as u64;
     Element(if x >= MODULUS { x - MODULUS } else { x })
 }
@@ -172,7 +190,9 @@ impl Stream {
     pub fn circle(&mut self) -> (Element, Element) {
         let t = self.element();
         // -1 is not a square in the field, so 1 + t^2 has an inverse.
-        let scale = (Element::ONE + t * t).inverse().expect("-1 is no square modulo a prime that is 3 modulo 4");
+        let scale = (Element::ONE + t * t)
+            .inverse()
+            .expect("-1 is no square modulo a prime that is 3 modulo 4");
         ((Element::ONE - t * t) * scale, (t + t) * scale)
     }
 }
@@ -220,7 +240,10 @@ mod tests {
     fn rationals_survive_the_field() {
         for (n, d) in [(0, 1), (1, 1), (-7, 3), (12345, 678), (-1, 536_870_911)] {
             let value = Rational::new(n, d);
-            assert_eq!(Element::from_rational(&value).unwrap().to_rational(), Some(value));
+            assert_eq!(
+                Element::from_rational(&value).unwrap().to_rational(),
+                Some(value)
+            );
         }
     }
 }

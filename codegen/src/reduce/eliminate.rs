@@ -16,7 +16,9 @@ pub(crate) fn echelon(mut rows: Vec<Vec<Element>>, order: &[usize]) -> Echelon {
     let mut pivots = Vec::new();
     let mut rank = 0;
     for &column in order {
-        let Some(found) = (rank..rows.len()).find(|r| rows[*r][column] != Element::ZERO) else { continue };
+        let Some(found) = (rank..rows.len()).find(|r| rows[*r][column] != Element::ZERO) else {
+            continue;
+        };
         rows.swap(rank, found);
         let inverse = rows[rank][column].inverse().expect("a pivot is not zero");
         for x in &mut rows[rank] {

@@ -50,7 +50,10 @@ pub struct Dependency {
 }
 
 /// Which of some functions are linearly independent over the constants, all atoms being free; the first ones are kept.
-pub(crate) fn independent_functions(graph: &Graph, roots: &[ExprId]) -> Result<Vec<usize>, DeriveError> {
+pub(crate) fn independent_functions(
+    graph: &Graph,
+    roots: &[ExprId],
+) -> Result<Vec<usize>, DeriveError> {
     if roots.is_empty() {
         return Ok(Vec::new());
     }
@@ -77,7 +80,9 @@ pub(crate) fn independent_functions(graph: &Graph, roots: &[ExprId]) -> Result<V
         }
     }
     if rows.len() < roots.len() {
-        return Err(DeriveError::NoPointFound { draws: 50 * roots.len() });
+        return Err(DeriveError::NoPointFound {
+            draws: 50 * roots.len(),
+        });
     }
     let order: Vec<usize> = (0..roots.len()).collect();
     let mut kept = eliminate::echelon(rows, &order).pivots;
@@ -95,10 +100,14 @@ pub(crate) fn reduce(
     candidates: &[Monomial],
     columns: &[Vec<ExprId>],
 ) -> Result<Reduction, DeriveError> {
-    let effective: Vec<usize> = (0..columns.len()).filter(|k| columns[*k].iter().any(|x| *x != Graph::ZERO)).collect();
+    let effective: Vec<usize> = (0..columns.len())
+        .filter(|k| columns[*k].iter().any(|x| *x != Graph::ZERO))
+        .collect();
     let n_drives = projection.drives.len();
-    let outputs: Vec<ExprId> =
-        (0..n_drives).flat_map(|d| effective.iter().map(move |k| (d, *k))).map(|(d, k)| columns[k][d]).collect();
+    let outputs: Vec<ExprId> = (0..n_drives)
+        .flat_map(|d| effective.iter().map(move |k| (d, *k)))
+        .map(|(d, k)| columns[k][d])
+        .collect();
     let roots = root_radicands(graph, &outputs, projection);
     let sampler = Sampler::new(graph, mechanism, projection, &outputs)?;
     let mut stream = Stream::new(SEED);
@@ -107,7 +116,10 @@ pub(crate) fn reduce(
     // A sign takes only two values: that two of them agree by chance at all points must be out of the question.
     let least_points = if has_sign(graph, &outputs) { 80 } else { 0 };
     // Rows of W for one set of constants, enough of them to show `rank` and a few more.
-    let rows_at = |constants: &FieldPoint, rank: usize, stream: &mut Stream| -> Result<Vec<Vec<Element>>, DeriveError> {
+    let rows_at = |constants: &FieldPoint,
+                   rank: usize,
+                   stream: &mut Stream|
+     -> Result<Vec<Vec<Element>>, DeriveError> {
         let mut rows = Vec::new();
         let mut points = 0;
         while rows.len() < rank + 6 || points < least_points {
@@ -119,18 +131,28 @@ pub(crate) fn reduce(
     };
 
     let constants = sampler.constants(&mut stream);
-    let rows = if n == 0 { Vec::new() } else { rows_at(&constants, n, &mut stream)? };
-    let is_zero: Vec<bool> = (0..n).map(|k| rows.iter().all(|row| row[k] == Element::ZERO)).collect();
+    let rows = if n == 0 {
+        Vec::new()
+    } else {
+        rows_at(&constants, n, &mut stream)?
+    };
+    let is_zero: Vec<bool> = (0..n)
+        .map(|k| rows.iter().all(|row| row[k] == Element::ZERO))
+        .collect();
     let preferred = preference(mechanism, candidates, &effective);
     let echelon = eliminate::echelon(rows, &preferred);
     let mut pivots = echelon.pivots.clone();
     pivots.sort_unstable();
     let order: Vec<usize> = pivots.clone();
     let rank = pivots.len();
-    let dependent: Vec<usize> = (0..n).filter(|k| !is_zero[*k] && !pivots.contains(k)).collect();
+    let dependent: Vec<usize> = (0..n)
+        .filter(|k| !is_zero[*k] && !pivots.contains(k))
+        .collect();
 
     // The factors that do not vanish, found again at any other constants.
-    let row_of = |echelon: &eliminate::Echelon, pivot: usize| echelon.pivots.iter().position(|p| *p == pivot);
+    let row_of = |echelon: &eliminate::Echelon, pivot: usize| {
+        echelon.pivots.iter().position(|p| *p == pivot)
+    };
     let wanted: Vec<(usize, usize)> = dependent
         .iter()
         .flat_map(|j| pivots.iter().map(move |p| (*j, *p)))
@@ -142,7 +164,11 @@ pub(crate) fn reduce(
         let echelon = eliminate::echelon(rows, &order);
         wanted
             .iter()
-            .map(|(j, p)| row_of(&echelon, *p).map(|r| echelon.rows[r][*j]).ok_or(DeriveError::RankChanged))
+            .map(|(j, p)| {
+                row_of(&echelon, *p)
+                    .map(|r| echelon.rows[r][*j])
+                    .ok_or(DeriveError::RankChanged)
+            })
             .collect()
     };
     let used = graph.atoms(&outputs);
@@ -165,22 +191,45 @@ pub(crate) fn reduce(
         (0..n).map(|k| kept.iter().position(|x| *x == k)).collect()
     };
     let at = |k: usize| position[k].expect("a column with an effect has a position");
-    let mut dependencies: Vec<Dependency> =
-        dependent.iter().map(|j| Dependency { product: at(*j), equals: Vec::new() }).collect();
+    let mut dependencies: Vec<Dependency> = dependent
+        .iter()
+        .map(|j| Dependency {
+            product: at(*j),
+            equals: Vec::new(),
+        })
+        .collect();
     for ((j, p), function) in wanted.iter().zip(functions) {
-        let k = pivots.iter().position(|x| x == p).expect("a wanted pivot is one");
-        let line = dependent.iter().position(|x| x == j).expect("a wanted column is dependent");
+        let k = pivots
+            .iter()
+            .position(|x| x == p)
+            .expect("a wanted pivot is one");
+        let line = dependent
+            .iter()
+            .position(|x| x == j)
+            .expect("a wanted column is dependent");
         let function = function.ok_or_else(|| DeriveError::FactorNotRecovered {
             product: candidates[effective[*j]].text(mechanism),
             retained: candidates[effective[*p]].text(mechanism),
         })?;
         dependencies[line].equals.push((k, function));
     }
-    let products: Vec<Monomial> =
-        (0..n).filter(|k| !is_zero[*k]).map(|k| candidates[effective[k]].clone()).collect();
-    let without_effect = candidates.iter().filter(|c| !products.contains(c)).cloned().collect();
+    let products: Vec<Monomial> = (0..n)
+        .filter(|k| !is_zero[*k])
+        .map(|k| candidates[effective[k]].clone())
+        .collect();
+    let without_effect = candidates
+        .iter()
+        .filter(|c| !products.contains(c))
+        .cloned()
+        .collect();
     let retained: Vec<usize> = pivots.iter().map(|p| at(*p)).collect();
-    let mut reduction = Reduction { products, without_effect, retained, dependencies, confirmed_at: 0 };
+    let mut reduction = Reduction {
+        products,
+        without_effect,
+        retained,
+        dependencies,
+        confirmed_at: 0,
+    };
     let shown: Vec<usize> = (0..n).filter(|k| !is_zero[*k]).collect();
     reduction.confirm(&sampler, n, &shown, &mut stream)?;
     Ok(reduction)
@@ -207,9 +256,15 @@ impl Reduction {
             }
             for _ in 0..2 {
                 for row in sampler.draw(&constants, stream)?.chunks(n.max(1)) {
-                    let full = shown.iter().zip(&parameters).fold(Element::ZERO, |s, (k, p)| s + row[*k] * *p);
-                    let reduced =
-                        self.retained.iter().zip(&base).fold(Element::ZERO, |s, (k, p)| s + row[shown[*k]] * *p);
+                    let full = shown
+                        .iter()
+                        .zip(&parameters)
+                        .fold(Element::ZERO, |s, (k, p)| s + row[*k] * *p);
+                    let reduced = self
+                        .retained
+                        .iter()
+                        .zip(&base)
+                        .fold(Element::ZERO, |s, (k, p)| s + row[shown[*k]] * *p);
                     if full != reduced {
                         return Err(DeriveError::NotConfirmed);
                     }
@@ -227,7 +282,9 @@ fn preference(mechanism: &Mechanism, candidates: &[Monomial], effective: &[usize
         .retain
         .iter()
         .filter_map(|powers| {
-            let wanted = powers.iter().fold(Monomial::default(), |m, (p, n)| m.times(&Monomial(vec![(p.0, *n)])));
+            let wanted = powers.iter().fold(Monomial::default(), |m, (p, n)| {
+                m.times(&Monomial(vec![(p.0, *n)]))
+            });
             effective.iter().position(|k| candidates[*k] == wanted)
         })
         .collect();
@@ -240,7 +297,9 @@ fn preference(mechanism: &Mechanism, candidates: &[Monomial], effective: &[usize
 }
 
 fn has_sign(graph: &Graph, outputs: &[ExprId]) -> bool {
-    graph.nodes_of(outputs).any(|node| matches!(node, Node::Unary(Unary::Sign | Unary::Abs, _)))
+    graph
+        .nodes_of(outputs)
+        .any(|node| matches!(node, Node::Unary(Unary::Sign | Unary::Abs, _)))
 }
 
 /// Numbers under a root sign: they come from sines and cosines of multiples of pi/12.

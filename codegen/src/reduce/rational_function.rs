@@ -25,7 +25,9 @@ impl Variable {
             Self::Constant(i) => point.values.get(&Atom::Constant(i)).copied(),
             Self::Cos(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.0),
             Self::Sin(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.1),
-            Self::Root(n) => crate::expr::Domain::unary(point, crate::expr::Unary::Sqrt, &Element::from_i64(n)),
+            Self::Root(n) => {
+                crate::expr::Domain::unary(point, crate::expr::Unary::Sqrt, &Element::from_i64(n))
+            }
         }
     }
 
@@ -62,8 +64,15 @@ impl RationalFunction {
     /// A number.
     pub fn constant(value: Rational) -> Self {
         let one = BTreeMap::from([(Powers::new(), Rational::ONE)]);
-        let numerator = if value.is_zero() { BTreeMap::new() } else { BTreeMap::from([(Powers::new(), value)]) };
-        Self { numerator, denominator: one }
+        let numerator = if value.is_zero() {
+            BTreeMap::new()
+        } else {
+            BTreeMap::from([(Powers::new(), value)])
+        };
+        Self {
+            numerator,
+            denominator: one,
+        }
     }
 
     /// Normalises a quotient; the denominator must not be zero.
@@ -77,7 +86,9 @@ impl RationalFunction {
             .chain(numerator.keys())
             .map(|powers| powers.iter().copied().collect::<BTreeMap<_, _>>())
             .reduce(|a, b| {
-                a.into_iter().filter_map(|(v, n)| b.get(&v).map(|m| (v, n.min(*m)))).collect()
+                a.into_iter()
+                    .filter_map(|(v, n)| b.get(&v).map(|m| (v, n.min(*m))))
+                    .collect()
             })
             .unwrap_or_default();
         let strip = |p: Polynomial| -> Polynomial {
@@ -93,15 +104,24 @@ impl RationalFunction {
                 .collect()
         };
         (numerator, denominator) = (strip(numerator), strip(denominator));
-        let mut content = denominator.values().fold(Rational::ZERO, |c, k| c.content_with(k));
-        if denominator.values().next_back().is_some_and(Rational::is_negative) {
+        let mut content = denominator
+            .values()
+            .fold(Rational::ZERO, |c, k| c.content_with(k));
+        if denominator
+            .values()
+            .next_back()
+            .is_some_and(Rational::is_negative)
+        {
             content = -&content;
         }
         let inverse = content.recip();
         for k in numerator.values_mut().chain(denominator.values_mut()) {
             *k = &*k * &inverse;
         }
-        Self { numerator, denominator }
+        Self {
+            numerator,
+            denominator,
+        }
     }
 
     /// Whether it is 0.
@@ -114,7 +134,11 @@ impl RationalFunction {
         if self.is_zero() {
             return Some(Rational::ZERO);
         }
-        match (self.numerator.len(), self.numerator.get(&Powers::new()), self.denominator.get(&Powers::new())) {
+        match (
+            self.numerator.len(),
+            self.numerator.get(&Powers::new()),
+            self.denominator.get(&Powers::new()),
+        ) {
             (1, Some(n), Some(d)) if self.denominator.len() == 1 => Some(n * &d.recip()),
             _ => None,
         }
@@ -154,7 +178,12 @@ impl RationalFunction {
                 .map(|(powers, k)| {
                     let factors: Vec<_> = powers
                         .iter()
-                        .map(|(v, n)| (v.expression(graph), i32::try_from(*n).expect("a small exponent")))
+                        .map(|(v, n)| {
+                            (
+                                v.expression(graph),
+                                i32::try_from(*n).expect("a small exponent"),
+                            )
+                        })
                         .collect();
                     (graph.product(&factors), k.clone())
                 })
@@ -167,7 +196,9 @@ impl RationalFunction {
 }
 
 pub(crate) fn monomial_value(powers: &Powers, point: &FieldPoint) -> Option<Element> {
-    powers.iter().try_fold(Element::ONE, |product, (v, n)| Some(product * v.value(point)?.power(u64::from(*n))))
+    powers.iter().try_fold(Element::ONE, |product, (v, n)| {
+        Some(product * v.value(point)?.power(u64::from(*n)))
+    })
 }
 
 fn polynomial_value(p: &Polynomial, point: &FieldPoint) -> Option<Element> {

@@ -34,11 +34,23 @@ pub(crate) fn reconstruct(
     let varying: Vec<usize> = (0..n).filter(|k| at_origin[*k] != elsewhere[*k]).collect();
     if !varying.is_empty() {
         for &(index, is_angle) in constants {
-            probe(oracle, &origin, &at_origin, (index, is_angle), &varying, &mut shape, stream)?;
+            probe(
+                oracle,
+                &origin,
+                &at_origin,
+                (index, is_angle),
+                &varying,
+                &mut shape,
+                stream,
+            )?;
         }
         total_degrees(oracle, &origin, constants, &varying, &mut shape, stream)?;
     }
-    let mut samples = Samples { oracle, draw, points: Vec::new() };
+    let mut samples = Samples {
+        oracle,
+        draw,
+        points: Vec::new(),
+    };
     let mut found = Vec::with_capacity(n);
     for (k, shape) in shape.iter().enumerate() {
         if !varying.contains(&k)
@@ -54,7 +66,9 @@ pub(crate) fn reconstruct(
 
 /// A coefficient of a mechanism's equations is a small number; a random element of the field almost never is.
 fn is_plausible(value: &crate::expr::Rational) -> bool {
-    value.as_small().is_some_and(|(n, d)| n.abs() < 1 << 20 && d < 1 << 20)
+    value
+        .as_small()
+        .is_some_and(|(n, d)| n.abs() < 1 << 20 && d < 1 << 20)
 }
 
 /// What is known about one function before its coefficients are.
@@ -120,14 +134,25 @@ fn total_degrees(
     shape: &mut [Shape],
     stream: &mut Stream,
 ) -> Result<(), DeriveError> {
-    let lengths: Vec<usize> = constants.iter().filter(|(_, is_angle)| !is_angle).map(|(i, _)| *i).collect();
+    let lengths: Vec<usize> = constants
+        .iter()
+        .filter(|(_, is_angle)| !is_angle)
+        .map(|(i, _)| *i)
+        .collect();
     let direction: Vec<Element> = lengths.iter().map(|_| stream.element()).collect();
     let mut x = Vec::new();
     let mut y: Vec<Vec<Element>> = Vec::new();
     let mut open: Vec<usize> = varying
         .iter()
         .copied()
-        .filter(|k| shape[*k].degrees.keys().filter(|(_, is_angle)| !is_angle).count() > 1)
+        .filter(|k| {
+            shape[*k]
+                .degrees
+                .keys()
+                .filter(|(_, is_angle)| !is_angle)
+                .count()
+                > 1
+        })
         .collect();
     while !open.is_empty() && x.len() < MOST_POINTS {
         let mut point = origin.clone();
@@ -154,7 +179,10 @@ fn total_degrees(
 fn set(point: &mut FieldPoint, index: usize, is_angle: bool, t: Element) {
     point.values.insert(Atom::Constant(index), t);
     if is_angle && let Some(scale) = (Element::ONE + t * t).inverse() {
-        point.angles.insert(Atom::Constant(index), ((Element::ONE - t * t) * scale, (t + t) * scale));
+        point.angles.insert(
+            Atom::Constant(index),
+            ((Element::ONE - t * t) * scale, (t + t) * scale),
+        );
     }
 }
 
@@ -189,8 +217,12 @@ impl Shape {
         if self.lost {
             return Ok(None);
         }
-        let angle_degree =
-            self.degrees.iter().filter(|((_, is_angle), _)| *is_angle).map(|(_, (n, d))| n.max(d).div_ceil(2)).max();
+        let angle_degree = self
+            .degrees
+            .iter()
+            .filter(|((_, is_angle), _)| *is_angle)
+            .map(|(_, (n, d))| n.max(d).div_ceil(2))
+            .max();
         let root_powers = root_products(roots);
         // The share of the angles in the denominator is raised until a function fits; lengths are known already.
         for angle_in_denominator in 0..=angle_degree.unwrap_or(0) {
@@ -218,7 +250,9 @@ impl Shape {
                 .iter()
                 .map(|(point, values)| {
                     let top = numerator.iter().map(|m| monomial_value(m, point));
-                    let bottom = denominator.iter().map(|m| monomial_value(m, point).map(|x| -(x * values[k])));
+                    let bottom = denominator
+                        .iter()
+                        .map(|m| monomial_value(m, point).map(|x| -(x * values[k])));
                     top.chain(bottom).collect::<Option<Vec<_>>>()
                 })
                 .collect::<Option<Vec<_>>>();
@@ -283,23 +317,42 @@ fn push_power(powers: &mut Powers, variable: Variable, exponent: usize) {
 /// 1 and every product of different roots.
 fn root_products(roots: &[i64]) -> Vec<Powers> {
     roots.iter().fold(vec![Powers::new()], |products, root| {
-        let with = products.iter().map(|p| p.iter().copied().chain([(Variable::Root(*root), 1)]).collect::<Powers>());
+        let with = products.iter().map(|p| {
+            p.iter()
+                .copied()
+                .chain([(Variable::Root(*root), 1)])
+                .collect::<Powers>()
+        });
         products.iter().cloned().chain(with).collect()
     })
 }
 
 /// Scales a solution so that all coefficients are small rationals.
-fn rational_coefficients(solution: &[Element], numerator: &[Powers], denominator: &[Powers]) -> Option<RationalFunction> {
+fn rational_coefficients(
+    solution: &[Element],
+    numerator: &[Powers],
+    denominator: &[Powers],
+) -> Option<RationalFunction> {
     let (top, bottom) = solution.split_at(numerator.len());
-    let lead = bottom.iter().rev().find(|x| **x != Element::ZERO)?.inverse()?;
+    let lead = bottom
+        .iter()
+        .rev()
+        .find(|x| **x != Element::ZERO)?
+        .inverse()?;
     let polynomial = |monomials: &[Powers], values: &[Element]| -> Option<Polynomial> {
         let mut p = Polynomial::new();
         for (powers, value) in monomials.iter().zip(values) {
             if *value != Element::ZERO {
-                p.insert(powers.clone(), (*value * lead).to_rational().filter(is_plausible)?);
+                p.insert(
+                    powers.clone(),
+                    (*value * lead).to_rational().filter(is_plausible)?,
+                );
             }
         }
         Some(p)
     };
-    Some(RationalFunction::new(polynomial(numerator, top)?, polynomial(denominator, bottom)?))
+    Some(RationalFunction::new(
+        polynomial(numerator, top)?,
+        polynomial(denominator, bottom)?,
+    ))
 }

@@ -47,7 +47,10 @@ pub(crate) fn plan(
     let mut steps = Vec::new();
     let mut fixed = Vec::new();
     let mut todo: Vec<usize> = (0..projection.closures.len()).collect();
-    search(graph, projection, unknowns, positive, &mut todo, &mut fixed, &mut steps).then_some(Plan { steps })
+    search(
+        graph, projection, unknowns, positive, &mut todo, &mut fixed, &mut steps,
+    )
+    .then_some(Plan { steps })
 }
 
 fn search(
@@ -68,32 +71,55 @@ fn search(
         let closure = &projection.closures[index];
         let coordinates = closure.coordinates.clone();
         // Coordinates that a later loop solves for must not be needed here.
-        let candidates: Vec<usize> =
-            coordinates.iter().copied().filter(|c| may_be_unknown(*c) && !fixed.contains(c)).collect();
+        let candidates: Vec<usize> = coordinates
+            .iter()
+            .copied()
+            .filter(|c| may_be_unknown(*c) && !fixed.contains(c))
+            .collect();
         let mut pairs: Vec<[usize; 2]> = Vec::new();
         for (i, a) in candidates.iter().enumerate() {
             pairs.extend(candidates[i + 1..].iter().map(|b| [*a, *b]));
         }
-        pairs.sort_by_key(|pair| pair.iter().filter(|c| !projection.passive.contains(c)).count());
+        pairs.sort_by_key(|pair| {
+            pair.iter()
+                .filter(|c| !projection.passive.contains(c))
+                .count()
+        });
         for pair in pairs {
             let is_known = |c: &usize| {
-                unknowns == Unknowns::Any || projection.active.contains(c) || pair.contains(c) || fixed.contains(c)
+                unknowns == Unknowns::Any
+                    || projection.active.contains(c)
+                    || pair.contains(c)
+                    || fixed.contains(c)
             };
             if !coordinates.iter().all(is_known) {
                 continue;
             }
             let closure = projection.closures[index].clone();
-            let Some(mut solved) = dyad::solve(graph, &closure, &pair, true) else { continue };
+            let Some(mut solved) = dyad::solve(graph, &closure, &pair, true) else {
+                continue;
+            };
             if let Some(root) = solved.root
                 && !positive(graph, root.witness)
             {
-                let Some(negative) = dyad::solve(graph, &closure, &pair, false) else { continue };
+                let Some(negative) = dyad::solve(graph, &closure, &pair, false) else {
+                    continue;
+                };
                 solved = negative;
             }
             let known_before = fixed.len();
-            fixed.extend(coordinates.iter().filter(|c| !fixed.contains(c)).copied().collect::<Vec<_>>());
+            fixed.extend(
+                coordinates
+                    .iter()
+                    .filter(|c| !fixed.contains(c))
+                    .copied()
+                    .collect::<Vec<_>>(),
+            );
             todo.remove(position);
-            steps.push(PlanStep { unknown: pair.to_vec(), solved });
+            steps.push(PlanStep {
+                unknown: pair.to_vec(),
+                solved,
+            });
             if search(graph, projection, unknowns, positive, todo, fixed, steps) {
                 return true;
             }
@@ -134,24 +160,43 @@ impl Sampler {
         projection: &Projection,
         outputs: &[ExprId],
     ) -> Result<Self, DeriveError> {
-        let plan = plan(graph, projection, Unknowns::Any, &mut |_, _| true)
-            .ok_or_else(|| DeriveError::LoopsNotSampled { loops: projection.closures.iter().map(|c| c.name.clone()).collect() })?;
+        let plan = plan(graph, projection, Unknowns::Any, &mut |_, _| true).ok_or_else(|| {
+            DeriveError::LoopsNotSampled {
+                loops: projection.closures.iter().map(|c| c.name.clone()).collect(),
+            }
+        })?;
         let steps = plan
             .steps
             .into_iter()
             .map(|step| {
-                let mut roots: Vec<ExprId> = step.solved.angles.iter().flat_map(|(_, cs)| *cs).collect();
+                let mut roots: Vec<ExprId> =
+                    step.solved.angles.iter().flat_map(|(_, cs)| *cs).collect();
                 roots.extend(step.solved.lengths.iter().map(|(_, value)| *value));
                 SolveStep {
                     unknown: step.unknown,
-                    angles: step.solved.angles.iter().map(|(angle, _)| angle.clone()).collect(),
+                    angles: step
+                        .solved
+                        .angles
+                        .iter()
+                        .map(|(angle, _)| angle.clone())
+                        .collect(),
                     lengths: step.solved.lengths.iter().map(|(i, _)| *i).collect(),
                     tape: Tape::new(graph, &roots),
                 }
             })
             .collect();
-        let coordinates = mechanism.coordinates.iter().enumerate().map(|(i, c)| (i, c.motion)).collect();
-        let constants = mechanism.constants.iter().enumerate().map(|(i, c)| (Atom::Constant(i), c.is_angle)).collect();
+        let coordinates = mechanism
+            .coordinates
+            .iter()
+            .enumerate()
+            .map(|(i, c)| (i, c.motion))
+            .collect();
+        let constants = mechanism
+            .constants
+            .iter()
+            .enumerate()
+            .map(|(i, c)| (Atom::Constant(i), c.is_angle))
+            .collect();
         Ok(Self {
             coordinates,
             n_drives: mechanism.drives.len(),
@@ -167,7 +212,10 @@ impl Sampler {
 
     /// Random constants.
     pub(crate) fn constants(&self, stream: &mut Stream) -> FieldPoint {
-        let mut point = FieldPoint { root_seed: stream.element().representative(), ..FieldPoint::default() };
+        let mut point = FieldPoint {
+            root_seed: stream.element().representative(),
+            ..FieldPoint::default()
+        };
         for (atom, is_angle) in &self.constants {
             point.values.insert(*atom, stream.element());
             if *is_angle {
@@ -178,7 +226,11 @@ impl Sampler {
     }
 
     /// Values of the outputs at a random point of motion, for the given constants.
-    pub(crate) fn draw(&self, constants: &FieldPoint, stream: &mut Stream) -> Result<Vec<Element>, DeriveError> {
+    pub(crate) fn draw(
+        &self,
+        constants: &FieldPoint,
+        stream: &mut Stream,
+    ) -> Result<Vec<Element>, DeriveError> {
         (0..MOST_DRAWS)
             .find_map(|_| self.try_draw(constants, stream))
             .ok_or(DeriveError::NoPointFound { draws: MOST_DRAWS })
@@ -195,7 +247,9 @@ impl Sampler {
         }
         for a in &self.active {
             point.values.insert(Atom::Rate(*a), stream.element());
-            point.values.insert(Atom::Acceleration(*a), stream.element());
+            point
+                .values
+                .insert(Atom::Acceleration(*a), stream.element());
         }
         for d in 0..self.n_drives {
             point.values.insert(Atom::Load(d), stream.element());
@@ -206,7 +260,11 @@ impl Sampler {
         for (p, value) in self.passive.iter().zip(self.rates.evaluate(&point)?) {
             point.values.insert(Atom::Rate(*p), value);
         }
-        for (p, value) in self.passive.iter().zip(self.accelerations.evaluate(&point)?) {
+        for (p, value) in self
+            .passive
+            .iter()
+            .zip(self.accelerations.evaluate(&point)?)
+        {
             point.values.insert(Atom::Acceleration(*p), value);
         }
         self.outputs.evaluate(&point)
@@ -220,7 +278,12 @@ impl SolveStep {
         for (i, value) in self.lengths.iter().zip(lengths) {
             point.values.insert(Atom::Coordinate(*i), *value);
         }
-        let mut unknown: Vec<usize> = self.unknown.iter().copied().filter(|c| !self.lengths.contains(c)).collect();
+        let mut unknown: Vec<usize> = self
+            .unknown
+            .iter()
+            .copied()
+            .filter(|c| !self.lengths.contains(c))
+            .collect();
         while !unknown.is_empty() {
             let before = unknown.len();
             for (k, angle) in self.angles.iter().enumerate() {
@@ -229,13 +292,17 @@ impl SolveStep {
                     .iter()
                     .filter(|(atom, _)| matches!(atom, Atom::Coordinate(i) if unknown.contains(i)))
                     .collect();
-                let &[(atom @ Atom::Coordinate(i), sign)] = inside.as_slice() else { continue };
+                let &[(atom @ Atom::Coordinate(i), sign)] = inside.as_slice() else {
+                    continue;
+                };
                 let rest = angle.plus(&AngleSum::new([(*atom, *sign)]), -1);
                 let (cr, sr) = crate::expr::Domain::cos_sin(point, &rest)?;
                 let (c, s) = (values[2 * k], values[2 * k + 1]);
                 // The unknown angle is sign * (angle - rest).
                 let (c, s) = (c * cr + s * sr, s * cr - c * sr);
-                point.angles.insert(*atom, (c, if *sign < 0 { -s } else { s }));
+                point
+                    .angles
+                    .insert(*atom, (c, if *sign < 0 { -s } else { s }));
                 unknown.retain(|u| u != i);
             }
             if unknown.len() == before {

@@ -11,7 +11,9 @@ pub(crate) fn degrees(x: &[Element], y: &[Element]) -> Option<(usize, usize)> {
     }
     // Extended Euclid on the node polynomial and the interpolant (von zur Gathen and Gerhard, Modern Computer
     // Algebra, 5.8): every remainder r = t f modulo the nodes is a candidate r / t.
-    let nodes = x.iter().fold(vec![Element::ONE], |p, xi| multiply(&p, &[-*xi, Element::ONE]));
+    let nodes = x.iter().fold(vec![Element::ONE], |p, xi| {
+        multiply(&p, &[-*xi, Element::ONE])
+    });
     let (mut r0, mut r1) = (nodes, interpolate(x, y));
     let (mut t0, mut t1) = (vec![], vec![Element::ONE]);
     let mut best = None;
@@ -54,7 +56,9 @@ fn multiply(a: &[Element], b: &[Element]) -> Vec<Element> {
 
 fn subtract(a: &[Element], b: &[Element]) -> Vec<Element> {
     let at = |p: &[Element], i: usize| p.get(i).copied().unwrap_or(Element::ZERO);
-    (0..a.len().max(b.len())).map(|i| at(a, i) - at(b, i)).collect()
+    (0..a.len().max(b.len()))
+        .map(|i| at(a, i) - at(b, i))
+        .collect()
 }
 
 fn divide(a: &[Element], b: &[Element]) -> (Vec<Element>, Vec<Element>) {
@@ -63,7 +67,9 @@ fn divide(a: &[Element], b: &[Element]) -> (Vec<Element>, Vec<Element>) {
     if rest.len() < b.len() {
         return (Vec::new(), rest);
     }
-    let inverse = b[b.len() - 1].inverse().expect("a trimmed polynomial has a leading coefficient");
+    let inverse = b[b.len() - 1]
+        .inverse()
+        .expect("a trimmed polynomial has a leading coefficient");
     let mut quotient = vec![Element::ZERO; rest.len() - b.len() + 1];
     for k in (0..quotient.len()).rev() {
         let factor = rest[k + b.len() - 1] * inverse;
@@ -106,11 +112,18 @@ mod tests {
         for (a, b) in [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (3, 2), (0, 3)] {
             let mut coefficients = |n: usize| (0..=n).map(|_| stream.element()).collect::<Vec<_>>();
             let (p, q) = (coefficients(a), coefficients(b));
-            let value = |c: &[Element], x: Element| c.iter().rev().fold(Element::ZERO, |s, k| s * x + *k);
+            let value =
+                |c: &[Element], x: Element| c.iter().rev().fold(Element::ZERO, |s, k| s * x + *k);
             let x: Vec<Element> = (0..a + b + 4).map(|_| stream.element()).collect();
-            let y: Vec<Element> = x.iter().map(|x| value(&p, *x) * value(&q, *x).inverse().unwrap()).collect();
+            let y: Vec<Element> = x
+                .iter()
+                .map(|x| value(&p, *x) * value(&q, *x).inverse().unwrap())
+                .collect();
             assert_eq!(degrees(&x, &y), Some((a, b)));
-            assert_eq!(degrees(&x[..a + b + 1], &y[..a + b + 1]).is_some(), a + b == 0 && y[0] == y[0]);
+            assert_eq!(
+                degrees(&x[..a + b + 1], &y[..a + b + 1]).is_some(),
+                a + b == 0 && y[0] == y[0]
+            );
         }
     }
 }

@@ -1,0 +1,94 @@
+//! Takes common factors out of sums: `a x + a y` becomes `a (x + y)`.
+
+use std::collections::BTreeMap;
+
+use super::flatten::{rebuild, rewrite, use_counts};
+use crate::expr::{ExprId, Graph, Node, Rational};
+
+/// Factors every sum greedily, most frequent factor first.
+pub(crate) fn factor_sums(graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
+    let uses = use_counts(graph, roots);
+    let mut shared: BTreeMap<ExprId, bool> = BTreeMap::new();
+    rewrite(graph, roots, |graph, id, node| {
+        let value = match &node {
+            Node::Sum(terms) if terms.len() > 1 => factor(graph, terms, &shared),
+            _ => rebuild(graph, id, &node),
+        };
+        let many = uses[id.index()] > 1;
+        shared
+            .entry(value)
+            .and_modify(|s| *s = true)
+            .or_insert(many);
+        value
+    })
+}
+
+/// A term as its rational factor and the factors that may be taken out of it.
+type Term = (Rational, Vec<(ExprId, i32)>);
+
+fn factor(
+    graph: &mut Graph,
+    terms: &[(ExprId, Rational)],
+    shared: &BTreeMap<ExprId, bool>,
+) -> ExprId {
+    let open: Vec<Term> = terms
+        .iter()
+        .map(|(id, k)| {
+            let (base, inner) = graph.split_factor(*id);
+            let k = k * &inner;
+            match graph.node(base) {
+                Node::Product(factors) if !shared.get(&base).copied().unwrap_or(false) => {
+                    (k, factors.clone())
+                }
+                _ => (k, vec![(base, 1)]),
+            }
+        })
+        .collect();
+    gather(graph, open)
+}
+
+fn gather(graph: &mut Graph, terms: Vec<Term>) -> ExprId {
+    let mut counts: BTreeMap<ExprId, usize> = BTreeMap::new();
+    for (_, factors) in &terms {
+        for (id, n) in factors {
+            if *n > 0 && *id != Graph::ONE {
+                *counts.entry(*id).or_insert(0) += 1;
+            }
+        }
+    }
+    let best = counts
+        .into_iter()
+        .filter(|(_, n)| *n > 1)
+        .max_by_key(|(id, n)| (*n, std::cmp::Reverse(*id)));
+    let Some((common, _)) = best else {
+        let terms: Vec<_> = terms
+            .into_iter()
+            .map(|(k, factors)| (graph.product(&factors), k))
+            .collect();
+        return graph.sum(&terms);
+    };
+    let (with, without): (Vec<Term>, Vec<Term>) = terms
+        .into_iter()
+        .partition(|(_, factors)| factors.iter().any(|(id, n)| *id == common && *n > 0));
+    let inner = with
+        .into_iter()
+        .map(|(k, mut factors)| {
+            for factor in &mut factors {
+                if factor.0 == common {
+                    factor.1 -= 1;
+                }
+            }
+            factors.retain(|(_, n)| *n != 0);
+            (k, factors)
+        })
+        .collect();
+    let inner = gather(graph, inner);
+    let product = graph.mul(common, inner);
+    if without.is_empty() {
+        return product;
+    }
+    let (base, k) = graph.split_factor(product);
+    let mut rest = without;
+    rest.push((k, vec![(base, 1)]));
+    gather(graph, rest)
+}

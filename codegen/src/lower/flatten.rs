@@ -1,0 +1,109 @@
+//! Opens nested sums and products that are used only once, so that the passes behind see them whole.
+
+use std::collections::BTreeMap;
+
+use super::schedule::fixed_nodes;
+use crate::expr::{ExprId, Graph, Node};
+
+/// How often each node is used by `roots` and each other.
+pub(crate) fn use_counts(graph: &Graph, roots: &[ExprId]) -> Vec<usize> {
+    let mut uses = vec![0; graph.len()];
+    for root in roots {
+        uses[root.index()] += 1;
+    }
+    for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
+        if needed {
+            graph.for_each_child(
+                ExprId(u32::try_from(i).expect("graph below 4G nodes")),
+                |child| {
+                    uses[child.index()] += 1;
+                },
+            );
+        }
+    }
+    uses
+}
+
+/// Rewrites every node bottom-up.
+pub(crate) fn rewrite(
+    graph: &mut Graph,
+    roots: &[ExprId],
+    mut rule: impl FnMut(&mut Graph, ExprId, Node) -> ExprId,
+) -> Vec<ExprId> {
+    let mut new: BTreeMap<ExprId, ExprId> = BTreeMap::new();
+    for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
+        if !needed {
+            continue;
+        }
+        let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
+        let node = match graph.node(id).clone() {
+            Node::Sum(terms) => Node::Sum(terms.into_iter().map(|(c, k)| (new[&c], k)).collect()),
+            Node::Product(factors) => {
+                Node::Product(factors.into_iter().map(|(c, n)| (new[&c], n)).collect())
+            }
+            Node::Unary(f, c) => Node::Unary(f, new[&c]),
+            leaf => leaf,
+        };
+        let value = rule(graph, id, node);
+        new.insert(id, value);
+    }
+    roots.iter().map(|root| new[root]).collect()
+}
+
+/// Builds a node through the smart constructors.
+pub(crate) fn rebuild(graph: &mut Graph, id: ExprId, node: &Node) -> ExprId {
+    match node {
+        Node::Sum(terms) => graph.sum(terms),
+        Node::Product(factors) => graph.product(factors),
+        Node::Unary(f, c) => graph.unary(*f, *c),
+        _ => id,
+    }
+}
+
+/// Opens what is used once.
+pub(crate) fn flatten(graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
+    let uses = use_counts(graph, roots);
+    let fixed = fixed_nodes(graph, roots);
+    // The rule sees rewritten operands; how often they were used is known by what they came from.
+    let mut once: BTreeMap<ExprId, bool> = BTreeMap::new();
+    rewrite(graph, roots, |graph, id, node| {
+        let open = |graph: &Graph, child: ExprId| {
+            once.get(&child).copied().unwrap_or(false) && graph.node(child).is_open()
+        };
+        let value = match &node {
+            Node::Sum(terms) => {
+                let mut flat = Vec::new();
+                for (child, k) in terms {
+                    let (base, inner_k) = graph.split_factor(*child);
+                    match graph.node(base) {
+                        Node::Sum(inner) if open(graph, base) || open(graph, *child) => {
+                            let k = &inner_k * k;
+                            flat.extend(inner.iter().map(|(c, m)| (*c, m * &k)));
+                        }
+                        _ => flat.push((*child, k.clone())),
+                    }
+                }
+                graph.sum(&flat)
+            }
+            Node::Product(factors) => {
+                let mut flat = Vec::new();
+                for (child, n) in factors {
+                    match graph.node(*child) {
+                        Node::Product(inner) if open(graph, *child) => {
+                            flat.extend(inner.iter().map(|(c, m)| (*c, m * n)));
+                        }
+                        _ => flat.push((*child, *n)),
+                    }
+                }
+                graph.product(&flat)
+            }
+            _ => rebuild(graph, id, &node),
+        };
+        let single = uses[id.index()] == 1 && !fixed.get(id.index()).copied().unwrap_or(false);
+        // A value that several nodes became is used more than once.
+        once.entry(value)
+            .and_modify(|o| *o = false)
+            .or_insert(single);
+        value
+    })
+}

@@ -1,0 +1,183 @@
+//! Straight-line programs: what emission writes as Rust and the block evaluator runs.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::expr::{Atom, Rational, Unary};
+
+/// Index of a value: the operation that makes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ValueId(pub(crate) u32);
+
+impl ValueId {
+    /// Position of its operation in [`Program::ops`].
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// One operation; operands stand before it.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Op {
+    /// A number.
+    Number(Rational),
+    /// An input.
+    Input(Atom),
+    /// `a + b`
+    Add(ValueId, ValueId),
+    /// `a - b`
+    Sub(ValueId, ValueId),
+    /// `a * b`
+    Mul(ValueId, ValueId),
+    /// `a / b`
+    Div(ValueId, ValueId),
+    /// `-a`
+    Neg(ValueId),
+    /// A function of one argument.
+    Unary(Unary, ValueId),
+    /// Sine; its cosine usually stands beside it.
+    Sin(ValueId),
+    /// Cosine.
+    Cos(ValueId),
+    /// Angle of the point (`x`, `y`), as `atan2(y, x)`; operands in the order y, x.
+    Atan2(ValueId, ValueId),
+}
+
+impl Op {
+    /// Calls `visit` for every operand.
+    pub fn for_each_operand(&self, mut visit: impl FnMut(ValueId)) {
+        match self {
+            Self::Number(_) | Self::Input(_) => {}
+            Self::Add(a, b)
+            | Self::Sub(a, b)
+            | Self::Mul(a, b)
+            | Self::Div(a, b)
+            | Self::Atan2(a, b) => {
+                visit(*a);
+                visit(*b);
+            }
+            Self::Neg(a) | Self::Unary(_, a) | Self::Sin(a) | Self::Cos(a) => visit(*a),
+        }
+    }
+}
+
+/// When a value can be computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Stage {
+    /// Once for a geometry and a set of parameters.
+    Fixed,
+    /// At every state.
+    State,
+}
+
+/// What must hold at a pose for the model to have an answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Guard {
+    /// The value must not be negative: otherwise the loops cannot close.
+    Reachable(ValueId),
+    /// The magnitude of the value must stay above the limit: otherwise the pose is singular.
+    Regular(ValueId, f64),
+}
+
+impl Guard {
+    /// The guarded value.
+    pub fn value(self) -> ValueId {
+        match self {
+            Self::Reachable(v) | Self::Regular(v, _) => v,
+        }
+    }
+
+    /// Whether a value passes; what is not a number never does.
+    pub fn passes(self, value: f64) -> bool {
+        match self {
+            Self::Reachable(_) => value >= 0.0,
+            Self::Regular(_, limit) => value.abs() > limit,
+        }
+    }
+}
+
+/// A straight-line program with several outputs.
+#[derive(Clone, Debug, Default)]
+pub struct Program {
+    /// Operations in order.
+    pub ops: Vec<Op>,
+    /// Stage of each operation.
+    pub stages: Vec<Stage>,
+    /// Names of intermediate values that mean something, by position in `ops`.
+    pub names: std::collections::BTreeMap<usize, String>,
+    /// Outputs.
+    pub outputs: Vec<ValueId>,
+    /// What must hold at a pose.
+    pub guards: Vec<Guard>,
+}
+
+/// Operations per call. Negations, and what is computed once per geometry, are not counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct OperationCount {
+    /// Additions and subtractions.
+    pub add: usize,
+    /// Multiplications.
+    pub mul: usize,
+    /// Divisions.
+    pub div: usize,
+    /// Square roots.
+    pub sqrt: usize,
+    /// Pairs of sine and cosine of the same angle, and arc tangents.
+    pub sincos: usize,
+    /// Signs, absolute values, exponentials.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub other: usize,
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde asks for a reference"
+)]
+fn is_zero(n: &usize) -> bool {
+    *n == 0
+}
+
+impl fmt::Display for OperationCount {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} additions, {} multiplications", self.add, self.mul)?;
+        for (n, one, many) in [
+            (self.div, "division", "divisions"),
+            (self.sqrt, "square root", "square roots"),
+            (self.sincos, "sine and cosine", "sines and cosines"),
+            (self.other, "other function", "other functions"),
+        ] {
+            match n {
+                0 => {}
+                1 => write!(f, ", 1 {one}")?,
+                _ => write!(f, ", {n} {many}")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Program {
+    /// Counts the operations of one stage.
+    pub fn count(&self, stage: Stage) -> OperationCount {
+        let mut count = OperationCount::default();
+        let mut angles = std::collections::BTreeSet::new();
+        for (op, s) in self.ops.iter().zip(&self.stages) {
+            if *s != stage {
+                continue;
+            }
+            match op {
+                Op::Add(..) | Op::Sub(..) => count.add += 1,
+                Op::Mul(..) => count.mul += 1,
+                Op::Div(..) => count.div += 1,
+                Op::Unary(Unary::Sqrt, _) => count.sqrt += 1,
+                Op::Sin(a) | Op::Cos(a) => _ = angles.insert(*a),
+                Op::Atan2(..) => count.sincos += 1,
+                Op::Unary(..) => count.other += 1,
+                Op::Number(_) | Op::Input(_) | Op::Neg(_) => {}
+            }
+        }
+        count.sincos += angles.len();
+        count
+    }
+}

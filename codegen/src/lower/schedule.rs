@@ -1,0 +1,335 @@
+//! The last pass: n-ary sums and products become binary operations, fixed factors and terms are gathered so that they
+//! are computed once, and equal operations are shared.
+
+use std::collections::HashMap;
+
+use super::program::{Guard, Op, Program, Stage, ValueId};
+use super::{Request, is_fixed};
+use crate::expr::{AngleSum, Atom, ExprId, Graph, Node, Rational};
+
+/// An atom that is computed: a passive angle from its sine and cosine.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Definition {
+    pub(crate) atom: Atom,
+    pub(crate) sine: ExprId,
+    pub(crate) cosine: ExprId,
+}
+
+impl Definition {
+    pub(crate) fn operands(&self) -> [ExprId; 2] {
+        [self.sine, self.cosine]
+    }
+}
+
+/// Writes the program for `roots`: outputs, then what must be reachable, regular, and defined, as in `request`.
+pub(crate) fn schedule(graph: &Graph, roots: &[ExprId], request: &Request<'_>) -> Program {
+    let (outputs, rest) = roots.split_at(request.outputs.len());
+    let (reachable, rest) = rest.split_at(request.reachable.len());
+    let (regular, defined) = rest.split_at(request.regular.len());
+    let mut scheduler = Scheduler {
+        graph,
+        fixed: fixed_nodes(graph, roots),
+        uses: inverse_uses(graph, roots),
+        program: Program::default(),
+        known: HashMap::new(),
+        values: HashMap::new(),
+        defined: request
+            .definitions
+            .iter()
+            .zip(defined.chunks(2))
+            .map(|(d, pair)| (d.atom, (pair[0], pair[1])))
+            .collect(),
+    };
+    for id in reachable {
+        let value = scheduler.value(*id);
+        scheduler.program.guards.push(Guard::Reachable(value));
+    }
+    for (id, (_, limit)) in regular.iter().zip(request.regular) {
+        let value = scheduler.value(*id);
+        scheduler.program.guards.push(Guard::Regular(value, *limit));
+    }
+    let outputs = outputs.iter().map(|id| scheduler.value(*id)).collect();
+    scheduler.program.outputs = outputs;
+    scheduler.program
+}
+
+/// For each node, whether it is known once geometry and parameters are.
+pub(crate) fn fixed_nodes(graph: &Graph, roots: &[ExprId]) -> Vec<bool> {
+    let reachable = graph.reachable(roots);
+    let mut fixed = vec![false; reachable.len()];
+    for (i, needed) in reachable.into_iter().enumerate() {
+        if !needed {
+            continue;
+        }
+        let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
+        fixed[i] = match graph.node(id) {
+            Node::Rational(_) => true,
+            Node::Atom(atom) => is_fixed(*atom),
+            Node::Sin(angle) | Node::Cos(angle) => angle.atoms().all(is_fixed),
+            Node::Sum(terms) => terms.iter().all(|(c, _)| fixed[c.index()]),
+            Node::Product(factors) => factors.iter().all(|(c, _)| fixed[c.index()]),
+            Node::Unary(_, c) => fixed[c.index()],
+        };
+    }
+    fixed
+}
+
+/// How often each node stands in a denominator.
+fn inverse_uses(graph: &Graph, roots: &[ExprId]) -> HashMap<(ExprId, i32), usize> {
+    let mut uses = HashMap::new();
+    for node in graph.nodes_of(roots) {
+        if let Node::Product(factors) = node {
+            for (base, n) in factors {
+                if *n < 0 {
+                    *uses.entry((*base, *n)).or_insert(0) += 1;
+                }
+            }
+        }
+    }
+    uses
+}
+
+struct Scheduler<'a> {
+    graph: &'a Graph,
+    fixed: Vec<bool>,
+    uses: HashMap<(ExprId, i32), usize>,
+    program: Program,
+    known: HashMap<Op, ValueId>,
+    values: HashMap<ExprId, ValueId>,
+    defined: HashMap<Atom, (ExprId, ExprId)>,
+}
+
+impl Scheduler<'_> {
+    fn push(&mut self, op: Op) -> ValueId {
+        if let Some(value) = self.known.get(&op) {
+            return *value;
+        }
+        let mut stage = match &op {
+            Op::Input(atom) if !is_fixed(*atom) => Stage::State,
+            _ => Stage::Fixed,
+        };
+        op.for_each_operand(|operand| stage = stage.max(self.program.stages[operand.index()]));
+        let value =
+            ValueId(u32::try_from(self.program.ops.len()).expect("program below 4G operations"));
+        self.program.ops.push(op.clone());
+        self.program.stages.push(stage);
+        self.known.insert(op, value);
+        value
+    }
+
+    fn number(&mut self, value: Rational) -> ValueId {
+        self.push(Op::Number(value))
+    }
+
+    fn commutative(&mut self, op: fn(ValueId, ValueId) -> Op, a: ValueId, b: ValueId) -> ValueId {
+        self.push(op(a.min(b), a.max(b)))
+    }
+
+    /// Value of a node; operands first, without recursion on the depth of the graph beyond its sums and products.
+    fn value(&mut self, id: ExprId) -> ValueId {
+        if let Some(value) = self.values.get(&id) {
+            return *value;
+        }
+        let needed = self.graph.reachable(&[id]);
+        for (i, needed) in needed.into_iter().enumerate() {
+            let node = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
+            if needed && !self.values.contains_key(&node) && !self.is_inner(node) {
+                let value = self.make(node);
+                self.values.insert(node, value);
+            }
+        }
+        match self.values.get(&id) {
+            Some(value) => *value,
+            None => {
+                let value = self.make(id);
+                self.values.insert(id, value);
+                value
+            }
+        }
+    }
+
+    /// Plain numbers become operations only where they are used.
+    fn is_inner(&self, id: ExprId) -> bool {
+        matches!(self.graph.node(id), Node::Rational(_))
+    }
+
+    fn get(&mut self, id: ExprId) -> ValueId {
+        if let Node::Rational(value) = self.graph.node(id) {
+            return self.number(value.clone());
+        }
+        self.values[&id]
+    }
+
+    fn make(&mut self, id: ExprId) -> ValueId {
+        match self.graph.node(id).clone() {
+            Node::Rational(value) => self.number(value),
+            Node::Atom(atom) => self.atom(atom),
+            Node::Sin(angle) => {
+                let angle = self.angle(&angle);
+                self.push(Op::Cos(angle));
+                self.push(Op::Sin(angle))
+            }
+            Node::Cos(angle) => {
+                let angle = self.angle(&angle);
+                self.push(Op::Cos(angle))
+            }
+            Node::Sum(terms) => self.sum(&terms),
+            Node::Product(factors) => self.product(&factors),
+            Node::Unary(function, child) => {
+                let child = self.get(child);
+                self.push(Op::Unary(function, child))
+            }
+        }
+    }
+
+    fn atom(&mut self, atom: Atom) -> ValueId {
+        match self.defined.get(&atom).copied() {
+            Some((sine, cosine)) => {
+                let (y, x) = (self.value(sine), self.value(cosine));
+                self.push(Op::Atan2(y, x))
+            }
+            None => self.push(Op::Input(atom)),
+        }
+    }
+
+    fn angle(&mut self, angle: &AngleSum) -> ValueId {
+        let mut total: Option<ValueId> = None;
+        for (atom, n) in angle.terms() {
+            let value = self.atom(*atom);
+            let term = if n.abs() == 1 {
+                value
+            } else {
+                let factor = self.number(Rational::integer(i64::from(n.abs())));
+                self.commutative(Op::Mul, factor, value)
+            };
+            total = Some(match (total, *n < 0) {
+                (None, false) => term,
+                (None, true) => self.push(Op::Neg(term)),
+                (Some(sum), false) => self.commutative(Op::Add, sum, term),
+                (Some(sum), true) => self.push(Op::Sub(sum, term)),
+            });
+        }
+        total.expect("an angle node has terms")
+    }
+
+    /// A linear combination: fixed terms first, then the others from left to right.
+    fn sum(&mut self, terms: &[(ExprId, Rational)]) -> ValueId {
+        let (fixed, moving): (Vec<_>, Vec<_>) = terms
+            .iter()
+            .cloned()
+            .partition(|(id, _)| self.fixed[id.index()]);
+        let mut signed: Vec<(bool, ValueId)> = Vec::new();
+        for (id, factor) in fixed.iter().chain(&moving) {
+            if fixed.len() > 1 && signed.len() == fixed.len() && fixed.len() < terms.len() {
+                signed = vec![self.add_up(&signed)];
+            }
+            let value = self.term(*id, &factor.abs());
+            signed.push((factor.is_negative(), value));
+        }
+        let (negative, value) = self.add_up(&signed);
+        if negative {
+            self.push(Op::Neg(value))
+        } else {
+            value
+        }
+    }
+
+    /// Adds signed values; the result's sign comes back beside it.
+    fn add_up(&mut self, signed: &[(bool, ValueId)]) -> (bool, ValueId) {
+        let start = signed
+            .iter()
+            .position(|(negative, _)| !negative)
+            .unwrap_or(0);
+        let all_negative = signed[start].0;
+        let mut total = signed[start].1;
+        for (i, (negative, value)) in signed.iter().enumerate() {
+            if i == start {
+                continue;
+            }
+            total = if *negative == all_negative {
+                self.commutative(Op::Add, total, *value)
+            } else {
+                self.push(Op::Sub(total, *value))
+            };
+        }
+        (all_negative, total)
+    }
+
+    /// `factor * id`, with the factor put to what is fixed.
+    fn term(&mut self, id: ExprId, factor: &Rational) -> ValueId {
+        if id == Graph::ONE {
+            return self.number(factor.clone());
+        }
+        if factor.is_one() {
+            return self.get(id);
+        }
+        if let Node::Product(factors) = self.graph.node(id).clone() {
+            let (fixed, moving): (Vec<_>, Vec<_>) =
+                factors.iter().partition(|(f, _)| self.fixed[f.index()]);
+            if !fixed.is_empty() && !moving.is_empty() {
+                let k = self.powers(&fixed);
+                let number = self.number(factor.clone());
+                let k = self.commutative(Op::Mul, number, k);
+                let m = self.powers(&moving);
+                return self.commutative(Op::Mul, k, m);
+            }
+        }
+        let value = self.get(id);
+        if *factor == Rational::integer(2) {
+            return self.push(Op::Add(value, value));
+        }
+        let number = self.number(factor.clone());
+        self.commutative(Op::Mul, number, value)
+    }
+
+    fn product(&mut self, factors: &[(ExprId, i32)]) -> ValueId {
+        let (fixed, moving): (Vec<_>, Vec<_>) =
+            factors.iter().partition(|(f, _)| self.fixed[f.index()]);
+        match (fixed.is_empty(), moving.is_empty()) {
+            (false, false) => {
+                let k = self.powers(&fixed);
+                let m = self.powers(&moving);
+                self.commutative(Op::Mul, k, m)
+            }
+            _ => self.powers(factors),
+        }
+    }
+
+    /// A product of powers: numerators from left to right, then the denominators.
+    fn powers(&mut self, factors: &[(ExprId, i32)]) -> ValueId {
+        let mut total: Option<ValueId> = None;
+        let mut divisors = Vec::new();
+        for (id, n) in factors {
+            let shared = *n < 0 && self.uses.get(&(*id, *n)).is_some_and(|u| *u > 1);
+            let base = self.get(*id);
+            let mut power = base;
+            for _ in 1..n.abs() {
+                power = self.commutative(Op::Mul, power, base);
+            }
+            if *n < 0 && !shared {
+                divisors.push(power);
+                continue;
+            }
+            if shared {
+                let one = self.number(Rational::ONE);
+                power = self.push(Op::Div(one, power));
+            }
+            total = Some(match total {
+                None => power,
+                Some(product) => self.commutative(Op::Mul, product, power),
+            });
+        }
+        let divisor = divisors
+            .into_iter()
+            .reduce(|a, b| self.commutative(Op::Mul, a, b));
+        match (total, divisor) {
+            (Some(product), None) => product,
+            (Some(product), Some(divisor)) => self.push(Op::Div(product, divisor)),
+            (None, Some(divisor)) => {
+                let one = self.number(Rational::ONE);
+                self.push(Op::Div(one, divisor))
+            }
+            (None, None) => self.number(Rational::ONE),
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! Shares pairs of terms or factors that several sums or products have in common (Breuer 1969, greedy).
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::flatten::{rebuild, rewrite};
+use super::schedule::fixed_nodes;
+use crate::expr::{ExprId, Graph, Node, Rational};
+
+/// Gives a node of its own to every pair that occurs at least twice, most frequent first.
+pub(crate) fn share(graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
+    let mut roots = roots.to_vec();
+    for _ in 0..200 {
+        let pairs = common_pairs(graph, &roots);
+        if pairs.is_empty() {
+            break;
+        }
+        roots = replace(graph, &roots, &pairs);
+    }
+    roots
+}
+
+/// Two operands that stand together: factors, or terms with the ratio of their coefficients.
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
+enum Pair {
+    Factors(ExprId, ExprId),
+    Terms(ExprId, ExprId, Rational),
+}
+
+impl Pair {
+    fn operands(&self) -> [ExprId; 2] {
+        match self {
+            Self::Factors(a, b) | Self::Terms(a, b, _) => [*a, *b],
+        }
+    }
+}
+
+fn pairs_of(node: &Node, fixed: &[bool], mut visit: impl FnMut(Pair)) {
+    match node {
+        Node::Sum(terms) if terms.len() > 2 => {
+            for (i, (a, k)) in terms.iter().enumerate() {
+                for (b, m) in &terms[i + 1..] {
+                    if !(fixed[a.index()] && fixed[b.index()]) {
+                        visit(Pair::Terms(*a, *b, m * &k.recip()));
+                    }
+                }
+            }
+        }
+        Node::Product(factors) if factors.len() > 2 => {
+            let simple: Vec<_> = factors
+                .iter()
+                .filter(|(id, n)| *n == 1 && !fixed[id.index()])
+                .collect();
+            for (i, (a, _)) in simple.iter().enumerate() {
+                for (b, _) in &simple[i + 1..] {
+                    visit(Pair::Factors(*a, *b));
+                }
+            }
+        }
+        // A sum or product of just two is a pair that exists already.
+        Node::Sum(terms) if terms.len() == 2 => {
+            let ((a, k), (b, m)) = (&terms[0], &terms[1]);
+            if !(fixed[a.index()] && fixed[b.index()]) {
+                visit(Pair::Terms(*a, *b, m * &k.recip()));
+            }
+        }
+        Node::Product(factors) => {
+            if let [(a, 1), (b, 1)] = factors.as_slice()
+                && !fixed[a.index()]
+                && !fixed[b.index()]
+            {
+                visit(Pair::Factors(*a, *b));
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Pairs that occur more than once, best first, no operand twice, so that they can be replaced together.
+fn common_pairs(graph: &Graph, roots: &[ExprId]) -> BTreeSet<Pair> {
+    let fixed = fixed_nodes(graph, roots);
+    let mut counts: BTreeMap<Pair, usize> = BTreeMap::new();
+    for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
+        if needed && !fixed[i] {
+            let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
+            pairs_of(graph.node(id), &fixed, |pair| {
+                *counts.entry(pair).or_insert(0) += 1
+            });
+        }
+    }
+    let mut found: Vec<(usize, Pair)> = counts
+        .into_iter()
+        .filter(|(_, n)| *n > 1)
+        .map(|(p, n)| (n, p))
+        .collect();
+    found.sort_by(|a, b| b.0.cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
+    let Some(most) = found.first().map(|f| f.0) else {
+        return BTreeSet::new();
+    };
+    let mut taken: BTreeSet<ExprId> = BTreeSet::new();
+    found
+        .into_iter()
+        .take_while(|(n, _)| *n == most)
+        .filter(|(_, pair)| {
+            let fresh = pair.operands().iter().all(|o| !taken.contains(o));
+            taken.extend(pair.operands());
+            fresh
+        })
+        .map(|(_, pair)| pair)
+        .collect()
+}
+
+fn replace(graph: &mut Graph, roots: &[ExprId], pairs: &BTreeSet<Pair>) -> Vec<ExprId> {
+    rewrite(graph, roots, |graph, id, node| match &node {
+        Node::Sum(terms) if terms.len() > 2 => {
+            let mut terms = terms.clone();
+            for pair in pairs {
+                let Pair::Terms(a, b, ratio) = pair else {
+                    continue;
+                };
+                let find = |id: ExprId| terms.iter().position(|(t, _)| *t == id);
+                if let (Some(i), Some(j)) = (find(*a), find(*b))
+                    && terms.len() > 2
+                    && terms[j].1 == &terms[i].1 * ratio
+                {
+                    let k = terms[i].1.clone();
+                    let joined = graph.sum(&[(*a, Rational::ONE), (*b, ratio.clone())]);
+                    terms = terms
+                        .into_iter()
+                        .filter(|(t, _)| t != a && t != b)
+                        .collect();
+                    terms.push((joined, k));
+                }
+            }
+            graph.sum(&terms)
+        }
+        Node::Product(factors) if factors.len() > 2 => {
+            let mut factors = factors.clone();
+            for pair in pairs {
+                let Pair::Factors(a, b) = pair else { continue };
+                let has = |id: ExprId| factors.iter().any(|f| *f == (id, 1));
+                if factors.len() > 2 && has(*a) && has(*b) {
+                    let joined = graph.mul(*a, *b);
+                    factors.retain(|(f, _)| f != a && f != b);
+                    factors.push((joined, 1));
+                }
+            }
+            graph.product(&factors)
+        }
+        _ => rebuild(graph, id, &node),
+    })
+}
