@@ -94,9 +94,19 @@ pub(crate) fn parse(text: &str, file: usize, log: &mut Log) -> Table {
         );
         return Table::new();
     }
-    let (root, errors) = DeTable::parse_recoverable(text);
+    let (root, mut errors) = DeTable::parse_recoverable(text);
+    errors.sort_by_key(|error| error.span().map_or(0, |range| range.start));
+    let mut last: Option<usize> = None;
     for error in &errors {
         log.syntax_broken = true;
+        // What follows on the same line is mostly a consequence.
+        let at = error.span().map_or(0, |range| range.start.min(text.len()));
+        let before = last.replace(at);
+        if before
+            .is_some_and(|before| before <= at && !text.as_bytes()[before..at].contains(&b'\n'))
+        {
+            continue;
+        }
         let span = error.span().map_or(whole, |range| Span {
             file,
             start: range.start.min(text.len()),
@@ -111,6 +121,11 @@ pub(crate) fn parse(text: &str, file: usize, log: &mut Log) -> Table {
 }
 
 fn syntax_error(span: Span, message: &str) -> Diagnostic {
+    if message.starts_with("string values must be quoted") {
+        return Diagnostic::error(span, "this is not TOML: this value cannot be read")
+            .label("expected one value, texts and expressions in quotes")
+            .help("separate the entries of `{ }` and `[ ]` by commas");
+    }
     let help = if message.contains("recurs") {
         "nest arrays and tables at most 80 deep; a model needs four levels"
     } else if message.contains("duplicate key") {

@@ -7,6 +7,7 @@ mod angle;
 mod build;
 mod diagnostic;
 mod document;
+mod editor;
 mod exact;
 mod formula;
 mod kinds;
@@ -27,12 +28,6 @@ pub use exact::*;
 pub use kinds::{ActsOn, Carries, EffectKind, KindConstant, KindParameter, LIBRARY, Sign, library};
 pub use load::{Failure, Loaded, load, load_file};
 pub use mechanism::*;
+pub use unit::unit_product;
 
-/// The JSON Schema of model files, for editors.
-pub fn json_schema() -> serde_json::Value {
-    let mut schema = schemars::generate::SchemaSettings::draft2020_12()
-        .into_generator()
-        .into_root_schema_for::<schema::ModelEntry>();
-    schema.insert("title".to_owned(), "A model file of modelmill".into());
-    schema.to_value()
-}
+pub use editor::json_schema;

@@ -39,7 +39,10 @@ pub(crate) fn check(mechanism: &mut Mechanism, places: &Places, log: &mut Log) {
     if !check_finite(mechanism, places, log) {
         return;
     }
-    if close_loops(mechanism, places, log) && check_passive(mechanism, places, log) {
+    if check_tied(mechanism, places, log)
+        && close_loops(mechanism, places, log)
+        && check_passive(mechanism, places, log)
+    {
         check_drives(mechanism, places, log);
     }
 }
@@ -377,43 +380,54 @@ fn check_same_assembly(
     fine
 }
 
-/// The loops must settle the passive coordinates, and nothing else.
+/// The loops must not tie more coordinates than are passive.
+fn check_tied(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
+    let n_passive = mechanism
+        .coordinates
+        .iter()
+        .filter(|coordinate| coordinate.passive)
+        .count();
+    let n_equations = rank(&gaps(mechanism).rows, SINGULAR);
+    if n_equations <= n_passive {
+        return true;
+    }
+    log.push(
+        Diagnostic::error(
+            places.loops[0],
+            format!(
+                "the loops tie {}, but {} passive",
+                plural(n_equations, "coordinate"),
+                if n_passive == 1 {
+                    "1 is".to_owned()
+                } else {
+                    format!("{n_passive} are")
+                }
+            ),
+        )
+        .label(format!(
+            "{} at the nominal pose",
+            plural(n_equations, "independent loop equation")
+        ))
+        .help(format!(
+            "mark {} more as `passive = true`, or give the mechanism another joint",
+            plural(n_equations - n_passive, "coordinate")
+        )),
+    );
+    false
+}
+
+fn plural(n: usize, one: &str) -> String {
+    format!("{n} {one}{}", if n == 1 { "" } else { "s" })
+}
+
+/// The loops must settle the passive coordinates.
 fn check_passive(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
     let passive: Vec<usize> = (0..mechanism.coordinates.len())
         .filter(|&i| mechanism.coordinates[i].passive)
         .collect();
-    if mechanism.loops.is_empty() && passive.is_empty() {
-        return true;
-    }
     let rows = gaps(mechanism).rows;
     let settled = rank(&columns(mechanism, &rows, true), SINGULAR);
     let equations = rank(&rows, SINGULAR);
-    let plural = |n: usize, one: &str| format!("{n} {one}{}", if n == 1 { "" } else { "s" });
-    if equations > passive.len() {
-        log.push(
-            Diagnostic::error(
-                places.loops[0],
-                format!(
-                    "the loops tie {}, but {} passive",
-                    plural(equations, "coordinate"),
-                    if passive.len() == 1 {
-                        "1 is".to_owned()
-                    } else {
-                        format!("{} are", passive.len())
-                    }
-                ),
-            )
-            .label(format!(
-                "{} are independent at the nominal pose",
-                plural(equations, "loop equation")
-            ))
-            .help(format!(
-                "mark {} more as `passive = true`, or give the mechanism another joint",
-                plural(equations - passive.len(), "coordinate")
-            )),
-        );
-        return false;
-    }
     if settled == passive.len() {
         return true;
     }
@@ -440,11 +454,12 @@ fn check_passive(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool 
     } else {
         diagnostic
             .label(format!(
-                "{} for {}",
+                "{} at the nominal pose for {}",
                 plural(equations, "independent loop equation"),
                 plural(passive.len(), "passive coordinate")
             ))
             .help("close another loop, or drive this coordinate and drop `passive`")
+            .help("if the loops should settle it, the nominal pose is singular: choose another one")
     });
     false
 }

@@ -71,6 +71,8 @@ macro_rules! record {
             /// The place of the table.
             pub(crate) span: $crate::diagnostic::Span,
             $( $(#[doc = $doc])* pub(crate) $field: Option<$type>, )*
+            /// True if something in the table was faulty, so that what seems to be missing may be there.
+            pub(crate) faulty: bool,
         }
 
         impl $name {
@@ -83,11 +85,19 @@ macro_rules! record {
                 span: $crate::diagnostic::Span,
                 log: &mut $crate::diagnostic::Log,
             ) -> Self {
+                let n_errors = log.n_errors();
                 $crate::record::check_keys(table, Self::KEYS, $title, log);
                 Self {
                     span,
                     $( $field: $crate::record::field::<$type>(
-                        table, $key, $crate::record::need!($need), $title, span, log), )*
+                        table,
+                        $key,
+                        $crate::record::need!($need).then_some(Self::KEYS),
+                        $title,
+                        span,
+                        log,
+                    ), )*
+                    faulty: log.n_errors() > n_errors,
                 }
             }
         }
@@ -146,11 +156,11 @@ macro_rules! first {
 }
 pub(crate) use {first, need, record};
 
-/// Reads one field of a table.
+/// Reads one field of a table; `required_of` lists all keys of the table if the field must be there.
 pub(crate) fn field<T: Read>(
     table: &Table,
     key: &str,
-    required: bool,
+    required_of: Option<&[&str]>,
     title: &str,
     span: Span,
     log: &mut Log,
@@ -158,7 +168,16 @@ pub(crate) fn field<T: Read>(
     if let Some((_, node)) = get(table, key) {
         return T::read(node, log);
     }
-    if required && !log.syntax_broken {
+    let misspelt = |keys: &[&str]| {
+        table.iter().take(MOST_ENTRIES).any(|(other, _)| {
+            !keys.contains(&other.name.as_str())
+                && suggest::nearest(&other.name, keys.iter().copied()) == Some(key)
+        })
+    };
+    if let Some(keys) = required_of
+        && !log.syntax_broken
+        && !misspelt(keys)
+    {
         log.push(
             Diagnostic::error(span, format!("{title} lacks `{key}`"))
                 .label(format!("expected `{key}`, {}", T::EXPECTED))
@@ -171,7 +190,8 @@ pub(crate) fn field<T: Read>(
 /// Reports keys that a table does not have.
 pub(crate) fn check_keys(table: &Table, known: &[&str], title: &str, log: &mut Log) {
     for (key, _) in table {
-        if known.contains(&key.name.as_str()) || log.is_full() {
+        // Broken text leaves scraps that look like keys.
+        if known.contains(&key.name.as_str()) || log.is_full() || log.syntax_broken {
             continue;
         }
         log.push(
@@ -385,6 +405,8 @@ impl JsonSchema for Flag {
 pub(crate) struct List<T> {
     pub(crate) entries: Vec<T>,
     pub(crate) span: Span,
+    /// True if any entry was faulty.
+    pub(crate) faulty: bool,
 }
 
 impl<T: Read> Read for List<T> {
@@ -406,12 +428,14 @@ impl<T: Read> Read for List<T> {
         if too_many(array.len(), node.span, log) {
             return None;
         }
+        let n_errors = log.n_errors();
         Some(Self {
             entries: array
                 .iter()
                 .filter_map(|entry| T::read(entry, log))
                 .collect(),
             span: node.span,
+            faulty: log.n_errors() > n_errors,
         })
     }
 }
@@ -485,6 +509,8 @@ impl<T: JsonSchema> JsonSchema for OneOrMany<T> {
 #[derive(Clone, Debug)]
 pub(crate) struct Named<T> {
     pub(crate) entries: Vec<(Key, T)>,
+    /// Names whose entries could not be read; they count as known.
+    pub(crate) faulty: Vec<Key>,
 }
 
 impl<T: Read> Read for Named<T> {
@@ -498,16 +524,18 @@ impl<T: Read> Read for Named<T> {
         if too_many(table.len(), node.span, log) {
             return None;
         }
-        Some(Self {
-            entries: table
-                .iter()
-                .filter_map(|(key, entry)| {
-                    let fine = check_name(&key.name, key.span, log);
-                    let entry = T::read(entry, log)?;
-                    fine.then(|| (key.clone(), entry))
-                })
-                .collect(),
-        })
+        let mut named = Self {
+            entries: Vec::new(),
+            faulty: Vec::new(),
+        };
+        for (key, entry) in table {
+            let fine = check_name(&key.name, key.span, log);
+            match T::read(entry, log) {
+                Some(entry) if fine => named.entries.push((key.clone(), entry)),
+                _ => named.faulty.push(key.clone()),
+            }
+        }
+        Some(named)
     }
 }
 

@@ -14,7 +14,7 @@ record! {
     /// A mechanism: its geometry, its masses, its drives and the effects that act in it.
     ModelEntry = "the model file" {
         /// Version of the file format; 1.
-        "schema" schema: required Number,
+        "schema" schema: required Version,
         /// Name of the model; also the name of the generated module.
         "name" name: required Name,
         /// What the model is, in one line.
@@ -462,6 +462,46 @@ impl JsonSchema for UnitByPlace {
     }
 }
 
+/// The version of the file format.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Version;
+
+impl Read for Version {
+    const EXPECTED: &'static str = "the version of the file format";
+    const EXAMPLE: &'static str = "1";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        let Value::Number { text, .. } = &node.value else {
+            return wrong_type::<Self>(node, log);
+        };
+        if text != "1" {
+            log.push(
+                Diagnostic::error(
+                    node.span,
+                    format!("file format {} is not known", crate::document::quote(text)),
+                )
+                .label("expected 1")
+                .help("a newer modelmill may read this file; this one reads `schema = 1`"),
+            );
+        }
+        Some(Self)
+    }
+}
+
+impl JsonSchema for Version {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Version".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "const": 1 })
+    }
+}
+
 /// Three expressions, or two in the x-y plane.
 #[derive(Clone, Debug)]
 pub(crate) struct Vector {
@@ -638,7 +678,7 @@ macro_rules! words {
                                 node.span,
                                 format!("`{}` is not {}", crate::document::quote(text), $expected),
                             )
-                            .label(concat!("expected one of" $(, " `", $word, "`")*))
+                            .label(format!("expected one of {}", [$(concat!("`", $word, "`")),*].join(", ")))
                             .help_if(crate::suggest::nearest(text, [$($word),*])
                                 .map(|near| format!("did you mean `{near}`?"))),
                         );

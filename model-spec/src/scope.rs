@@ -168,9 +168,13 @@ impl Scope {
             log.push(
                 Diagnostic::error(
                     formula.ast.span,
-                    format!("{} must be {}", wanted.what, wanted.dimension.describe()),
+                    format!("{} has the wrong unit", wanted.what),
                 )
-                .label(format!("this is {}", found.describe()))
+                .label(format!(
+                    "expected {}, found {}",
+                    wanted.dimension.describe(),
+                    found.describe()
+                ))
                 .help("check the units of the names in it, and whether a factor is missing"),
             );
         }

@@ -226,6 +226,20 @@ impl schemars::JsonSchema for Unit {
     }
 }
 
+/// Unit of a product of powers of quantities: `kg m` for a mass times a length.
+///
+/// A single quantity keeps its unit as the file writes it; what is no unit counts as a pure number.
+pub fn unit_product(factors: &[(&str, i32)]) -> String {
+    if let [(unit, 1)] = factors {
+        return (*unit).to_owned();
+    }
+    let product = factors
+        .iter()
+        .filter_map(|(unit, n)| parse(unit).ok().map(|dimension| dimension.power(*n)))
+        .fold(Dimension::ONE, Dimension::times);
+    product.to_string()
+}
+
 /// A stretch of the unit's text that has no meaning.
 struct Fault {
     start: usize,

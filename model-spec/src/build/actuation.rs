@@ -98,7 +98,7 @@ pub(super) fn drives(
                 from.zip(to)
                     .map(|(from, to)| DriveKind::Linear { from, to })
             }
-            _ if log.syntax_broken => None,
+            _ if log.syntax_broken || entry.faulty => None,
             _ => {
                 log.push(
                     Diagnostic::error(entry.span, "this drive does not say what it drives")
@@ -154,8 +154,9 @@ fn check_number(
     let n_declared = model
         .coordinates
         .as_ref()
-        .map_or(0, |table| table.entries.len());
-    if drives.len() == n_active || n_declared != symbols.coordinates.len() {
+        .map_or(0, |table| table.entries.len() + table.faulty.len());
+    let faulty = model.drive.as_ref().is_some_and(|list| list.faulty);
+    if drives.len() == n_active || faulty || n_declared != symbols.coordinates.len() {
         return;
     }
     let span = if drives.len() > n_active {

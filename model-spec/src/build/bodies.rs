@@ -67,7 +67,7 @@ fn inertial(entry: &PartEntry, symbols: &Symbols, log: &mut Log) -> Inertial {
         }
         return linear_inertial(linear, symbols, log);
     }
-    if !about_centre && !log.syntax_broken {
+    if !about_centre && !log.syntax_broken && !entry.faulty {
         log.push(
             Diagnostic::error(entry.span, "this part has neither mass nor inertia")
                 .label("expected `mass`, `centre` and `inertia`, or `linear`")
@@ -84,10 +84,16 @@ fn inertial(entry: &PartEntry, symbols: &Symbols, log: &mut Log) -> Inertial {
         inertia.and_then(|inertia| inertia.zz.as_ref()),
     ];
     Inertial::AboutCentre {
-        mass: quantity(entry.mass.as_ref(), symbols, Dimension::MASS, "a mass", log),
-        centre: position(entry.centre.as_ref(), symbols, "a centre of mass", log),
+        mass: quantity(
+            entry.mass.as_ref(),
+            symbols,
+            Dimension::MASS,
+            "the mass",
+            log,
+        ),
+        centre: position(entry.centre.as_ref(), symbols, "the centre of mass", log),
         inertia: entries
-            .map(|entry| quantity(entry, symbols, Dimension::INERTIA, "an inertia", log)),
+            .map(|entry| quantity(entry, symbols, Dimension::INERTIA, "the inertia", log)),
     }
 }
 
@@ -237,6 +243,7 @@ fn lumped_mass(
         (None, Some(point)) => points.points[point.0].frame,
         (None, None) => {
             if !log.syntax_broken
+                && !entry.faulty
                 && !spots
                     .iter()
                     .any(|spot| matches!(spot, Some(Spot::Point(_))))
@@ -256,7 +263,7 @@ fn lumped_mass(
         (None, Some(_), None) => Some("moment_at"),
         _ => None,
     };
-    if let Some(key) = lacking.filter(|_| !log.syntax_broken) {
+    if let Some(key) = lacking.filter(|_| !log.syntax_broken && !entry.faulty) {
         log.push(
             Diagnostic::error(entry.span, "this lumped mass has no place")
                 .label(format!("expected `{key}`, the name of a point or a vector"))
@@ -266,7 +273,13 @@ fn lumped_mass(
     let force_at = entry.force_at.as_ref().or(entry.at.as_ref());
     let moment_at = entry.moment_at.as_ref().or(entry.at.as_ref());
     LumpedMass {
-        mass: quantity(entry.mass.as_ref(), symbols, Dimension::MASS, "a mass", log),
+        mass: quantity(
+            entry.mass.as_ref(),
+            symbols,
+            Dimension::MASS,
+            "the mass",
+            log,
+        ),
         share: share(entry.share.as_ref(), log),
         frame,
         force_at: spot(force_at, frame, symbols, tree, points, log),
@@ -301,7 +314,7 @@ fn spot(
         return nowhere();
     };
     match spot {
-        Spot::Vector(vector) => position(Some(vector), symbols, "the place of a mass", log),
+        Spot::Vector(vector) => position(Some(vector), symbols, "the place of a lumped mass", log),
         Spot::Point(name) => {
             let Some(idx) = points.find(name, log) else {
                 return nowhere();

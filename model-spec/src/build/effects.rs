@@ -103,6 +103,7 @@ fn effect(
         );
         return None;
     };
+    check_parameter_names(entry, kind, log);
     let at = at?;
     if at.entries.is_empty() {
         log.push(
@@ -117,7 +118,6 @@ fn effect(
     let carries = common_load(kind, &at.entries, &places, symbols, drives, log)?;
     let before = log.n_errors();
     let constants = constants(entry, kind, kind_name, symbols, carries, log);
-    check_parameter_names(entry, kind, log);
     let factors = factors(kind, carries, &constants, log)?;
     let place_names = at
         .entries

@@ -205,7 +205,7 @@ fn placement(entry: &FrameEntry, symbols: &Symbols, log: &mut Log) -> (Vec<Step>
     let n_ways = usize::from(entry.modified_dh.is_some())
         + usize::from(entry.standard_dh.is_some())
         + usize::from(entry.transform.is_some() || entry.joint.is_some());
-    if n_ways != 1 && !log.syntax_broken {
+    if n_ways != 1 && !log.syntax_broken && !(n_ways == 0 && entry.faulty) {
         log.push(
             Diagnostic::error(
                 name_span,
@@ -319,7 +319,7 @@ fn transform_steps(
     }
     for (i, axis) in [Axis::X, Axis::Y, Axis::Z].into_iter().enumerate() {
         let along = entry(&transform.xyz, i);
-        let along = length_or_zero(along.as_ref(), symbols, "a position", log);
+        let along = length_or_zero(along.as_ref(), symbols, "the position of a frame", log);
         if let Some(formula) = entry(&transform.xyz, i).filter(|_| !along.coordinates.is_empty()) {
             log.push(fixed(&formula, "prismatic"));
         }
@@ -380,7 +380,7 @@ fn joint_step(
             steps.push(Step::Rotate(axis, about));
         }
         (None, Some(formula)) => {
-            let mut along = length_or_zero(Some(formula), symbols, "a joint's length", log);
+            let mut along = length_or_zero(Some(formula), symbols, "the length of a joint", log);
             if minus {
                 along.offset = match along.offset {
                     Exact::Rational(value) => Exact::Rational(-value),
@@ -393,7 +393,7 @@ fn joint_step(
             text.push(format!("prismatic({}, {shown})", formula.text));
             steps.push(Step::Translate(axis, along));
         }
-        _ if log.syntax_broken => {}
+        _ if log.syntax_broken || joint.faulty => {}
         _ => log.push(
             Diagnostic::error(joint.span, "this joint does not say how it moves")
                 .label("expected either `revolute` or `prismatic`")

@@ -9,7 +9,7 @@ mod effects;
 mod frames;
 mod symbols;
 
-use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::diagnostic::{Log, Span};
 use crate::kinds::{EffectKind, describe, library_entries};
 use crate::mechanism::{Mechanism, Recording};
 use crate::pose;
@@ -28,14 +28,17 @@ pub(crate) struct Places {
 
 /// Builds the mechanism, if there are no errors, and the kinds of effects that its file may use.
 pub(crate) fn build(model: &ModelEntry, log: &mut Log) -> (Option<Mechanism>, Vec<EffectKind>) {
-    check_schema(model, log);
     let mut places = Places {
         whole: Some(model.span),
         ..Places::default()
     };
     let mut symbols = symbols::declare(model, &mut places, log);
     let gravity = symbols::gravity(model, &symbols.scope, log);
+    let n_errors = log.n_errors();
     let tree = frames::frames(model, &symbols, &mut places, log);
+    if log.n_errors() == n_errors {
+        symbols::check_coordinates_move(model, &symbols, &places, log);
+    }
     let points = frames::points(model, &symbols.scope, &tree, &mut places, log);
     let parts = bodies::parts(model, &symbols, &tree, log);
     let lumped_masses = bodies::lumped_masses(model, &symbols, &tree, &points, log);
@@ -79,20 +82,4 @@ pub(crate) fn build(model: &ModelEntry, log: &mut Log) -> (Option<Mechanism>, Ve
     };
     pose::check(&mut mechanism, &places, log);
     ((log.n_errors() == 0).then_some(mechanism), kinds)
-}
-
-#[allow(clippy::float_cmp)] // The version is an integer, and only that one is known.
-fn check_schema(model: &ModelEntry, log: &mut Log) {
-    if let Some(schema) = model.schema
-        && schema.value != 1.0
-    {
-        log.push(
-            Diagnostic::error(
-                schema.span,
-                format!("file format {} is not known", schema.value),
-            )
-            .label("expected 1")
-            .help("a newer modelmill may read this file; this one reads `schema = 1`"),
-        );
-    }
 }

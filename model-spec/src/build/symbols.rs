@@ -1,12 +1,14 @@
 //! Constants, parameters and coordinates: the names that expressions may use.
 
+use std::cell::Cell;
+
 use crate::build::Places;
 use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::exact::{ConstantIdx, CoordinateIdx, Exact, ParameterIdx, Symbol};
 use crate::formula::{Ast, AstKind, Formula};
 use crate::mechanism::{Constant, Coordinate, Motion, Parameter};
 use crate::schema::{LinearEntry, LinearNominalEntry, ModelEntry, Vector};
-use crate::scope::{Scope, Sort, Wanted, meaning};
+use crate::scope::{Meaning, Scope, Sort, Wanted, meaning};
 use crate::unit::Dimension;
 
 /// Most coordinates of a mechanism.
@@ -20,6 +22,8 @@ pub(super) struct Symbols {
     /// Where each parameter got its nominal value; those of effects and shorthands may get one later.
     pub(super) nominal_given: Vec<Option<Span>>,
     pub(super) coordinates: Vec<Coordinate>,
+    /// Coordinates that no frame mentions.
+    still: Vec<CoordinateIdx>,
 }
 
 /// The linear parameters in the order in which a shorthand declares them, with their dimensions.
@@ -46,6 +50,7 @@ pub(super) fn declare(model: &ModelEntry, places: &mut Places, log: &mut Log) ->
         parameters: Vec::new(),
         nominal_given: Vec::new(),
         coordinates: Vec::new(),
+        still: Vec::new(),
     };
     for (key, entry) in model.constants.iter().flat_map(|table| &table.entries) {
         let symbol = Symbol::Constant(ConstantIdx(symbols.constants.len()));
@@ -80,7 +85,64 @@ pub(super) fn declare(model: &ModelEntry, places: &mut Places, log: &mut Log) ->
     }
     declare_shorthands(model, &mut symbols, log);
     declare_coordinates(model, &mut symbols, places, log);
+    declare_faulty(model, &mut symbols, log);
     symbols
+}
+
+/// Declares the names whose entries could not be read, with a meaning that fits anything:
+/// what is wrong with them is reported, and they are not unknown.
+fn declare_faulty(model: &ModelEntry, symbols: &mut Symbols, log: &mut Log) {
+    let constants = model.constants.iter().flat_map(|table| &table.faulty);
+    let parameters = model.parameters.iter().flat_map(|table| &table.faulty);
+    let coordinates = model.coordinates.iter().flat_map(|table| &table.faulty);
+    let all = constants
+        .map(|key| (key, Sort::Constant))
+        .chain(parameters.map(|key| (key, Sort::Parameter)))
+        .chain(coordinates.map(|key| (key, Sort::Coordinate)));
+    for (key, sort) in all {
+        let meaning = Meaning {
+            sort,
+            exact: Exact::zero(),
+            dimension: None,
+            unit: "?".to_owned(),
+            declared: Some(key.span),
+            used: Cell::new(false),
+        };
+        symbols.scope.declare(&key.name, meaning, log);
+    }
+}
+
+/// Reports coordinates that no joint moves by, and a mechanism without any.
+pub(super) fn check_coordinates_move(
+    model: &ModelEntry,
+    symbols: &Symbols,
+    places: &Places,
+    log: &mut Log,
+) {
+    if log.syntax_broken || model.frame.as_ref().is_some_and(|list| list.faulty) {
+        return; // A faulty frame may be the one that moves.
+    }
+    for &CoordinateIdx(idx) in &symbols.still {
+        log.push(
+            Diagnostic::error(
+                places.coordinates[idx],
+                format!("no joint moves by `{}`", symbols.coordinates[idx].name),
+            )
+            .label("expected in `theta` or `d` of a frame, or in its `joint`")
+            .help("use the coordinate in a frame, or delete it"),
+        );
+    }
+    let faulty = model
+        .coordinates
+        .as_ref()
+        .is_some_and(|table| !table.faulty.is_empty());
+    if symbols.coordinates.is_empty() && !faulty {
+        log.push(
+            Diagnostic::error(model.span, "this mechanism cannot move")
+                .label("expected at least one coordinate")
+                .help("declare it, `[coordinates]` with `q1 = { nominal = 0 }`, and use it in a frame"),
+        );
+    }
 }
 
 impl Symbols {
@@ -303,11 +365,8 @@ fn declare_coordinates(
             (None, Some(_)) => Some(Motion::Prismatic),
             (Some(_), None) => Some(Motion::Revolute),
             (None, None) => {
-                log.push(
-                    Diagnostic::error(key.span, format!("no joint moves by `{}`", key.name))
-                        .label("expected in `theta` or `d` of a frame, or in its `joint`")
-                        .help("use the coordinate in a frame, or delete it"),
-                );
+                let next = CoordinateIdx(symbols.coordinates.len());
+                symbols.still.push(next);
                 None
             }
         };
@@ -322,7 +381,11 @@ fn declare_coordinates(
         };
         let symbol = Symbol::Coordinate(CoordinateIdx(symbols.coordinates.len()));
         let meaning = meaning(Sort::Coordinate, symbol, dimension, unit, Some(key.span));
-        if symbols.scope.declare(&key.name, meaning, log) {
+        if !symbols.scope.declare(&key.name, meaning, log) {
+            symbols
+                .still
+                .retain(|idx| idx.0 < symbols.coordinates.len());
+        } else {
             places.coordinates.push(key.span);
             symbols.coordinates.push(Coordinate {
                 name: key.name.clone(),

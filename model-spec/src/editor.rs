@@ -1,0 +1,111 @@
+//! The JSON Schema of model files, by which editors complete, explain and check them while they are written.
+
+use serde_json::{Map, Value, json};
+
+/// Ends the names of definitions that serve variants, whose entries may be parts of entries.
+const PARTIAL: &str = "InVariant";
+
+/// The JSON Schema of model files.
+///
+/// It derives from the types that read a file. Entries of a variant (a file with `extends`) override single fields,
+/// so only there may required fields be missing.
+pub fn json_schema() -> Value {
+    let root = schemars::generate::SchemaSettings::draft2020_12()
+        .into_generator()
+        .into_root_schema_for::<crate::schema::ModelEntry>()
+        .to_value();
+    let mut strict_definitions = root["$defs"].as_object().cloned().unwrap_or_default();
+    let mut definitions = Map::new();
+    for (name, schema) in &strict_definitions {
+        definitions.insert(format!("{name}{PARTIAL}"), partial(schema));
+    }
+    definitions.append(&mut strict_definitions);
+    let known: Vec<String> = definitions.keys().cloned().collect();
+    let mut schema = json!({
+        "$schema": root["$schema"],
+        "title": "A model file of modelmill",
+        "description": root["description"],
+        "type": "object",
+        "properties": partial(&root["properties"]),
+        "required": root["required"],
+        "additionalProperties": false,
+        "if": { "not": { "required": ["extends"] } },
+        "then": { "properties": root["properties"] },
+        "$defs": definitions,
+    });
+    prune(&mut schema, &known);
+    schema
+}
+
+/// A copy in which nothing is required, and which refers to such copies.
+fn partial(schema: &Value) -> Value {
+    match schema {
+        Value::Object(fields) => Value::Object(
+            fields
+                .iter()
+                // A property may be called `required`; only a list of names is the keyword.
+                .filter(|(key, value)| !(*key == "required" && value.is_array()))
+                .map(|(key, value)| match value.as_str() {
+                    Some(target) if key == "$ref" => {
+                        (key.clone(), Value::String(format!("{target}{PARTIAL}")))
+                    }
+                    _ => (key.clone(), partial(value)),
+                })
+                .collect(),
+        ),
+        Value::Array(entries) => Value::Array(entries.iter().map(partial).collect()),
+        other => other.clone(),
+    }
+}
+
+/// Drops copies that do not differ from their originals, and points to these instead.
+fn prune(schema: &mut Value, known: &[String]) {
+    for _ in 0..known.len() {
+        let Some(definitions) = schema["$defs"].as_object() else {
+            return;
+        };
+        let same: Vec<String> = known
+            .iter()
+            .filter_map(|name| name.strip_suffix(PARTIAL))
+            .filter(|name| {
+                let copy = definitions.get(&format!("{name}{PARTIAL}"));
+                copy.is_some() && copy == definitions.get(*name)
+            })
+            .map(str::to_owned)
+            .collect();
+        if same.is_empty() {
+            return;
+        }
+        for name in same {
+            let copy = format!("{name}{PARTIAL}");
+            if let Some(definitions) = schema["$defs"].as_object_mut() {
+                definitions.remove(&copy);
+            }
+            redirect(
+                schema,
+                &format!("#/$defs/{copy}"),
+                &format!("#/$defs/{name}"),
+            );
+        }
+    }
+}
+
+fn redirect(schema: &mut Value, from: &str, to: &str) {
+    match schema {
+        Value::Object(fields) => {
+            for (key, value) in fields.iter_mut() {
+                if key == "$ref" && value == from {
+                    *value = Value::String(to.to_owned());
+                } else {
+                    redirect(value, from, to);
+                }
+            }
+        }
+        Value::Array(entries) => {
+            for entry in entries {
+                redirect(entry, from, to);
+            }
+        }
+        _ => {}
+    }
+}

@@ -1,0 +1,149 @@
+//! Faulty files: each fixture's whole message is a snapshot, so that every change of a message is seen.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use modelmill_spec::{Failure, Severity, load};
+
+/// Reads a fixture under the path that messages should show.
+fn render(name: &str) -> String {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faulty");
+    let text = std::fs::read_to_string(folder.join(name)).unwrap();
+    match load(name, &text, &mut |path| {
+        std::fs::read_to_string(folder.join(path))
+            .map_err(|_| std::io::Error::other("no such file"))
+    }) {
+        Ok(loaded) => format!("(no errors)\n\n{}", loaded.render(false)),
+        Err(failure) => failure.render(false),
+    }
+}
+
+fn failure(text: &str) -> Failure {
+    let start = Instant::now();
+    let result = load("model.toml", text, &mut |_| {
+        Err(std::io::Error::other("none"))
+    });
+    let took = start.elapsed();
+    assert!(took < Duration::from_secs(5), "took {took:?}");
+    result.map(|_| ()).expect_err("the file is faulty")
+}
+
+#[test]
+fn messages() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faulty");
+    let mut names: Vec<String> = std::fs::read_dir(folder)
+        .unwrap()
+        .filter_map(|entry| entry.unwrap().file_name().into_string().ok())
+        .filter(|name| name.ends_with(".toml"))
+        .collect();
+    names.sort();
+    assert!(names.len() >= 30);
+    insta::with_settings!({ prepend_module_to_snapshot => false, omit_expression => true }, {
+        for name in names {
+            let message = render(&name);
+            insta::assert_snapshot!(name.trim_end_matches(".toml").to_owned(), message);
+        }
+    });
+}
+
+#[test]
+fn color_marks_the_same_text() {
+    let failure = failure("schema = 2");
+    assert!(failure.render(true).contains("\u{1b}["));
+    assert!(!failure.render(false).contains("\u{1b}["));
+}
+
+#[test]
+fn a_thousand_nested_brackets() {
+    for (open, close) in [("[", "]"), ("{ a = ", " }")] {
+        let text = format!(
+            "schema = 1\nx = {}1{}\n",
+            open.repeat(1000),
+            close.repeat(1000)
+        );
+        let found = failure(&text);
+        assert!(
+            found.render(false).contains("at most 80 deep"),
+            "{}",
+            found.render(false)
+        );
+        let unclosed = format!("x = {}", open.repeat(200_000));
+        failure(&unclosed);
+    }
+    let dotted = format!("x{} = 1\n[y{}]\n", ".x".repeat(1000), ".y".repeat(1000));
+    failure(&dotted);
+    let parentheses = format!(
+        "gravity = [\"{}1{}\", 0, 0]",
+        "(".repeat(1000),
+        ")".repeat(1000)
+    );
+    assert!(
+        failure(&parentheses)
+            .render(false)
+            .contains("nested too deeply")
+    );
+    let minus = format!(
+        "gravity = [\"{}1\", \"1{}\", \"1{}\"]",
+        "-".repeat(3000),
+        "/2".repeat(1900),
+        "-g".repeat(1900)
+    );
+    failure(&minus);
+    let towers = format!("gravity = [\"2{}\", 0]", "^2".repeat(1000));
+    failure(&towers);
+}
+
+#[test]
+fn a_file_of_megabytes() {
+    let huge = "x".repeat(5 << 20);
+    assert!(failure(&huge).render(false).contains("too large"));
+    let mut table = "schema = 1\nname = \"big\"\n[constants]\n".to_owned();
+    for i in 0..40_000 {
+        let _ = writeln!(table, "c{i} = {{ value = 1, unit = \"m\" }}");
+    }
+    assert!(failure(&table).render(false).contains("at most 1000"));
+    let mut frames = "schema = 1\nname = \"big\"\n".to_owned();
+    for i in 0..50_000 {
+        let _ = writeln!(frames, "[[frame]]\nname = \"f{i}\"\non = \"f{}\"", i + 1);
+    }
+    assert!(failure(&frames).render(false).contains("at most 1000"));
+    let one_line = format!("schema = 1\nretain = [{}]\n", "\"a*b\", ".repeat(200_000));
+    failure(&one_line);
+    let keys = (0..150_000).fold(String::new(), |mut text, i| {
+        let _ = writeln!(text, "k{i} = {i}");
+        text
+    });
+    let found = failure(&keys);
+    assert!(found.diagnostics.len() <= 102);
+    let broken = "= 1\n".repeat(200_000);
+    failure(&broken);
+    let long_text = format!("name = \"{}\"", "a".repeat(1 << 20));
+    failure(&long_text);
+    let long_name = format!("{} = 1\n", "k".repeat(1 << 20));
+    failure(&long_name);
+}
+
+#[test]
+fn every_error_says_where() {
+    let found = failure(
+        "schema = 1\nname = \"x\"\ngravity = [\"q\", 0, 0]\nframe = 1\ncoordinates = { q = 1 }\n",
+    );
+    let mut places = Vec::new();
+    for diagnostic in &found.diagnostics {
+        assert_eq!(diagnostic.severity, Severity::Error);
+        let span = diagnostic.span.expect("a place");
+        places.push(found.sources.line_and_column(span));
+    }
+    assert_eq!(places, [(3, 13), (4, 9), (5, 21)]);
+}
+
+#[test]
+fn a_file_that_cannot_be_read() {
+    let failure = modelmill_spec::load_file(Path::new("no/such/model.toml")).unwrap_err();
+    assert!(
+        failure
+            .render(false)
+            .contains("cannot read `no/such/model.toml`")
+    );
+}
