@@ -1,1 +1,107 @@
-//! To be written.
+//! Generates models from a build script, as people use prost-build.
+//!
+//! In `build.rs`:
+//!
+//! ```no_run
+//! modelmill_build::generate("models/*.toml");
+//! ```
+//!
+//! and in the crate, `include!(concat!(env!("OUT_DIR"), "/models.rs"));`, which brings one module per model file.
+//! The crate needs `modelmill-runtime` as a dependency and `modelmill-build` as a build dependency.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Why models could not be generated: the model files' own diagnostics, rendered.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BuildError(String);
+
+impl std::fmt::Display for BuildError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for BuildError {}
+
+/// Generates a module for every model file that `pattern` names: a file, or a folder with `/*.toml`.
+///
+/// Writes `models.rs` to the build's output folder, reruns when a model file or one that it extends changes, and ends the
+/// build with the model's own diagnostics if one is at fault.
+pub fn generate(pattern: &str) {
+    println!("cargo::rerun-if-changed=build.rs");
+    let out = std::env::var_os("OUT_DIR").map(PathBuf::from);
+    let result = match out {
+        Some(out) => try_generate(pattern, &out.join("models.rs")),
+        None => Err(BuildError("OUT_DIR is not set: call this from a build script".to_owned())),
+    };
+    if let Err(error) = result {
+        for line in error.0.lines() {
+            println!("cargo::error={line}");
+        }
+        std::process::exit(1);
+    }
+}
+
+/// Generates like [`generate`] into a given file, and returns what is wrong instead of ending the process.
+///
+/// # Errors
+/// Diagnostics of all faulty model files together.
+pub fn try_generate(pattern: &str, out: &Path) -> Result<(), BuildError> {
+    let files = files(pattern)?;
+    let mut text = String::new();
+    let mut faults = String::new();
+    let mut names = BTreeSet::new();
+    for file in &files {
+        match module(file) {
+            Ok((name, module)) if names.insert(name.clone()) => text.push_str(&module),
+            Ok((name, _)) => {
+                _ = writeln!(faults, "{}: another model is called `{name}` too; change `name` in one of them", file.display());
+            }
+            Err(error) => faults.push_str(&error.0),
+        }
+    }
+    if !faults.is_empty() {
+        return Err(BuildError(faults));
+    }
+    // An unchanged file keeps its date, so that nothing behind it is built again.
+    if std::fs::read_to_string(out).is_ok_and(|old| old == text) {
+        return Ok(());
+    }
+    std::fs::write(out, text).map_err(|error| BuildError(format!("cannot write {}: {error}", out.display())))
+}
+
+fn files(pattern: &str) -> Result<Vec<PathBuf>, BuildError> {
+    let Some(folder) = pattern.strip_suffix("/*.toml") else { return Ok(vec![PathBuf::from(pattern)]) };
+    println!("cargo::rerun-if-changed={folder}");
+    let entries = std::fs::read_dir(folder).map_err(|error| BuildError(format!("cannot read folder `{folder}`: {error}")))?;
+    let mut files: Vec<PathBuf> = entries
+        .filter_map(|entry| entry.ok().map(|e| e.path()))
+        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+        .collect();
+    files.sort();
+    if files.is_empty() {
+        return Err(BuildError(format!("no model file `*.toml` in folder `{folder}`")));
+    }
+    Ok(files)
+}
+
+fn module(file: &Path) -> Result<(String, String), BuildError> {
+    let loaded = modelmill_spec::load_file(file);
+    let sources = match &loaded {
+        Ok(loaded) => &loaded.sources,
+        Err(failure) => &failure.sources,
+    };
+    println!("cargo::rerun-if-changed={}", file.display());
+    for source in sources.paths() {
+        println!("cargo::rerun-if-changed={}", source.display());
+    }
+    let loaded = loaded.map_err(|failure| BuildError(failure.render(false)))?;
+    for line in loaded.render(false).lines() {
+        println!("cargo::warning={line}");
+    }
+    let derivation = modelmill_codegen::derive(&loaded.mechanism)
+        .map_err(|error| BuildError(format!("{}: {error}\n", file.display())))?;
+    Ok((loaded.mechanism.name.clone(), modelmill_codegen::emit(&derivation).module()))
+}

@@ -1,7 +1,9 @@
 //! From a mechanism to its base parameters and fast code: the mill itself.
 
+mod base;
 mod closure;
 mod dyad;
+mod emit;
 mod error;
 mod evaluate;
 mod exact;
@@ -20,6 +22,8 @@ mod vector;
 
 use modelmill_spec::Mechanism;
 
+pub use base::BaseParameter;
+pub use emit::{Emitted, emit};
 pub use error::DeriveError;
 pub use evaluate::{Evaluator, PoseFault, PoseReason, States};
 pub use exact::Monomial;

@@ -41,6 +41,8 @@ pub struct Programs {
     pub regressor: Program,
     /// Forces of the drives for given p_min.
     pub inverse_dynamics: Program,
+    /// p_min of given parameters and constants; all of it is fixed.
+    pub base_parameters: Program,
     /// Coordinates and rates of the drives, then their Jacobian by the active coordinates, row by row.
     pub drives: Program,
 }
@@ -123,6 +125,9 @@ pub(crate) fn programs(
             residual: lower(graph, &request),
         }
     };
+    let base = crate::base::expressions(graph, reduction);
+    let request = Request { outputs: &base, reachable: &[], regular: &[], definitions: &[] };
+    let base_parameters = lower(graph, &request);
     let mut program = |outputs: &[ExprId]| closing.program(graph, equations, outputs);
     Ok(Programs {
         passive_position,
@@ -130,6 +135,7 @@ pub(crate) fn programs(
         full_regressor: program(&rows(&all)),
         regressor: program(&rows(&retained)),
         inverse_dynamics: program(&forces),
+        base_parameters,
         drives: program(&drives),
     })
 }

@@ -45,6 +45,22 @@ pub enum Op {
 }
 
 impl Op {
+    /// The same operation on other operands.
+    fn map_operands(self, new: impl Fn(ValueId) -> ValueId) -> Self {
+        match self {
+            Self::Number(_) | Self::Input(_) => self,
+            Self::Add(a, b) => Self::Add(new(a), new(b)),
+            Self::Sub(a, b) => Self::Sub(new(a), new(b)),
+            Self::Mul(a, b) => Self::Mul(new(a), new(b)),
+            Self::Div(a, b) => Self::Div(new(a), new(b)),
+            Self::Atan2(a, b) => Self::Atan2(new(a), new(b)),
+            Self::Neg(a) => Self::Neg(new(a)),
+            Self::Unary(f, a) => Self::Unary(f, new(a)),
+            Self::Sin(a) => Self::Sin(new(a)),
+            Self::Cos(a) => Self::Cos(new(a)),
+        }
+    }
+
     /// Calls `visit` for every operand.
     pub fn for_each_operand(&self, mut visit: impl FnMut(ValueId)) {
         match self {
@@ -158,6 +174,42 @@ impl fmt::Display for OperationCount {
 }
 
 impl Program {
+    /// The same program without the operations that no output and no guard needs.
+    pub(crate) fn without_dead_code(self) -> Self {
+        let mut needed = vec![false; self.ops.len()];
+        for value in self.outputs.iter().copied().chain(self.guards.iter().map(|g| g.value())) {
+            needed[value.index()] = true;
+        }
+        for i in (0..self.ops.len()).rev() {
+            if needed[i] {
+                self.ops[i].for_each_operand(|operand| needed[operand.index()] = true);
+            }
+        }
+        let mut new = vec![ValueId(0); self.ops.len()];
+        let mut kept = Self::default();
+        for (i, op) in self.ops.into_iter().enumerate() {
+            if !needed[i] {
+                continue;
+            }
+            new[i] = ValueId(u32::try_from(kept.ops.len()).expect("program below 4G operations"));
+            if let Some(name) = self.names.get(&i) {
+                kept.names.insert(kept.ops.len(), name.clone());
+            }
+            kept.ops.push(op.map_operands(|operand| new[operand.index()]));
+            kept.stages.push(self.stages[i]);
+        }
+        kept.outputs = self.outputs.iter().map(|v| new[v.index()]).collect();
+        kept.guards = self
+            .guards
+            .iter()
+            .map(|guard| match guard {
+                Guard::Reachable(v) => Guard::Reachable(new[v.index()]),
+                Guard::Regular(v, limit) => Guard::Regular(new[v.index()], *limit),
+            })
+            .collect();
+        kept
+    }
+
     /// Counts the operations of one stage.
     pub fn count(&self, stage: Stage) -> OperationCount {
         let mut count = OperationCount::default();

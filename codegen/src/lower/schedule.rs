@@ -50,7 +50,7 @@ pub(crate) fn schedule(graph: &Graph, roots: &[ExprId], request: &Request<'_>) -
     }
     let outputs = outputs.iter().map(|id| scheduler.value(*id)).collect();
     scheduler.program.outputs = outputs;
-    scheduler.program
+    scheduler.program.without_dead_code()
 }
 
 /// For each node, whether it is known once geometry and parameters are.

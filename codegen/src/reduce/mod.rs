@@ -8,6 +8,7 @@ mod eliminate;
 mod rational_function;
 mod reconstruct;
 mod sample;
+mod text;
 mod univariate;
 
 use modelmill_spec::Mechanism;

@@ -1,0 +1,79 @@
+//! Emission: a derivation goes in, a Rust module comes out, as tokens printed by prettyplease.
+//!
+//! The module depends on `modelmill-runtime` alone. It is `no_std`, allocates nothing, contains no unsafe code, and works
+//! for `f32` and `f64`.
+
+mod body;
+mod items;
+
+use proc_macro2::TokenStream;
+use quote::{format_ident, quote};
+
+use crate::Derivation;
+
+/// Rust source of a module.
+#[derive(Clone, Debug)]
+pub struct Emitted {
+    /// Name of the module.
+    pub name: String,
+    /// Documentation of the module, in Markdown.
+    pub doc: String,
+    items: TokenStream,
+}
+
+/// Writes the module of a derivation.
+pub fn emit(derivation: &Derivation) -> Emitted {
+    Emitted {
+        name: derivation.mechanism.name.clone(),
+        doc: items::module_doc(derivation),
+        items: items::items(derivation),
+    }
+}
+
+impl Emitted {
+    /// The source as a file of its own, to be declared with `mod`.
+    pub fn file(&self) -> String {
+        let (doc, items) = (doc_lines(&self.doc, true), &self.items);
+        print(&quote! { #doc #![allow(#LINTS)] #items })
+    }
+
+    /// The source as a `pub mod` that can be included anywhere.
+    pub fn module(&self) -> String {
+        let (doc, items) = (doc_lines(&self.doc, false), &self.items);
+        let name = identifier(&self.name);
+        print(&quote! { #doc #[allow(#LINTS)] pub mod #name { #items } })
+    }
+}
+
+/// Lints that emitted code does not keep to: names come from the model file, and code is in single assignments.
+struct Lints;
+const LINTS: Lints = Lints;
+
+impl quote::ToTokens for Lints {
+    fn to_tokens(&self, tokens: &mut TokenStream) {
+        tokens.extend(quote! {
+            non_snake_case, unused_parens, unused_variables, clippy::all, clippy::pedantic
+        });
+    }
+}
+
+fn doc_lines(doc: &str, inner: bool) -> TokenStream {
+    let lines = doc.lines().map(|line| {
+        let line = format!(" {line}");
+        if inner { quote! { #![doc = #line] } } else { quote! { #[doc = #line] } }
+    });
+    quote! { #(#lines)* }
+}
+
+fn print(tokens: &TokenStream) -> String {
+    let file = syn::parse2(tokens.clone()).unwrap_or_else(|error| panic!("emitted tokens do not parse: {error}\n{tokens}"));
+    prettyplease::unparse(&file)
+}
+
+/// A Rust identifier for a name of the model file.
+fn identifier(name: &str) -> proc_macro2::Ident {
+    match syn::parse_str::<syn::Ident>(name) {
+        Ok(ident) => ident,
+        Err(_) => format_ident!("{}_", name),
+    }
+}

@@ -1,0 +1,126 @@
+//! Floating-point numbers.
+
+use core::fmt::Debug;
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+/// What an emitted model asks of its numbers; `f32` and `f64` have it.
+pub trait Real:
+    Copy
+    + Debug
+    + PartialOrd
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// The nearest number of this type.
+    fn from_f64(value: f64) -> Self;
+    /// The same number as `f64`.
+    fn to_f64(self) -> f64;
+    /// Sine and cosine of an angle in rad.
+    fn sin_cos(self) -> (Self, Self);
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// Angle of the point (`x`, `self`) in rad.
+    fn atan2(self, x: Self) -> Self;
+    /// Absolute value.
+    fn abs(self) -> Self;
+    /// Hyperbolic tangent.
+    fn tanh(self) -> Self;
+    /// Exponential.
+    fn exp(self) -> Self;
+
+    /// -1, 0 or 1.
+    fn sign(self) -> Self {
+        let zero = Self::from_f64(0.0);
+        if self > zero {
+            Self::from_f64(1.0)
+        } else if self < zero {
+            Self::from_f64(-1.0)
+        } else {
+            zero
+        }
+    }
+}
+
+macro_rules! real {
+    ($float:ty, $sincos:path, $sqrt:path, $atan2:path, $tanh:path, $exp:path) => {
+        #[cfg(feature = "std")]
+        impl Real for $float {
+            #[inline]
+            #[allow(clippy::cast_possible_truncation, trivial_numeric_casts)]
+            fn from_f64(value: f64) -> Self {
+                value as Self
+            }
+            #[inline]
+            fn to_f64(self) -> f64 {
+                f64::from(self)
+            }
+            #[inline]
+            fn sin_cos(self) -> (Self, Self) {
+                self.sin_cos()
+            }
+            #[inline]
+            fn sqrt(self) -> Self {
+                self.sqrt()
+            }
+            #[inline]
+            fn atan2(self, x: Self) -> Self {
+                self.atan2(x)
+            }
+            #[inline]
+            fn abs(self) -> Self {
+                self.abs()
+            }
+            #[inline]
+            fn tanh(self) -> Self {
+                self.tanh()
+            }
+            #[inline]
+            fn exp(self) -> Self {
+                self.exp()
+            }
+        }
+
+        #[cfg(not(feature = "std"))]
+        impl Real for $float {
+            #[inline]
+            #[allow(clippy::cast_possible_truncation, trivial_numeric_casts)]
+            fn from_f64(value: f64) -> Self {
+                value as Self
+            }
+            #[inline]
+            fn to_f64(self) -> f64 {
+                f64::from(self)
+            }
+            #[inline]
+            fn sin_cos(self) -> (Self, Self) {
+                $sincos(self)
+            }
+            #[inline]
+            fn sqrt(self) -> Self {
+                $sqrt(self)
+            }
+            #[inline]
+            fn atan2(self, x: Self) -> Self {
+                $atan2(self, x)
+            }
+            #[inline]
+            fn abs(self) -> Self {
+                self.abs()
+            }
+            #[inline]
+            fn tanh(self) -> Self {
+                $tanh(self)
+            }
+            #[inline]
+            fn exp(self) -> Self {
+                $exp(self)
+            }
+        }
+    };
+}
+
+real!(f64, libm::sincos, libm::sqrt, libm::atan2, libm::tanh, libm::exp);
+real!(f32, libm::sincosf, libm::sqrtf, libm::atan2f, libm::tanhf, libm::expf);
