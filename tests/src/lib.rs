@@ -1,1 +1,13 @@
-//! To be written.
+//! What the tests and benchmarks of the workspace share.
+//!
+//! [`fixtures`] finds models and reference tables, [`random`] builds mechanisms from a seed, [`mechanics`] is a second
+//! opinion on their dynamics that shares no code with the mill, and [`published`] reads regroupings from the literature
+//! as exact linear maps.
+
+pub mod base_parameters;
+pub mod fixtures;
+pub mod mechanics;
+pub mod published;
+pub mod random;
+pub mod sample;
+pub mod stream;

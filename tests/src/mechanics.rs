@@ -1,0 +1,507 @@
+//! A second opinion on kinematics and dynamics, numeric and slow, that shares no code with the mill.
+//!
+//! Poses are 4x4 matrices whose entries are truncated Taylor series in time. With the pseudo-inertia matrix J of a body,
+//! its kinetic energy is `tr(X' J X'^T) / 2` (Uicker 1965), so that d'Alembert's principle reads
+//! `power along dX = tr(dX J X''^T) - g . (m dp + dR mc)`. No recursion, no frames of links, no angular velocities.
+
+use std::ops::{Add, Mul, Neg, Sub};
+
+use modelmill_spec::{
+    Axis, DriveKind, Exact, Function, Inertial, LumpedMass, Mechanism, Motion, Place,
+    PlaceQuantity, PointIdx, Step, Symbol,
+};
+use nalgebra::{DMatrix, Matrix3, Matrix4, Vector3};
+
+/// A value with its first and second derivative by time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jet(pub [f64; 3]);
+
+impl Jet {
+    /// A constant.
+    pub fn constant(value: f64) -> Self {
+        Self([value, 0.0, 0.0])
+    }
+
+    fn function(self, f: f64, f1: f64, f2: f64) -> Self {
+        let [_, v, a] = self.0;
+        Self([f, f1 * v, f1 * a + f2 * v * v])
+    }
+
+    fn cos(self) -> Self {
+        let (s, c) = self.0[0].sin_cos();
+        self.function(c, -s, -c)
+    }
+
+    fn sin(self) -> Self {
+        let (s, c) = self.0[0].sin_cos();
+        self.function(s, c, -s)
+    }
+
+    fn sqrt(self) -> Self {
+        let root = self.0[0].sqrt();
+        self.function(root, 0.5 / root, -0.25 / (root * self.0[0]))
+    }
+}
+
+impl Add for Jet {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] + other.0[i]))
+    }
+}
+
+impl Sub for Jet {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] - other.0[i]))
+    }
+}
+
+impl Neg for Jet {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self(self.0.map(|x| -x))
+    }
+}
+
+impl Mul for Jet {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        let ([a, a1, a2], [b, b1, b2]) = (self.0, other.0);
+        Self([a * b, a1 * b + a * b1, a2 * b + 2.0 * a1 * b1 + a * b2])
+    }
+}
+
+/// A pose with its derivatives: `[rotation | position]` by rows.
+#[derive(Clone, Debug)]
+struct Pose([[Jet; 4]; 3]);
+
+impl Pose {
+    fn identity() -> Self {
+        Self(std::array::from_fn(|i| {
+            std::array::from_fn(|j| Jet::constant(f64::from(u8::from(i == j))))
+        }))
+    }
+
+    fn then(&self, other: &Self) -> Self {
+        Self(std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                let moved = if j == 3 {
+                    self.0[i][3]
+                } else {
+                    Jet::constant(0.0)
+                };
+                (0..3).fold(moved, |sum, k| sum + self.0[i][k] * other.0[k][j])
+            })
+        }))
+    }
+
+    fn rotation(axis: Axis, angle: Jet) -> Self {
+        let mut pose = Self::identity();
+        let (j, k) = match axis {
+            Axis::X => (1, 2),
+            Axis::Y => (2, 0),
+            Axis::Z => (0, 1),
+        };
+        let (c, s) = (angle.cos(), angle.sin());
+        pose.0[j][j] = c;
+        pose.0[k][k] = c;
+        pose.0[k][j] = s;
+        pose.0[j][k] = -s;
+        pose
+    }
+
+    fn translation(axis: Axis, length: Jet) -> Self {
+        let mut pose = Self::identity();
+        pose.0[axis as usize][3] = length;
+        pose
+    }
+
+    fn point(&self, at: [f64; 3]) -> [Jet; 3] {
+        std::array::from_fn(|i| {
+            (0..3).fold(self.0[i][3], |sum, k| {
+                sum + self.0[i][k] * Jet::constant(at[k])
+            })
+        })
+    }
+
+    /// The derivative of the given order as a 4x4 matrix.
+    fn derivative(&self, order: usize) -> Matrix4<f64> {
+        Matrix4::from_fn(|i, j| match i {
+            3 => f64::from(u8::from(j == 3 && order == 0)),
+            _ => self.0[i][j].0[order],
+        })
+    }
+}
+
+/// A mechanism in numbers.
+#[derive(Clone, Debug)]
+pub struct Numbers<'a> {
+    mechanism: &'a Mechanism,
+    constants: Vec<f64>,
+    parameters: Vec<f64>,
+}
+
+/// A sum with the magnitude of what was summed, by which its rounding is judged.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Balance {
+    /// The sum.
+    pub value: f64,
+    /// Sum of magnitudes.
+    pub magnitude: f64,
+}
+
+impl Balance {
+    fn add(&mut self, term: f64) {
+        self.value += term;
+        self.magnitude += term.abs();
+    }
+}
+
+impl<'a> Numbers<'a> {
+    /// The model file's constants with given values of the dynamic parameters.
+    pub fn new(mechanism: &'a Mechanism, parameters: Vec<f64>) -> Self {
+        Self {
+            mechanism,
+            constants: mechanism.constants.iter().map(|c| c.value).collect(),
+            parameters,
+        }
+    }
+
+    /// Value of an expression over constants and parameters.
+    pub fn value(&self, exact: &Exact) -> f64 {
+        self.value_at(exact, &|_| unreachable!("no quantity of a place stands here"))
+    }
+
+    fn value_at(&self, exact: &Exact, place: &dyn Fn(PlaceQuantity) -> f64) -> f64 {
+        let value = |e: &Exact| self.value_at(e, place);
+        match exact {
+            Exact::Rational(r) => rational(r),
+            Exact::Pi => std::f64::consts::PI,
+            Exact::Symbol(Symbol::Constant(i)) => self.constants[i.0],
+            Exact::Symbol(Symbol::Parameter(i)) => self.parameters[i.0],
+            Exact::Symbol(Symbol::Coordinate(_)) => {
+                unreachable!("coordinates stand in steps alone")
+            }
+            Exact::Symbol(Symbol::Place(quantity)) => place(*quantity),
+            Exact::Sum(operands) => operands.iter().map(value).sum(),
+            Exact::Product(operands) => operands.iter().map(value).product(),
+            Exact::Quotient(a, b) => value(a) / value(b),
+            Exact::Negative(a) => -value(a),
+            Exact::Power(a, n) => value(a).powi(*n),
+            Exact::Apply(function, a) => {
+                let a = value(a);
+                match function {
+                    Function::Sin => a.sin(),
+                    Function::Cos => a.cos(),
+                    Function::Sqrt => a.sqrt(),
+                    Function::Abs => a.abs(),
+                    Function::Sign => f64::from(i8::from(a > 0.0) - i8::from(a < 0.0)),
+                    Function::Tanh => a.tanh(),
+                    Function::Exp => a.exp(),
+                }
+            }
+        }
+    }
+
+    fn vector(&self, exact: &[Exact; 3]) -> [f64; 3] {
+        std::array::from_fn(|i| self.value(&exact[i]))
+    }
+
+    /// Poses of all frames for coordinates with rates and accelerations.
+    fn poses(&self, coordinates: &[Jet]) -> Vec<Pose> {
+        let mut poses: Vec<Pose> = vec![Pose::identity()];
+        for frame in &self.mechanism.frames[1..] {
+            let mut pose = poses[frame.parent.0].clone();
+            for step in &frame.steps {
+                pose = pose.then(&match step {
+                    Step::Rotate(axis, angle) => {
+                        let mut total =
+                            Jet::constant(rational(&angle.pi) * std::f64::consts::PI);
+                        for (symbol, n) in &angle.terms {
+                            let factor = Jet::constant(f64::from(*n));
+                            total = total
+                                + factor
+                                    * match symbol {
+                                        Symbol::Constant(i) => {
+                                            Jet::constant(self.constants[i.0])
+                                        }
+                                        Symbol::Coordinate(i) => coordinates[i.0],
+                                        _ => unreachable!("an angle is made of angles"),
+                                    };
+                        }
+                        Pose::rotation(*axis, total)
+                    }
+                    Step::Translate(axis, length) => {
+                        let mut total = Jet::constant(self.value(&length.offset));
+                        for (i, factor) in &length.coordinates {
+                            total = total + Jet::constant(rational(factor)) * coordinates[i.0];
+                        }
+                        Pose::translation(*axis, total)
+                    }
+                });
+            }
+            poses.push(pose);
+        }
+        poses
+    }
+
+    fn point(&self, poses: &[Pose], point: PointIdx) -> [Jet; 3] {
+        let point = &self.mechanism.points[point.0];
+        poses[point.frame.0].point(self.vector(&point.at))
+    }
+
+    /// Distances of the points that loops join, with derivatives: three components per loop.
+    pub fn gaps(&self, coordinates: &[Jet]) -> Vec<Jet> {
+        let poses = self.poses(coordinates);
+        self.mechanism
+            .loops
+            .iter()
+            .flat_map(|l| {
+                let [a, b] = l.joins.map(|p| self.point(&poses, p));
+                std::array::from_fn::<Jet, 3, _>(|i| a[i] - b[i])
+            })
+            .collect()
+    }
+
+    /// Derivatives of the gaps by the coordinates, one column each.
+    pub fn gap_jacobian(&self, coordinates: &[f64]) -> DMatrix<f64> {
+        let columns: Vec<Vec<Jet>> = (0..coordinates.len())
+            .map(|i| self.gaps(&along(coordinates, i)))
+            .collect();
+        DMatrix::from_fn(columns[0].len(), columns.len(), |r, c| columns[c][r].0[1])
+    }
+
+    /// Lengths or angles of the drives with their derivatives.
+    pub fn drives(&self, coordinates: &[Jet]) -> Vec<Jet> {
+        let poses = self.poses(coordinates);
+        self.mechanism
+            .drives
+            .iter()
+            .map(|drive| match drive.kind {
+                DriveKind::Joint(i) => coordinates[i.0],
+                DriveKind::Linear { from, to } => {
+                    let (a, b) = (self.point(&poses, from), self.point(&poses, to));
+                    (0..3)
+                        .fold(Jet::constant(0.0), |sum, i| {
+                            sum + (b[i] - a[i]) * (b[i] - a[i])
+                        })
+                        .sqrt()
+                }
+            })
+            .collect()
+    }
+
+    /// What the drives must supply per unit of the virtual motion `direction` (one rate per coordinate), in W:
+    /// inertia, weight and effects. The direction must satisfy the loops.
+    pub fn virtual_power(
+        &self,
+        coordinates: &[Jet],
+        direction: &[f64],
+        load: &[f64],
+    ) -> Balance {
+        let poses = self.poses(coordinates);
+        let moved: Vec<Jet> = coordinates
+            .iter()
+            .zip(direction)
+            .map(|(q, d)| Jet([q.0[0], *d, 0.0]))
+            .collect();
+        let displaced = self.poses(&moved);
+        let gravity = Vector3::from(self.vector(&self.mechanism.gravity));
+        let mut balance = Balance::default();
+        for part in &self.mechanism.parts {
+            let inertia = self.pseudo_inertia(&part.inertial);
+            let (pose, change) = (&poses[part.frame.0], &displaced[part.frame.0]);
+            add_body(&mut balance, pose, change, &inertia, &gravity);
+        }
+        for lump in &self.mechanism.lumped_masses {
+            self.add_lump(
+                &mut balance,
+                &poses[lump.frame.0],
+                &displaced[lump.frame.0],
+                lump,
+                &gravity,
+            );
+        }
+        let (drives, drive_rates) = (self.drives(coordinates), self.drives(&moved));
+        for effect in &self.mechanism.effects {
+            for place in &effect.places {
+                for term in &effect.terms {
+                    let parameter = self.parameters[term.parameter.0];
+                    match place {
+                        Place::Point(p) => {
+                            let point = &self.mechanism.points[p.0];
+                            let factor = self.value(&term.expression);
+                            let inertia =
+                                point_mass(parameter * factor, self.vector(&point.at).into());
+                            let (pose, change) = (&poses[point.frame.0], &displaced[point.frame.0]);
+                            add_body(&mut balance, pose, change, &inertia, &gravity);
+                        }
+                        Place::Drive(d) => {
+                            let quantity = quantity(drives[d.0], load[d.0]);
+                            let force = parameter * self.value_at(&term.expression, &quantity);
+                            balance.add(force * drive_rates[d.0].0[1]);
+                        }
+                        Place::Coordinate(i) => {
+                            let quantity = quantity(coordinates[i.0], f64::NAN);
+                            let force = parameter * self.value_at(&term.expression, &quantity);
+                            balance.add(force * direction[i.0]);
+                        }
+                    }
+                }
+            }
+        }
+        balance
+    }
+
+    /// Kinetic and potential energy of parts, lumped masses and masses at points.
+    pub fn energy(&self, coordinates: &[Jet]) -> f64 {
+        let poses = self.poses(coordinates);
+        let gravity = Vector3::from(self.vector(&self.mechanism.gravity));
+        let mut bodies: Vec<(usize, Matrix4<f64>)> = self
+            .mechanism
+            .parts
+            .iter()
+            .map(|part| (part.frame.0, self.pseudo_inertia(&part.inertial)))
+            .collect();
+        for lump in &self.mechanism.lumped_masses {
+            let mass = self.value(&lump.mass) * rational(&lump.share);
+            let at = Vector3::from(self.vector(&lump.force_at));
+            bodies.push((lump.frame.0, point_mass(mass, at)));
+        }
+        for effect in &self.mechanism.effects {
+            for place in &effect.places {
+                if let Place::Point(p) = place {
+                    let point = &self.mechanism.points[p.0];
+                    for term in &effect.terms {
+                        let mass =
+                            self.parameters[term.parameter.0] * self.value(&term.expression);
+                        let at = Vector3::from(self.vector(&point.at));
+                        bodies.push((point.frame.0, point_mass(mass, at)));
+                    }
+                }
+            }
+        }
+        bodies
+            .iter()
+            .map(|(frame, inertia)| {
+                let (x, v) = (poses[*frame].derivative(0), poses[*frame].derivative(1));
+                let kinetic = 0.5 * (v * inertia * v.transpose()).trace();
+                let moment = (x * inertia.column(3)).xyz();
+                kinetic - gravity.dot(&moment)
+            })
+            .sum()
+    }
+
+    fn add_lump(
+        &self,
+        balance: &mut Balance,
+        pose: &Pose,
+        change: &Pose,
+        lump: &LumpedMass,
+        gravity: &Vector3<f64>,
+    ) {
+        let mass = self.value(&lump.mass) * rational(&lump.share);
+        let acceleration = |at: [f64; 3]| -> Vector3<f64> {
+            let point = pose.point(at);
+            Vector3::from_fn(|i, _| point[i].0[2]) - gravity
+        };
+        let (force_at, moment_at) = (self.vector(&lump.force_at), self.vector(&lump.moment_at));
+        let x = pose.derivative(0);
+        let rotation: Matrix3<f64> = x.fixed_view::<3, 3>(0, 0).into();
+        let dx = change.derivative(1);
+        let turning: Matrix3<f64> = dx.fixed_view::<3, 3>(0, 0) * rotation.transpose();
+        let turn = Vector3::new(turning[(2, 1)], turning[(0, 2)], turning[(1, 0)]);
+        let shift: Vector3<f64> = dx.fixed_view::<3, 1>(0, 3).into();
+        let arm = rotation * Vector3::from(moment_at);
+        balance.add(mass * shift.dot(&acceleration(force_at)));
+        balance.add(mass * turn.dot(&arm.cross(&acceleration(moment_at))));
+    }
+
+    fn pseudo_inertia(&self, inertial: &Inertial) -> Matrix4<f64> {
+        match inertial {
+            Inertial::Linear {
+                mass,
+                first_moment,
+                inertia,
+            } => {
+                let inertia: [f64; 6] = std::array::from_fn(|i| self.value(&inertia[i]));
+                let mut j = spread(inertia);
+                let moment = self.vector(first_moment);
+                for i in 0..3 {
+                    j[(i, 3)] = moment[i];
+                    j[(3, i)] = moment[i];
+                }
+                j[(3, 3)] = self.value(mass);
+                j
+            }
+            Inertial::AboutCentre {
+                mass,
+                centre,
+                inertia,
+            } => {
+                let inertia: [f64; 6] = std::array::from_fn(|i| self.value(&inertia[i]));
+                spread(inertia) + point_mass(self.value(mass), self.vector(centre).into())
+            }
+        }
+    }
+}
+
+/// Coordinates that move along coordinate `i` alone, at rate 1.
+pub fn along(coordinates: &[f64], i: usize) -> Vec<Jet> {
+    coordinates
+        .iter()
+        .enumerate()
+        .map(|(k, q)| Jet([*q, f64::from(u8::from(k == i)), 0.0]))
+        .collect()
+}
+
+/// Whether a coordinate is an angle.
+pub fn is_angle(mechanism: &Mechanism, coordinate: usize) -> bool {
+    mechanism.coordinates[coordinate].motion == Motion::Revolute
+}
+
+fn quantity(motion: Jet, load: f64) -> impl Fn(PlaceQuantity) -> f64 {
+    move |quantity| match quantity {
+        PlaceQuantity::Coordinate => motion.0[0],
+        PlaceQuantity::Rate => motion.0[1],
+        PlaceQuantity::Acceleration => motion.0[2],
+        PlaceQuantity::Load => load,
+    }
+}
+
+fn add_body(
+    balance: &mut Balance,
+    pose: &Pose,
+    change: &Pose,
+    inertia: &Matrix4<f64>,
+    gravity: &Vector3<f64>,
+) {
+    let (a, d) = (pose.derivative(2), change.derivative(1));
+    let product = d * inertia * a.transpose();
+    for i in 0..3 {
+        balance.add(product[(i, i)]);
+    }
+    let moment = d * inertia.column(3);
+    for i in 0..3 {
+        balance.add(-gravity[i] * moment[i]);
+    }
+}
+
+/// Second moments `integral of x x^T` from the inertia about the same point.
+fn spread([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> Matrix4<f64> {
+    let half = 0.5 * (xx + yy + zz);
+    Matrix4::new(
+        half - xx, -xy, -xz, 0.0, -xy, half - yy, -yz, 0.0, -xz, -yz, half - zz, 0.0, 0.0, 0.0,
+        0.0, 0.0,
+    )
+}
+
+fn point_mass(mass: f64, at: Vector3<f64>) -> Matrix4<f64> {
+    let place = at.push(1.0);
+    mass * place * place.transpose()
+}
+
+fn rational(value: &num_rational::BigRational) -> f64 {
+    modelmill_codegen::expr::Rational::from(value.clone()).to_f64()
+}
