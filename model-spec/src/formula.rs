@@ -377,7 +377,7 @@ impl Parser<'_> {
             let diagnostic =
                 Diagnostic::error(span, format!("`{}` is not a function", quote(&name)))
                     .label("expected an operator, such as `*`, before `(`, or a function");
-            return Err(Box::new(diagnostic.help_if(suggest::advice(
+            return Err(Box::new(diagnostic.help(suggest::advice(
                 &name,
                 "functions",
                 known,

@@ -233,12 +233,8 @@ pub(crate) fn check(entry: &EffectKindEntry, log: &mut Log) {
         }
         acts = true;
         let lacking = lacking_units(entry, carries);
-        let usable = match carries {
-            Carries::Mass => lacking.is_empty(),
-            // A kind for linear drives alone need not say what it would be on a joint that turns.
-            Carries::Force | Carries::Torque => lacking.is_empty(),
-        };
-        if !usable {
+        // A kind for linear drives alone need not say what it would be on a joint that turns.
+        if !lacking.is_empty() {
             continue;
         }
         let placeholders: Vec<(String, Exact)> = entry

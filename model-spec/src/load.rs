@@ -133,21 +133,19 @@ pub fn load(
         build(&model, &mut log)
     };
     let mut diagnostics = log.finish();
-    match mechanism {
-        Some(mechanism) => Ok(Loaded {
-            mechanism,
-            warnings: diagnostics,
+    let Some(mechanism) = mechanism else {
+        diagnostics.sort_by_key(|found| found.severity);
+        return Err(Failure {
+            diagnostics,
             sources,
-            kinds,
-        }),
-        None => {
-            diagnostics.sort_by_key(|found| found.severity);
-            Err(Failure {
-                diagnostics,
-                sources,
-            })
-        }
-    }
+        });
+    };
+    Ok(Loaded {
+        mechanism,
+        warnings: diagnostics,
+        sources,
+        kinds,
+    })
 }
 
 /// Reads a file and those that it extends, and merges them, the variant over its base.

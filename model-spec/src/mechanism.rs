@@ -27,7 +27,7 @@ pub struct Mechanism {
     pub gravity: [Exact; 3],
     /// Known geometry and the like.
     pub constants: Vec<Constant>,
-    /// Dynamic parameters in the order of declaration, which orders p_g.
+    /// Dynamic parameters in the order of declaration, which orders `p_g`.
     pub parameters: Vec<Parameter>,
     /// Joint coordinates in the order of declaration.
     pub coordinates: Vec<Coordinate>,

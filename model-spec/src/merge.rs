@@ -133,7 +133,7 @@ fn remove(base: &mut Table, list: &Node, log: &mut Log) {
                     format!("there is no `{}` to remove", quote(section)),
                 )
                 .label("the extended file has no such entry")
-                .help_if(suggest::advice(
+                .help(suggest::advice(
                     section,
                     "entries",
                     sections.iter().map(String::as_str),
@@ -166,7 +166,7 @@ fn remove(base: &mut Table, list: &Node, log: &mut Log) {
                     format!("there is no `{}` in `{section}` to remove", quote(name)),
                 )
                 .label("the extended file has no entry of this name")
-                .help_if(suggest::advice(
+                .help(suggest::advice(
                     name,
                     "names there",
                     names.iter().map(String::as_str),

@@ -177,7 +177,7 @@ fn cross(a: Vec3, b: Vec3) -> Vec3 {
 
 /// Gaps of all loops, the derivative of the gaps, and the size of the mechanism.
 struct Gaps {
-    gaps: Vec<f64>,
+    values: Vec<f64>,
     rows: Rows,
     size: f64,
 }
@@ -185,7 +185,7 @@ struct Gaps {
 fn gaps(mechanism: &Mechanism) -> Gaps {
     let poses = frame_poses(mechanism);
     let mut found = Gaps {
-        gaps: Vec::new(),
+        values: Vec::new(),
         rows: Vec::new(),
         size: 0.0,
     };
@@ -194,7 +194,7 @@ fn gaps(mechanism: &Mechanism) -> Gaps {
         let left = jacobian(mechanism, &poses, closed.joins[0], one);
         let right = jacobian(mechanism, &poses, closed.joins[1], other);
         for k in 0..3 {
-            found.gaps.push(one[k] - other[k]);
+            found.values.push(one[k] - other[k]);
             found
                 .rows
                 .push(left[k].iter().zip(&right[k]).map(|(a, b)| a - b).collect());
@@ -288,11 +288,11 @@ fn close_loops(mechanism: &mut Mechanism, places: &Places, log: &mut Log) -> boo
     let mut now = at_start;
     let mut damping = 1e-9;
     for _ in 0..100 {
-        if norm(&now.gaps) <= 1e-14 * size || passive.is_empty() {
+        if norm(&now.values) <= 1e-14 * size || passive.is_empty() {
             break;
         }
         let rows = columns(mechanism, &now.rows, true);
-        let Some(step) = least_squares(&rows, &now.gaps, damping * size * size) else {
+        let Some(step) = least_squares(&rows, &now.values, damping * size * size) else {
             damping = f64::max(damping * 10.0, 1e-12);
             continue;
         };
@@ -304,7 +304,7 @@ fn close_loops(mechanism: &mut Mechanism, places: &Places, log: &mut Log) -> boo
             mechanism.coordinates[i].nominal -= change;
         }
         let next = gaps(mechanism);
-        if norm(&next.gaps) < norm(&now.gaps) {
+        if norm(&next.values) < norm(&now.values) {
             now = next;
             damping *= 0.1;
         } else {
@@ -319,7 +319,7 @@ fn close_loops(mechanism: &mut Mechanism, places: &Places, log: &mut Log) -> boo
     }
     let mut closes = true;
     for (i, closed) in mechanism.loops.iter().enumerate() {
-        let gap = norm(&now.gaps[3 * i..3 * i + 3]);
+        let gap = norm(&now.values[3 * i..3 * i + 3]);
         // A gap that is no number is no closed loop either.
         if gap <= CLOSED * size {
             continue;

@@ -197,7 +197,7 @@ pub(crate) fn check_keys(table: &Table, known: &[&str], title: &str, log: &mut L
         log.push(
             Diagnostic::error(key.span, format!("unknown key `{}`", quote(&key.name)))
                 .label(format!("{title} has no such key"))
-                .help_if(suggest::advice(&key.name, "keys", known.iter().copied())),
+                .help(suggest::advice(&key.name, "keys", known.iter().copied())),
         );
     }
 }

@@ -614,13 +614,13 @@ impl Read for Suffix {
     const EXAMPLE: &'static str = "\"1\"";
 
     fn read(node: &Node, log: &mut Log) -> Option<Self> {
-        let text = match &node.value {
-            Value::Text { text, .. } => text,
-            Value::Number {
-                text,
-                is_integer: true,
-            } => text,
-            _ => return wrong_type::<Self>(node, log),
+        let (Value::Text { text, .. }
+        | Value::Number {
+            text,
+            is_integer: true,
+        }) = &node.value
+        else {
+            return wrong_type::<Self>(node, log);
         };
         let fine = text.len() <= 40
             && text

@@ -129,7 +129,7 @@ impl Scope {
                 log.push(
                     Diagnostic::error(span, format!("unknown name `{}`", quote(name)))
                         .label(format!("expected {list}"))
-                        .help_if(suggest::advice(name, "names", candidates.iter().copied())),
+                        .help(suggest::advice(name, "names", candidates.iter().copied())),
                 );
             }
             return None;

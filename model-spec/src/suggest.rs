@@ -26,13 +26,13 @@ pub(crate) fn advice<'a>(
     name: &str,
     what: &str,
     candidates: impl IntoIterator<Item = &'a str> + Clone,
-) -> Option<String> {
+) -> String {
     if let Some(found) = nearest(name, candidates.clone()) {
-        return Some(format!("did you mean `{found}`?"));
+        return format!("did you mean `{found}`?");
     }
     let mut all: Vec<&str> = candidates.into_iter().collect();
     if all.is_empty() {
-        return Some(format!("the file declares no {what}"));
+        return format!("the file declares no {what}");
     }
     let n = all.len();
     all.truncate(16);
@@ -42,7 +42,7 @@ pub(crate) fn advice<'a>(
         .collect::<Vec<_>>()
         .join(", ");
     let more = if n > all.len() { ", ..." } else { "" };
-    Some(format!("known {what}: {list}{more}"))
+    format!("known {what}: {list}{more}")
 }
 
 /// Number of insertions, deletions, substitutions and swaps of neighbours between two names; case counts half.

@@ -287,7 +287,7 @@ pub(super) fn recording(
                 log.push(
                     Diagnostic::error(key.span, format!("unknown column `{}`", key.name))
                         .label("expected `t`, a coordinate, with `_d` or `_dd` for its derivatives, or a drive")
-                        .help_if(suggest::advice(
+                        .help(suggest::advice(
                             &key.name,
                             "columns",
                             known.iter().map(String::as_str),

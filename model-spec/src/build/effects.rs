@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::build::bodies::check_unique;
 use crate::build::frames::{Points, twice};
-use crate::build::symbols::Symbols;
+use crate::build::symbols::{Shared, Symbols};
 use crate::diagnostic::{Diagnostic, Log};
 use crate::exact::{CoordinateIdx, Exact, ParameterIdx, Symbol};
 use crate::formula::{Ast, AstKind};
@@ -95,7 +95,7 @@ fn effect(
                 format!("unknown kind of effect `{}`", kind_name.text),
             )
             .label("expected a kind of the library or of this file")
-            .help_if(suggest::advice(
+            .help(suggest::advice(
                 &kind_name.text,
                 "kinds",
                 kinds.keys().copied(),
@@ -142,9 +142,11 @@ fn effect(
         let span = named.map_or(kind_name.span, |name| name.span);
         let nominal = said.and_then(|said| said.nominal);
         let unit = unit_at(parameter.unit.as_ref(), carries)?;
-        let idx = match symbols.share_parameter(&name, Some(unit.dimension), span, nominal, log) {
-            Some(idx) => idx?,
-            None => {
+        let shared = symbols.share_parameter(&name, Some(unit.dimension), span, nominal, log);
+        let idx = match shared {
+            Shared::Known(idx) => idx,
+            Shared::Faulty => return None,
+            Shared::New => {
                 let idx = ParameterIdx(symbols.parameters.len());
                 let fine = symbols.declare_parameter(
                     Parameter {
@@ -209,7 +211,7 @@ fn place(
         log.push(
             Diagnostic::error(name.span, format!("unknown place `{}`", name.text))
                 .label("expected the name of a drive, a coordinate or a point")
-                .help_if(suggest::advice(&name.text, "places", known.iter().copied())),
+                .help(suggest::advice(&name.text, "places", known.iter().copied())),
         );
     }
     None
@@ -310,7 +312,7 @@ fn constants(
             log.push(
                 Diagnostic::error(key.span, format!("unknown constant `{}`", key.name))
                     .label(format!("`{}` has no such constant", kind_name.text))
-                    .help_if(suggest::advice(
+                    .help(suggest::advice(
                         &key.name,
                         "constants",
                         names.iter().copied(),
@@ -369,7 +371,7 @@ fn check_parameter_names(entry: &EffectEntry, kind: &EffectKindEntry, log: &mut 
             log.push(
                 Diagnostic::error(key.span, format!("unknown parameter `{}`", key.name))
                     .label("this kind of effect has no such parameter")
-                    .help_if(suggest::advice(
+                    .help(suggest::advice(
                         &key.name,
                         "parameters",
                         names.iter().copied(),

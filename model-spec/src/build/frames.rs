@@ -31,7 +31,7 @@ impl Tree {
             log.push(
                 Diagnostic::error(name.span, format!("unknown frame `{}`", name.text))
                     .label("expected the name of a frame, or `base`")
-                    .help_if(suggest::advice(
+                    .help(suggest::advice(
                         &name.text,
                         "frames",
                         self.names.keys().map(String::as_str),
@@ -149,7 +149,7 @@ fn parents_first(
                     log.push(
                         Diagnostic::error(on.span, format!("unknown frame `{}`", on.text))
                             .label("expected the name of a frame, or `base`")
-                            .help_if(suggest::advice(&on.text, "frames", known)),
+                            .help(suggest::advice(&on.text, "frames", known)),
                     );
                 }
                 break;
@@ -426,7 +426,7 @@ impl Points {
             log.push(
                 Diagnostic::error(name.span, format!("unknown point `{}`", name.text))
                     .label("expected the name of a point")
-                    .help_if(suggest::advice(&name.text, "points", self.names())),
+                    .help(suggest::advice(&name.text, "points", self.names())),
             );
         }
         found

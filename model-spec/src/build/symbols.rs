@@ -26,6 +26,16 @@ pub(super) struct Symbols {
     still: Vec<CoordinateIdx>,
 }
 
+/// What became of a parameter's name that may be declared already.
+pub(super) enum Shared {
+    /// No one has declared it yet.
+    New,
+    /// It is this parameter.
+    Known(ParameterIdx),
+    /// It is something else, which is reported.
+    Faulty,
+}
+
 /// The linear parameters in the order in which a shorthand declares them, with their dimensions.
 pub(super) const LINEAR: [(&str, Dimension); 10] = [
     ("XX", Dimension::INERTIA),
@@ -172,7 +182,6 @@ impl Symbols {
     }
 
     /// The parameter of a name that a second place shares; its dimension must agree, and its nominal value if both give one.
-    /// `None` if the name is not declared yet.
     pub(super) fn share_parameter(
         &mut self,
         name: &str,
@@ -180,8 +189,10 @@ impl Symbols {
         span: Span,
         nominal: Option<crate::record::Number>,
         log: &mut Log,
-    ) -> Option<Option<ParameterIdx>> {
-        let meaning = self.scope.get(name)?;
+    ) -> Shared {
+        let Some(meaning) = self.scope.get(name) else {
+            return Shared::New;
+        };
         let Exact::Symbol(Symbol::Parameter(idx)) = meaning.exact else {
             let diagnostic = Diagnostic::error(span, format!("`{name}` is not a parameter"))
                 .label("expected the name of a parameter, or a new name");
@@ -189,7 +200,7 @@ impl Symbols {
                 Some(declared) => diagnostic.related(declared, "defined here"),
                 None => diagnostic,
             });
-            return Some(None);
+            return Shared::Faulty;
         };
         if let (Some(wanted), Some(found)) = (dimension, meaning.dimension)
             && wanted != found
@@ -204,7 +215,7 @@ impl Symbols {
                 Some(declared) => diagnostic.related(declared, "defined here"),
                 None => diagnostic,
             });
-            return Some(None);
+            return Shared::Faulty;
         }
         if let Some(nominal) = nominal {
             match self.nominal_given[idx.0] {
@@ -227,7 +238,7 @@ impl Symbols {
                 }
             }
         }
-        Some(Some(idx))
+        Shared::Known(idx)
     }
 }
 
@@ -267,7 +278,7 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut Symbols, log: &mut Log) 
             }
             let name = format!("{symbol}{}", suffix.text);
             let shared = symbols.share_parameter(&name, Some(dimension), suffix.span, nominal, log);
-            if shared.is_none() {
+            if matches!(shared, Shared::New) {
                 symbols.declare_parameter(
                     Parameter {
                         name,
@@ -381,11 +392,7 @@ fn declare_coordinates(
         };
         let symbol = Symbol::Coordinate(CoordinateIdx(symbols.coordinates.len()));
         let meaning = meaning(Sort::Coordinate, symbol, dimension, unit, Some(key.span));
-        if !symbols.scope.declare(&key.name, meaning, log) {
-            symbols
-                .still
-                .retain(|idx| idx.0 < symbols.coordinates.len());
-        } else {
+        if symbols.scope.declare(&key.name, meaning, log) {
             places.coordinates.push(key.span);
             symbols.coordinates.push(Coordinate {
                 name: key.name.clone(),
@@ -393,6 +400,9 @@ fn declare_coordinates(
                 passive: entry.passive.is_some_and(|flag| flag.0),
                 nominal: entry.nominal.map_or(0.0, |number| number.value),
             });
+        } else {
+            let n_coordinates = symbols.coordinates.len();
+            symbols.still.retain(|idx| idx.0 < n_coordinates);
         }
     }
 }
