@@ -1,1 +1,23 @@
-//! Printers for people and for other programs.
+//! Printing of expressions: a notation-neutral [`Formula`] and its renderings as plain text, LaTeX and presentation
+//! MathML.
+//!
+//! Everything that is shown to people goes through a [`Formula`]: expressions of the graph, exact expressions of the
+//! model file, factors of eq. (6), operations of a program. The text is infix with `+ - * / ^ ( )`, rational numbers
+//! and functions by name, so that a script can read it again.
+
+mod formula;
+mod from_exact;
+mod from_graph;
+mod latex;
+mod mathml;
+mod symbol;
+mod text;
+
+#[cfg(test)]
+mod tests;
+
+pub use formula::{Formula, Function};
+pub use from_exact::{angle, exact, length};
+pub use from_graph::{atom, formula, tree_size};
+pub use mathml::escape;
+pub use symbol::Symbol;

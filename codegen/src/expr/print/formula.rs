@@ -1,0 +1,251 @@
+//! The tree that is printed: sums of terms, fractions, powers and functions, as a person would write them.
+
+use super::symbol::Symbol;
+use crate::expr::Rational;
+
+/// A function by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Function {
+    Sin,
+    Cos,
+    Sqrt,
+    Sign,
+    Abs,
+    Tanh,
+    Exp,
+    Atan2,
+}
+
+impl Function {
+    /// Its name in text.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sin => "sin",
+            Self::Cos => "cos",
+            Self::Sqrt => "sqrt",
+            Self::Sign => "sign",
+            Self::Abs => "abs",
+            Self::Tanh => "tanh",
+            Self::Exp => "exp",
+            Self::Atan2 => "atan2",
+        }
+    }
+}
+
+impl From<crate::expr::Unary> for Function {
+    fn from(unary: crate::expr::Unary) -> Self {
+        use crate::expr::Unary;
+        match unary {
+            Unary::Sqrt => Self::Sqrt,
+            Unary::Sign => Self::Sign,
+            Unary::Abs => Self::Abs,
+            Unary::Tanh => Self::Tanh,
+            Unary::Exp => Self::Exp,
+        }
+    }
+}
+
+/// A formula to be printed. The constructors keep it tidy: no term of zero, no factor of one, no sum in a sum.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Formula {
+    /// A rational number.
+    Number(Rational),
+    /// A name.
+    Symbol(Symbol),
+    /// A name with a formula as its index: `h` with `m1*dc1`.
+    Indexed(Symbol, Box<Formula>),
+    /// A sum of two or more.
+    Sum(Vec<Formula>),
+    /// A number times a product over a product.
+    Term {
+        /// The number, not zero.
+        factor: Rational,
+        /// Factors above the line.
+        above: Vec<Formula>,
+        /// Factors below the line.
+        below: Vec<Formula>,
+    },
+    /// A power with an exponent of at least two.
+    Power(Box<Formula>, u32),
+    /// A function of one or two operands.
+    Apply(Function, Vec<Formula>),
+}
+
+impl Formula {
+    /// An integer.
+    pub fn integer(value: i64) -> Self {
+        Self::Number(Rational::integer(value))
+    }
+
+    /// A name.
+    pub fn name(name: impl Into<String>) -> Self {
+        Self::Symbol(Symbol::new(name))
+    }
+
+    /// Whether it is the number 0.
+    pub fn is_zero(&self) -> bool {
+        matches!(self, Self::Number(n) if n.is_zero())
+    }
+
+    /// Whether it is the number 1.
+    pub fn is_one(&self) -> bool {
+        matches!(self, Self::Number(n) if n.is_one())
+    }
+
+    /// Whether it starts with a minus sign.
+    pub fn is_negative(&self) -> bool {
+        match self {
+            Self::Number(n) => n.is_negative(),
+            Self::Term { factor, .. } => factor.is_negative(),
+            _ => false,
+        }
+    }
+
+    /// A sum; its first positive term comes first.
+    pub fn sum(terms: impl IntoIterator<Item = Self>) -> Self {
+        let mut flat = Vec::new();
+        for term in terms {
+            match term {
+                Self::Sum(inner) => flat.extend(inner),
+                term if term.is_zero() => {}
+                term => flat.push(term),
+            }
+        }
+        if let Some(first) = flat.iter().position(|term| !term.is_negative()) {
+            flat[..=first].rotate_right(1);
+        }
+        match flat.len() {
+            0 => Self::integer(0),
+            1 => flat.remove(0),
+            _ => Self::Sum(flat),
+        }
+    }
+
+    /// A number times a product.
+    pub fn product(factor: Rational, factors: impl IntoIterator<Item = Self>) -> Self {
+        Self::term(factor, factors, [])
+    }
+
+    /// `above / below`
+    pub fn quotient(above: Self, below: Self) -> Self {
+        Self::term(Rational::ONE, [above], [below])
+    }
+
+    /// A number times a product over a product; nothing below must be zero.
+    pub fn term(
+        factor: Rational,
+        above: impl IntoIterator<Item = Self>,
+        below: impl IntoIterator<Item = Self>,
+    ) -> Self {
+        let mut number = factor;
+        let (mut up, mut down) = (Vec::new(), Vec::new());
+        for one in above {
+            Self::gather(one, &mut number, &mut up, &mut down);
+        }
+        let mut inverse = Rational::ONE;
+        for one in below {
+            Self::gather(one, &mut inverse, &mut down, &mut up);
+        }
+        number = &number * &inverse.recip();
+        if number.is_zero() {
+            return Self::Number(number);
+        }
+        if up.is_empty() && down.is_empty() {
+            return Self::Number(number);
+        }
+        if number.is_one() && down.is_empty() && up.len() == 1 {
+            return up.remove(0);
+        }
+        Self::Term {
+            factor: number,
+            above: up,
+            below: down,
+        }
+    }
+
+    fn gather(one: Self, number: &mut Rational, above: &mut Vec<Self>, below: &mut Vec<Self>) {
+        match one {
+            Self::Number(n) => *number = &*number * &n,
+            Self::Term {
+                factor,
+                above: up,
+                below: down,
+            } => {
+                *number = &*number * &factor;
+                up.into_iter().for_each(|x| Self::multiply(above, x));
+                down.into_iter().for_each(|x| Self::multiply(below, x));
+            }
+            other => Self::multiply(above, other),
+        }
+    }
+
+    /// Appends a factor, as a power where it is there already.
+    fn multiply(factors: &mut Vec<Self>, factor: Self) {
+        let (base, n) = factor.into_power();
+        let same = |there: &&mut Self| match there {
+            Self::Power(inner, _) => **inner == base,
+            other => **other == base,
+        };
+        if let Some(there) = factors.iter_mut().find(same) {
+            let (inner, m) = std::mem::replace(there, Self::integer(1)).into_power();
+            *there = Self::Power(Box::new(inner), n + m);
+            return;
+        }
+        factors.push(match n {
+            1 => base,
+            _ => Self::Power(Box::new(base), n),
+        });
+    }
+
+    fn into_power(self) -> (Self, u32) {
+        match self {
+            Self::Power(base, n) => (*base, n),
+            other => (other, 1),
+        }
+    }
+
+    /// An integer power; a negative exponent goes below the line.
+    #[must_use]
+    pub fn power(self, n: i32) -> Self {
+        let magnitude = match (self, n.unsigned_abs()) {
+            (_, 0) => return Self::integer(1),
+            (base, 1) => base,
+            (Self::Number(value), m) => Self::Number(value.pow(i32::try_from(m).unwrap_or(1))),
+            (Self::Power(base, k), m) => Self::Power(base, k * m),
+            (Self::Term { factor, above, below }, m) => {
+                let exponent = i32::try_from(m).unwrap_or(1);
+                let raise = |x: Vec<Self>| -> Vec<Self> {
+                    x.into_iter().map(|one| one.power(exponent)).collect()
+                };
+                Self::term(factor.pow(exponent), raise(above), raise(below))
+            }
+            (base, m) => Self::Power(Box::new(base), m),
+        };
+        if n < 0 {
+            Self::quotient(Self::integer(1), magnitude)
+        } else {
+            magnitude
+        }
+    }
+
+    /// The formula with its sign changed.
+    #[must_use]
+    pub fn negated(self) -> Self {
+        Self::product(Rational::MINUS_ONE, [self])
+    }
+
+    /// A function of one operand.
+    pub fn apply(function: Function, operand: Self) -> Self {
+        Self::Apply(function, vec![operand])
+    }
+}
+
+/// Numerator and denominator of the magnitude of a number, as decimal digits.
+pub(super) fn digits(value: &Rational) -> (String, Option<String>) {
+    let text = value.abs().to_string();
+    match text.split_once('/') {
+        Some((n, d)) => (n.to_owned(), Some(d.to_owned())),
+        None => (text, None),
+    }
+}

@@ -1,0 +1,131 @@
+//! Formulas as plain infix text that can be read again.
+
+use std::fmt::{self, Write};
+
+use super::formula::{Formula, digits};
+use crate::expr::Rational;
+
+/// How tightly the surroundings bind.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Level {
+    Sum,
+    Factor,
+    Power,
+}
+
+impl Formula {
+    /// As infix text: `m1*dc1 + d1*m2 + 1/2*d1*m4*dc3/d3`.
+    pub fn text(&self) -> String {
+        self.to_string()
+    }
+}
+
+impl fmt::Display for Formula {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_at(f, self, Level::Sum)
+    }
+}
+
+fn write_at(f: &mut dyn Write, formula: &Formula, level: Level) -> fmt::Result {
+    let enclosed = match formula {
+        Formula::Sum(_) => level > Level::Sum,
+        Formula::Number(n) => level > Level::Sum && (n.is_negative() || !n.is_integer()),
+        Formula::Term { factor, .. } => {
+            level > Level::Factor || (level > Level::Sum && factor.is_negative())
+        }
+        Formula::Power(..) => level > Level::Factor,
+        Formula::Symbol(_) | Formula::Indexed(..) | Formula::Apply(..) => false,
+    };
+    if enclosed {
+        f.write_char('(')?;
+    }
+    match formula {
+        Formula::Number(n) => write!(f, "{n}")?,
+        Formula::Symbol(symbol) => f.write_str(&symbol.text())?,
+        Formula::Indexed(symbol, index) => match index.as_ref() {
+            Formula::Symbol(inner) => write!(f, "{}_{}", symbol.text(), inner.text())?,
+            index => write!(f, "{}[{index}]", symbol.text())?,
+        },
+        Formula::Sum(terms) => {
+            for (i, term) in terms.iter().enumerate() {
+                match (i, term.is_negative()) {
+                    (0, true) => f.write_str("-")?,
+                    (0, false) => {}
+                    (_, true) => f.write_str(" - ")?,
+                    (_, false) => f.write_str(" + ")?,
+                }
+                magnitude(f, term)?;
+            }
+        }
+        Formula::Term { .. } => {
+            if formula.is_negative() {
+                f.write_char('-')?;
+            }
+            magnitude(f, formula)?;
+        }
+        Formula::Power(base, n) => {
+            write_at(f, base, Level::Power)?;
+            write!(f, "^{n}")?;
+        }
+        Formula::Apply(function, operands) => {
+            write!(f, "{}(", function.name())?;
+            for (i, operand) in operands.iter().enumerate() {
+                if i > 0 {
+                    f.write_str(", ")?;
+                }
+                write_at(f, operand, Level::Sum)?;
+            }
+            f.write_char(')')?;
+        }
+    }
+    if enclosed {
+        f.write_char(')')?;
+    }
+    Ok(())
+}
+
+/// Writes a term of a sum without its sign.
+fn magnitude(f: &mut dyn Write, formula: &Formula) -> fmt::Result {
+    match formula {
+        Formula::Number(n) => write!(f, "{}", n.abs()),
+        Formula::Term {
+            factor,
+            above,
+            below,
+        } => term(f, factor, above, below),
+        other => write_at(f, other, Level::Sum),
+    }
+}
+
+fn term(f: &mut dyn Write, factor: &Rational, above: &[Formula], below: &[Formula]) -> fmt::Result {
+    let (n, d) = digits(factor);
+    let mut divisors = Vec::new();
+    if above.is_empty() {
+        // 1/2/x is written 1/(2*x).
+        f.write_str(&n)?;
+        divisors.extend(d);
+    } else {
+        match d {
+            Some(d) => write!(f, "{n}/{d}*")?,
+            None if n != "1" => write!(f, "{n}*")?,
+            None => {}
+        }
+        for (i, one) in above.iter().enumerate() {
+            if i > 0 {
+                f.write_char('*')?;
+            }
+            write_at(f, one, Level::Factor)?;
+        }
+    }
+    let several = divisors.len() + below.len() > 1;
+    for one in below {
+        let mut text = String::new();
+        write_at(&mut text, one, Level::Factor)?;
+        divisors.push(text);
+    }
+    match (divisors.is_empty(), several) {
+        (true, _) => Ok(()),
+        (false, false) => write!(f, "/{}", divisors[0]),
+        (false, true) => write!(f, "/({})", divisors.join("*")),
+    }
+}

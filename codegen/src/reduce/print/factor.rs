@@ -1,0 +1,209 @@
+//! Factors of polynomials in the constants as far as trial division finds them: a number, a monomial, linear factors
+//! with small coefficients. What is left over stays a sum; the product is always the polynomial itself.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::super::rational_function::{Polynomial, Powers, Variable};
+use super::{content, ordered};
+use crate::expr::Rational;
+
+/// A product that equals a polynomial.
+pub(super) struct Factored {
+    pub(super) number: Rational,
+    pub(super) monomial: Powers,
+    /// Polynomials of several terms with their exponents.
+    pub(super) factors: Vec<(Polynomial, u32)>,
+}
+
+/// Beyond these the search is not cheap and the result is not readable anyway.
+const MOST_TERMS: usize = 60;
+const MOST_VARIABLES: usize = 7;
+
+pub(super) fn factor(p: &Polynomial) -> Factored {
+    let mut number = content(p);
+    let Some((_, leading)) = ordered(p).into_iter().next() else {
+        return Factored {
+            number: Rational::ZERO,
+            monomial: Powers::new(),
+            factors: Vec::new(),
+        };
+    };
+    if leading.is_negative() {
+        number = -&number;
+    }
+    let monomial = common_powers(p);
+    let inverse = number.recip();
+    let mut rest: Polynomial = p
+        .iter()
+        .map(|(powers, k)| {
+            let left = divide_powers(powers, &monomial).expect("a common power divides");
+            (left, k * &inverse)
+        })
+        .collect();
+    let mut factors: Vec<(Polynomial, u32)> = Vec::new();
+    let names: BTreeSet<Variable> = rest.keys().flatten().map(|(v, _)| *v).collect();
+    if rest.len() <= MOST_TERMS && names.len() <= MOST_VARIABLES {
+        for divisor in candidates(&names.into_iter().collect::<Vec<_>>()) {
+            let mut n = 0;
+            while rest.len() > 1 {
+                let Some(quotient) = divide(&rest, &divisor) else {
+                    break;
+                };
+                rest = quotient;
+                n += 1;
+            }
+            if n > 0 {
+                factors.push((divisor, n));
+            }
+        }
+    }
+    // Division by primitive factors leaves a primitive rest: 1, -1 or a sum.
+    match (rest.len(), rest.get(&Powers::new())) {
+        (1, Some(unit)) => number = &number * unit,
+        _ => factors.push((rest, 1)),
+    }
+    Factored {
+        number,
+        monomial,
+        factors,
+    }
+}
+
+fn common_powers(p: &Polynomial) -> Powers {
+    p.keys()
+        .map(|powers| powers.iter().copied().collect::<BTreeMap<_, _>>())
+        .reduce(|a, b| {
+            a.into_iter()
+                .filter_map(|(v, n)| b.get(&v).map(|m| (v, n.min(*m))))
+                .collect()
+        })
+        .unwrap_or_default()
+        .into_iter()
+        .collect()
+}
+
+fn divide_powers(powers: &Powers, by: &Powers) -> Option<Powers> {
+    let mut left: BTreeMap<Variable, u32> = powers.iter().copied().collect();
+    for (v, n) in by {
+        let there = left.get_mut(v)?;
+        *there = there.checked_sub(*n)?;
+    }
+    Some(left.into_iter().filter(|(_, n)| *n > 0).collect())
+}
+
+fn multiply_powers(a: &Powers, b: &Powers) -> Powers {
+    let mut total: BTreeMap<Variable, u32> = a.iter().copied().collect();
+    for (v, n) in b {
+        *total.entry(*v).or_insert(0) += n;
+    }
+    total.into_iter().collect()
+}
+
+/// Linear forms worth trying: `a u + b v` with coefficients up to 2, and `u + v + w` with any signs.
+fn candidates(variables: &[Variable]) -> Vec<Polynomial> {
+    let linear = |terms: &[(Variable, i64)]| -> Polynomial {
+        terms
+            .iter()
+            .map(|(v, k)| (vec![(*v, 1)], Rational::integer(*k)))
+            .collect()
+    };
+    let mut found = Vec::new();
+    for (i, u) in variables.iter().enumerate() {
+        for (j, v) in variables.iter().enumerate().skip(i + 1) {
+            for (a, b) in [(1, 1), (1, -1), (2, 1), (2, -1), (1, 2), (1, -2)] {
+                found.push(linear(&[(*u, a), (*v, b)]));
+            }
+            for w in &variables[j + 1..] {
+                for (b, c) in [(1, 1), (1, -1), (-1, 1), (-1, -1)] {
+                    found.push(linear(&[(*u, 1), (*v, b), (*w, c)]));
+                }
+            }
+        }
+    }
+    found
+}
+
+/// The leading term in the lexicographic order of variables, an order that products respect.
+fn leading(p: &Polynomial) -> Option<(&Powers, &Rational)> {
+    p.iter()
+        .max_by(|(a, _), (b, _)| super::compare_powers(b, a))
+}
+
+/// The exact quotient, if there is one.
+fn divide(p: &Polynomial, by: &Polynomial) -> Option<Polynomial> {
+    let (lead, k) = leading(by)?;
+    let inverse = k.recip();
+    let mut rest = p.clone();
+    let mut quotient = Polynomial::new();
+    while let Some((powers, value)) = leading(&rest) {
+        let step = divide_powers(powers, lead)?;
+        let value = value * &inverse;
+        for (other, k) in by {
+            let at = multiply_powers(&step, other);
+            let there = rest.remove(&at).unwrap_or(Rational::ZERO);
+            let left = &there - &(&value * k);
+            if !left.is_zero() {
+                rest.insert(at, left);
+            }
+        }
+        quotient.insert(step, value);
+    }
+    Some(quotient)
+}
+
+/// `number * (sum of linear)^2`, which consists of `terms` of a polynomial.
+pub(super) struct Square {
+    pub(super) number: Rational,
+    pub(super) linear: Vec<(Variable, Rational)>,
+    pub(super) terms: Vec<Powers>,
+}
+
+/// Squares of sums of several variables that a polynomial contains term by term.
+pub(super) fn squares(p: &Polynomial) -> Vec<Square> {
+    let coefficient = |powers: &Powers| p.get(powers).cloned().unwrap_or(Rational::ZERO);
+    let cross = |u: Variable, v: Variable| coefficient(&vec![(u.min(v), 1), (u.max(v), 1)]);
+    let mut variables: Vec<Variable> = p
+        .keys()
+        .filter_map(|powers| match powers.as_slice() {
+            [(v, 2)] => Some(*v),
+            _ => None,
+        })
+        .collect();
+    variables.sort();
+    let mut found = Vec::new();
+    while !variables.is_empty() {
+        let first = variables.remove(0);
+        let number = coefficient(&vec![(first, 2)]);
+        let half = (&number * &Rational::integer(2)).recip();
+        let mut linear = vec![(first, Rational::ONE)];
+        for v in &variables {
+            let k = &cross(first, *v) * &half;
+            if !k.is_zero() {
+                linear.push((*v, k));
+            }
+        }
+        let whole = linear.iter().enumerate().all(|(i, (u, k))| {
+            coefficient(&vec![(*u, 2)]) == &number * &(k * k)
+                && linear[i + 1..].iter().all(|(v, l)| {
+                    cross(*u, *v) == &(&number * &Rational::integer(2)) * &(k * l)
+                })
+        });
+        if linear.len() < 2 || !whole {
+            continue;
+        }
+        variables.retain(|v| linear.iter().all(|(u, _)| u != v));
+        let mut terms = Vec::new();
+        for (i, (u, _)) in linear.iter().enumerate() {
+            terms.push(vec![(*u, 2)]);
+            for (v, _) in &linear[i + 1..] {
+                terms.push(vec![(*u.min(v), 1), (*u.max(v), 1)]);
+            }
+        }
+        found.push(Square {
+            number,
+            linear,
+            terms,
+        });
+    }
+    found
+}
