@@ -6,8 +6,9 @@
 
 use crate::build::Places;
 use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::exact::{CoordinateIdx, Symbol};
-use crate::mechanism::{Axis, DriveKind, Mechanism, Motion, PointIdx, Step};
+use crate::exact::Symbol;
+use crate::kinematics::{Vec3, frame_poses, jacobian, position};
+use crate::mechanism::{DriveKind, Mechanism, Motion, Step};
 use crate::numeric::{Rows, least_squares, rank};
 
 /// Passive angles may move this far, in rad, before it counts as another assembly.
@@ -16,23 +17,6 @@ const FARTHEST_TURN: f64 = 0.5;
 const CLOSED: f64 = 1e-9;
 /// Pivots below this, relative to the largest, count as zero.
 const SINGULAR: f64 = 1e-8;
-
-type Vec3 = [f64; 3];
-
-/// One motion on the way from the base to a frame.
-struct Moved {
-    coordinate: CoordinateIdx,
-    factor: f64,
-    motion: Motion,
-    axis: Vec3,
-    origin: Vec3,
-}
-
-struct FramePose {
-    rotation: [Vec3; 3],
-    origin: Vec3,
-    own: Vec<Moved>,
-}
 
 /// Checks the nominal pose and refines the passive coordinates there.
 pub(crate) fn check(mechanism: &mut Mechanism, places: &Places, log: &mut Log) {
@@ -45,134 +29,6 @@ pub(crate) fn check(mechanism: &mut Mechanism, places: &Places, log: &mut Log) {
     {
         check_drives(mechanism, places, log);
     }
-}
-
-/// Poses of all frames at the nominal values.
-fn frame_poses(mechanism: &Mechanism) -> Vec<FramePose> {
-    let value = |symbol: Symbol| mechanism.symbol_nominal(symbol);
-    let mut poses: Vec<FramePose> = Vec::with_capacity(mechanism.frames.len());
-    for (i, frame) in mechanism.frames.iter().enumerate() {
-        let (mut rotation, mut origin) = if i == 0 {
-            (
-                [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-                [0.0; 3],
-            )
-        } else {
-            let parent = &poses[frame.parent.0];
-            (parent.rotation, parent.origin)
-        };
-        let mut own = Vec::new();
-        for step in &frame.steps {
-            match step {
-                Step::Rotate(axis, angle) => {
-                    let direction = column(&rotation, *axis);
-                    for &(symbol, factor) in &angle.terms {
-                        if let Symbol::Coordinate(coordinate) = symbol {
-                            own.push(Moved {
-                                coordinate,
-                                factor: f64::from(factor),
-                                motion: Motion::Revolute,
-                                axis: direction,
-                                origin,
-                            });
-                        }
-                    }
-                    rotate(&mut rotation, *axis, angle.evaluate(&value));
-                }
-                Step::Translate(axis, length) => {
-                    let direction = column(&rotation, *axis);
-                    for (coordinate, factor) in &length.coordinates {
-                        own.push(Moved {
-                            coordinate: *coordinate,
-                            factor: crate::print::to_f64(factor),
-                            motion: Motion::Prismatic,
-                            axis: direction,
-                            origin,
-                        });
-                    }
-                    let distance = length.evaluate(&value);
-                    for k in 0..3 {
-                        origin[k] += distance * direction[k];
-                    }
-                }
-            }
-        }
-        poses.push(FramePose {
-            rotation,
-            origin,
-            own,
-        });
-    }
-    poses
-}
-
-fn column(rotation: &[Vec3; 3], axis: Axis) -> Vec3 {
-    let j = match axis {
-        Axis::X => 0,
-        Axis::Y => 1,
-        Axis::Z => 2,
-    };
-    [rotation[0][j], rotation[1][j], rotation[2][j]]
-}
-
-/// Multiplies from the right by an elementary rotation.
-fn rotate(rotation: &mut [Vec3; 3], axis: Axis, angle: f64) {
-    let (sin, cos) = angle.sin_cos();
-    let (j, k) = match axis {
-        Axis::X => (1, 2),
-        Axis::Y => (2, 0),
-        Axis::Z => (0, 1),
-    };
-    for row in rotation {
-        let (first, second) = (row[j], row[k]);
-        row[j] = first * cos + second * sin;
-        row[k] = second * cos - first * sin;
-    }
-}
-
-fn position(mechanism: &Mechanism, poses: &[FramePose], point: PointIdx) -> Vec3 {
-    let value = |symbol: Symbol| mechanism.symbol_nominal(symbol);
-    let point = &mechanism.points[point.0];
-    let pose = &poses[point.frame.0];
-    let local = [0, 1, 2].map(|k| point.at[k].evaluate(&value));
-    std::array::from_fn(|k| {
-        pose.origin[k] + (0..3).map(|j| pose.rotation[k][j] * local[j]).sum::<f64>()
-    })
-}
-
-/// Derivative of a point's position by each coordinate: three rows.
-fn jacobian(
-    mechanism: &Mechanism,
-    poses: &[FramePose],
-    point: PointIdx,
-    at: Vec3,
-) -> [Vec<f64>; 3] {
-    let mut rows = [0, 1, 2].map(|_| vec![0.0; mechanism.coordinates.len()]);
-    let mut frame = mechanism.points[point.0].frame.0;
-    while frame != 0 {
-        for moved in &poses[frame].own {
-            let velocity = match moved.motion {
-                Motion::Prismatic => moved.axis,
-                Motion::Revolute => {
-                    let arm: Vec3 = std::array::from_fn(|k| at[k] - moved.origin[k]);
-                    cross(moved.axis, arm)
-                }
-            };
-            for k in 0..3 {
-                rows[k][moved.coordinate.0] += moved.factor * velocity[k];
-            }
-        }
-        frame = mechanism.frames[frame].parent.0;
-    }
-    rows
-}
-
-fn cross(a: Vec3, b: Vec3) -> Vec3 {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
 }
 
 /// Gaps of all loops, the derivative of the gaps, and the size of the mechanism.

@@ -10,9 +10,9 @@ use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::document::quote;
 use crate::exact::{Exact, Function, Symbol};
 use crate::formula::{Ast, AstKind, Formula};
-use crate::record::check_not_reserved;
 use crate::suggest;
 use crate::unit::Dimension;
+use crate::values::check_not_reserved;
 
 /// What sort of thing a name stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -9,10 +9,10 @@ use crate::build::symbols::Symbols;
 use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::exact::{CoordinateIdx, Exact, Symbol};
 use crate::mechanism::{Drive, DriveKind, Loop};
-use crate::record::Name;
 use crate::schema::ModelEntry;
 use crate::scope::Sort;
 use crate::suggest;
+use crate::values::Name;
 
 /// Most loops of a mechanism.
 const MOST_LOOPS: usize = 60;

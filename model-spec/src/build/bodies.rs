@@ -10,10 +10,11 @@ use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::exact::{Exact, Symbol};
 use crate::formula::Formula;
 use crate::mechanism::{FrameIdx, Inertial, LumpedMass, Part};
-use crate::record::Name;
-use crate::schema::{LinearEntry, LumpedMassEntry, ModelEntry, PartEntry, Spot, Vector};
+use crate::schema::{LinearEntry, LumpedMassEntry, ModelEntry, PartEntry};
 use crate::scope::{Sort, Wanted};
 use crate::unit::Dimension;
+use crate::values::Name;
+use crate::values::{Spot, Vector};
 
 const SORTS: [Sort; 2] = [Sort::Constant, Sort::Parameter];
 

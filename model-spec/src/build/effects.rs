@@ -8,13 +8,15 @@ use crate::build::symbols::{Shared, Symbols};
 use crate::diagnostic::{Diagnostic, Log};
 use crate::exact::{CoordinateIdx, Exact, ParameterIdx, Symbol};
 use crate::formula::{Ast, AstKind};
-use crate::kinds::{Carries, check, factors, lacking_units, library_entries, unit_at};
+use crate::kind_terms::{factors, lacking_units, unit_at};
+use crate::kinds::{Carries, check, library_entries};
 use crate::mechanism::{Drive, DriveIdx, DriveKind, Effect, EffectTerm, Motion, Parameter, Place};
-use crate::record::Name;
-use crate::schema::{EffectEntry, EffectKindEntry, ModelEntry, PlaceKind};
+use crate::schema::{EffectEntry, EffectKindEntry, ModelEntry};
 use crate::scope::{Sort, Wanted};
 use crate::suggest;
 use crate::unit::Dimension;
+use crate::values::Name;
+use crate::values::PlaceKind;
 
 /// Reads the effects; their parameters join those of the file.
 pub(super) fn effects(

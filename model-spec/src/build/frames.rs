@@ -11,11 +11,12 @@ use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::exact::{Angle, Exact, Length};
 use crate::formula::Formula;
 use crate::mechanism::{Axis, Convention, Frame, FrameIdx, Point, PointIdx, Step};
-use crate::record::Name;
-use crate::schema::{AxisName, DhEntry, FrameEntry, JointEntry, ModelEntry, TransformEntry};
+use crate::schema::{DhEntry, FrameEntry, JointEntry, ModelEntry, TransformEntry};
 use crate::scope::{Scope, Sort, Wanted};
 use crate::suggest;
 use crate::unit::Dimension;
+use crate::values::AxisName;
+use crate::values::Name;
 
 /// The frames with their names.
 pub(super) struct Tree {
@@ -300,12 +301,12 @@ fn transform_steps(
     text: &mut Vec<String>,
     log: &mut Log,
 ) {
-    let entry = |vector: &Option<crate::schema::Vector>, i: usize| {
+    let entry = |vector: &Option<crate::values::Vector>, i: usize| {
         vector
             .as_ref()
             .and_then(|vector| vector.entries.get(i)?.clone())
     };
-    let shown = |vector: &Option<crate::schema::Vector>| {
+    let shown = |vector: &Option<crate::values::Vector>| {
         (0..3)
             .map(|i| entry(vector, i).map_or_else(|| "0".to_owned(), |formula| formula.text))
             .collect::<Vec<_>>()

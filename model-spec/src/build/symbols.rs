@@ -7,9 +7,10 @@ use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::exact::{ConstantIdx, CoordinateIdx, Exact, ParameterIdx, Symbol};
 use crate::formula::{Ast, AstKind, Formula};
 use crate::mechanism::{Constant, Coordinate, Motion, Parameter};
-use crate::schema::{LinearEntry, LinearNominalEntry, ModelEntry, Vector};
+use crate::schema::{LinearEntry, LinearNominalEntry, ModelEntry};
 use crate::scope::{Meaning, Scope, Sort, Wanted, meaning};
 use crate::unit::Dimension;
+use crate::values::Vector;
 
 /// Most coordinates of a mechanism.
 const MOST_COORDINATES: usize = 100;
@@ -187,7 +188,7 @@ impl Symbols {
         name: &str,
         dimension: Option<Dimension>,
         span: Span,
-        nominal: Option<crate::record::Number>,
+        nominal: Option<crate::values::Number>,
         log: &mut Log,
     ) -> Shared {
         let Some(meaning) = self.scope.get(name) else {
@@ -299,7 +300,7 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut Symbols, log: &mut Log) 
 /// The suffix of a shorthand and the symbols that it stands for.
 pub(super) fn shorthand(
     linear: &LinearEntry,
-) -> Option<(&crate::schema::Suffix, &'static [&'static str])> {
+) -> Option<(&crate::values::Suffix, &'static [&'static str])> {
     const ALL: [&str; 10] = ["XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M"];
     match (&linear.all, &linear.planar) {
         (Some(suffix), _) => Some((suffix, &ALL)),
@@ -324,7 +325,7 @@ pub(super) fn explicit<'a>(linear: &'a LinearEntry, symbol: &str) -> Option<&'a 
     }
 }
 
-fn nominal_of(nominal: &LinearNominalEntry, symbol: &str) -> Option<crate::record::Number> {
+fn nominal_of(nominal: &LinearNominalEntry, symbol: &str) -> Option<crate::values::Number> {
     match symbol {
         "XX" => nominal.xx,
         "XY" => nominal.xy,

@@ -1,0 +1,547 @@
+//! Parser of exact expressions: `"2*r3 + d4"` becomes a tree whose every node knows its place in the file.
+//!
+//! The grammar is that of everyday formulas: `+ - * / ^`, parentheses, `pi`, names, decimals,
+//! and the functions `sin cos sqrt abs sign tanh exp`. Nothing is rounded.
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{One, Pow, Zero};
+
+use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::document::quote;
+use crate::formula::{Ast, AstKind, FUNCTIONS, LONGEST_FORMULA};
+use crate::suggest;
+
+/// Deepest nesting of parentheses, functions and powers.
+const DEEPEST: usize = 48;
+/// Most digits of one number, before and after the point together.
+const MOST_DIGITS: usize = 40;
+/// Largest exponent of a power, and of ten in a decimal.
+const LARGEST_EXPONENT: i32 = 16;
+/// Largest product of exponents of powers of powers.
+const LARGEST_DEGREE: i32 = 64;
+
+/// Parses `text`, which stands in the file at `outer`, its characters from byte `inner` on if they can be told apart.
+pub(crate) fn parse(text: &str, outer: Span, inner: Option<usize>, log: &mut Log) -> Option<Ast> {
+    if text.len() > LONGEST_FORMULA {
+        log.push(
+            Diagnostic::error(outer, "this expression is too long")
+                .label(format!("at most {LONGEST_FORMULA} characters"))
+                .help("name parts of it as constants"),
+        );
+        return None;
+    }
+    let mut parser = Parser {
+        text,
+        at: 0,
+        depth: 0,
+        outer,
+        inner,
+    };
+    let parsed = parser.whole();
+    match parsed {
+        Ok(ast) => Some(ast),
+        Err(diagnostic) => {
+            log.push(*diagnostic);
+            None
+        }
+    }
+}
+
+struct Parser<'a> {
+    text: &'a str,
+    at: usize,
+    depth: usize,
+    outer: Span,
+    inner: Option<usize>,
+}
+
+type Parsed<T> = Result<T, Box<Diagnostic>>;
+
+impl Parser<'_> {
+    fn whole(&mut self) -> Parsed<Ast> {
+        self.skip_blanks();
+        if self.at == self.text.len() {
+            return Err(Box::new(
+                Diagnostic::error(self.outer, "this expression is empty")
+                    .label("expected a number, a name or a formula")
+                    .help("write `\"0\"` for nothing"),
+            ));
+        }
+        let (ast, _) = self.sum()?;
+        self.skip_blanks();
+        if let Some(found) = self.peek() {
+            return Err(self.unexpected(found));
+        }
+        Ok(ast)
+    }
+
+    fn sum(&mut self) -> Parsed<(Ast, i32)> {
+        self.deeper()?;
+        let start = self.at;
+        let (first, mut degree) = self.product()?;
+        let mut terms = vec![first];
+        loop {
+            self.skip_blanks();
+            let sign = self.peek();
+            if !matches!(sign, Some('+' | '-')) {
+                break;
+            }
+            let sign_at = self.at;
+            self.at += 1;
+            let (term, term_degree) = self.product()?;
+            degree = degree.max(term_degree);
+            terms.push(if sign == Some('-') {
+                negative(term, self.span(sign_at, self.at))
+            } else {
+                term
+            });
+        }
+        self.depth -= 1;
+        let ast = match <[Ast; 1]>::try_from(terms) {
+            Ok([only]) => only,
+            Err(terms) => Ast {
+                span: self.span(start, self.at),
+                kind: AstKind::Sum(terms),
+            },
+        };
+        Ok((ast, degree))
+    }
+
+    fn product(&mut self) -> Parsed<(Ast, i32)> {
+        self.skip_blanks();
+        let start = self.at;
+        let mut minus = false;
+        let mut signs = 0;
+        while let Some(sign @ ('+' | '-')) = self.peek() {
+            signs += 1;
+            if signs > 2 {
+                return Err(self.unexpected(sign));
+            }
+            minus ^= sign == '-';
+            self.at += 1;
+            self.skip_blanks();
+        }
+        let (first, mut degree) = self.power()?;
+        let mut above = vec![first];
+        let mut below = Vec::new();
+        loop {
+            self.skip_blanks();
+            let operator = self.peek();
+            if !matches!(operator, Some('*' | '/')) {
+                break;
+            }
+            self.at += 1;
+            if operator == Some('*') && self.peek() == Some('*') {
+                let span = self.span(self.at - 1, self.at + 1);
+                return Err(Box::new(
+                    Diagnostic::error(span, "`**` is not an operator here")
+                        .label("powers are written `^`"),
+                ));
+            }
+            let (factor, factor_degree) = self.power()?;
+            degree = degree.max(factor_degree);
+            if operator == Some('*') {
+                above.push(factor);
+            } else {
+                below.push(factor);
+            }
+        }
+        let span = self.span(start, self.at);
+        let mut ast = if above.len() == 1 && below.is_empty() {
+            above.swap_remove(0)
+        } else {
+            fraction(above, below, span)?
+        };
+        if minus {
+            ast = negative(ast, span);
+        }
+        Ok((ast, degree))
+    }
+
+    fn power(&mut self) -> Parsed<(Ast, i32)> {
+        self.skip_blanks();
+        let start = self.at;
+        let (base, degree) = self.atom()?;
+        self.skip_blanks();
+        if self.peek() != Some('^') {
+            return Ok((base, degree));
+        }
+        self.at += 1;
+        self.skip_blanks();
+        let exponent_start = self.at;
+        let bracket = self.peek() == Some('(');
+        if bracket {
+            self.at += 1;
+            self.skip_blanks();
+        }
+        let minus = self.peek() == Some('-');
+        if minus {
+            self.at += 1;
+            self.skip_blanks();
+        }
+        let digits_start = self.at;
+        while self.peek().is_some_and(|found| found.is_ascii_digit()) {
+            self.at += 1;
+        }
+        let digits = &self.text[digits_start..self.at];
+        if bracket {
+            self.skip_blanks();
+            if self.peek() == Some(')') {
+                self.at += 1;
+            } else {
+                return Err(self.bad_exponent(exponent_start));
+            }
+        }
+        let after = self.peek();
+        if matches!(after, Some('.')) || after.is_some_and(char::is_alphabetic) {
+            return Err(self.bad_exponent(exponent_start));
+        }
+        let exponent = match digits.parse::<i32>() {
+            Ok(value) if value <= LARGEST_EXPONENT => {
+                if minus {
+                    -value
+                } else {
+                    value
+                }
+            }
+            _ => return Err(self.bad_exponent(exponent_start)),
+        };
+        let degree = degree.saturating_mul(exponent.abs().max(1));
+        if degree > LARGEST_DEGREE {
+            return Err(Box::new(
+                Diagnostic::error(
+                    self.span(start, self.at),
+                    "this power of powers is too high",
+                )
+                .label(format!("exponents multiply to at most {LARGEST_DEGREE}")),
+            ));
+        }
+        if exponent < 0 && matches!(&base.kind, AstKind::Rational(value) if value.is_zero()) {
+            return Err(Box::new(Diagnostic::error(
+                self.span(start, self.at),
+                "this divides by zero",
+            )));
+        }
+        let span = self.span(start, self.at);
+        Ok((
+            Ast {
+                span,
+                kind: AstKind::Power(Box::new(base), exponent),
+            },
+            degree,
+        ))
+    }
+
+    fn atom(&mut self) -> Parsed<(Ast, i32)> {
+        self.skip_blanks();
+        let start = self.at;
+        match self.peek() {
+            Some('(') => {
+                self.at += 1;
+                let (mut inner, degree) = self.sum()?;
+                self.close(start)?;
+                inner.span = self.span(start, self.at);
+                Ok((inner, degree))
+            }
+            Some(found) if found.is_ascii_digit() || found == '.' => {
+                let value = self.number()?;
+                let span = self.span(start, self.at);
+                Ok((
+                    Ast {
+                        span,
+                        kind: AstKind::Rational(value),
+                    },
+                    1,
+                ))
+            }
+            Some(found) if found.is_ascii_alphabetic() || found == '_' => self.name_or_function(),
+            Some(found) => Err(self.unexpected(found)),
+            None => {
+                let span = self.span(self.at.saturating_sub(1), self.at);
+                Err(Box::new(
+                    Diagnostic::error(span, "this expression breaks off")
+                        .label("expected a number, a name or `(` after this"),
+                ))
+            }
+        }
+    }
+
+    fn name_or_function(&mut self) -> Parsed<(Ast, i32)> {
+        let start = self.at;
+        while self
+            .peek()
+            .is_some_and(|found| found.is_ascii_alphanumeric() || found == '_')
+        {
+            self.at += 1;
+        }
+        let name = self.text[start..self.at].to_owned();
+        let span = self.span(start, self.at);
+        self.skip_blanks();
+        if self.peek() != Some('(') {
+            if FUNCTIONS.iter().any(|(function, _)| *function == name) {
+                return Err(Box::new(
+                    Diagnostic::error(span, format!("the function `{name}` has no operand"))
+                        .label(format!("expected `{name}(...)`")),
+                ));
+            }
+            let kind = if name == "pi" {
+                AstKind::Pi
+            } else {
+                AstKind::Name(name)
+            };
+            return Ok((Ast { span, kind }, 1));
+        }
+        let known = FUNCTIONS.iter().map(|(function, _)| *function);
+        let Some(&(_, function)) = FUNCTIONS.iter().find(|(function, _)| *function == name) else {
+            let diagnostic =
+                Diagnostic::error(span, format!("`{}` is not a function", quote(&name)))
+                    .label("expected an operator, such as `*`, before `(`, or a function");
+            return Err(Box::new(diagnostic.help(suggest::advice(
+                &name,
+                "functions",
+                known,
+            ))));
+        };
+        let open = self.at;
+        self.at += 1;
+        let (inner, degree) = self.sum()?;
+        self.close(open)?;
+        let span = self.span(start, self.at);
+        Ok((
+            Ast {
+                span,
+                kind: AstKind::Apply(function, Box::new(inner)),
+            },
+            degree,
+        ))
+    }
+
+    /// A decimal as an exact rational, such as `0.316` or `2.5e-3`.
+    fn number(&mut self) -> Parsed<BigRational> {
+        let start = self.at;
+        let mut digits = String::new();
+        let mut n_decimals = 0_i32;
+        let mut point = false;
+        while let Some(found) = self.peek() {
+            match found {
+                '0'..='9' => {
+                    digits.push(found);
+                    n_decimals += i32::from(point);
+                }
+                '.' if !point => point = true,
+                _ => break,
+            }
+            if digits.len() > MOST_DIGITS {
+                return Err(Box::new(
+                    Diagnostic::error(
+                        self.span(start, self.at + 1),
+                        "this number has too many digits",
+                    )
+                    .label(format!("at most {MOST_DIGITS} digits")),
+                ));
+            }
+            self.at += 1;
+        }
+        let mut ten_power = -n_decimals;
+        if let Some('e' | 'E') = self.peek() {
+            let rest = &self.text[self.at + 1..];
+            let signed = rest.trim_start_matches(['+', '-']);
+            let n_signs = rest.len() - signed.len();
+            let n_digits = signed.bytes().take_while(u8::is_ascii_digit).count();
+            if n_digits > 0 && n_signs <= 1 {
+                let exponent = rest[..n_signs + n_digits].parse::<i32>();
+                self.at += 1 + n_signs + n_digits;
+                match exponent {
+                    Ok(exponent) if exponent.abs() <= 2 * LARGEST_EXPONENT => {
+                        ten_power += exponent;
+                    }
+                    _ => {
+                        return Err(Box::new(
+                            Diagnostic::error(
+                                self.span(start, self.at),
+                                "the exponent of this number is out of range",
+                            )
+                            .label(format!("between e-{0} and e{0}", 2 * LARGEST_EXPONENT)),
+                        ));
+                    }
+                }
+            }
+        }
+        let Ok(value) = digits.parse::<BigInt>() else {
+            return Err(Box::new(
+                Diagnostic::error(self.span(start, self.at), "this is not a number")
+                    .label("expected digits"),
+            ));
+        };
+        let ten = BigInt::from(10);
+        Ok(if ten_power >= 0 {
+            BigRational::from_integer(value * Pow::pow(ten, ten_power.unsigned_abs()))
+        } else {
+            BigRational::new(value, Pow::pow(ten, ten_power.unsigned_abs()))
+        })
+    }
+
+    fn close(&mut self, open: usize) -> Parsed<()> {
+        self.skip_blanks();
+        if self.peek() == Some(')') {
+            self.at += 1;
+            return Ok(());
+        }
+        if let Some(found) = self.peek() {
+            return Err(self.unexpected(found));
+        }
+        Err(Box::new(
+            Diagnostic::error(
+                self.span(open, open + 1),
+                "this parenthesis is never closed",
+            )
+            .label("expected a `)` further on"),
+        ))
+    }
+
+    fn deeper(&mut self) -> Parsed<()> {
+        self.depth += 1;
+        if self.depth > DEEPEST {
+            return Err(Box::new(
+                Diagnostic::error(
+                    self.span(self.at.saturating_sub(1), self.at),
+                    "this expression is nested too deeply",
+                )
+                .label(format!("at most {DEEPEST} levels of parentheses"))
+                .help("name parts of it as constants"),
+            ));
+        }
+        Ok(())
+    }
+
+    fn unexpected(&self, found: char) -> Box<Diagnostic> {
+        let span = self.span(self.at, self.at + found.len_utf8());
+        let shown = found.escape_debug();
+        let diagnostic = Diagnostic::error(span, format!("unexpected `{shown}` in an expression"));
+        Box::new(match found {
+            ')' => diagnostic.label("no parenthesis is open here, or its content is missing"),
+            '=' | '<' | '>' => diagnostic.label("an expression compares nothing"),
+            '\u{2212}' => diagnostic
+                .label("this is a typographic minus")
+                .help("write the plain `-`"),
+            '\u{b7}' | '\u{d7}' => diagnostic
+                .label("this is a typographic product sign")
+                .help("write the plain `*`"),
+            ',' => diagnostic
+                .label("expected a point in a decimal; functions have one operand")
+                .help("write `0.5`, not `0,5`"),
+            _ if found.is_alphanumeric() || found == '(' => {
+                diagnostic.label("expected an operator: `+ - * / ^`")
+            }
+            _ => diagnostic.label("expected a number, a name or a parenthesis"),
+        })
+    }
+
+    fn bad_exponent(&self, start: usize) -> Box<Diagnostic> {
+        let mut end = self.at;
+        while self
+            .text
+            .get(end..)
+            .and_then(|rest| rest.chars().next())
+            .is_some_and(|found| found.is_alphanumeric() || found == '.')
+        {
+            end += self.text[end..].chars().next().map_or(1, char::len_utf8);
+        }
+        Box::new(
+            Diagnostic::error(
+                self.span(start, end.max(start + 1)),
+                "this exponent is not allowed",
+            )
+            .label(format!(
+                "expected an integer between -{LARGEST_EXPONENT} and {LARGEST_EXPONENT}"
+            ))
+            .help("write `sqrt(x)` for a square root"),
+        )
+    }
+
+    fn peek(&self) -> Option<char> {
+        self.text[self.at..].chars().next()
+    }
+
+    fn skip_blanks(&mut self) {
+        while let Some(' ' | '\t' | '\n' | '\r') = self.peek() {
+            self.at += 1;
+        }
+    }
+
+    fn span(&self, start: usize, end: usize) -> Span {
+        match self.inner {
+            Some(inner) => Span {
+                file: self.outer.file,
+                start: (inner + start).min(self.outer.end),
+                end: (inner + end).min(self.outer.end),
+            },
+            None => self.outer,
+        }
+    }
+}
+
+fn negative(ast: Ast, span: Span) -> Ast {
+    let kind = match ast.kind {
+        AstKind::Rational(value) => AstKind::Rational(-value),
+        kind => AstKind::Negative(Box::new(Ast {
+            span: ast.span,
+            kind,
+        })),
+    };
+    Ast { span, kind }
+}
+
+/// Makes `a*c/(b*d)` of the chain `a/b*c/d`, its numbers collected into one, so that no chain is deep.
+fn fraction(above: Vec<Ast>, below: Vec<Ast>, span: Span) -> Parsed<Ast> {
+    let mut number = BigRational::one();
+    let mut numerator = Vec::new();
+    let mut denominator = Vec::new();
+    for factor in above {
+        match factor.kind {
+            AstKind::Rational(value) => number *= value,
+            _ => numerator.push(factor),
+        }
+    }
+    for factor in below {
+        match factor.kind {
+            AstKind::Rational(value) if value.is_zero() => {
+                return Err(Box::new(
+                    Diagnostic::error(factor.span, "this divides by zero")
+                        .label("must not be zero"),
+                ));
+            }
+            AstKind::Rational(value) => number /= value,
+            _ => denominator.push(factor),
+        }
+    }
+    if !number.is_one() || numerator.is_empty() {
+        numerator.insert(
+            0,
+            Ast {
+                span,
+                kind: AstKind::Rational(number),
+            },
+        );
+    }
+    let numerator = product(numerator, span);
+    if denominator.is_empty() {
+        return Ok(numerator);
+    }
+    let denominator = product(denominator, span);
+    Ok(Ast {
+        span,
+        kind: AstKind::Quotient(Box::new(numerator), Box::new(denominator)),
+    })
+}
+
+fn product(mut factors: Vec<Ast>, span: Span) -> Ast {
+    if factors.len() == 1 {
+        return factors.swap_remove(0);
+    }
+    Ast {
+        span,
+        kind: AstKind::Product(factors),
+    }
+}

@@ -1,0 +1,522 @@
+//! The small values of a model file: names, texts, numbers, vectors, and words from a fixed choice.
+
+use std::borrow::Cow;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+
+use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::document::{Node, Value, quote};
+use crate::formula::Formula;
+use crate::record::{Read, wrong_type};
+use crate::schema::UnitTable;
+use crate::unit::Unit;
+
+/// Words that mean something in expressions and so name nothing else.
+const RESERVED: [&str; 14] = [
+    "pi",
+    "sin",
+    "cos",
+    "sqrt",
+    "abs",
+    "sign",
+    "tanh",
+    "exp",
+    "base",
+    "coordinate",
+    "rate",
+    "acceleration",
+    "load",
+    "t",
+];
+
+/// A name, where it is defined or where it is used.
+#[derive(Clone, Debug)]
+pub(crate) struct Name {
+    pub(crate) text: String,
+    pub(crate) span: Span,
+}
+
+impl Read for Name {
+    const EXPECTED: &'static str = "a name in quotes";
+    const EXAMPLE: &'static str = "\"S1\"";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        let Value::Text { text, .. } = &node.value else {
+            return wrong_type::<Self>(node, log);
+        };
+        check_name(text, node.span, log).then(|| Self {
+            text: text.clone(),
+            span: node.span,
+        })
+    }
+}
+
+/// Reports a name that is no identifier.
+pub(crate) fn check_name(text: &str, span: Span, log: &mut Log) -> bool {
+    let fine = text.len() <= 60
+        && text.starts_with(|first: char| first.is_ascii_alphabetic())
+        && text
+            .chars()
+            .all(|found| found.is_ascii_alphanumeric() || found == '_');
+    if !fine {
+        log.push(
+            Diagnostic::error(span, format!("`{}` cannot be a name", quote(text)))
+                .label("expected a letter, then letters, digits and `_`, at most 60"),
+        );
+    }
+    fine
+}
+
+/// Reports a name that is taken by the language of expressions.
+pub(crate) fn check_not_reserved(text: &str, span: Span, log: &mut Log) -> bool {
+    let reserved = RESERVED.contains(&text);
+    if reserved {
+        log.push(
+            Diagnostic::error(span, format!("`{text}` cannot name anything new"))
+                .label("this word has a meaning of its own in model files")
+                .help(format!("call it `{text}_1`, for example")),
+        );
+    }
+    !reserved
+}
+
+impl JsonSchema for Name {
+    fn schema_name() -> Cow<'static, str> {
+        "Name".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "description": "A name: a letter, then letters, digits and underscores.",
+            "type": "string",
+            "pattern": "^[A-Za-z][A-Za-z0-9_]*$",
+            "maxLength": 60,
+        })
+    }
+}
+
+/// Free text.
+#[derive(Clone, Debug)]
+pub(crate) struct Text {
+    pub(crate) text: String,
+    pub(crate) span: Span,
+}
+
+impl Read for Text {
+    const EXPECTED: &'static str = "a text in quotes";
+    const EXAMPLE: &'static str = "\"...\"";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        let Value::Text { text, .. } = &node.value else {
+            return wrong_type::<Self>(node, log);
+        };
+        if text.len() > 4000 {
+            log.push(
+                Diagnostic::error(node.span, "this text is too long")
+                    .label("at most 4000 characters"),
+            );
+            return None;
+        }
+        Some(Self {
+            text: text.clone(),
+            span: node.span,
+        })
+    }
+}
+
+impl JsonSchema for Text {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Text".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "string" })
+    }
+}
+
+/// A finite number.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Number {
+    pub(crate) value: f64,
+    pub(crate) span: Span,
+}
+
+impl Read for Number {
+    const EXPECTED: &'static str = "a number";
+    const EXAMPLE: &'static str = "0.25";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        let Value::Number { text, .. } = &node.value else {
+            return wrong_type::<Self>(node, log);
+        };
+        match text.parse::<f64>() {
+            Ok(value) if value.is_finite() => Some(Self {
+                value,
+                span: node.span,
+            }),
+            _ => {
+                log.push(
+                    Diagnostic::error(node.span, format!("`{}` is not finite", quote(text)))
+                        .label("expected a finite number")
+                        .help("nothing in a mechanism is infinite; leave the entry away if it is not known"),
+                );
+                None
+            }
+        }
+    }
+}
+
+impl JsonSchema for Number {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Number".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "number" })
+    }
+}
+
+/// Yes or no.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Flag(pub(crate) bool);
+
+impl Read for Flag {
+    const EXPECTED: &'static str = "`true` or `false`";
+    const EXAMPLE: &'static str = "true";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        let Value::Boolean(value) = node.value else {
+            return wrong_type::<Self>(node, log);
+        };
+        Some(Self(value))
+    }
+}
+
+impl JsonSchema for Flag {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Flag".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "boolean" })
+    }
+}
+
+/// A unit that may depend on what the place carries.
+#[derive(Clone, Debug)]
+pub(crate) struct UnitByPlace {
+    pub(crate) force: Option<Unit>,
+    pub(crate) torque: Option<Unit>,
+    pub(crate) point: Option<Unit>,
+}
+
+impl Read for UnitByPlace {
+    const EXPECTED: &'static str = "a unit in quotes, or units by place";
+    const EXAMPLE: &'static str = "{ force = \"N\", torque = \"N m\" }";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        match &node.value {
+            Value::Text { .. } => {
+                let unit = Unit::read(node, log)?;
+                Some(Self {
+                    force: Some(unit.clone()),
+                    torque: Some(unit.clone()),
+                    point: Some(unit),
+                })
+            }
+            Value::Table(table) => {
+                let table = UnitTable::from_table(table, node.span, log);
+                Some(Self {
+                    force: table.force,
+                    torque: table.torque,
+                    point: table.point,
+                })
+            }
+            _ => wrong_type::<Self>(node, log),
+        }
+    }
+}
+
+impl JsonSchema for UnitByPlace {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "UnitByPlace".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let unit = generator.subschema_for::<Unit>();
+        let table = generator.subschema_for::<UnitTable>();
+        json_schema!({ "anyOf": [unit, table] })
+    }
+}
+
+/// The version of the file format.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Version;
+
+impl Read for Version {
+    const EXPECTED: &'static str = "the version of the file format";
+    const EXAMPLE: &'static str = "1";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        let Value::Number { text, .. } = &node.value else {
+            return wrong_type::<Self>(node, log);
+        };
+        if text != "1" {
+            log.push(
+                Diagnostic::error(
+                    node.span,
+                    format!("file format {} is not known", quote(text)),
+                )
+                .label("expected 1")
+                .help("a newer modelmill may read this file; this one reads `schema = 1`"),
+            );
+        }
+        Some(Self)
+    }
+}
+
+impl JsonSchema for Version {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Version".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "const": 1 })
+    }
+}
+
+/// Three expressions, or two in the x-y plane.
+#[derive(Clone, Debug)]
+pub(crate) struct Vector {
+    /// The entries; absent where one was faulty.
+    pub(crate) entries: Vec<Option<Formula>>,
+    pub(crate) span: Span,
+}
+
+impl Read for Vector {
+    const EXPECTED: &'static str = "a vector of three expressions, or of two in the x-y plane";
+    const EXAMPLE: &'static str = "[\"d1\", 0, 0]";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        let Value::Array(array) = &node.value else {
+            return wrong_type::<Self>(node, log);
+        };
+        if !(2..=3).contains(&array.len()) {
+            log.push(
+                Diagnostic::error(
+                    node.span,
+                    format!("this vector has {} entries", array.len()),
+                )
+                .label("expected x, y and z, or x and y")
+                .help(format!("for example `{}`", Self::EXAMPLE)),
+            );
+            return None;
+        }
+        Some(Self {
+            entries: array
+                .iter()
+                .map(|entry| Formula::read(entry, log))
+                .collect(),
+            span: node.span,
+        })
+    }
+}
+
+impl JsonSchema for Vector {
+    fn schema_name() -> Cow<'static, str> {
+        "Vector".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "description": "x, y and z; z may be left away.",
+            "type": "array",
+            "items": generator.subschema_for::<Formula>(),
+            "minItems": 2,
+            "maxItems": 3,
+        })
+    }
+}
+
+/// A place of a lumped mass.
+#[derive(Clone, Debug)]
+pub(crate) enum Spot {
+    /// A named point.
+    Point(Name),
+    /// A position in the frame.
+    Vector(Vector),
+}
+
+impl Spot {
+    pub(crate) fn span(&self) -> Span {
+        match self {
+            Self::Point(name) => name.span,
+            Self::Vector(vector) => vector.span,
+        }
+    }
+}
+
+impl Read for Spot {
+    const EXPECTED: &'static str = "the name of a point, or a vector";
+    const EXAMPLE: &'static str = "\"R3m\"";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        match &node.value {
+            Value::Text { .. } => Name::read(node, log).map(Self::Point),
+            Value::Array(_) => Vector::read(node, log).map(Self::Vector),
+            _ => wrong_type::<Self>(node, log),
+        }
+    }
+}
+
+impl JsonSchema for Spot {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Spot".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let name = generator.subschema_for::<Name>();
+        let vector = generator.subschema_for::<Vector>();
+        json_schema!({ "anyOf": [name, vector] })
+    }
+}
+
+/// The end of a parameter's name, such as `1` in `M1`.
+#[derive(Clone, Debug)]
+pub(crate) struct Suffix {
+    pub(crate) text: String,
+    pub(crate) span: Span,
+}
+
+impl Read for Suffix {
+    const EXPECTED: &'static str = "the end of a name in quotes";
+    const EXAMPLE: &'static str = "\"1\"";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        let (Value::Text { text, .. }
+        | Value::Number {
+            text,
+            is_integer: true,
+        }) = &node.value
+        else {
+            return wrong_type::<Self>(node, log);
+        };
+        let fine = text.len() <= 40
+            && text
+                .chars()
+                .all(|found| found.is_ascii_alphanumeric() || found == '_');
+        if !fine {
+            log.push(
+                Diagnostic::error(node.span, "this cannot end a name")
+                    .label("expected letters, digits and `_`, at most 40"),
+            );
+            return None;
+        }
+        Some(Self {
+            text: text.clone(),
+            span: node.span,
+        })
+    }
+}
+
+impl JsonSchema for Suffix {
+    fn schema_name() -> Cow<'static, str> {
+        "Suffix".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "description": "The end of a name, such as 1 in M1.",
+            "anyOf": [{ "type": "string", "pattern": "^[A-Za-z0-9_]*$", "maxLength": 40 }, { "type": "integer", "minimum": 0 }],
+        })
+    }
+}
+
+/// Declares a type with a fixed choice of words.
+macro_rules! words {
+    ($(#[doc = $about:literal])* $name:ident: $expected:literal, $($word:literal => $variant:ident),*) => {
+        $(#[doc = $about])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(crate) enum $name {
+            $(#[doc = $word] $variant),*
+        }
+
+        impl Read for $name {
+            const EXPECTED: &'static str = $expected;
+            const EXAMPLE: &'static str = concat!("\"", crate::record::first!($($word),*), "\"");
+
+            fn read(node: &Node, log: &mut Log) -> Option<Self> {
+                let Value::Text { text, .. } = &node.value else {
+                    return wrong_type::<Self>(node, log);
+                };
+                match text.as_str() {
+                    $($word => Some(Self::$variant),)*
+                    _ => {
+                        log.push(
+                            Diagnostic::error(
+                                node.span,
+                                format!("`{}` is not {}", quote(text), $expected),
+                            )
+                            .label(format!("expected one of {}", [$(concat!("`", $word, "`")),*].join(", ")))
+                            .help_if(crate::suggest::nearest(text, [$($word),*])
+                                .map(|near| format!("did you mean `{near}`?"))),
+                        );
+                        None
+                    }
+                }
+            }
+        }
+
+        impl JsonSchema for $name {
+            fn schema_name() -> Cow<'static, str> {
+                stringify!($name).into()
+            }
+
+            fn json_schema(_: &mut SchemaGenerator) -> Schema {
+                json_schema!({ "enum": [$($word),*] })
+            }
+        }
+    };
+}
+
+words! {
+    /// An axis with its direction.
+    AxisName: "an axis",
+    "x" => X, "y" => Y, "z" => Z, "-x" => MinusX, "-y" => MinusY, "-z" => MinusZ
+}
+
+words! {
+    /// What a kind of effect may act on.
+    PlaceKind: "a place",
+    "drive" => Drive, "coordinate" => Coordinate, "point" => Point
+}
+
+words! {
+    /// The sign that a parameter must have.
+    SignName: "a sign",
+    "positive" => Positive, "negative" => Negative, "any" => Any
+}
