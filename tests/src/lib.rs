@@ -6,8 +6,10 @@
 
 pub mod base_parameters;
 pub mod fixtures;
+pub mod laws;
 pub mod mechanics;
 pub mod published;
 pub mod random;
+pub mod rank;
 pub mod sample;
 pub mod stream;

@@ -1,8 +1,8 @@
 //! Numbers of base parameters that the literature prints, and those that independent programs agree on.
 
 use modelmill_codegen::Evaluator;
-use modelmill_identify::numeric_rank::numeric_rank;
 use modelmill_tests::fixtures::{derive, model};
+use modelmill_tests::rank::rank_of_products;
 use modelmill_tests::sample::Sample;
 use modelmill_tests::stream::Stream;
 
@@ -22,10 +22,7 @@ fn check(name: &str, published: usize) {
         sample.len() * mechanism.drives.len() > 2 * products,
         "{name}: too few states"
     );
-    let w = evaluator
-        .full_regressor(&sample.states())
-        .expect("reachable states");
-    let rank = numeric_rank(&w).expect("finite numbers");
+    let rank = rank_of_products(&evaluator, &sample).expect("reachable states");
     assert_eq!(rank.rank, published, "{name}: {rank:?}");
     assert!(rank.gap > 1e6, "{name}: gap {:.1e}", rank.gap);
 }
@@ -70,10 +67,7 @@ fn a_parallelogram_closed_by_a_loop_has_8_over_both_assemblies_and_3_in_its_own(
     let evaluator = Evaluator::new(&derivation);
     let sample =
         Sample::random(&mechanism, 200, 0.4, &mut Stream::new(3)).reachable(&evaluator);
-    let w = evaluator
-        .regressor(&sample.states())
-        .expect("reachable states");
-    let rank = numeric_rank(&w).expect("finite numbers");
+    let rank = rank_of_products(&evaluator, &sample).expect("reachable states");
     assert_eq!(rank.rank, 3);
     assert!(rank.gap > 1e6, "gap {:.1e}", rank.gap);
 }
