@@ -6,7 +6,7 @@
 
 use crate::expr::{Atom, ExprId, Graph, Rational};
 use crate::tree::Tree;
-use crate::vector::{self, Vector};
+use crate::vector::{self, Turn, Vector};
 
 /// What a link's inertia is linear in. The first moment stands twice: as the balance of forces sees it and as the
 /// balance of moments sees it; the two agree except for lumped masses that are placed apart.
@@ -41,6 +41,15 @@ pub(crate) type Inertia = [ExprId; ELEMENTS];
 pub(crate) struct Wrench {
     force: Vector,
     moment: Vector,
+}
+
+/// How the recursions treat links whose axes are parallel; all styles give the same values at different cost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Style {
+    /// From link to link.
+    LinkByLink,
+    /// Through the fixed side of the first of several parallel axes, with the sum of their angles.
+    AcrossParallelAxes,
 }
 
 /// Motion of every link in its own frame.
@@ -83,7 +92,7 @@ impl LinkMotion {
 }
 
 /// Forward recursion: the motion of every link as expressions in coordinates, rates and accelerations.
-pub(crate) fn forward(graph: &mut Graph, tree: &Tree, gravity: &Vector) -> Motion {
+pub(crate) fn forward(graph: &mut Graph, tree: &Tree, gravity: &Vector, style: Style) -> Motion {
     let lifted = gravity.map(|g| graph.neg(g));
     let base = LinkMotion::new(graph, vector::ZERO, vector::ZERO, lifted);
     let mut links: Vec<LinkMotion> = Vec::new();
@@ -94,26 +103,41 @@ pub(crate) fn forward(graph: &mut Graph, tree: &Tree, gravity: &Vector) -> Motio
             let moved = graph.dot(&parent.field[row], &link.position);
             along[row] = graph.add(along[row], moved);
         }
-        let (omega, alpha) = (parent.omega, parent.alpha);
-        let mut omega = tree.to_link(graph, i, &omega);
-        let mut alpha = tree.to_link(graph, i, &alpha);
         let mut acceleration = tree.to_link(graph, i, &along);
-        let integer = |n: i32| Rational::integer(i64::from(n));
+        // Angular motion without the turning about z that is added below.
+        let (mut omega, mut alpha, turning) = match style {
+            Style::LinkByLink => {
+                let (omega, alpha) = (parent.omega, parent.alpha);
+                (tree.to_link(graph, i, &omega), tree.to_link(graph, i, &alpha), link.turns.clone())
+            }
+            Style::AcrossParallelAxes => {
+                let first = &tree.links[link.first_parallel];
+                let fixed = first.parent.map_or(&base, |p| &links[p]);
+                let turns: Vec<Turn> = first.pre.iter().chain([&link.absolute]).cloned().collect();
+                let turned = |graph: &mut Graph, v: &Vector| turns.iter().fold(*v, |v, turn| graph.turn_in(turn, &v));
+                let turning = link
+                    .absolute
+                    .sum
+                    .terms()
+                    .iter()
+                    .filter_map(|(atom, n)| if let Atom::Coordinate(c) = atom { Some((*c, *n)) } else { None })
+                    .collect();
+                (turned(graph, &fixed.omega), turned(graph, &fixed.alpha), turning)
+            }
+        };
         let sum = |graph: &mut Graph, atom: fn(usize) -> Atom, terms: &[(usize, Rational)]| {
-            let terms: Vec<_> = terms
-                .iter()
-                .map(|(c, k)| (graph.atom(atom(*c)), k.clone()))
-                .collect();
+            let terms: Vec<_> = terms.iter().map(|(c, k)| (graph.atom(atom(*c)), k.clone())).collect();
             graph.sum(&terms)
         };
         // R'omega_parent x z rate = (omega_y, -omega_x, 0) rate
-        let turns: Vec<_> = link.turns.iter().map(|(c, n)| (*c, integer(*n))).collect();
-        let rate = sum(graph, Atom::Rate, &turns);
+        let turning: Vec<_> = turning.iter().map(|(c, n)| (*c, Rational::integer(i64::from(*n)))).collect();
+        let rate = sum(graph, Atom::Rate, &turning);
         let swing = [graph.mul(omega[1], rate), graph.mul(omega[0], rate)];
         alpha[0] = graph.add(alpha[0], swing[0]);
         alpha[1] = graph.sub(alpha[1], swing[1]);
-        let turn_acceleration = sum(graph, Atom::Acceleration, &turns);
+        let turn_acceleration = sum(graph, Atom::Acceleration, &turning);
         alpha[2] = graph.add(alpha[2], turn_acceleration);
+        omega[2] = graph.add(omega[2], rate);
         // 2 omega x z slide_rate
         let slide = sum(graph, Atom::Rate, &link.slides);
         let twice = graph.scale(slide, &Rational::integer(2));
@@ -122,7 +146,6 @@ pub(crate) fn forward(graph: &mut Graph, tree: &Tree, gravity: &Vector) -> Motio
         acceleration[1] = graph.sub(acceleration[1], coriolis[1]);
         let slide_acceleration = sum(graph, Atom::Acceleration, &link.slides);
         acceleration[2] = graph.add(acceleration[2], slide_acceleration);
-        omega[2] = graph.add(omega[2], rate);
         let motion = LinkMotion::new(graph, omega, alpha, acceleration);
         links.push(motion);
     }
@@ -213,4 +236,75 @@ pub(crate) fn backward(
         }
     }
     rows.into_iter().map(|terms| graph.sum(&terms)).collect()
+}
+
+/// Backward recursion across parallel axes: each wrench on its own, turned to the fixed side of the first of several
+/// parallel axes at once.
+pub(crate) fn backward_across(
+    graph: &mut Graph,
+    tree: &Tree,
+    n_coordinates: usize,
+    wrenches: impl IntoIterator<Item = (usize, Wrench)>,
+) -> Vec<ExprId> {
+    let mut rows: Vec<Vec<(ExprId, Rational)>> = vec![Vec::new(); n_coordinates];
+    for (start, wrench) in wrenches {
+        let mut at = Some((start, wrench));
+        while let Some((link, wrench)) = at {
+            let (first, mut wrench) = across(graph, tree, link, wrench, &mut rows);
+            at = tree.links[first].parent.map(|parent| {
+                for turn in tree.links[first].pre.iter().rev() {
+                    wrench.force = graph.turn_out(turn, &wrench.force);
+                    wrench.moment = graph.turn_out(turn, &wrench.moment);
+                }
+                let lever = graph.cross(&tree.links[first].position, &wrench.force);
+                wrench.moment = graph.add_vectors(&[wrench.moment, lever]);
+                (parent, wrench)
+            });
+        }
+    }
+    rows.into_iter().map(|terms| graph.sum(&terms)).collect()
+}
+
+/// Reads off the generalised forces of the parallel joints from `link` up to the first, and returns that first link with
+/// the wrench about its origin on the fixed side of its joint.
+fn across(
+    graph: &mut Graph,
+    tree: &Tree,
+    link: usize,
+    wrench: Wrench,
+    rows: &mut [Vec<(ExprId, Rational)>],
+) -> (usize, Wrench) {
+    let first = tree.links[link].first_parallel;
+    // About z: from joint to joint, since only one component of the force is needed there.
+    let (mut force, mut about_z) = (wrench.force, wrench.moment[2]);
+    let mut arms: Vec<Vector> = Vec::new();
+    let mut i = link;
+    loop {
+        let joint = &tree.links[i];
+        for (coordinate, n) in &joint.turns {
+            rows[*coordinate].push((about_z, Rational::integer(i64::from(*n))));
+        }
+        for (coordinate, k) in &joint.slides {
+            rows[*coordinate].push((wrench.force[2], k.clone()));
+        }
+        if i == first {
+            break;
+        }
+        force = tree.to_parent(graph, i, &force);
+        let [px, py, _] = joint.position;
+        let (x, y) = (graph.mul(px, force[1]), graph.mul(py, force[0]));
+        about_z = graph.combine([(about_z, Rational::ONE), (x, Rational::ONE), (y, Rational::MINUS_ONE)]);
+        let parent = joint.parent.expect("a link below the first parallel one has a parent");
+        let absolute = tree.links[parent].absolute.clone();
+        arms.push(graph.turn_out(&absolute, &joint.position));
+        i = parent;
+    }
+    // About x and y: at once.
+    let absolute = &tree.links[link].absolute;
+    let force = graph.turn_out(absolute, &wrench.force);
+    let turned = graph.turn_out(absolute, &wrench.moment);
+    let arm = graph.add_vectors(&arms);
+    let lever = graph.cross(&arm, &force);
+    let moment = [graph.add(turned[0], lever[0]), graph.add(turned[1], lever[1]), about_z];
+    (first, Wrench { force, moment })
 }

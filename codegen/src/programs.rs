@@ -70,33 +70,35 @@ pub(crate) fn programs(
         .iter()
         .map(|k| &reduction.products[*k])
         .collect();
-    let position = |m: &Monomial| {
-        equations
-            .products
+    let base: BTreeMap<Monomial, ExprId> = retained
+        .iter()
+        .enumerate()
+        .map(|(k, m)| ((*m).clone(), graph.atom(Atom::Base(k))))
+        .collect();
+    let base_value = |m: &Monomial| base.get(m).copied().unwrap_or(Graph::ZERO);
+    let row_by_row = |columns: &[Vec<ExprId>]| -> Vec<ExprId> {
+        (0..n_drives).flat_map(|d| columns.iter().map(move |column| column[d])).collect()
+    };
+    let mut regressors = Vec::new();
+    let mut inverse_dynamics = Vec::new();
+    for style in equations.styles() {
+        let columns = retained
             .iter()
-            .position(|p| p == m)
-            .expect("a product of p_g is a candidate")
-    };
-    let rows = |columns: &[&Monomial]| -> Vec<ExprId> {
-        (0..n_drives)
-            .flat_map(|d| columns.iter().map(move |m| (d, *m)))
-            .map(|(d, m)| equations.columns[position(m)][d])
-            .collect()
-    };
-    let value = |graph: &mut Graph| -> BTreeMap<Monomial, ExprId> {
-        retained
-            .iter()
-            .enumerate()
-            .map(|(k, m)| ((*m).clone(), graph.atom(Atom::Base(k))))
-            .collect()
-    };
-    let base = value(graph);
-    let forces = equations.inverse_dynamics(graph, mechanism, &|m: &Monomial| {
-        base.get(m).copied().unwrap_or(Graph::ZERO)
-    })?;
+            .map(|m| equations.column(graph, mechanism, m, style))
+            .collect::<Result<Vec<_>, _>>()?;
+        regressors.push(row_by_row(&columns));
+        inverse_dynamics.push(equations.inverse_dynamics(graph, mechanism, &base_value, style)?);
+    }
 
     let projection = &equations.projection;
-    let all: Vec<&Monomial> = reduction.products.iter().collect();
+    let all: Vec<Vec<ExprId>> = reduction
+        .products
+        .iter()
+        .map(|m| {
+            let position = equations.products.iter().position(|p| p == m);
+            equations.columns[position.expect("a product of p_g is a candidate")].clone()
+        })
+        .collect();
     let mut passive: Vec<ExprId> = projection
         .passive
         .iter()
@@ -129,15 +131,22 @@ pub(crate) fn programs(
     let request = Request { outputs: &base, reachable: &[], regular: &[], definitions: &[] };
     let base_parameters = lower(graph, &request);
     let mut program = |outputs: &[ExprId]| closing.program(graph, equations, outputs);
+    let regressor = cheapest(regressors.iter().map(|outputs| program(outputs)));
+    let inverse_dynamics = cheapest(inverse_dynamics.iter().map(|outputs| program(outputs)));
     Ok(Programs {
         passive_position,
         passive: program(&passive),
-        full_regressor: program(&rows(&all)),
-        regressor: program(&rows(&retained)),
-        inverse_dynamics: program(&forces),
+        full_regressor: program(&row_by_row(&all)),
+        regressor,
+        inverse_dynamics,
         base_parameters,
         drives: program(&drives),
     })
+}
+
+/// The program that costs least per state; the first of equals.
+fn cheapest(programs: impl Iterator<Item = Program>) -> Program {
+    programs.min_by_key(Program::weight).expect("there is at least one way to write the equations")
 }
 
 /// Value of an expression at the nominal pose, with the file's constants; rates are zero.

@@ -288,23 +288,12 @@ impl Projection {
 /// How every coordinate's rate follows from the rates `y`: for a passive revolute joint `y` is the absolute rate of its
 /// link about the axes that are parallel to its own.
 fn rate_map(tree: &Tree, passive: &[usize], n: usize) -> Vec<Vec<i64>> {
-    let mut absolute: Vec<AngleSum> = Vec::new();
-    for link in &tree.links {
-        let parallel = link
-            .pre
-            .iter()
-            .all(|turn| turn.axis == modelmill_spec::Axis::Z);
-        let below = link
-            .parent
-            .filter(|_| parallel)
-            .map_or(AngleSum::NONE, |p| absolute[p].clone());
-        absolute.push(below.plus(&link.joint.sum, 1));
-    }
     let mut rates_of: Vec<Vec<i64>> = (0..n)
         .map(|i| (0..n).map(|j| i64::from(i == j)).collect())
         .collect();
     let mut done = Vec::new();
-    for (link, sum) in tree.links.iter().zip(&absolute) {
+    for link in &tree.links {
+        let sum = &link.absolute.sum;
         let [(p, sign @ (1 | -1))] = link.turns[..] else {
             continue;
         };

@@ -8,14 +8,15 @@ use crate::DeriveError;
 use crate::exact::{self, Monomial};
 use crate::expr::{Atom, ExprId, Graph};
 use crate::inertia::InertiaByProduct;
-use crate::newton_euler::{self, Motion};
+use crate::newton_euler::{self, Motion, Style};
 use crate::projection::Projection;
 use crate::tree::Tree;
 
 /// The mechanism's equations before reduction.
 pub(crate) struct Equations {
     pub(crate) tree: Tree,
-    pub(crate) motion: Motion,
+    /// The links' motion in every style that differs for this tree.
+    motions: Vec<(Style, Motion)>,
     pub(crate) inertia: InertiaByProduct,
     pub(crate) projection: Projection,
     /// Products of parameters that occur anywhere, in the order of eq. (5).
@@ -35,7 +36,13 @@ pub(crate) fn equations(
         exact::expression(graph, &mechanism.gravity[1])?,
         exact::expression(graph, &mechanism.gravity[2])?,
     ];
-    let motion = newton_euler::forward(graph, &tree, &gravity);
+    let has_parallel_axes = tree.links.iter().enumerate().any(|(i, link)| link.first_parallel != i);
+    let styles = [Style::LinkByLink, Style::AcrossParallelAxes];
+    let motions = styles
+        .into_iter()
+        .filter(|style| *style == Style::LinkByLink || has_parallel_axes)
+        .map(|style| (style, newton_euler::forward(graph, &tree, &gravity, style)))
+        .collect();
     let inertia = InertiaByProduct::new(graph, mechanism, &tree)?;
     let projection = Projection::new(graph, mechanism, &tree)?;
     let mut products: BTreeSet<Monomial> = inertia.products();
@@ -50,44 +57,48 @@ pub(crate) fn equations(
     let products: Vec<Monomial> = products.into_iter().collect();
     let mut equations = Equations {
         tree,
-        motion,
+        motions,
         inertia,
         projection,
         products,
         columns: Vec::new(),
     };
     for product in equations.products.clone() {
-        let column = equations.column(graph, mechanism, &product)?;
+        let column = equations.column(graph, mechanism, &product, Style::LinkByLink)?;
         equations.columns.push(column);
     }
     Ok(equations)
 }
 
 impl Equations {
+    /// The styles in which the equations can be written.
+    pub(crate) fn styles(&self) -> Vec<Style> {
+        self.motions.iter().map(|(style, _)| *style).collect()
+    }
+
+    fn motion(&self, style: Style) -> &Motion {
+        &self.motions.iter().find(|(s, _)| *s == style).unwrap_or(&self.motions[0]).1
+    }
+
     /// Forces of the drives for one product of value 1, all others 0.
-    fn column(
+    pub(crate) fn column(
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
         product: &Monomial,
+        style: Style,
     ) -> Result<Vec<ExprId>, DeriveError> {
-        let bodies: Vec<_> = self
-            .inertia
-            .of(product)
-            .map(|(link, inertia)| (link, *inertia))
-            .collect();
-        let wrenches: Vec<_> = bodies
-            .iter()
-            .map(|(link, inertia)| (*link, self.motion.wrench(graph, *link, inertia)))
-            .collect();
-        let value = |m: &Monomial| {
-            if m == product {
-                Graph::ONE
-            } else {
-                Graph::ZERO
-            }
+        let bodies: Vec<_> = self.inertia.of(product).map(|(link, inertia)| (link, *inertia)).collect();
+        let motion = self.motion(style);
+        let wrenches: Vec<_> =
+            bodies.iter().map(|(link, inertia)| (*link, motion.wrench(graph, *link, inertia))).collect();
+        let n = mechanism.coordinates.len();
+        let on_tree = match style {
+            Style::LinkByLink => newton_euler::backward(graph, &self.tree, n, wrenches),
+            Style::AcrossParallelAxes => newton_euler::backward_across(graph, &self.tree, n, wrenches),
         };
-        self.forces(graph, mechanism, wrenches, &value)
+        let value = |m: &Monomial| if m == product { Graph::ONE } else { Graph::ZERO };
+        self.forces(graph, mechanism, on_tree, &value)
     }
 
     /// Inverse dynamics: forces of the drives when every product has the value that `value` gives it.
@@ -96,24 +107,23 @@ impl Equations {
         graph: &mut Graph,
         mechanism: &Mechanism,
         value: &dyn Fn(&Monomial) -> ExprId,
+        style: Style,
     ) -> Result<Vec<ExprId>, DeriveError> {
         let inertia = self.inertia.total(graph, value);
-        let wrenches: Vec<_> = inertia
-            .iter()
-            .map(|(link, inertia)| (*link, self.motion.wrench(graph, *link, inertia)))
-            .collect();
-        self.forces(graph, mechanism, wrenches, value)
+        let motion = self.motion(style);
+        let wrenches: Vec<_> =
+            inertia.iter().map(|(link, inertia)| (*link, motion.wrench(graph, *link, inertia))).collect();
+        let on_tree = newton_euler::backward(graph, &self.tree, mechanism.coordinates.len(), wrenches);
+        self.forces(graph, mechanism, on_tree, value)
     }
 
     fn forces(
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
-        wrenches: Vec<(usize, newton_euler::Wrench)>,
+        mut on_tree: Vec<ExprId>,
         value: &dyn Fn(&Monomial) -> ExprId,
     ) -> Result<Vec<ExprId>, DeriveError> {
-        let n = mechanism.coordinates.len();
-        let mut on_tree = newton_euler::backward(graph, &self.tree, n, wrenches);
         let mut on_drives = vec![Graph::ZERO; mechanism.drives.len()];
         for effect in &mechanism.effects {
             for (place, term) in effect

@@ -7,7 +7,7 @@ use modelmill_spec::{Axis, FrameIdx, Mechanism, Step};
 
 use crate::DeriveError;
 use crate::exact;
-use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational};
+use crate::expr::{AngleSum, Atom, Graph, Rational};
 use crate::vector::{self, Turn, Vector, push_turn};
 
 /// A rigid frame that moves relative to its parent about or along its own z axis, or not at all.
@@ -25,6 +25,10 @@ pub(crate) struct Link {
     pub(crate) turns: Vec<(usize, i32)>,
     /// Coordinates that slide it along z, with their factors.
     pub(crate) slides: Vec<(usize, Rational)>,
+    /// The first of the links above it whose z axes are all parallel to its own; itself if its parent's axis is not.
+    pub(crate) first_parallel: usize,
+    /// Its rotation about z relative to the fixed side of that first link's joint.
+    pub(crate) absolute: Turn,
 }
 
 /// All links; parents come before their children.
@@ -231,6 +235,19 @@ impl Builder {
     fn close(&mut self, links: &mut Vec<Link>) {
         let fresh = Self::new(Some(links.len()));
         let done = std::mem::replace(self, fresh);
+        let parallel = done.parent.filter(|_| done.pre.iter().all(|turn| turn.axis == Axis::Z));
+        let mut absolute = NO_TURN;
+        let mut first_parallel = links.len();
+        if let Some(parent) = parallel {
+            first_parallel = links[parent].first_parallel;
+            absolute = links[parent].absolute.clone();
+            for turn in &done.pre {
+                absolute.sum = absolute.sum.plus(&turn.sum, 1);
+                absolute.pi12 += turn.pi12;
+            }
+        }
+        absolute.sum = absolute.sum.plus(&done.joint.sum, 1);
+        absolute.pi12 = (absolute.pi12 + done.joint.pi12).rem_euclid(24);
         links.push(Link {
             parent: done.parent,
             pre: done.pre,
@@ -238,6 +255,8 @@ impl Builder {
             position: done.position,
             turns: done.turns,
             slides: done.slides,
+            first_parallel,
+            absolute,
         });
     }
 

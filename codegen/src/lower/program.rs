@@ -210,6 +210,12 @@ impl Program {
         kept
     }
 
+    /// Estimated cost per state in additions: multiplications cost the same, the slow operations more.
+    pub fn weight(&self) -> usize {
+        let count = self.count(Stage::State);
+        count.add + count.mul + 6 * (count.div + count.sqrt) + 20 * (count.sincos + count.other)
+    }
+
     /// Counts the operations of one stage.
     pub fn count(&self, stage: Stage) -> OperationCount {
         let mut count = OperationCount::default();
