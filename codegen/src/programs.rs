@@ -173,8 +173,8 @@ struct Closing {
     /// Sums of angles whose cosine and sine are known, and what every passive angle is made of.
     solved: Vec<[ExprId; 2]>,
     angle_of: BTreeMap<usize, (AngleSum, Vec<(usize, i32)>)>,
-    /// Magnitudes below which the determinants count as zero.
-    limits: Vec<f64>,
+    /// Determinants, with the magnitudes below which they count as zero.
+    regular: Vec<(ExprId, f64)>,
 }
 
 /// A determinant this much smaller than at the nominal pose counts as zero.
@@ -194,11 +194,11 @@ impl Closing {
             position: BTreeMap::new(),
             solved: Vec::new(),
             angle_of: BTreeMap::new(),
-            limits: Vec::new(),
+            regular: Vec::new(),
         };
         for id in &equations.projection.determinants {
             let nominal = nominal_value(graph, mechanism, *id).unwrap_or(1.0);
-            closing.limits.push(SINGULAR * nominal.abs());
+            closing.regular.push((*id, SINGULAR * nominal.abs()));
         }
         let Some(plan) = closing.plan.clone() else {
             return closing;
@@ -357,7 +357,7 @@ impl Closing {
         }
         let mut roots = graph.substitute(outputs, &motion);
         let n = roots.len();
-        roots.extend(&projection.determinants);
+        roots.extend(self.regular.iter().map(|(id, _)| *id));
         roots = self.close_position(graph, &roots);
         let (outputs, regular) = roots.split_at(n);
         let used = graph.atoms(outputs);
@@ -370,7 +370,12 @@ impl Closing {
         let regular: Vec<(ExprId, f64)> = regular
             .iter()
             .copied()
-            .zip(self.limits.iter().copied())
+            .zip(&self.regular)
+            .map(|(closed, (_, limit))| {
+                // A rational factor need not be multiplied just to be compared with.
+                let (base, factor) = graph.split_factor(closed);
+                (base, limit / factor.abs().to_f64())
+            })
             .collect();
         lower(
             graph,

@@ -217,12 +217,15 @@ impl Graph {
         if flat[0].0 == Self::ONE {
             flat.rotate_left(1);
         }
-        let mut content = flat
-            .iter()
-            .fold(Rational::ZERO, |content, (_, k)| content.content_with(k));
-        if flat[0].1.is_negative() {
-            content = -&content;
-        }
+        // A factor that all terms share goes outwards; a mere common divisor stays, as it would only be multiplied back.
+        let first = flat[0].1.clone();
+        let content = if flat.iter().all(|(_, k)| k.abs() == first.abs()) {
+            first
+        } else if first.is_negative() {
+            Rational::MINUS_ONE
+        } else {
+            Rational::ONE
+        };
         if !content.is_one() {
             let inverse = content.recip();
             for (_, k) in &mut flat {

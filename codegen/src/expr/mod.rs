@@ -77,7 +77,8 @@ pub enum Node {
     Cos(AngleSum),
     /// Linear combination; a rational term stands as a multiple of [`Graph::ONE`].
     ///
-    /// Either one term whose factor is not 1, or several with coprime factors of which the first is positive.
+    /// Either one term whose factor is not 1, or several of which the first has a positive factor; if all factors have
+    /// the same magnitude, it is 1.
     Sum(Vec<(ExprId, Rational)>),
     /// Product of integer powers, never with a rational factor; a negative exponent divides.
     Product(Vec<(ExprId, i32)>),
