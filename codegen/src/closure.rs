@@ -5,6 +5,7 @@ use modelmill_spec::{FrameIdx, Mechanism, Point};
 use crate::DeriveError;
 use crate::exact;
 use crate::expr::{AngleSum, Atom, ExprId, Graph};
+use crate::linear_loops::Relation;
 use crate::tree::Tree;
 use crate::vector::{self, Turn, Vector, push_turn};
 
@@ -17,6 +18,8 @@ pub(crate) struct Closure {
     pub(crate) residual: Vec<ExprId>,
     /// The same as a chain of vectors turned about one axis, if the loop is planar.
     pub(crate) chain: Option<Vec<Leg>>,
+    /// Relations that solve it outright; empty if there are none.
+    pub(crate) relations: Vec<Relation>,
     /// Coordinates on which it depends, sorted.
     pub(crate) coordinates: Vec<usize>,
 }
@@ -163,12 +166,7 @@ fn close(graph: &mut Graph, name: String, path: &[Stretch]) -> Closure {
     }
     let residual: Vec<ExprId> = total.into_iter().filter(|r| *r != Graph::ZERO).collect();
     let coordinates = coordinates_of(graph, &residual);
-    Closure {
-        name,
-        residual,
-        chain,
-        coordinates,
-    }
+    Closure { name, residual, chain, relations: Vec::new(), coordinates }
 }
 
 /// Coordinates on which some expressions depend.

@@ -7,12 +7,15 @@ use std::collections::BTreeSet;
 
 use crate::closure::{Closure, Leg};
 use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational};
+use crate::linear_loops::Relation;
 
 /// What a dyad yields.
 #[derive(Clone, Debug)]
 pub(crate) struct Solved {
     /// Cosine and sine of sums of angles, each of which holds unknown coordinates.
     pub(crate) angles: Vec<(AngleSum, [ExprId; 2])>,
+    /// Angles that are integer combinations of known ones.
+    pub(crate) relations: Vec<Relation>,
     /// Values of prismatic coordinates.
     pub(crate) lengths: Vec<(usize, ExprId)>,
     /// The square root that chooses between the two assembly modes: its sign is `branch`'s.
@@ -44,6 +47,10 @@ pub(crate) fn solve(
     unknown: &[usize],
     positive: bool,
 ) -> Option<Solved> {
+    if !closure.relations.is_empty() {
+        let relations = closure.relations.clone();
+        return Some(Solved { angles: Vec::new(), relations, lengths: Vec::new(), root: None });
+    }
     let legs = closure.chain.as_ref()?;
     let mut known = [Graph::ZERO; 2];
     let mut groups: Vec<Group> = Vec::new();
@@ -216,6 +223,7 @@ fn two_circles(
                 direction(graph, v2, second.vector, bb),
             ),
         ],
+        relations: Vec::new(),
         lengths: Vec::new(),
         root: Some(Root { radicand, witness }),
     })
@@ -270,6 +278,7 @@ fn circle_and_line(
     let angles = vec![(group.angle.clone(), direction(graph, v, arm, arm_squared))];
     Some(Solved {
         angles,
+        relations: Vec::new(),
         lengths: vec![(slide, value)],
         root,
     })
@@ -287,6 +296,7 @@ fn two_lines(graph: &mut Graph, known: [ExprId; 2], first: usize, second: usize)
     let (s, t) = (graph.div(s, determinant), graph.div(t, determinant));
     Some(Solved {
         angles: Vec::new(),
+        relations: Vec::new(),
         lengths: vec![(first, s), (second, t)],
         root: None,
     })

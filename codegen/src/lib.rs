@@ -1,6 +1,7 @@
 //! From a mechanism to its base parameters and fast code: the mill itself.
 
 mod base;
+mod closing;
 mod closure;
 mod dyad;
 mod emit;
@@ -11,6 +12,7 @@ pub mod expr;
 pub mod field;
 mod inertia;
 mod linear;
+mod linear_loops;
 mod lower;
 mod newton_euler;
 mod programs;

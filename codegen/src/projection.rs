@@ -10,6 +10,7 @@ use crate::DeriveError;
 use crate::closure::{self, Closure};
 use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational, Unary};
 use crate::linear;
+use crate::linear_loops;
 use crate::tree::Tree;
 
 /// Kinematics of a drive.
@@ -54,7 +55,8 @@ impl Projection {
         let n = mechanism.coordinates.len();
         let (passive, active): (Vec<usize>, Vec<usize>) =
             (0..n).partition(|i| mechanism.coordinates[*i].passive);
-        let closures = closure::closures(graph, mechanism, tree)?;
+        let mut closures = closure::closures(graph, mechanism, tree)?;
+        linear_loops::find(graph, mechanism, &mut closures);
         let residual: Vec<ExprId> = closures
             .iter()
             .flat_map(|c| c.residual.iter().copied())

@@ -76,33 +76,34 @@ fn search(
             .copied()
             .filter(|c| may_be_unknown(*c) && !fixed.contains(c))
             .collect();
-        let mut pairs: Vec<[usize; 2]> = Vec::new();
-        for (i, a) in candidates.iter().enumerate() {
-            pairs.extend(candidates[i + 1..].iter().map(|b| [*a, *b]));
+        let mut choices: Vec<Vec<usize>> = Vec::new();
+        if closure.relations.is_empty() {
+            for (i, a) in candidates.iter().enumerate() {
+                choices.extend(candidates[i + 1..].iter().map(|b| vec![*a, *b]));
+            }
+            choices.sort_by_key(|pair| pair.iter().filter(|c| !projection.passive.contains(c)).count());
+        } else {
+            let related: Vec<usize> = closure.relations.iter().map(|r| r.coordinate).collect();
+            choices.extend(related.iter().all(|c| candidates.contains(c)).then_some(related));
         }
-        pairs.sort_by_key(|pair| {
-            pair.iter()
-                .filter(|c| !projection.passive.contains(c))
-                .count()
-        });
-        for pair in pairs {
+        for unknown in choices {
             let is_known = |c: &usize| {
                 unknowns == Unknowns::Any
                     || projection.active.contains(c)
-                    || pair.contains(c)
+                    || unknown.contains(c)
                     || fixed.contains(c)
             };
             if !coordinates.iter().all(is_known) {
                 continue;
             }
             let closure = projection.closures[index].clone();
-            let Some(mut solved) = dyad::solve(graph, &closure, &pair, true) else {
+            let Some(mut solved) = dyad::solve(graph, &closure, &unknown, true) else {
                 continue;
             };
             if let Some(root) = solved.root
                 && !positive(graph, root.witness)
             {
-                let Some(negative) = dyad::solve(graph, &closure, &pair, false) else {
+                let Some(negative) = dyad::solve(graph, &closure, &unknown, false) else {
                     continue;
                 };
                 solved = negative;
@@ -117,7 +118,7 @@ fn search(
             );
             todo.remove(position);
             steps.push(PlanStep {
-                unknown: pair.to_vec(),
+                unknown: unknown.clone(),
                 solved,
             });
             if search(graph, projection, unknowns, positive, todo, fixed, steps) {
@@ -169,18 +170,19 @@ impl Sampler {
             .steps
             .into_iter()
             .map(|step| {
-                let mut roots: Vec<ExprId> =
-                    step.solved.angles.iter().flat_map(|(_, cs)| *cs).collect();
-                roots.extend(step.solved.lengths.iter().map(|(_, value)| *value));
+                let solved = step.solved;
+                let mut angles: Vec<(AngleSum, [ExprId; 2])> = solved.angles;
+                for relation in &solved.relations {
+                    let (c, s) = graph.cos_sin(&relation.sum, relation.pi12);
+                    let angle = AngleSum::new([(Atom::Coordinate(relation.coordinate), 1)]);
+                    angles.push((angle, [c, s]));
+                }
+                let mut roots: Vec<ExprId> = angles.iter().flat_map(|(_, cs)| *cs).collect();
+                roots.extend(solved.lengths.iter().map(|(_, value)| *value));
                 SolveStep {
                     unknown: step.unknown,
-                    angles: step
-                        .solved
-                        .angles
-                        .iter()
-                        .map(|(angle, _)| angle.clone())
-                        .collect(),
-                    lengths: step.solved.lengths.iter().map(|(i, _)| *i).collect(),
+                    angles: angles.into_iter().map(|(angle, _)| angle).collect(),
+                    lengths: solved.lengths.iter().map(|(i, _)| *i).collect(),
                     tape: Tape::new(graph, &roots),
                 }
             })

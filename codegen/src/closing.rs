@@ -1,0 +1,259 @@
+//! Closes expressions over the active coordinates: passive positions by their closed form, passive rates and
+//! accelerations from the differentiated loops.
+
+use std::collections::BTreeMap;
+
+use modelmill_spec::Mechanism;
+
+use crate::expr::{AngleSum, Atom, ExprId, Graph, Node};
+use crate::lower::{Definition, Program, Request, lower};
+use crate::programs::nominal_value;
+use crate::reduce::Plan;
+use crate::regressor::Equations;
+
+/// Puts the passive coordinates' closed form, rates and accelerations in place.
+pub(crate) struct Closing {
+    plan: Option<Plan>,
+    /// Cosine and sine of passive coordinates alone, for their values.
+    definitions: Vec<Definition>,
+    reachable: Vec<ExprId>,
+    /// Nodes replaced by the position's closed form.
+    position: BTreeMap<ExprId, ExprId>,
+    /// Sums of angles whose cosine and sine are known, and what every passive angle is made of.
+    solved: Vec<[ExprId; 2]>,
+    angle_of: BTreeMap<usize, AngleParts>,
+    /// Determinants, with the magnitudes below which they count as zero.
+    regular: Vec<(ExprId, f64)>,
+}
+
+/// An angle as a sum of known angles, a multiple of pi/12, and solved angles by position.
+#[derive(Clone, Debug, Default)]
+struct AngleParts {
+    known: AngleSum,
+    pi12: i32,
+    solved: Vec<(usize, i32)>,
+}
+
+/// A determinant this much smaller than at the nominal pose counts as zero.
+const SINGULAR: f64 = 1e-9;
+
+impl Closing {
+    pub(crate) fn new(
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        equations: &Equations,
+        plan: Option<Plan>,
+    ) -> Self {
+        let mut closing = Self {
+            plan,
+            definitions: Vec::new(),
+            reachable: Vec::new(),
+            position: BTreeMap::new(),
+            solved: Vec::new(),
+            angle_of: BTreeMap::new(),
+            regular: Vec::new(),
+        };
+        for id in &equations.projection.determinants {
+            let nominal = nominal_value(graph, mechanism, *id).unwrap_or(1.0);
+            closing.regular.push((*id, SINGULAR * nominal.abs()));
+        }
+        let Some(plan) = closing.plan.clone() else {
+            return closing;
+        };
+        for step in &plan.steps {
+            // Earlier steps' unknowns are known by now; their closed form goes into this step's expressions.
+            let mut roots: Vec<ExprId> =
+                step.solved.angles.iter().flat_map(|(_, cs)| *cs).collect();
+            roots.extend(step.solved.lengths.iter().map(|(_, value)| *value));
+            roots.extend(step.solved.root.iter().map(|root| root.radicand));
+            let closed = closing.close_position(graph, &roots);
+            let n_angles = step.solved.angles.len();
+            let first = closing.solved.len();
+            closing
+                .solved
+                .extend(closed[..2 * n_angles].chunks(2).map(|cs| [cs[0], cs[1]]));
+            for ((coordinate, _), value) in step.solved.lengths.iter().zip(&closed[2 * n_angles..])
+            {
+                let atom = graph.atom(Atom::Coordinate(*coordinate));
+                closing.position.insert(atom, *value);
+            }
+            closing
+                .reachable
+                .extend(step.solved.root.iter().map(|_| closed[closed.len() - 1]));
+            let angles: Vec<AngleSum> = step
+                .solved
+                .angles
+                .iter()
+                .map(|(angle, _)| angle.clone())
+                .collect();
+            closing.resolve(step.unknown.clone(), &angles, first);
+            for relation in &step.solved.relations {
+                let parts = closing.split(&relation.sum, relation.pi12);
+                closing.angle_of.insert(relation.coordinate, parts);
+            }
+        }
+        for p in &equations.projection.passive {
+            if closing.angle_of.contains_key(p) {
+                let [cosine, sine] =
+                    closing.cos_sin(graph, &AngleSum::new([(Atom::Coordinate(*p), 1)]));
+                closing.definitions.push(Definition {
+                    atom: Atom::Coordinate(*p),
+                    sine,
+                    cosine,
+                });
+            }
+        }
+        closing
+    }
+
+    /// Whether every loop has a closed form.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.plan.is_some()
+    }
+
+    /// Writes every unknown angle as a sum of solved angles and known coordinates.
+    fn resolve(&mut self, mut unknown: Vec<usize>, angles: &[AngleSum], first: usize) {
+        let mut progress = true;
+        while progress {
+            progress = false;
+            for (k, angle) in angles.iter().enumerate() {
+                let inside: Vec<_> = angle
+                    .terms()
+                    .iter()
+                    .filter(|(atom, _)| matches!(atom, Atom::Coordinate(i) if unknown.contains(i)))
+                    .collect();
+                let &[(atom @ Atom::Coordinate(i), sign)] = inside.as_slice() else {
+                    continue;
+                };
+                // q = sign * (solved - rest)
+                let rest = self.split(&angle.plus(&AngleSum::new([(*atom, *sign)]), -1), 0);
+                let mut parts = AngleParts {
+                    known: AngleSum::NONE.plus(&rest.known, -sign),
+                    pi12: -sign * rest.pi12,
+                    solved: rest.solved.into_iter().map(|(s, n)| (s, -n * sign)).collect(),
+                };
+                parts.solved.push((first + k, *sign));
+                self.angle_of.insert(*i, parts);
+                unknown.retain(|u| u != i);
+                progress = true;
+            }
+        }
+    }
+
+    /// A sum of angles with its passive coordinates put by what they are made of.
+    fn split(&self, sum: &AngleSum, pi12: i32) -> AngleParts {
+        let mut known = AngleSum::NONE;
+        let mut pi12 = pi12;
+        let mut solved: BTreeMap<usize, i32> = BTreeMap::new();
+        for (atom, n) in sum.terms() {
+            match atom {
+                Atom::Coordinate(i) if self.angle_of.contains_key(i) => {
+                    let inner = &self.angle_of[i];
+                    known = known.plus(&inner.known, *n);
+                    pi12 += inner.pi12 * n;
+                    for (piece, m) in &inner.solved {
+                        *solved.entry(*piece).or_insert(0) += m * n;
+                    }
+                }
+                _ => known = known.plus(&AngleSum::new([(*atom, 1)]), *n),
+            }
+        }
+        AngleParts { known, pi12, solved: solved.into_iter().filter(|(_, n)| *n != 0).collect() }
+    }
+
+    /// Cosine and sine of a sum of angles, by the addition theorem.
+    fn cos_sin(&self, graph: &mut Graph, sum: &AngleSum) -> [ExprId; 2] {
+        let parts = self.split(sum, 0);
+        let (c, s) = graph.cos_sin(&parts.known, parts.pi12);
+        let mut total = [c, s];
+        for (piece, n) in parts.solved {
+            let [c, mut s] = self.solved[piece];
+            if n < 0 {
+                s = graph.neg(s);
+            }
+            for _ in 0..n.abs() {
+                let products = [(total[0], c), (total[1], s), (total[1], c), (total[0], s)]
+                    .map(|(a, b)| graph.mul(a, b));
+                total = [
+                    graph.sub(products[0], products[1]),
+                    graph.add(products[2], products[3]),
+                ];
+            }
+        }
+        total
+    }
+
+    /// Replaces passive positions by their closed form.
+    fn close_position(&self, graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
+        let mut replacements = self.position.clone();
+        let trigonometric: Vec<(Node, AngleSum)> = graph
+            .nodes_of(roots)
+            .filter_map(|node| match node {
+                Node::Sin(angle) | Node::Cos(angle)
+                    if angle.atoms().any(
+                        |a| matches!(a, Atom::Coordinate(i) if self.angle_of.contains_key(&i)),
+                    ) =>
+                {
+                    Some((node.clone(), angle.clone()))
+                }
+                _ => None,
+            })
+            .collect();
+        for (node, angle) in trigonometric {
+            let [c, s] = self.cos_sin(graph, &angle);
+            let (cosine, sine) = graph.cos_sin(&angle, 0);
+            match node {
+                Node::Cos(_) => replacements.insert(cosine, c),
+                _ => replacements.insert(sine, s),
+            };
+        }
+        graph.substitute(roots, &replacements)
+    }
+
+    /// Closes some expressions over the active coordinates and lowers them.
+    pub(crate) fn program(&self, graph: &mut Graph, equations: &Equations, outputs: &[ExprId]) -> Program {
+        let projection = &equations.projection;
+        let rates: BTreeMap<ExprId, ExprId> = projection
+            .passive
+            .iter()
+            .zip(&projection.passive_rates)
+            .map(|(p, rate)| (graph.atom(Atom::Rate(*p)), *rate))
+            .collect();
+        let accelerations = graph.substitute(&projection.passive_accelerations, &rates);
+        let mut motion = rates;
+        for (p, acceleration) in projection.passive.iter().zip(accelerations) {
+            motion.insert(graph.atom(Atom::Acceleration(*p)), acceleration);
+        }
+        let mut roots = graph.substitute(outputs, &motion);
+        let n = roots.len();
+        roots.extend(self.regular.iter().map(|(id, _)| *id));
+        roots = self.close_position(graph, &roots);
+        let (outputs, regular) = roots.split_at(n);
+        let used = graph.atoms(outputs);
+        let definitions: Vec<Definition> = self
+            .definitions
+            .iter()
+            .filter(|d| used.contains(&d.atom))
+            .copied()
+            .collect();
+        let regular: Vec<(ExprId, f64)> = regular
+            .iter()
+            .copied()
+            .zip(&self.regular)
+            .map(|(closed, (_, limit))| {
+                // A rational factor need not be multiplied just to be compared with.
+                let (base, factor) = graph.split_factor(closed);
+                (base, limit / factor.abs().to_f64())
+            })
+            .collect();
+        lower(
+            graph,
+            &Request {
+                outputs,
+                reachable: &self.reachable,
+                regular: &regular,
+                definitions: &definitions,
+            },
+        )
+    }
+}
