@@ -9,6 +9,8 @@ mod diagnostic;
 mod document;
 mod editor;
 mod exact;
+#[cfg(test)]
+mod exact_tests;
 mod formula;
 mod kind_terms;
 mod kinds;

@@ -100,17 +100,17 @@ pub fn load_file(path: &Path) -> Result<Loaded, Failure> {
 ///     name = "pendulum"
 ///     gravity = [0, "-g", 0]
 ///     constants = { g = { value = 9.81, unit = "m/s^2" } }
-///     coordinates = { q = {} }
-///     frame = [{ name = "arm", on = "base", modified_dh = { theta = "q" } }]
+///     coordinates = { angle = {} }
+///     frame = [{ name = "arm", on = "base", modified_dh = { theta = "angle" } }]
 ///     part = [{ on = "arm", linear = { planar = "1" } }]
-///     drive = [{ name = "motor", joint = "q" }]
+///     drive = [{ name = "motor", joint = "angle" }]
 /// "#;
 /// let loaded = modelmill_spec::load("pendulum.toml", text, &mut |_| unreachable!()).unwrap();
 /// let names: Vec<_> = loaded.mechanism.parameters.iter().map(|p| p.name.as_str()).collect();
 /// assert_eq!(names, ["ZZ1", "MX1", "MY1", "M1"]);
 ///
-/// let failure = modelmill_spec::load("p.toml", &text.replace("\"q\" }", "\"p\" }"), &mut |_| unreachable!());
-/// assert!(failure.unwrap_err().render(false).contains("did you mean `q`?"));
+/// let failure = modelmill_spec::load("p.toml", &text.replace("\"angle\" }", "\"angel\" }"), &mut |_| unreachable!());
+/// assert!(failure.unwrap_err().render(false).contains("did you mean `angle`?"));
 /// ```
 pub fn load(
     path_name: &str,

@@ -16,7 +16,7 @@ pub(crate) fn nearest<'a>(
         .into_iter()
         .filter(|candidate| candidate.len() <= LONGEST_COMPARED)
         .map(|candidate| (distance(name, candidate), candidate))
-        .filter(|&(steps, candidate)| steps <= allowed && steps < candidate.chars().count().max(2))
+        .filter(|&(steps, candidate)| steps <= allowed && steps < candidate.chars().count())
         .min_by_key(|&(steps, candidate)| (steps, candidate.len()))
         .map(|(_, candidate)| candidate)
 }
@@ -66,4 +66,19 @@ fn distance(one: &str, other: &str) -> usize {
         before_last = std::mem::replace(&mut last, row);
     }
     last[other.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nearest;
+
+    #[test]
+    fn the_nearest_name_is_the_one_meant() {
+        let names = ["theta1", "theta2", "gamma1", "dc1", "g"];
+        assert_eq!(nearest("theat1", names), Some("theta1"));
+        assert_eq!(nearest("Theta2", names), Some("theta2"));
+        assert_eq!(nearest("dc2", names), Some("dc1"));
+        assert_eq!(nearest("mass", names), None);
+        assert_eq!(nearest("", names), None);
+    }
 }

@@ -338,3 +338,42 @@ fn factors(text: &str, offset: usize) -> Result<(Dimension, usize), Fault> {
     }
     Ok((dimension, n_factors))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Dimension, UNITS, parse};
+
+    #[test]
+    fn units_multiply_and_divide() {
+        for (text, printed) in [
+            ("kg m^2", "kg m^2"),
+            ("N s/m", "N s/m"),
+            ("N m s/rad", "N m s"),
+            ("m/s^2", "m/s^2"),
+            ("J", "N m"),
+            ("1/s", "1/s"),
+            ("kg*m", "kg m"),
+            ("V s/(rad A)", "kg m^2 s^-2 A^-2"),
+            ("rad", "1"),
+        ] {
+            let dimension = parse(text).map_err(|fault| fault.message).unwrap();
+            assert_eq!(dimension.to_string(), printed, "{text}");
+        }
+        for text in [
+            "", "kg m s/", "m/s/s", "N/m s", "Nm", "mm", "m^x", "m^99", "()", "m/(", "\u{e9}",
+        ] {
+            assert!(parse(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn printed_dimensions_read_as_the_same() {
+        for (name, _) in UNITS {
+            let dimension = parse(name).map_err(|fault| fault.message).unwrap();
+            let square = dimension.times(dimension);
+            for found in [dimension, square, Dimension::ONE.over(dimension)] {
+                assert_eq!(parse(&found.to_string()).ok(), Some(found), "{name}");
+            }
+        }
+    }
+}
