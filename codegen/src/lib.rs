@@ -19,6 +19,7 @@ mod programs;
 mod projection;
 mod reduce;
 mod regressor;
+pub mod review;
 mod tree;
 mod vector;
 

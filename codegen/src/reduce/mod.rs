@@ -5,6 +5,7 @@
 //! of the model's constants. A wrong answer has a probability below 1e-15 (Schwartz 1980, Zippel 1979).
 
 mod eliminate;
+mod print;
 mod rational_function;
 mod reconstruct;
 mod sample;

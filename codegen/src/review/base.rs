@@ -1,0 +1,262 @@
+//! From p_g to p_min: products, dependencies and base parameters, eq. (5), (6) and (16).
+
+use modelmill_spec::Mechanism;
+
+use super::document::{Document, Equation, Inline, Line, Table, cell, number, text};
+use super::equations::{NumericRank, base_name};
+use crate::Derivation;
+use crate::base::unit;
+use crate::exact::Monomial;
+use crate::expr::Rational;
+use crate::expr::print::{Formula, Symbol};
+use crate::reduce::RationalFunction;
+
+/// Base parameter `k` written out term by term: what a script reads.
+pub fn base_expression(derivation: &Derivation, k: usize) -> Formula {
+    let Derivation {
+        mechanism,
+        reduction,
+        ..
+    } = derivation;
+    let mut terms = vec![product(mechanism, &reduction.products[reduction.retained[k]])];
+    for line in &reduction.dependencies {
+        let factors = factors(mechanism, &reduction.products[line.product]);
+        for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
+            terms.extend(factor.expanded_times(mechanism, &factors));
+        }
+    }
+    Formula::sum(terms)
+}
+
+/// Base parameter `k` with common factors collected: `m1*dc1 + d1*(m2 + m3)`.
+pub fn base_grouped(derivation: &Derivation, k: usize) -> Formula {
+    let Derivation {
+        mechanism,
+        reduction,
+        ..
+    } = derivation;
+    let mut terms = vec![product(mechanism, &reduction.products[reduction.retained[k]])];
+    let mut groups: Vec<(RationalFunction, Vec<(Rational, Formula)>)> = Vec::new();
+    for line in &reduction.dependencies {
+        let what = product(mechanism, &reduction.products[line.product]);
+        for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
+            let (number, function) = factor.split_number();
+            let member = (number, what.clone());
+            match groups.iter_mut().find(|(f, _)| *f == function) {
+                Some((_, members)) => members.push(member),
+                None => groups.push((function, vec![member])),
+            }
+        }
+    }
+    for (function, mut members) in groups {
+        let factor = function.formula(mechanism);
+        let mut number = members
+            .iter()
+            .fold(Rational::ZERO, |c, (k, _)| c.content_with(k));
+        if members[0].0.is_negative() {
+            number = -&number;
+        }
+        let inverse = number.recip();
+        for (k, _) in &mut members {
+            *k = &*k * &inverse;
+        }
+        let sum = members
+            .into_iter()
+            .map(|(k, what)| Formula::product(k, [what]));
+        let term = Formula::product(number, [factor, Formula::sum(sum)]);
+        terms.push(term);
+    }
+    Formula::sum(terms)
+}
+
+/// A factor of eq. (6) as expanded text.
+pub(super) fn factor_text(mechanism: &Mechanism, factor: &RationalFunction) -> String {
+    factor.expanded(mechanism).text()
+}
+
+fn factors(mechanism: &Mechanism, product: &Monomial) -> Vec<Formula> {
+    product
+        .0
+        .iter()
+        .map(|(p, n)| {
+            let name = Formula::name(&*mechanism.parameters[*p].name);
+            name.power(i32::try_from(*n).unwrap_or(i32::MAX))
+        })
+        .collect()
+}
+
+fn product(mechanism: &Mechanism, product: &Monomial) -> Formula {
+    Formula::product(Rational::ONE, factors(mechanism, product))
+}
+
+/// The column of a product: `h` with the product as its index.
+fn column(mechanism: &Mechanism, of: &Monomial) -> Formula {
+    Formula::Indexed(Symbol::new("h"), Box::new(product(mechanism, of)))
+}
+
+/// p_g with units, and what has no effect.
+pub(super) fn products(page: &mut Document, derivation: &Derivation) {
+    let Derivation {
+        mechanism,
+        reduction,
+        ..
+    } = derivation;
+    page.heading("Products of dynamic parameters");
+    page.paragraph([text(
+        "The forces of the drives are linear in the following products of dynamic parameters, p_g of eq. (5): \
+         tau = H(q, q', q'') p_g, where column h of H belongs to one product.",
+    )]);
+    let parameters: Vec<f64> = mechanism.parameters.iter().map(|p| p.nominal).collect();
+    let rows = reduction
+        .products
+        .iter()
+        .enumerate()
+        .map(|(k, m)| {
+            let fate = match reduction.retained.iter().position(|r| *r == k) {
+                Some(at) => vec![text("retained, "), Inline::Math(Formula::name(base_name(at)))],
+                None => cell(text("follows from retained columns")),
+            };
+            vec![
+                cell(text((k + 1).to_string())),
+                cell(Inline::Math(product(mechanism, m))),
+                cell(text(unit(mechanism, m))),
+                cell(text(number(m.value(&parameters)))),
+                fate,
+            ]
+        })
+        .collect();
+    page.table(
+        "products",
+        Table {
+            head: vec!["", "product", "unit", "nominal", "column"],
+            rows,
+        },
+    );
+    if !reduction.without_effect.is_empty() {
+        let mut line: Line = vec![text("Without any effect on the drives, and so not in p_g: ")];
+        for (i, m) in reduction.without_effect.iter().enumerate() {
+            if i > 0 {
+                line.push(text(", "));
+            }
+            line.push(Inline::Math(product(mechanism, m)));
+        }
+        line.push(text("."));
+        page.paragraph(line);
+    }
+}
+
+/// Eq. (6).
+pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
+    let Derivation {
+        mechanism,
+        reduction,
+        ..
+    } = derivation;
+    page.heading("Dependent columns");
+    if reduction.dependencies.is_empty() {
+        page.paragraph([text(
+            "All columns are linearly independent; nothing needs to be regrouped.",
+        )]);
+        return;
+    }
+    page.paragraph([text(format!(
+        "Columns that are constant combinations of retained ones at every state, eq. (6). \
+         They were found in exact arithmetic and confirmed at {} further states with other values of the constants.",
+        reduction.confirmed_at
+    ))]);
+    let lines = reduction
+        .dependencies
+        .iter()
+        .enumerate()
+        .map(|(i, line)| Equation {
+            left: column(mechanism, &reduction.products[line.product]),
+            right: Formula::sum(line.equals.iter().map(|(k, factor)| {
+                let retained = &reduction.products[reduction.retained[*k]];
+                Formula::product(
+                    Rational::ONE,
+                    [factor.formula(mechanism), column(mechanism, retained)],
+                )
+            })),
+            tag: format!("6.{}", i + 1),
+            remark: None,
+        })
+        .collect();
+    page.equations("dependent columns", lines);
+}
+
+/// Eq. (16).
+pub(super) fn base_parameters(
+    page: &mut Document,
+    derivation: &Derivation,
+    numeric: Option<&NumericRank>,
+) {
+    let Derivation {
+        mechanism,
+        reduction,
+        ..
+    } = derivation;
+    page.heading("Base parameters");
+    let rank = reduction.retained.len();
+    let mut says = format!(
+        "With eq. (6) the {} products regroup to {rank} base parameters, eq. (16): tau = H_min p_min.",
+        reduction.products.len()
+    );
+    if let Some(n) = numeric {
+        says.push_str(&format!(
+            " On the file's values the numeric rank of eq. (9) over {} states is {}{}.",
+            n.samples,
+            n.rank,
+            if n.rank == rank {
+                ", the same"
+            } else {
+                ": this geometry is special, some base parameters cannot be told apart"
+            }
+        ));
+        if let Some(condition) = n.condition {
+            says.push_str(&format!(" The condition number is {condition:.3}."));
+        }
+    }
+    page.paragraph([text(says)]);
+    let equation = |k: usize, right: Formula| Equation {
+        left: Formula::name(base_name(k)),
+        right,
+        tag: format!("16.{}", k + 1),
+        remark: Some(unit(
+            mechanism,
+            &reduction.products[reduction.retained[k]],
+        )),
+    };
+    let grouped = (0..rank)
+        .map(|k| equation(k, base_grouped(derivation, k)))
+        .collect();
+    page.equations("base parameters", grouped);
+    let values = derivation.nominal_base_values();
+    let rows = (0..rank)
+        .map(|k| {
+            let retained = &reduction.products[reduction.retained[k]];
+            vec![
+                cell(Inline::Math(Formula::name(base_name(k)))),
+                cell(Inline::Math(product(mechanism, retained))),
+                cell(text(format!("{:.6}", Shown(values[k])))),
+                cell(text(unit(mechanism, retained))),
+            ]
+        })
+        .collect();
+    page.table(
+        "values",
+        Table {
+            head: vec!["base parameter", "retained product", "nominal value", "unit"],
+            rows,
+        },
+    );
+}
+
+/// A number with six significant digits.
+struct Shown(f64);
+
+impl std::fmt::Display for Shown {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let rounded: f64 = format!("{:.5e}", self.0).parse().unwrap_or(self.0);
+        f.write_str(&number(rounded))
+    }
+}

@@ -1,0 +1,154 @@
+//! The equations as data, in the form that `modelmill equations --format json` prints.
+
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
+
+use super::base::{base_expression, factor_text};
+use crate::{Derivation, OperationCount, Stage};
+
+/// Rank of the regressor on the file's values, found numerically.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NumericRank {
+    /// The rank.
+    pub rank: usize,
+    /// At how many random states the regressor was stacked.
+    pub samples: usize,
+    /// Condition number of the columns that are retained, if known.
+    pub condition: Option<f64>,
+}
+
+/// Everything that reduction says about a model.
+#[derive(Clone, Debug, Serialize)]
+pub struct Equations {
+    /// Name of the model, as its file calls it.
+    pub model: String,
+    /// p_g, eq. (5), in order.
+    pub parameters: Vec<String>,
+    /// Products whose column vanishes.
+    pub without_effect: Vec<String>,
+    /// Eq. (6); products without effect come last, with nothing on the right.
+    pub dependencies: Vec<DependencyLine>,
+    /// Eq. (16).
+    pub base: Vec<BaseLine>,
+    /// How many base parameters there are.
+    pub rank: Rank,
+    /// Operations per state.
+    pub operations: Operations,
+}
+
+/// One line of eq. (6): a column as a combination of retained ones.
+#[derive(Clone, Debug, Serialize)]
+pub struct DependencyLine {
+    /// The product whose column it is.
+    pub parameter: String,
+    /// Retained products with their factors.
+    #[serde(serialize_with = "as_map")]
+    pub equals: Vec<(String, String)>,
+}
+
+/// One line of eq. (16).
+#[derive(Clone, Debug, Serialize)]
+pub struct BaseLine {
+    /// `p1_min`, `p2_min`, ...
+    pub name: String,
+    /// The product whose column is retained.
+    pub retained: String,
+    /// The base parameter as expanded infix text.
+    pub expression: String,
+}
+
+/// Ranks.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Rank {
+    /// By exact reduction, for any geometry but special ones.
+    pub exact: usize,
+    /// Of eq. (9) on the file's values.
+    pub numeric: Option<usize>,
+    /// States of which eq. (9) was made.
+    pub samples: Option<usize>,
+}
+
+/// Operation counts per state.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Operations {
+    /// H_min.
+    pub regressor: OperationCount,
+    /// Inverse dynamics with p_min.
+    pub inverse_dynamics: OperationCount,
+}
+
+fn as_map<S: Serializer>(pairs: &[(String, String)], serializer: S) -> Result<S::Ok, S::Error> {
+    let mut map = serializer.serialize_map(Some(pairs.len()))?;
+    for (key, value) in pairs {
+        map.serialize_entry(key, value)?;
+    }
+    map.end()
+}
+
+impl Equations {
+    /// Collects the equations of a derivation.
+    pub fn new(derivation: &Derivation, numeric: Option<&NumericRank>) -> Self {
+        let Derivation {
+            mechanism,
+            reduction,
+            programs,
+            ..
+        } = derivation;
+        let product = |k: usize| reduction.products[k].text(mechanism);
+        let dependent = reduction.dependencies.iter().map(|line| DependencyLine {
+            parameter: product(line.product),
+            equals: line
+                .equals
+                .iter()
+                .map(|(k, factor)| {
+                    let retained = product(reduction.retained[*k]);
+                    (retained, factor_text(mechanism, factor))
+                })
+                .collect(),
+        });
+        let without_effect: Vec<String> = reduction
+            .without_effect
+            .iter()
+            .map(|m| m.text(mechanism))
+            .collect();
+        let vanishing = without_effect.iter().map(|parameter| DependencyLine {
+            parameter: parameter.clone(),
+            equals: Vec::new(),
+        });
+        Self {
+            model: mechanism.name.clone(),
+            parameters: (0..reduction.products.len()).map(product).collect(),
+            dependencies: dependent.chain(vanishing).collect(),
+            base: (0..reduction.retained.len())
+                .map(|k| BaseLine {
+                    name: base_name(k),
+                    retained: product(reduction.retained[k]),
+                    expression: base_expression(derivation, k).text(),
+                })
+                .collect(),
+            rank: Rank {
+                exact: reduction.retained.len(),
+                numeric: numeric.map(|n| n.rank),
+                samples: numeric.map(|n| n.samples),
+            },
+            operations: Operations {
+                regressor: programs.regressor.count(Stage::State),
+                inverse_dynamics: programs.inverse_dynamics.count(Stage::State),
+            },
+            without_effect,
+        }
+    }
+
+    /// As indented JSON with a line feed at the end.
+    pub fn json(&self) -> String {
+        let mut text =
+            serde_json::to_string_pretty(self).expect("strings and counts always make JSON");
+        text.push('\n');
+        text
+    }
+}
+
+/// Name of the base parameter at position `k`.
+pub(super) fn base_name(k: usize) -> String {
+    format!("p{}_min", k + 1)
+}

@@ -1,0 +1,255 @@
+//! Loops, drives and effects: closure equations, how they are solved, and what the drives see.
+
+use modelmill_spec::{DriveKind, Mechanism, Motion, Place};
+
+use super::document::{Block, Document, Equation, Inline, Line, Table, cell, code, text};
+use crate::expr::print::{Formula, exact, formula, tree_size};
+use crate::expr::{ExprId, Graph};
+use crate::programs::nominal_value;
+use crate::reduce::{Unknowns, plan};
+use crate::{Derivation, PassivePosition};
+
+/// Expressions with more nodes than this are shown in a program rather than in one line.
+const LONGEST: usize = 120;
+
+fn names(mechanism: &Mechanism, coordinates: &[usize]) -> Line {
+    let mut line = Line::new();
+    for (i, c) in coordinates.iter().enumerate() {
+        if i > 0 {
+            line.push(text(if i + 1 == coordinates.len() { " and " } else { ", " }));
+        }
+        line.push(Inline::Math(Formula::name(&*mechanism.coordinates[*c].name)));
+    }
+    line
+}
+
+fn shown(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Option<Formula> {
+    (tree_size(graph, id, LONGEST) < LONGEST).then(|| formula(graph, mechanism, id))
+}
+
+/// Closure equations and the way from the active to the passive coordinates.
+pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
+    let Derivation {
+        mechanism,
+        graph,
+        programs,
+        equations,
+        ..
+    } = derivation;
+    let projection = &equations.projection;
+    if mechanism.loops.is_empty() {
+        return;
+    }
+    page.heading("Loops");
+    let mut tag = 0;
+    for (l, closure) in mechanism.loops.iter().zip(&projection.closures) {
+        let [a, b] = l.joins.map(|p| code(&*mechanism.points[p.0].name));
+        let plane = if closure.chain.is_some() {
+            "; the loop is planar"
+        } else {
+            ""
+        };
+        page.paragraph([
+            text("Loop "),
+            code(&*l.name),
+            text(": "),
+            a,
+            text(" and "),
+            b,
+            text(format!(" coincide{plane}.")),
+        ]);
+        let lines = closure
+            .residual
+            .iter()
+            .filter_map(|id| {
+                tag += 1;
+                Some(Equation {
+                    left: Formula::integer(0),
+                    right: shown(graph, mechanism, *id)?,
+                    tag: format!("L{tag}"),
+                    remark: None,
+                })
+            })
+            .collect();
+        page.equations("closure equations", lines);
+    }
+    match &programs.passive_position {
+        PassivePosition::None => {}
+        PassivePosition::Closed => solved_in_closed_form(page, derivation),
+        PassivePosition::Newton { .. } => {
+            let mut line = vec![text("The passive coordinates ")];
+            line.extend(names(mechanism, &projection.passive));
+            line.push(text(
+                " follow by Newton's method on the closure equations, started from the nominal pose or the pose before, \
+                 which keeps to the assembly mode of the model file.",
+            ));
+            page.paragraph(line);
+        }
+    }
+    let mut line = vec![text(
+        "Their rates and accelerations follow from the differentiated closure equations, which are linear in them",
+    )];
+    let determinants = &projection.determinants;
+    match determinants.iter().map(|id| shown(graph, mechanism, *id)).collect::<Option<Vec<_>>>() {
+        Some(formulas) if !formulas.is_empty() => {
+            line.push(text("; the model is singular where one of these vanishes: "));
+            for (i, f) in formulas.into_iter().enumerate() {
+                if i > 0 {
+                    line.push(text("; "));
+                }
+                line.push(Inline::Math(f));
+            }
+            line.push(text("."));
+        }
+        _ => line.push(text("; a pose where their matrix is singular is reported as such.")),
+    }
+    page.paragraph(line);
+}
+
+fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
+    let Derivation {
+        mechanism,
+        graph,
+        equations,
+        ..
+    } = derivation;
+    let mut graph = graph.clone();
+    let mut positive = |graph: &Graph, id: ExprId| {
+        nominal_value(graph, mechanism, id).is_none_or(|v| v >= 0.0)
+    };
+    let Some(plan) = plan(&mut graph, &equations.projection, Unknowns::Passive, &mut positive) else {
+        return;
+    };
+    for step in &plan.steps {
+        let mut line = names(mechanism, &step.unknown);
+        line.push(text(match step.solved.lengths.len() {
+            0 => " follow in closed form as the intersection of two circles",
+            1 => " follow in closed form as the intersection of a circle and a line",
+            _ => " follow from two linear equations",
+        }));
+        if let Some(root) = step.solved.root {
+            let sign = if positive(&graph, root.witness) { "positive" } else { "negative" };
+            line.push(text(format!(
+                "; the nominal pose chooses the {sign} root. Where the radicand is negative the pose is out of reach"
+            )));
+        }
+        line.push(text("."));
+        page.paragraph(line);
+    }
+}
+
+/// Drives with their coordinates and Jacobian.
+pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
+    let Derivation {
+        mechanism,
+        graph,
+        equations,
+        ..
+    } = derivation;
+    let projection = &equations.projection;
+    page.heading("Drives");
+    let mut any_linear = false;
+    let rows = mechanism
+        .drives
+        .iter()
+        .map(|drive| {
+            let acts = match drive.kind {
+                DriveKind::Joint(i) => {
+                    let coordinate = &mechanism.coordinates[i.0];
+                    let kind = match coordinate.motion {
+                        Motion::Revolute => "torque on ",
+                        Motion::Prismatic => "force on ",
+                    };
+                    vec![text(kind), Inline::Math(Formula::name(&*coordinate.name))]
+                }
+                DriveKind::Linear { from, to } => {
+                    any_linear = true;
+                    vec![
+                        text("force from "),
+                        code(&*mechanism.points[from.0].name),
+                        text(" to "),
+                        code(&*mechanism.points[to.0].name),
+                        text(", positive when it pushes them apart"),
+                    ]
+                }
+            };
+            vec![cell(code(&*drive.name)), acts]
+        })
+        .collect();
+    page.table("drives", Table { head: vec!["drive", "acts as"], rows });
+    let mut lines = Vec::new();
+    for (d, drive) in mechanism.drives.iter().enumerate() {
+        if matches!(drive.kind, DriveKind::Joint(_)) {
+            continue;
+        }
+        let mut line = |left: String, id: ExprId| {
+            let right = shown(graph, mechanism, id)?;
+            let tag = format!("D{}", lines.len() + 1);
+            lines.push(Equation {
+                left: Formula::name(left),
+                right,
+                tag,
+                remark: None,
+            });
+            Some(())
+        };
+        line(format!("l_{}", drive.name), projection.drives[d].coordinate);
+        for (a, slope) in projection.active.iter().zip(&projection.drive_jacobian[d]) {
+            let coordinate = &mechanism.coordinates[*a].name;
+            line(format!("J_{}_{coordinate}", drive.name), *slope);
+        }
+    }
+    if any_linear {
+        page.paragraph([text(
+            "Lengths of the linear drives, and their derivatives by the independent coordinates, the Jacobian J. \
+             By virtual power J' f equals the generalised forces of the independent coordinates.",
+        )]);
+        page.blocks.push(Block::Equations(lines));
+    }
+}
+
+/// Effects with their expressions.
+pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
+    if mechanism.effects.is_empty() {
+        return;
+    }
+    page.heading("Effects");
+    page.paragraph([
+        text("Each adds to the force of its place; "),
+        Inline::Math(Formula::name("x")),
+        text(" is the coordinate of the place, dots are its time derivatives, "),
+        code("load"),
+        text(" is the force that it carries. At a point the parameter is a mass."),
+    ]);
+    let rows = mechanism
+        .effects
+        .iter()
+        .map(|effect| {
+            let mut places = Line::new();
+            for (i, place) in effect.places.iter().enumerate() {
+                if i > 0 {
+                    places.push(text(", "));
+                }
+                places.push(code(match place {
+                    Place::Drive(d) => &*mechanism.drives[d.0].name,
+                    Place::Coordinate(c) => &*mechanism.coordinates[c.0].name,
+                    Place::Point(p) => &*mechanism.points[p.0].name,
+                }));
+            }
+            let sum = Formula::sum(effect.terms.iter().map(|term| {
+                let parameter = Formula::name(&*mechanism.parameters[term.parameter.0].name);
+                Formula::product(
+                    crate::expr::Rational::ONE,
+                    [parameter, exact(mechanism, &term.expression)],
+                )
+            }));
+            vec![
+                cell(text(effect.kind.replace('_', " "))),
+                places,
+                cell(Inline::Math(sum)),
+            ]
+        })
+        .collect();
+    let head = vec!["effect", "at", "adds"];
+    page.table("effects", Table { head, rows });
+}

@@ -1,0 +1,80 @@
+//! Equations for review: a page that shows a model's derivation from its file to p_min and the programs, and the same
+//! facts as JSON. A [`Derivation`] goes in, text of one notation comes out; equal input gives equal bytes.
+//!
+//! Equation numbers 5, 6 and 16 are those of the paper on the parameter-minimal model of the SpiderMill.
+
+mod base;
+mod document;
+mod equations;
+mod frames;
+mod listing;
+mod loops;
+mod names;
+mod parameters;
+mod programs;
+mod render_html;
+mod render_latex;
+mod render_markdown;
+mod render_text;
+
+#[cfg(test)]
+mod tests;
+
+pub use base::{base_expression, base_grouped};
+pub use equations::{
+    BaseLine, DependencyLine, Equations, NumericRank, Operations, Rank,
+};
+
+use crate::Derivation;
+use document::Document;
+
+/// How a page is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Plain text for a terminal.
+    Text,
+    /// Markdown with LaTeX formulas.
+    Markdown,
+    /// A standalone LaTeX article.
+    Latex,
+    /// One self-contained HTML file with MathML.
+    Html,
+    /// [`Equations`] as JSON.
+    Json,
+}
+
+/// The page of a model.
+///
+/// `numeric` is the rank of eq. (9) on the file's values, if the caller has found it.
+pub fn page(derivation: &Derivation, format: Format, numeric: Option<&NumericRank>) -> String {
+    let document = || write(derivation, numeric);
+    match format {
+        Format::Text => render_text::render(&document()),
+        Format::Markdown => render_markdown::render(&document()),
+        Format::Latex => render_latex::render(&document()),
+        Format::Html => render_html::render(&document()),
+        Format::Json => Equations::new(derivation, numeric).json(),
+    }
+}
+
+/// The derivation, step by step.
+fn write(derivation: &Derivation, numeric: Option<&NumericRank>) -> Document {
+    let mechanism = &derivation.mechanism;
+    let title = mechanism.title.clone();
+    let mut page = Document {
+        title: title.unwrap_or_else(|| mechanism.name.clone()),
+        blocks: Vec::new(),
+    };
+    parameters::summary(&mut page, derivation);
+    parameters::quantities(&mut page, mechanism);
+    frames::frames(&mut page, mechanism);
+    frames::bodies(&mut page, mechanism);
+    loops::loops(&mut page, derivation);
+    loops::drives(&mut page, derivation);
+    loops::effects(&mut page, mechanism);
+    base::products(&mut page, derivation);
+    base::dependencies(&mut page, derivation);
+    base::base_parameters(&mut page, derivation, numeric);
+    programs::programs(&mut page, derivation);
+    page
+}

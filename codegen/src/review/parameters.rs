@@ -1,0 +1,115 @@
+//! What the model is, and the tables of its constants, parameters and coordinates.
+
+use modelmill_spec::{Mechanism, Motion};
+
+use super::document::{Document, Inline, Table, cell, code, name, number, text};
+use crate::Derivation;
+use crate::expr::print::{Formula, exact};
+
+/// The first paragraph.
+pub(super) fn summary(page: &mut Document, derivation: &Derivation) {
+    let mechanism = &derivation.mechanism;
+    let reduction = &derivation.reduction;
+    let count = |n: usize, one: &str, many: &str| match n {
+        0 => format!("no {many}"),
+        1 => format!("1 {one}"),
+        n => format!("{n} {many}"),
+    };
+    let passive = mechanism.coordinates.iter().filter(|c| c.passive).count();
+    page.paragraph([
+        text("Model "),
+        code(&*mechanism.name),
+        text(format!(
+            ": {}, {} ({} passive), {}, {}, {}. {} of dynamic parameters act on the drives and regroup to {}.",
+            count(
+                mechanism.parts.len() + mechanism.lumped_masses.len(),
+                "body or lumped mass",
+                "bodies and lumped masses"
+            ),
+            count(mechanism.coordinates.len(), "coordinate", "coordinates"),
+            passive,
+            count(mechanism.loops.len(), "loop", "loops"),
+            count(mechanism.drives.len(), "drive", "drives"),
+            count(mechanism.effects.len(), "further effect", "further effects"),
+            count(reduction.products.len(), "product", "products"),
+            count(reduction.retained.len(), "base parameter", "base parameters"),
+        )),
+    ]);
+}
+
+/// Constants, gravity, parameters, coordinates.
+pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
+    if !mechanism.constants.is_empty() {
+        page.heading("Constants");
+    }
+    let remark = |note: &Option<String>| cell(text(note.clone().unwrap_or_default()));
+    let rows = mechanism
+        .constants
+        .iter()
+        .map(|c| {
+            vec![
+                cell(name(&c.name)),
+                cell(text(number(c.value))),
+                cell(text(&*c.unit)),
+                remark(&c.note),
+            ]
+        })
+        .collect();
+    let head = vec!["symbol", "value", "unit", "meaning"];
+    page.table("constants", Table { head, rows });
+    let gravity = mechanism.gravity.each_ref().map(|g| exact(mechanism, g));
+    if gravity.iter().all(Formula::is_zero) {
+        page.paragraph([text("Gravity does not act.")]);
+    } else {
+        let [x, y, z] = gravity.map(Inline::Math);
+        page.paragraph([
+            text("Gravity in the base frame: ("),
+            x,
+            text(", "),
+            y,
+            text(", "),
+            z,
+            text(") m/s^2."),
+        ]);
+    }
+    page.heading("Dynamic parameters");
+    let rows = mechanism
+        .parameters
+        .iter()
+        .map(|p| {
+            vec![
+                cell(name(&p.name)),
+                cell(text(number(p.nominal))),
+                cell(text(&*p.unit)),
+                remark(&p.note),
+            ]
+        })
+        .collect();
+    let head = vec!["symbol", "nominal", "unit", "meaning"];
+    page.table("parameters", Table { head, rows });
+    page.heading("Coordinates");
+    let rows = mechanism
+        .coordinates
+        .iter()
+        .map(|c| {
+            let (kind, unit) = match c.motion {
+                Motion::Revolute => ("angle", "rad"),
+                Motion::Prismatic => ("length", "m"),
+            };
+            let role = if c.passive {
+                "passive, follows from the loops"
+            } else {
+                "independent"
+            };
+            vec![
+                cell(name(&c.name)),
+                cell(text(kind)),
+                cell(text(format!("{:.6}", c.nominal).trim_end_matches('0').trim_end_matches('.'))),
+                cell(text(unit)),
+                cell(text(role)),
+            ]
+        })
+        .collect();
+    let head = vec!["symbol", "kind", "nominal", "unit", "role"];
+    page.table("coordinates", Table { head, rows });
+}

@@ -1,0 +1,121 @@
+//! A page as one self-contained HTML file: MathML for the formulas, no scripts, light and dark.
+
+use std::fmt::Write;
+
+use super::document::{Block, Document, Equation, Inline, Line, terms};
+use crate::expr::print::{Formula, escape};
+
+const STYLE: &str = include_str!("page.css");
+
+pub(super) fn render(document: &Document) -> String {
+    let title = escape(&document.title);
+    let mut out = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n<h1>{title}</h1>\n"
+    );
+    let headings: Vec<&String> = document
+        .blocks
+        .iter()
+        .filter_map(|block| match block {
+            Block::Heading(text) => Some(text),
+            _ => None,
+        })
+        .collect();
+    out.push_str("<nav>");
+    for text in headings {
+        _ = write!(out, "<a href=\"#{}\">{}</a> ", anchor(text), escape(text));
+    }
+    out.push_str("</nav>\n");
+    blocks(&mut out, &document.blocks);
+    out.push_str("</main>\n</body>\n</html>\n");
+    out
+}
+
+fn anchor(text: &str) -> String {
+    text.chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' })
+        .collect()
+}
+
+fn blocks(out: &mut String, blocks: &[Block]) {
+    for block in blocks {
+        match block {
+            Block::Heading(text) => {
+                _ = writeln!(out, "<h2 id=\"{}\">{}</h2>", anchor(text), escape(text));
+            }
+            Block::Paragraph(line) => _ = writeln!(out, "<p>{}</p>", inlines(line)),
+            Block::Table(table) => {
+                out.push_str("<div class=\"wide\"><table>\n<thead><tr>");
+                for head in &table.head {
+                    _ = write!(out, "<th>{}</th>", escape(head));
+                }
+                out.push_str("</tr></thead>\n<tbody>\n");
+                for row in &table.rows {
+                    out.push_str("<tr>");
+                    for cell in row {
+                        _ = write!(out, "<td>{}</td>", inlines(cell));
+                    }
+                    out.push_str("</tr>\n");
+                }
+                out.push_str("</tbody>\n</table></div>\n");
+            }
+            Block::Equations(equations) => {
+                out.push_str("<div class=\"equations\">\n");
+                for equation in equations {
+                    write_equation(out, equation);
+                }
+                out.push_str("</div>\n");
+            }
+            Block::Folded(summary, inner) => {
+                _ = writeln!(out, "<details>\n<summary>{}</summary>", escape(summary));
+                self::blocks(out, inner);
+                out.push_str("</details>\n");
+            }
+        }
+    }
+}
+
+/// Terms are formulas of their own, so that the browser can break a long sum between them.
+fn write_equation(out: &mut String, equation: &Equation) {
+    _ = write!(
+        out,
+        "<div class=\"equation\"><span class=\"left\">{}</span><span class=\"right\">",
+        math(&format!("{}<mo>=</mo>", equation.left.mathml()))
+    );
+    for (i, term) in terms(&equation.right).iter().enumerate() {
+        let (sign, term) = match (i, term.is_negative()) {
+            (0, _) => ("", term.clone()),
+            (_, true) => ("<mo form=\"infix\">&#x2212;</mo>", term.clone().negated()),
+            (_, false) => ("<mo form=\"infix\">+</mo>", term.clone()),
+        };
+        if i > 0 {
+            out.push(' ');
+        }
+        out.push_str(&math(&format!("{sign}{}", term.mathml())));
+    }
+    if let Some(remark) = &equation.remark {
+        _ = write!(out, " <span class=\"unit\">{}</span>", escape(remark));
+    }
+    _ = writeln!(
+        out,
+        "</span><span class=\"tag\">({})</span></div>",
+        escape(&equation.tag)
+    );
+}
+
+fn math(content: &str) -> String {
+    format!("<math>{content}</math>")
+}
+
+fn inlines(line: &Line) -> String {
+    line.iter()
+        .map(|inline| match inline {
+            Inline::Text(text) => escape(text),
+            Inline::Code(text) => format!("<code>{}</code>", escape(text)),
+            Inline::Math(Formula::Number(n)) => n.to_string().replace('-', "\u{2212}"),
+            Inline::Math(formula) => math(&formula.mathml()),
+        })
+        .collect()
+}

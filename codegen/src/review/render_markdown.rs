@@ -1,0 +1,79 @@
+//! A page as Markdown with formulas in LaTeX between dollar signs.
+
+use std::fmt::Write;
+
+use super::document::{Block, Document, Equation, Inline, Line};
+use super::render_latex;
+use super::render_text;
+
+/// Lists of equations beyond this length are shown as text, which a reader can scan and copy.
+const MOST_DISPLAYED: usize = 24;
+
+pub(super) fn render(document: &Document) -> String {
+    let mut out = format!("# {}\n\n", escape(&document.title));
+    blocks(&mut out, &document.blocks);
+    out
+}
+
+fn blocks(out: &mut String, blocks: &[Block]) {
+    for block in blocks {
+        match block {
+            Block::Heading(text) => _ = writeln!(out, "## {}\n", escape(text)),
+            Block::Paragraph(line) => _ = writeln!(out, "{}\n", inlines(line)),
+            Block::Table(table) => {
+                _ = writeln!(out, "| {} |", table.head.join(" | "));
+                _ = writeln!(out, "|{}", " --- |".repeat(table.head.len()));
+                for row in &table.rows {
+                    let cells: Vec<String> = row.iter().map(inlines).collect();
+                    _ = writeln!(out, "| {} |", cells.join(" | "));
+                }
+                out.push('\n');
+            }
+            Block::Equations(equations) => write_equations(out, equations),
+            Block::Folded(summary, inner) => {
+                _ = writeln!(
+                    out,
+                    "<details><summary>{}</summary>\n",
+                    crate::expr::print::escape(summary)
+                );
+                self::blocks(out, inner);
+                out.push_str("</details>\n\n");
+            }
+        }
+    }
+}
+
+fn write_equations(out: &mut String, equations: &[Equation]) {
+    if equations.len() > MOST_DISPLAYED {
+        _ = writeln!(out, "```text\n{}```\n", render_text::lines(equations));
+        return;
+    }
+    for equation in equations {
+        _ = writeln!(
+            out,
+            "$$\n{}\n$$\n",
+            render_latex::aligned(equation, &format!(" \\qquad ({})", equation.tag))
+        );
+    }
+}
+
+fn inlines(line: &Line) -> String {
+    line.iter()
+        .map(|inline| match inline {
+            Inline::Text(text) => escape(text),
+            Inline::Code(text) => format!("`{text}`"),
+            Inline::Math(formula) => format!("${}$", formula.latex().replace('|', "\\vert ")),
+        })
+        .collect()
+}
+
+fn escape(text: &str) -> String {
+    let mut out = String::new();
+    for c in text.chars() {
+        if matches!(c, '\\' | '`' | '*' | '_' | '|' | '<' | '$') {
+            out.push('\\');
+        }
+        out.push(c);
+    }
+    out
+}

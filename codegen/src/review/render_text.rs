@@ -1,0 +1,153 @@
+//! A page as plain text for a terminal.
+
+use std::fmt::Write;
+
+use super::document::{Block, Document, Equation, Inline, Line, Table};
+
+/// Width at which equations and paragraphs are broken.
+const WIDTH: usize = 110;
+
+pub(super) fn render(document: &Document) -> String {
+    let mut out = String::new();
+    underlined(&mut out, &document.title, '=');
+    blocks(&mut out, &document.blocks);
+    out
+}
+
+fn underlined(out: &mut String, text: &str, with: char) {
+    let line: String = std::iter::repeat_n(with, text.chars().count()).collect();
+    _ = writeln!(out, "{text}\n{line}\n");
+}
+
+fn blocks(out: &mut String, blocks: &[Block]) {
+    for block in blocks {
+        match block {
+            Block::Heading(text) => underlined(out, text, '-'),
+            Block::Paragraph(line) => {
+                wrap(out, &plain(line), 0);
+                out.push('\n');
+            }
+            Block::Table(table) => {
+                write_table(out, table);
+                out.push('\n');
+            }
+            Block::Equations(equations) => {
+                out.push_str(&lines(equations));
+                out.push('\n');
+            }
+            Block::Folded(summary, inner) => {
+                _ = writeln!(out, "{summary}:\n");
+                self::blocks(out, inner);
+            }
+        }
+    }
+}
+
+/// A line without marks.
+pub(super) fn plain(line: &Line) -> String {
+    line.iter()
+        .map(|inline| match inline {
+            Inline::Text(text) | Inline::Code(text) => text.clone(),
+            Inline::Math(formula) => formula.text(),
+        })
+        .collect()
+}
+
+/// Breaks at blanks.
+fn wrap(out: &mut String, text: &str, indent: usize) {
+    let mut column = 0;
+    for word in text.split(' ') {
+        let width = word.chars().count();
+        if column > 0 && column + 1 + width > WIDTH {
+            _ = write!(out, "\n{:indent$}", "");
+            column = indent;
+        } else if column > 0 {
+            out.push(' ');
+            column += 1;
+        }
+        out.push_str(word);
+        column += width;
+    }
+    out.push('\n');
+}
+
+fn write_table(out: &mut String, table: &Table) {
+    let rows: Vec<Vec<String>> = table
+        .rows
+        .iter()
+        .map(|row| row.iter().map(plain).collect())
+        .collect();
+    let head: Vec<String> = table.head.iter().map(|h| (*h).to_owned()).collect();
+    let rule: Vec<String> = Vec::new();
+    let widths: Vec<usize> = (0..head.len())
+        .map(|i| {
+            rows.iter()
+                .chain([&head])
+                .map(|row| row[i].chars().count())
+                .max()
+                .unwrap_or(0)
+        })
+        .collect();
+    for row in [&head, &rule].into_iter().chain(&rows) {
+        let mut line = String::new();
+        for (i, width) in widths.iter().enumerate() {
+            if row.is_empty() {
+                line.extend(std::iter::repeat_n('-', *width));
+                line.push_str("  ");
+                continue;
+            }
+            _ = write!(line, "{:width$}  ", row[i]);
+        }
+        _ = writeln!(out, "  {}", line.trim_end());
+    }
+}
+
+/// Equations one below the other, long ones broken after a term.
+pub(super) fn lines(equations: &[Equation]) -> String {
+    let widest = equations
+        .iter()
+        .map(|e| e.tag.chars().count() + 2)
+        .max()
+        .unwrap_or(0);
+    let mut out = String::new();
+    for equation in equations {
+        let tag = format!("({})", equation.tag);
+        let start = format!("  {tag:>widest$}  {} = ", equation.left);
+        let indent = start.chars().count();
+        let mut body = equation.right.text();
+        if let Some(remark) = &equation.remark {
+            _ = write!(body, "   [{remark}]");
+        }
+        // Terms are kept whole: their blanks are those around signs.
+        out.push_str(&start);
+        let mut column = indent;
+        for (i, piece) in pieces(&body).into_iter().enumerate() {
+            let width = piece.chars().count();
+            if i > 0 && column + width > WIDTH {
+                let indent = indent.min(40);
+                _ = write!(out, "\n{:indent$}", "");
+                column = indent;
+            } else if i > 0 {
+                out.push(' ');
+            }
+            out.push_str(piece);
+            column += width + 1;
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// Splits before every sign that stands between blanks.
+fn pieces(text: &str) -> Vec<&str> {
+    let mut found = Vec::new();
+    let mut start = 0;
+    for (i, pair) in text.as_bytes().windows(3).enumerate() {
+        if pair[0] == b' ' && pair[2] == b' ' && matches!(pair[1], b'+' | b'-') {
+            found.push(&text[start..i]);
+            start = i + 1;
+        }
+    }
+    found.push(&text[start..]);
+    found
+}
