@@ -1,0 +1,249 @@
+//! The command line: names, options and help of every command.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::preparation::PreparationArgs;
+
+/// From a model file to base parameters, equations, fast Rust, and parameters from measurements.
+#[derive(Debug, Parser)]
+#[command(
+    name = "modelmill",
+    version,
+    about,
+    disable_help_subcommand = true,
+    after_help = "Start here:\n  \
+        modelmill tour                              the whole story on bundled recordings\n  \
+        modelmill equations models/two_link.toml    the reduced model of a file of yours\n\n\
+        Exit status: 0 done, 1 the input is at fault (with the place and what to do), 2 wrong usage."
+)]
+pub(crate) struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Validate a model file and print a summary
+    #[command(after_help = "Examples:\n  modelmill check models/spidermill.toml\n  \
+        modelmill check models/spidermill.toml --json")]
+    Check(CheckArgs),
+    /// Say what a variant changes: entries, p_g, dependencies, p_min, operation counts
+    #[command(
+        after_help = "Examples:\n  modelmill diff models/spidermill.toml models/spidermill-paper.toml"
+    )]
+    Diff(DiffArgs),
+    /// Print the reduced model as equations: p_g, dependencies, p_min, intermediate variables, counts
+    #[command(
+        after_help = "Examples:\n  modelmill equations models/spidermill-paper.toml\n  \
+        modelmill equations models/panda.toml --format html --out panda.html\n  \
+        modelmill equations models/panda.toml --format json | jq .rank"
+    )]
+    Equations(EquationsArgs),
+    /// Write the model as Rust source, the same that `cargo build` makes
+    #[command(after_help = "Examples:\n  modelmill generate models/scara.toml --out scara.rs")]
+    Generate(GenerateArgs),
+    /// Compute the model's forces along a recording
+    #[command(after_help = "Examples:\n  \
+        modelmill evaluate models/spidermill.toml --data run.csv --out forces.csv\n  \
+        modelmill evaluate models/spidermill.toml --data run.csv --parameters fit.json --out forces.csv")]
+    Evaluate(EvaluateArgs),
+    /// Find the base parameters from recordings by least squares
+    #[command(after_help = "Examples:\n  \
+        modelmill identify models/spidermill.toml --data fit.csv --check check.csv --out fit.json\n  \
+        modelmill identify models/emps.toml --data emps_train.csv \\\n      \
+        --order 4 --cutoff 100 --trim 49 --decimate 10\n  \
+        modelmill identify arm.toml --data a.csv --data b.csv --map t=time_s --map q1=pos_1")]
+    Identify(IdentifyArgs),
+    /// Hold the model against recordings: error figures, and where the error lives
+    #[command(after_help = "Examples:\n  \
+        modelmill compare models/spidermill.toml --data check.csv\n  \
+        modelmill compare models/spidermill.toml --data check.csv --parameters fit.json --json")]
+    Compare(CompareArgs),
+    /// Print a completion script for a shell
+    #[command(after_help = "Examples:\n  \
+        modelmill completions bash > ~/.local/share/bash-completion/completions/modelmill\n  \
+        modelmill completions zsh > ~/.zfunc/_modelmill\n  \
+        modelmill completions fish > ~/.config/fish/completions/modelmill.fish")]
+    Completions(CompletionsArgs),
+    /// Tell the story of a model on bundled recordings: derive, compare, identify, compare again
+    #[command(
+        after_help = "Examples:\n  modelmill tour\n  modelmill tour --out tour\n\n\
+        With --out the equations of both models and the figures are written as files there."
+    )]
+    Tour(TourArgs),
+}
+
+/// `check`.
+#[derive(Debug, Args)]
+pub(crate) struct CheckArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `diff`.
+#[derive(Debug, Args)]
+pub(crate) struct DiffArgs {
+    /// Model file as it was
+    pub(crate) before: PathBuf,
+    /// Model file as it is now
+    pub(crate) after: PathBuf,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// How equations are printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum EquationsFormat {
+    /// Plain text for the terminal
+    Text,
+    /// Markdown with TeX formulas
+    Markdown,
+    /// A LaTeX document
+    Latex,
+    /// One self-contained page with MathML
+    Html,
+    /// One JSON object
+    Json,
+}
+
+/// `equations`.
+#[derive(Debug, Args)]
+pub(crate) struct EquationsArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Form of the equations
+    #[arg(long, value_enum, default_value = "text")]
+    pub(crate) format: EquationsFormat,
+    /// The same as --format json
+    #[arg(long, conflicts_with = "format")]
+    pub(crate) json: bool,
+    /// Write to this file instead of standard output
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// `generate`.
+#[derive(Debug, Args)]
+pub(crate) struct GenerateArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Write the source to this file instead of standard output
+    #[arg(long, value_name = "FILE.rs")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// Where the values of the base parameters come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum ParameterSource {
+    /// The model file's nominal values.
+    Nominal,
+    /// A file that `identify` wrote.
+    Fit(PathBuf),
+}
+
+impl ParameterSource {
+    /// Reads the argument of `--parameters`.
+    fn parse(text: &str) -> Result<Self, String> {
+        match text {
+            "" => Err("expected `nominal` or the path of a fit".to_owned()),
+            "nominal" => Ok(Self::Nominal),
+            path => Ok(Self::Fit(PathBuf::from(path))),
+        }
+    }
+
+    /// The file, if there is one.
+    pub(crate) fn file(&self) -> Option<&PathBuf> {
+        match self {
+            Self::Nominal => None,
+            Self::Fit(path) => Some(path),
+        }
+    }
+
+    /// What the JSON calls it.
+    pub(crate) fn name(&self) -> String {
+        match self {
+            Self::Nominal => "nominal".to_owned(),
+            Self::Fit(path) => path.display().to_string(),
+        }
+    }
+}
+
+/// `evaluate`.
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Recording (CSV) whose states are taken
+    #[arg(long, value_name = "RUN")]
+    pub(crate) data: PathBuf,
+    /// Values of the base parameters: `nominal`, or a file that `identify` wrote
+    #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
+    pub(crate) parameters: ParameterSource,
+    /// Write the forces to this file instead of standard output
+    #[arg(long, value_name = "OUT.csv")]
+    pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) preparation: PreparationArgs,
+}
+
+/// `identify`.
+#[derive(Debug, Args)]
+pub(crate) struct IdentifyArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Recordings (CSV) to identify from; may be repeated
+    #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
+    pub(crate) data: Vec<PathBuf>,
+    /// Recordings to check the result on, which the fit does not see; may be repeated
+    #[arg(long, value_name = "RUN", num_args = 1..)]
+    pub(crate) check: Vec<PathBuf>,
+    /// Write the result as JSON to this file, for `--parameters`
+    #[arg(long, value_name = "FIT.json")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) preparation: PreparationArgs,
+}
+
+/// `compare`.
+#[derive(Debug, Args)]
+pub(crate) struct CompareArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Recordings (CSV); may be repeated
+    #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
+    pub(crate) data: Vec<PathBuf>,
+    /// Values of the base parameters: `nominal`, or a file that `identify` wrote
+    #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
+    pub(crate) parameters: ParameterSource,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) preparation: PreparationArgs,
+}
+
+/// `completions`.
+#[derive(Debug, Args)]
+pub(crate) struct CompletionsArgs {
+    /// Shell
+    pub(crate) shell: clap_complete::Shell,
+}
+
+/// `tour`.
+#[derive(Debug, Args)]
+pub(crate) struct TourArgs {
+    /// Write the equations and the figures as files into this folder
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}

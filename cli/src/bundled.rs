@@ -1,0 +1,75 @@
+//! Models and recordings that are part of the program, so that the tour needs no files.
+
+use std::io;
+use std::path::Path;
+
+use modelmill_spec::Loaded;
+
+use crate::failure::{Failure, Outcome};
+use crate::terminal;
+
+/// Model files by name.
+const MODELS: [(&str, &str); 2] = [
+    (
+        "spidermill.toml",
+        include_str!("../../model-spec/models/spidermill.toml"),
+    ),
+    (
+        "spidermill-paper.toml",
+        include_str!("../../model-spec/models/spidermill-paper.toml"),
+    ),
+];
+
+/// A recorded pair of runs of the whole robot: one to identify from, one to check on.
+pub(crate) struct Runs {
+    /// Short name.
+    pub(crate) name: &'static str,
+    /// What the robot was.
+    pub(crate) about: &'static str,
+    /// Name and text of the recording to identify from.
+    pub(crate) fit: (&'static str, &'static str),
+    /// Name and text of the recording to check on.
+    pub(crate) check: (&'static str, &'static str),
+}
+
+/// The robot as the model describes it.
+pub(crate) const PLAIN: Runs = Runs {
+    name: "plain",
+    about: "the whole robot, masses as in Table 1",
+    fit: (
+        "spidermill-mbs/plain-fit.csv",
+        include_str!("../../recordings/spidermill-mbs/plain-fit.csv"),
+    ),
+    check: (
+        "spidermill-mbs/plain-check.csv",
+        include_str!("../../recordings/spidermill-mbs/plain-check.csv"),
+    ),
+};
+
+/// The robot with something that the model does not know of.
+pub(crate) const WITH_RODS: Runs = Runs {
+    name: "with rods",
+    about: "besides, each spindle is a rod of 8 kg",
+    fit: (
+        "spidermill-mbs/with-rods-fit.csv",
+        include_str!("../../recordings/spidermill-mbs/with-rods-fit.csv"),
+    ),
+    check: (
+        "spidermill-mbs/with-rods-check.csv",
+        include_str!("../../recordings/spidermill-mbs/with-rods-check.csv"),
+    ),
+};
+
+/// Reads a bundled model file.
+pub(crate) fn model(name: &str) -> Outcome<Loaded> {
+    let text = |wanted: &Path| {
+        MODELS
+            .iter()
+            .find(|(name, _)| Path::new(name) == wanted)
+            .map(|(_, text)| (*text).to_owned())
+            .ok_or_else(|| io::Error::other("it is not part of the program"))
+    };
+    let own = text(Path::new(name)).map_err(|error| Failure::Input(format!("{name}: {error}")))?;
+    modelmill_spec::load(name, &own, &mut |path| text(path))
+        .map_err(|failure| Failure::Rendered(failure.render(terminal::errors_in_colour())))
+}

@@ -1,0 +1,50 @@
+//! `evaluate`: the model's forces along a recording.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use crate::along;
+use crate::args::EvaluateArgs;
+use crate::data;
+use crate::failure::Outcome;
+use crate::model;
+use crate::output::Target;
+use crate::terminal;
+
+/// Writes `t` and one column per drive.
+pub(crate) fn run(args: &EvaluateArgs) -> Outcome {
+    let model = model::derive(&args.model)?;
+    let mut inputs: Vec<&Path> = model.files.iter().map(AsRef::as_ref).collect();
+    inputs.push(&args.data);
+    inputs.extend(args.parameters.file().map(AsRef::<Path>::as_ref));
+    let target = args
+        .out
+        .as_ref()
+        .map(|path| Target::new(path, inputs))
+        .transpose()?;
+    let values = model.values(&args.parameters)?;
+    let data = data::read(&model, &args.data, &args.preparation)?;
+    let forces = along::forces(&model, &data, &values)?;
+    let time = data.time();
+    let mut text = format!("t,{}\n", model.drives().join(","));
+    for (i, t) in time.iter().enumerate() {
+        let _ = write!(text, "{t}");
+        for force in &forces {
+            let _ = write!(text, ",{}", force[i]);
+        }
+        text.push('\n');
+    }
+    match target {
+        Some(target) => {
+            target.write(&text)?;
+            terminal::note(&format!(
+                "{}: {} samples of {}",
+                target.path().display(),
+                time.len(),
+                model.drives().join(", ")
+            ));
+            Ok(())
+        }
+        None => terminal::print(&text),
+    }
+}

@@ -1,0 +1,32 @@
+//! `generate`: the model as Rust source.
+
+use std::path::PathBuf;
+
+use crate::args::GenerateArgs;
+use crate::failure::Outcome;
+use crate::model;
+use crate::output::Target;
+use crate::terminal;
+
+/// Writes the source that `cargo build` makes of the model.
+pub(crate) fn run(args: &GenerateArgs) -> Outcome {
+    let model = model::derive(&args.model)?;
+    let target = args
+        .out
+        .as_ref()
+        .map(|path| Target::new(path, model.files.iter().map(PathBuf::as_path)))
+        .transpose()?;
+    let source = modelmill_codegen::emit(&model.derivation).file();
+    match target {
+        Some(target) => {
+            target.write(&source)?;
+            terminal::note(&format!(
+                "{}: {} lines",
+                target.path().display(),
+                source.lines().count()
+            ));
+            Ok(())
+        }
+        None => terminal::print(&source),
+    }
+}

@@ -1,0 +1,250 @@
+//! The entries of a model as pairs of a name and a text, so that two models can be compared.
+
+use modelmill_spec::{
+    Angle, Axis, Convention, DriveKind, Effect, Exact, Inertial, Length, Mechanism, Motion, Place,
+    Step, Symbol,
+};
+
+/// All entries in the order of the file, each named by its table and its own name.
+pub(crate) fn entries(m: &Mechanism) -> Vec<(String, String)> {
+    let mut list = Vec::new();
+    let mut add = |kind: &str, name: &str, text: String| {
+        let mut key = format!("{kind} {name}").trim().to_owned();
+        // Entries of the same name are told apart by their place in the file.
+        let mut twin = 1;
+        while list.iter().any(|(other, _)| *other == key) {
+            twin += 1;
+            key = format!("{kind} {name} ({twin})");
+        }
+        list.push((key, text));
+    };
+    let exact = |e: &Exact| text(m, e);
+    let triple =
+        |v: &[Exact; 3]| format!("({})", v.iter().map(exact).collect::<Vec<_>>().join(", "));
+    add("gravity", "", triple(&m.gravity));
+    for c in &m.constants {
+        add("constant", &c.name, format!("{} {}", c.value, c.unit));
+    }
+    for p in &m.parameters {
+        add("parameter", &p.name, format!("{} {}", p.nominal, p.unit));
+    }
+    for c in &m.coordinates {
+        let motion = match c.motion {
+            Motion::Revolute => "revolute",
+            Motion::Prismatic => "prismatic",
+        };
+        let passive = if c.passive { ", passive" } else { "" };
+        add(
+            "coordinate",
+            &c.name,
+            format!("{motion}{passive}, nominal {}", c.nominal),
+        );
+    }
+    for f in &m.frames {
+        if f.convention == Convention::Base {
+            continue;
+        }
+        let steps: Vec<String> = f.steps.iter().map(|s| step(m, s)).collect();
+        let steps = if steps.is_empty() {
+            "no displacement".to_owned()
+        } else {
+            steps.join(" ")
+        };
+        add(
+            "frame",
+            &f.name,
+            format!("on {}, {steps}", m.frames[f.parent.0].name),
+        );
+    }
+    for p in &m.points {
+        add(
+            "point",
+            &p.name,
+            format!("on {} at {}", m.frames[p.frame.0].name, triple(&p.at)),
+        );
+    }
+    for p in &m.parts {
+        let inertial = match &p.inertial {
+            Inertial::AboutCentre {
+                mass,
+                centre,
+                inertia,
+            } => format!(
+                "mass {}, centre {}, inertia about it {}",
+                exact(mass),
+                triple(centre),
+                tensor(m, inertia)
+            ),
+            Inertial::Linear {
+                mass,
+                first_moment,
+                inertia,
+            } => format!(
+                "mass {}, first moment {}, inertia about the origin {}",
+                exact(mass),
+                triple(first_moment),
+                tensor(m, inertia)
+            ),
+        };
+        add(
+            "part",
+            &p.name,
+            format!("on {}, {inertial}", m.frames[p.frame.0].name),
+        );
+    }
+    for l in &m.lumped_masses {
+        let places = if l.force_at == l.moment_at {
+            format!("at {}", triple(&l.force_at))
+        } else {
+            format!(
+                "at {} for the balance of forces and at {} for the balance of moments",
+                triple(&l.force_at),
+                triple(&l.moment_at)
+            )
+        };
+        let frame = &m.frames[l.frame.0].name;
+        let what = format!("{} of {} on {frame}, {places}", l.share, exact(&l.mass));
+        add("lumped mass on", frame, what);
+    }
+    for l in &m.loops {
+        let [a, b] = l.joins.map(|p| m.points[p.0].name.clone());
+        add("loop", &l.name, format!("joins {a} and {b}"));
+    }
+    for d in &m.drives {
+        let how = match d.kind {
+            DriveKind::Joint(i) => format!("on the joint {}", m.coordinates[i.0].name),
+            DriveKind::Linear { from, to } => {
+                format!(
+                    "linear, from {} to {}",
+                    m.points[from.0].name, m.points[to.0].name
+                )
+            }
+        };
+        add("drive", &d.name, how);
+    }
+    for e in &m.effects {
+        add(
+            "effect",
+            &format!("{} at {}", e.kind, places(m, e)),
+            terms(m, e),
+        );
+    }
+    let retained: Vec<String> = m.retain.iter().map(|powers| product(m, powers)).collect();
+    if !retained.is_empty() {
+        add("retain", "", retained.join(", "));
+    }
+    for (ours, theirs) in &m.recording.columns {
+        add("column", ours, theirs.clone());
+    }
+    list
+}
+
+fn text(m: &Mechanism, exact: &Exact) -> String {
+    exact.to_text(&|symbol| m.symbol_name(symbol).to_owned())
+}
+
+fn product(m: &Mechanism, powers: &[(modelmill_spec::ParameterIdx, u32)]) -> String {
+    let factors: Vec<String> = powers
+        .iter()
+        .map(|(p, n)| match n {
+            1 => m.parameters[p.0].name.clone(),
+            n => format!("{}^{n}", m.parameters[p.0].name),
+        })
+        .collect();
+    factors.join("*")
+}
+
+fn tensor(m: &Mechanism, inertia: &[Exact; 6]) -> String {
+    let entries: Vec<String> = ["xx", "xy", "xz", "yy", "yz", "zz"]
+        .iter()
+        .zip(inertia)
+        .filter(|(_, value)| !value.is_zero())
+        .map(|(name, value)| format!("{name} {}", text(m, value)))
+        .collect();
+    if entries.is_empty() {
+        "zero".to_owned()
+    } else {
+        entries.join(", ")
+    }
+}
+
+fn step(m: &Mechanism, step: &Step) -> String {
+    let letter = |axis: &Axis| match axis {
+        Axis::X => "x",
+        Axis::Y => "y",
+        Axis::Z => "z",
+    };
+    match step {
+        Step::Rotate(axis, angle) => format!("R{}({})", letter(axis), angle_text(m, angle)),
+        Step::Translate(axis, length) => format!("T{}({})", letter(axis), length_text(m, length)),
+    }
+}
+
+fn angle_text(m: &Mechanism, angle: &Angle) -> String {
+    let mut terms: Vec<String> = angle
+        .terms
+        .iter()
+        .map(|(symbol, factor)| times(&factor.to_string(), m.symbol_name(*symbol)))
+        .collect();
+    let pi = angle.pi.to_string();
+    if pi != "0" {
+        terms.push(times(&pi, "pi"));
+    }
+    join(&terms)
+}
+
+fn length_text(m: &Mechanism, length: &Length) -> String {
+    let mut terms: Vec<String> = length
+        .coordinates
+        .iter()
+        .map(|(i, factor)| times(&factor.to_string(), m.symbol_name(Symbol::Coordinate(*i))))
+        .collect();
+    if !length.offset.is_zero() {
+        terms.push(text(m, &length.offset));
+    }
+    join(&terms)
+}
+
+fn times(factor: &str, what: &str) -> String {
+    match factor {
+        "1" => what.to_owned(),
+        "-1" => format!("-{what}"),
+        factor => format!("{factor}*{what}"),
+    }
+}
+
+fn join(terms: &[String]) -> String {
+    if terms.is_empty() {
+        return "0".to_owned();
+    }
+    terms.join(" + ").replace("+ -", "- ")
+}
+
+fn places(m: &Mechanism, effect: &Effect) -> String {
+    let names: Vec<&str> = effect
+        .places
+        .iter()
+        .map(|place| match place {
+            Place::Drive(d) => m.drives[d.0].name.as_str(),
+            Place::Coordinate(i) => m.coordinates[i.0].name.as_str(),
+            Place::Point(p) => m.points[p.0].name.as_str(),
+        })
+        .collect();
+    names.join(", ")
+}
+
+fn terms(m: &Mechanism, effect: &Effect) -> String {
+    let terms: Vec<String> = effect
+        .terms
+        .iter()
+        .map(|term| {
+            let name = &m.parameters[term.parameter.0].name;
+            match text(m, &term.expression).as_str() {
+                "1" => name.clone(),
+                expression if expression.contains([' ', '/']) => format!("{name}*({expression})"),
+                expression => format!("{name}*{expression}"),
+            }
+        })
+        .collect();
+    join(&terms)
+}

@@ -1,0 +1,230 @@
+//! Model files as commands see them: read, derived, with names for people and messages for faults.
+
+use std::path::{Path, PathBuf};
+
+use modelmill_codegen::{BaseParameter, Derivation};
+use modelmill_identify::{FitFile, ParameterInfo};
+use modelmill_spec::{Loaded, PlaceQuantity, Symbol};
+
+use crate::args::ParameterSource;
+use crate::failure::{Failure, Outcome};
+use crate::progress::watched;
+use crate::terminal;
+
+/// A model file that was read and derived.
+pub(crate) struct Model {
+    /// The file's name without folder and extension; what the JSON calls the model.
+    pub(crate) name: String,
+    /// What messages call the file.
+    pub(crate) path: String,
+    /// The files it was read from.
+    pub(crate) files: Vec<PathBuf>,
+    /// Everything the mill knows about it.
+    pub(crate) derivation: Derivation,
+    /// The base parameters.
+    pub(crate) base: Vec<BaseParameter>,
+    /// Their values from the file's nominal values.
+    pub(crate) nominal: Vec<f64>,
+}
+
+/// Reads a model file; warnings go to standard error.
+pub(crate) fn load(path: &Path) -> Outcome<Loaded> {
+    if path.is_dir() {
+        return Err(Failure::Input(format!(
+            "{} is a folder; a model file is expected{}",
+            path.display(),
+            nearby(path)
+        )));
+    }
+    if !path.exists() {
+        return Err(Failure::Input(format!(
+            "there is no file {}; the path of a model file (TOML) is expected{}",
+            path.display(),
+            nearby(path)
+        )));
+    }
+    let loaded = modelmill_spec::load_file(path)
+        .map_err(|failure| Failure::Rendered(failure.render(terminal::errors_in_colour())))?;
+    if !loaded.warnings.is_empty() {
+        terminal::say(loaded.render(terminal::errors_in_colour()).trim_end());
+    }
+    Ok(loaded)
+}
+
+/// Reads and derives a model file.
+pub(crate) fn derive(path: &Path) -> Outcome<Model> {
+    let loaded = load(path)?;
+    derive_loaded(&path.display().to_string(), &loaded)
+}
+
+/// Derives a model that was read from `path`.
+pub(crate) fn derive_loaded(path: &str, loaded: &Loaded) -> Outcome<Model> {
+    let mechanism = &loaded.mechanism;
+    let derivation = watched(&format!("deriving {}", mechanism.name), 0, |_| {
+        modelmill_codegen::derive(mechanism)
+    })
+    .map_err(|error| Failure::Input(format!("{path}: {error}")))?;
+    let stem = Path::new(path).file_stem();
+    Ok(Model {
+        name: stem.map_or_else(
+            || mechanism.name.clone(),
+            |s| s.to_string_lossy().into_owned(),
+        ),
+        path: path.to_owned(),
+        files: loaded.sources.paths().map(Path::to_owned).collect(),
+        base: derivation.base_parameters(),
+        nominal: derivation.nominal_base_values(),
+        derivation,
+    })
+}
+
+impl Model {
+    /// Names of the active coordinates, in the order of the file.
+    pub(crate) fn active(&self) -> Vec<String> {
+        self.coordinates(false)
+    }
+
+    /// Names of the passive coordinates, in the order of the file.
+    pub(crate) fn passive(&self) -> Vec<String> {
+        self.coordinates(true)
+    }
+
+    fn coordinates(&self, passive: bool) -> Vec<String> {
+        let coordinates = self.derivation.mechanism.coordinates.iter();
+        coordinates
+            .filter(|c| c.passive == passive)
+            .map(|c| c.name.clone())
+            .collect()
+    }
+
+    /// Names of the drives.
+    pub(crate) fn drives(&self) -> Vec<String> {
+        let drives = self.derivation.mechanism.drives.iter();
+        drives.map(|d| d.name.clone()).collect()
+    }
+
+    /// The base parameters as a fit describes them.
+    pub(crate) fn infos(&self) -> Vec<ParameterInfo> {
+        self.base
+            .iter()
+            .enumerate()
+            .map(|(k, base)| ParameterInfo {
+                name: base.name.clone(),
+                expression: base.expression.clone(),
+                unit: base.unit.clone(),
+                nominal: self.has_nominal(k).then(|| self.nominal[k]),
+            })
+            .collect()
+    }
+
+    /// Whether the file gives a nominal value for anything that a base parameter consists of.
+    pub(crate) fn has_nominal(&self, k: usize) -> bool {
+        let reduction = &self.derivation.reduction;
+        let parameters = &self.derivation.mechanism.parameters;
+        let lumped = reduction
+            .dependencies
+            .iter()
+            .filter(|line| line.equals.iter().any(|(at, _)| *at == k))
+            .map(|line| line.product);
+        std::iter::once(reduction.retained[k])
+            .chain(lumped)
+            .any(|product| {
+                let powers = &reduction.products[product].0;
+                powers.iter().all(|(p, _)| parameters[*p].nominal != 0.0)
+            })
+    }
+
+    /// Values of the base parameters from where `--parameters` says.
+    pub(crate) fn values(&self, source: &ParameterSource) -> Outcome<Vec<f64>> {
+        let ParameterSource::Fit(path) = source else {
+            let without: Vec<&str> = (0..self.base.len())
+                .filter(|k| !self.has_nominal(*k))
+                .map(|k| self.base[k].expression.as_str())
+                .collect();
+            if !without.is_empty() {
+                terminal::warn(&format!(
+                    "{} gives no nominal value for {}; 0 is taken",
+                    self.path,
+                    without.join(", ")
+                ));
+            }
+            return Ok(self.nominal.clone());
+        };
+        let names: Vec<(&str, &str)> = self
+            .base
+            .iter()
+            .map(|base| (base.name.as_str(), base.expression.as_str()))
+            .collect();
+        FitFile::read(path)
+            .and_then(|fit| fit.values_for(&names, &path.display().to_string()))
+            .map_err(Failure::input)
+    }
+
+    /// Effects whose force depends on the load of the drive.
+    pub(crate) fn load_dependent(&self) -> Vec<&str> {
+        let effects = self.derivation.mechanism.effects.iter();
+        effects
+            .filter(|effect| {
+                effect.terms.iter().any(|term| {
+                    term.expression
+                        .mentions(&|symbol| symbol == Symbol::Place(PlaceQuantity::Load))
+                })
+            })
+            .map(|effect| effect.kind.as_str())
+            .collect()
+    }
+}
+
+/// Model files around a path that led nowhere, as a sentence for the end of a message.
+fn nearby(path: &Path) -> String {
+    let own = if path.is_dir() {
+        path
+    } else {
+        path.parent().unwrap_or(Path::new(""))
+    };
+    let folders = [
+        own,
+        Path::new("models"),
+        Path::new("model-spec/models"),
+        Path::new(""),
+    ];
+    for folder in folders {
+        let here = if folder.as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            folder
+        };
+        let mut found: Vec<String> = std::fs::read_dir(here)
+            .into_iter()
+            .flatten()
+            .flatten()
+            .map(|entry| folder.join(entry.file_name()))
+            .filter(|file| is_model(file))
+            .map(|file| file.display().to_string())
+            .collect();
+        if found.is_empty() {
+            continue;
+        }
+        found.sort();
+        let more = found.len().saturating_sub(24);
+        found.truncate(24);
+        let more = if more > 0 {
+            format!("\n  and {more} more")
+        } else {
+            String::new()
+        };
+        return format!("; model files nearby:\n  {}{more}", found.join("\n  "));
+    }
+    "; `modelmill tour` shows what a model file gives".to_owned()
+}
+
+/// Whether a file looks like a model: TOML with a line that gives the version of the schema.
+fn is_model(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e == "toml")
+        && std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() < 1 << 20)
+        && std::fs::read_to_string(path).is_ok_and(|text| {
+            text.lines()
+                .filter_map(|line| line.split_once('='))
+                .any(|(key, _)| key.trim() == "schema")
+        })
+}

@@ -1,0 +1,60 @@
+//! Files that commands write: never over an input, with the reason when it fails.
+
+use std::path::{Path, PathBuf};
+
+use crate::failure::{Failure, Outcome};
+
+/// A place to write to that is none of the inputs.
+#[derive(Debug, Clone)]
+pub(crate) struct Target(PathBuf);
+
+impl Target {
+    /// Refuses a target that is one of the files that the command reads, or a folder.
+    pub(crate) fn new<'a>(
+        path: &Path,
+        inputs: impl IntoIterator<Item = &'a Path>,
+    ) -> Outcome<Self> {
+        if path.is_dir() {
+            return Err(Failure::Usage(format!(
+                "--out {}: this is a folder; give the name of a file in it",
+                path.display()
+            )));
+        }
+        for input in inputs {
+            if same_file(path, input) {
+                return Err(Failure::Usage(format!(
+                    "--out {} would overwrite a file that this command reads; choose another name",
+                    path.display()
+                )));
+            }
+        }
+        Ok(Self(path.to_owned()))
+    }
+
+    /// Writes the file.
+    pub(crate) fn write(&self, text: &str) -> Outcome {
+        write(&self.0, text)
+    }
+
+    /// The path as the user gave it.
+    pub(crate) fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+/// Writes a file; the reason and what to do if it cannot be.
+pub(crate) fn write(path: &Path, text: &str) -> Outcome {
+    std::fs::write(path, text).map_err(|error| {
+        Failure::Input(format!(
+            "{} cannot be written: {error}; check that the folder exists and may be written to",
+            path.display()
+        ))
+    })
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    }
+}

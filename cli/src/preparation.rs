@@ -1,0 +1,107 @@
+//! Options that say how recordings are read and prepared, shared by all commands that read them.
+
+use clap::{Args, ValueEnum};
+use modelmill_identify::Preparation;
+use modelmill_identify::derivatives::Source;
+
+/// How recordings are read and states are prepared.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Reading and preparing recordings")]
+pub(crate) struct PreparationArgs {
+    /// The recording calls our column by another name, e.g. `--map theta1=pos_left`; may be
+    /// repeated. Ours are `t`, a coordinate, a coordinate with `_d` or `_dd`, and a drive
+    #[arg(long, value_name = "OURS=THEIRS", value_parser = parse_map)]
+    pub(crate) map: Vec<(String, String)>,
+    /// Cut-off of the low-pass on positions, Hz; chosen from the signal if not given
+    #[arg(long, value_name = "HZ", value_parser = parse_cutoff)]
+    pub(crate) cutoff: Option<f64>,
+    /// Order of the Butterworth low-pass, which runs forwards and backwards
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    pub(crate) order: usize,
+    /// Samples dropped at the start and at the end, once derivatives are made; a single number
+    /// counts for both ends
+    #[arg(long, value_name = "N[,N]", value_parser = parse_trim)]
+    pub(crate) trim: Option<(usize, usize)>,
+    /// Keep every n-th sample, after a low-pass on forces and regressor alike
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_decimate)]
+    pub(crate) decimate: usize,
+    /// Which rates and accelerations are taken
+    #[arg(long, value_enum, default_value = "recorded")]
+    pub(crate) derivatives: DerivativesArg,
+    /// Leave out samples with NaN, infinite or empty fields instead of refusing the recording
+    #[arg(long)]
+    pub(crate) skip_bad_samples: bool,
+}
+
+/// Where derivatives come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DerivativesArg {
+    /// Recorded columns where there are any, the others from positions
+    Recorded,
+    /// All from positions, whatever the file holds
+    Positions,
+}
+
+impl PreparationArgs {
+    /// The same for recordings that need nothing.
+    pub(crate) fn none() -> Self {
+        Self {
+            map: Vec::new(),
+            cutoff: None,
+            order: 4,
+            trim: None,
+            decimate: 1,
+            derivatives: DerivativesArg::Recorded,
+            skip_bad_samples: false,
+        }
+    }
+
+    /// As the identification crate wants it.
+    pub(crate) fn preparation(&self) -> Preparation {
+        Preparation {
+            cutoff_hz: self.cutoff,
+            order: self.order,
+            trim: self.trim,
+            decimate: self.decimate,
+            source: match self.derivatives {
+                DerivativesArg::Recorded => Source::RecordedFirst,
+                DerivativesArg::Positions => Source::Positions,
+            },
+        }
+    }
+}
+
+fn parse_map(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((ours, theirs)) if !ours.trim().is_empty() && !theirs.trim().is_empty() => {
+            Ok((ours.trim().to_owned(), theirs.trim().to_owned()))
+        }
+        _ => Err("expected OURS=THEIRS, such as theta1=pos_left".to_owned()),
+    }
+}
+
+fn parse_cutoff(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("expected a frequency above 0 in Hz, such as 25".to_owned()),
+    }
+}
+
+fn parse_trim(text: &str) -> Result<(usize, usize), String> {
+    let count = |text: &str| {
+        text.trim().parse::<usize>().map_err(|_| {
+            "expected a number of samples, such as 49, or two of them, such as 49,10".to_owned()
+        })
+    };
+    match text.split_once(',') {
+        Some((start, end)) => Ok((count(start)?, count(end)?)),
+        None => count(text).map(|both| (both, both)),
+    }
+}
+
+fn parse_decimate(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(value) if value > 0 => Ok(value),
+        _ => Err("expected a whole number from 1 on; 1 keeps all samples".to_owned()),
+    }
+}
