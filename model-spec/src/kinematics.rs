@@ -7,11 +7,11 @@ pub(crate) type Vec3 = [f64; 3];
 
 /// One motion on the way from the base to a frame.
 pub(crate) struct Moved {
-    coordinate: CoordinateIdx,
-    factor: f64,
-    motion: Motion,
-    axis: Vec3,
-    origin: Vec3,
+    pub(crate) coordinate: CoordinateIdx,
+    pub(crate) factor: f64,
+    pub(crate) motion: Motion,
+    pub(crate) axis: Vec3,
+    pub(crate) origin: Vec3,
 }
 
 /// A frame in the base frame, and the motions between it and its parent.

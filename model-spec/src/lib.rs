@@ -22,6 +22,8 @@ mod numeric;
 mod parser;
 mod pose;
 mod print;
+#[cfg(test)]
+mod rank_tests;
 mod record;
 mod schema;
 mod scope;

@@ -32,13 +32,13 @@ pub(crate) fn check(mechanism: &mut Mechanism, places: &Places, log: &mut Log) {
 }
 
 /// Gaps of all loops, the derivative of the gaps, and the size of the mechanism.
-struct Gaps {
-    values: Vec<f64>,
-    rows: Rows,
-    size: f64,
+pub(crate) struct Gaps {
+    pub(crate) values: Vec<f64>,
+    pub(crate) rows: Rows,
+    pub(crate) size: f64,
 }
 
-fn gaps(mechanism: &Mechanism) -> Gaps {
+pub(crate) fn gaps(mechanism: &Mechanism) -> Gaps {
     let poses = frame_poses(mechanism);
     let mut found = Gaps {
         values: Vec::new(),
