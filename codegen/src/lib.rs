@@ -15,6 +15,7 @@ mod linear;
 mod linear_loops;
 mod lower;
 mod newton_euler;
+mod numeric_pose;
 mod programs;
 mod projection;
 mod reduce;
@@ -32,7 +33,7 @@ pub use evaluate::{Evaluator, PoseFault, PoseReason, States};
 pub use exact::Monomial;
 pub use lower::{Guard, Op, OperationCount, Program, Stage, ValueId};
 pub use programs::{PassivePosition, Programs};
-pub use reduce::{Dependency, RationalFunction, Reduction, Variable};
+pub use reduce::{Dependency, Method, RationalFunction, Reduction, Variable};
 
 use expr::Graph;
 use regressor::Equations;

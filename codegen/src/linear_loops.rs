@@ -8,8 +8,9 @@ use modelmill_spec::{Mechanism, Motion};
 use nalgebra::{DMatrix, DVector};
 
 use crate::closure::Closure;
-use crate::expr::{AngleSum, Atom, ExprId, F64, FieldPoint, Graph, Node, Tape};
+use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Node, Tape};
 use crate::field::{Element, Stream};
+use crate::numeric_pose::Loops;
 
 /// A passive angle that equals `sum + pi12 * pi/12`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -55,49 +56,15 @@ fn residual(graph: &mut Graph, relation: &Relation) -> ExprId {
 
 /// Coordinates at the nominal pose and at some poses around it; `None` if the loops cannot be followed there.
 fn poses(graph: &mut Graph, mechanism: &Mechanism, closures: &[Closure]) -> Option<Vec<Vec<f64>>> {
-    let n = mechanism.coordinates.len();
-    let passive: Vec<usize> = (0..n).filter(|i| mechanism.coordinates[*i].passive).collect();
-    let residual: Vec<ExprId> = closures.iter().flat_map(|c| c.residual.iter().copied()).collect();
-    if passive.is_empty() || residual.len() < passive.len() {
+    if closures.is_empty() {
         return None;
     }
-    let mut roots = residual.clone();
-    for p in &passive {
-        roots.extend(graph.differentiate(&residual, Atom::Coordinate(*p)));
-    }
-    let tape = Tape::new(graph, &roots);
-    let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
+    let residual: Vec<ExprId> = closures.iter().flat_map(|c| c.residual.iter().copied()).collect();
+    let loops = Loops::new(graph, mechanism, &residual);
     let mut stream = Stream::new(1);
-    let mut found = vec![nominal.clone()];
-    for _ in 0..n + 4 {
-        let mut q = nominal.clone();
-        for i in (0..n).filter(|i| !passive.contains(i)) {
-            let share = stream.element().representative() as f64 / crate::field::MODULUS as f64;
-            q[i] += MOVE * (2.0 * share - 1.0);
-        }
-        let mut converged = false;
-        for _ in 0..30 {
-            let value = |atom: Atom| match atom {
-                Atom::Constant(i) => mechanism.constants[i].value,
-                Atom::Coordinate(i) => q[i],
-                _ => 0.0,
-            };
-            let values = tape.evaluate(&F64(value))?;
-            let r = DVector::from_column_slice(&values[..residual.len()]);
-            let jacobian = DMatrix::from_column_slice(residual.len(), passive.len(), &values[residual.len()..]);
-            let step = jacobian.svd(true, true).solve(&r, 1e-12).ok()?;
-            for (p, dx) in passive.iter().zip(step.iter()) {
-                q[*p] -= dx;
-            }
-            if step.amax() < 1e-13 {
-                converged = true;
-                break;
-            }
-        }
-        if !converged {
-            return None;
-        }
-        found.push(q);
+    let mut found = vec![loops.nominal()];
+    for _ in 0..mechanism.coordinates.len() + 4 {
+        found.push(loops.random(MOVE, &mut stream)?);
     }
     Some(found)
 }

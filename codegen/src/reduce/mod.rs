@@ -6,6 +6,7 @@
 
 mod eliminate;
 mod print;
+mod numeric;
 mod rational_function;
 mod reconstruct;
 mod sample;
@@ -38,8 +39,25 @@ pub struct Reduction {
     pub retained: Vec<usize>,
     /// Eq. (6): for every other product, by position, the retained ones (by position in `retained`) with their factors.
     pub dependencies: Vec<Dependency>,
-    /// At how many points of motion the result was confirmed, with fresh constants.
-    pub confirmed_at: usize,
+    /// How it was found.
+    pub method: Method,
+}
+
+/// How a reduction was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// In the prime field: it holds for all values of the constants but special ones.
+    Exact {
+        /// At how many points of motion `H p_g = H_min p_min` was shown, with fresh constants.
+        confirmed_at: usize,
+    },
+    /// On the model file's values, in floating point: the factors are rounded numbers.
+    Numeric {
+        /// What the others leave of the retained column that is nearest to being dependent, relative to its size.
+        least_kept: f64,
+        /// The same for the dependent column that is furthest from it.
+        most_dropped: f64,
+    },
 }
 
 /// One line of eq. (6): `h_j = sum of a_k h_k`.
@@ -111,7 +129,14 @@ pub(crate) fn reduce(
         .map(|(d, k)| columns[k][d])
         .collect();
     let roots = root_radicands(graph, &outputs, projection);
-    let sampler = Sampler::new(graph, mechanism, projection, &outputs)?;
+    let sampler = match Sampler::new(graph, mechanism, projection, &outputs) {
+        Err(DeriveError::LoopsNotSampled { .. }) => {
+            let order = preference(mechanism, candidates, &effective);
+            let order: Vec<usize> = order.into_iter().map(|k| effective[k]).collect();
+            return numeric::reduce(graph, mechanism, projection, candidates, columns, &order);
+        }
+        sampler => sampler?,
+    };
     let mut stream = Stream::new(SEED);
     let n = effective.len();
 
@@ -230,7 +255,7 @@ pub(crate) fn reduce(
         without_effect,
         retained,
         dependencies,
-        confirmed_at: 0,
+        method: Method::Exact { confirmed_at: 0 },
     };
     let shown: Vec<usize> = (0..n).filter(|k| !is_zero[*k]).collect();
     reduction.confirm(&sampler, n, &shown, &mut stream)?;
@@ -246,6 +271,7 @@ impl Reduction {
         shown: &[usize],
         stream: &mut Stream,
     ) -> Result<(), DeriveError> {
+        let mut points = 0;
         for _ in 0..4 {
             let constants = sampler.constants(stream);
             let parameters: Vec<Element> = self.products.iter().map(|_| stream.element()).collect();
@@ -271,9 +297,10 @@ impl Reduction {
                         return Err(DeriveError::NotConfirmed);
                     }
                 }
-                self.confirmed_at += 1;
+                points += 1;
             }
         }
+        self.method = Method::Exact { confirmed_at: points };
         Ok(())
     }
 }

@@ -1,0 +1,152 @@
+//! The numeric reduction, for loops that cannot be sampled exactly: the rank test of eq. (9) on the model file's values.
+//!
+//! Its factors are floating-point numbers and hold for these values alone; results say so.
+
+use modelmill_spec::Mechanism;
+use nalgebra::{DMatrix, DVector};
+
+use super::{Dependency, Method, RationalFunction, Reduction};
+use crate::DeriveError;
+use crate::exact::Monomial;
+use crate::expr::{Atom, ExprId, F64, Graph, Rational, Tape};
+use crate::field::Stream;
+use crate::numeric_pose::{Loops, symmetric};
+use crate::projection::Projection;
+
+/// What is left of a column, relative to its size, below which it counts as dependent.
+const DEPENDENT: f64 = 1e-9;
+/// How far poses lie from the nominal one, rad or m.
+const REACH: f64 = 0.4;
+
+/// Reduces `columns[k][d]`, trying them in the given order.
+pub(super) fn reduce(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    projection: &Projection,
+    candidates: &[Monomial],
+    columns: &[Vec<ExprId>],
+    order: &[usize],
+) -> Result<Reduction, DeriveError> {
+    let w = sample(graph, mechanism, projection, columns)?;
+    let norms: Vec<f64> = (0..columns.len()).map(|k| w.column(k).norm()).collect();
+    let largest = norms.iter().fold(0.0, |a: f64, b| a.max(*b));
+    let mut kept: Vec<usize> = Vec::new();
+    let mut lines: Vec<(usize, Vec<f64>)> = Vec::new();
+    let (mut least_kept, mut most_dropped) = (1.0_f64, 0.0_f64);
+    let mut effective = Vec::new();
+    for &k in order {
+        if norms[k] <= DEPENDENT * largest {
+            continue;
+        }
+        effective.push(k);
+        let basis = DMatrix::from_fn(w.nrows(), kept.len(), |i, j| w[(i, kept[j])] / norms[kept[j]]);
+        let column: DVector<f64> = w.column(k) / norms[k];
+        let factors = if kept.is_empty() {
+            DVector::zeros(0)
+        } else {
+            let qr = basis.clone().qr();
+            let rotated = qr.q().transpose() * &column;
+            qr.r().solve_upper_triangular(&rotated).ok_or(DeriveError::RankChanged)?
+        };
+        let left = (&column - &basis * &factors).norm();
+        if left > DEPENDENT {
+            least_kept = least_kept.min(left);
+            kept.push(k);
+        } else {
+            most_dropped = most_dropped.max(left);
+            lines.push((k, factors.iter().zip(&kept).map(|(f, j)| f * norms[k] / norms[*j]).collect()));
+        }
+    }
+    effective.sort_unstable();
+    let at = |k: usize| effective.iter().position(|x| *x == k).expect("an effective column has a position");
+    let mut sorted = kept.clone();
+    sorted.sort_unstable();
+    let mut dependencies: Vec<Dependency> = lines
+        .iter()
+        .map(|(k, factors)| Dependency {
+            product: at(*k),
+            equals: kept
+                .iter()
+                .zip(factors)
+                .filter(|(_, f)| f.abs() > 1e-9)
+                .map(|(j, f)| (sorted.iter().position(|x| x == j).expect("a kept column is kept"), decimal(*f)))
+                .collect(),
+        })
+        .collect();
+    dependencies.sort_by_key(|line| line.product);
+    let products: Vec<Monomial> = effective.iter().map(|k| candidates[*k].clone()).collect();
+    Ok(Reduction {
+        without_effect: candidates.iter().filter(|c| !products.contains(c)).cloned().collect(),
+        retained: sorted.iter().map(|k| at(*k)).collect(),
+        products,
+        dependencies,
+        method: Method::Numeric { least_kept, most_dropped },
+    })
+}
+
+/// A number with ten decimals, as an exact rational, so that everything behind treats it like any other factor.
+fn decimal(value: f64) -> RationalFunction {
+    const SCALE: f64 = 1e10;
+    let scaled = (value * SCALE).round();
+    #[expect(clippy::cast_possible_truncation, reason = "checked against the range")]
+    let rational = if scaled.abs() < 9e18 {
+        Rational::new(scaled as i64, 10_000_000_000)
+    } else {
+        num_rational::BigRational::from_float(value).map_or(Rational::ZERO, Rational::from)
+    };
+    RationalFunction::constant(rational)
+}
+
+/// W of eq. (9) at random states around the nominal pose.
+fn sample(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    projection: &Projection,
+    columns: &[Vec<ExprId>],
+) -> Result<DMatrix<f64>, DeriveError> {
+    let n_drives = projection.drives.len();
+    let outputs: Vec<ExprId> = (0..n_drives).flat_map(|d| columns.iter().map(move |c| c[d])).collect();
+    let loops = Loops::new(graph, mechanism, &projection.residual);
+    let [rates, accelerations, outputs] =
+        [&projection.passive_rates, &projection.passive_accelerations, &outputs].map(|roots| Tape::new(graph, roots));
+    let mut stream = Stream::new(super::SEED);
+    let n_coordinates = mechanism.coordinates.len();
+    let mut rows: Vec<f64> = Vec::new();
+    let wanted = (4 * columns.len()).div_ceil(n_drives.max(1)) + 10;
+    let (mut n_points, mut tries) = (0, 0);
+    while n_points < wanted && tries < 20 * wanted {
+        tries += 1;
+        let Some(q) = loops.random(REACH, &mut stream) else { continue };
+        let mut qd: Vec<f64> = (0..n_coordinates).map(|_| 2.0 * symmetric(&mut stream)).collect();
+        let mut qdd: Vec<f64> = (0..n_coordinates).map(|_| 5.0 * symmetric(&mut stream)).collect();
+        let load: Vec<f64> = (0..n_drives).map(|_| 100.0 * symmetric(&mut stream)).collect();
+        let evaluate = |tape: &Tape, qd: &[f64], qdd: &[f64]| {
+            tape.evaluate(&F64(|atom: Atom| match atom {
+                Atom::Constant(i) => mechanism.constants[i].value,
+                Atom::Parameter(i) => mechanism.parameters[i].nominal,
+                Atom::Coordinate(i) => q[i],
+                Atom::Rate(i) => qd[i],
+                Atom::Acceleration(i) => qdd[i],
+                Atom::Load(d) => load[d],
+                Atom::Base(_) => 0.0,
+            }))
+        };
+        let Some(found) = evaluate(&rates, &qd, &qdd) else { continue };
+        for (p, value) in projection.passive.iter().zip(found) {
+            qd[*p] = value;
+        }
+        let Some(found) = evaluate(&accelerations, &qd, &qdd) else { continue };
+        for (p, value) in projection.passive.iter().zip(found) {
+            qdd[*p] = value;
+        }
+        let Some(values) = evaluate(&outputs, &qd, &qdd) else { continue };
+        if values.iter().all(|v| v.is_finite()) {
+            rows.extend(values);
+            n_points += 1;
+        }
+    }
+    if n_points < wanted {
+        return Err(DeriveError::NoPointFound { draws: tries });
+    }
+    Ok(DMatrix::from_row_slice(n_points * n_drives, columns.len(), &rows))
+}
