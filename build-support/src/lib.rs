@@ -34,7 +34,9 @@ pub fn generate(pattern: &str) {
     let out = std::env::var_os("OUT_DIR").map(PathBuf::from);
     let result = match out {
         Some(out) => try_generate(pattern, &out.join("models.rs")),
-        None => Err(BuildError("OUT_DIR is not set: call this from a build script".to_owned())),
+        None => Err(BuildError(
+            "OUT_DIR is not set: call this from a build script".to_owned(),
+        )),
     };
     if let Err(error) = result {
         for line in error.0.lines() {
@@ -57,7 +59,11 @@ pub fn try_generate(pattern: &str, out: &Path) -> Result<(), BuildError> {
         match module(file) {
             Ok((name, module)) if names.insert(name.clone()) => text.push_str(&module),
             Ok((name, _)) => {
-                _ = writeln!(faults, "{}: another model is called `{name}` too; change `name` in one of them", file.display());
+                _ = writeln!(
+                    faults,
+                    "{}: another model is called `{name}` too; change `name` in one of them",
+                    file.display()
+                );
             }
             Err(error) => faults.push_str(&error.0),
         }
@@ -69,20 +75,26 @@ pub fn try_generate(pattern: &str, out: &Path) -> Result<(), BuildError> {
     if std::fs::read_to_string(out).is_ok_and(|old| old == text) {
         return Ok(());
     }
-    std::fs::write(out, text).map_err(|error| BuildError(format!("cannot write {}: {error}", out.display())))
+    std::fs::write(out, text)
+        .map_err(|error| BuildError(format!("cannot write {}: {error}", out.display())))
 }
 
 fn files(pattern: &str) -> Result<Vec<PathBuf>, BuildError> {
-    let Some(folder) = pattern.strip_suffix("/*.toml") else { return Ok(vec![PathBuf::from(pattern)]) };
+    let Some(folder) = pattern.strip_suffix("/*.toml") else {
+        return Ok(vec![PathBuf::from(pattern)]);
+    };
     println!("cargo::rerun-if-changed={folder}");
-    let entries = std::fs::read_dir(folder).map_err(|error| BuildError(format!("cannot read folder `{folder}`: {error}")))?;
+    let entries = std::fs::read_dir(folder)
+        .map_err(|error| BuildError(format!("cannot read folder `{folder}`: {error}")))?;
     let mut files: Vec<PathBuf> = entries
         .filter_map(|entry| entry.ok().map(|e| e.path()))
         .filter(|path| path.extension().is_some_and(|e| e == "toml"))
         .collect();
     files.sort();
     if files.is_empty() {
-        return Err(BuildError(format!("no model file `*.toml` in folder `{folder}`")));
+        return Err(BuildError(format!(
+            "no model file `*.toml` in folder `{folder}`"
+        )));
     }
     Ok(files)
 }
@@ -103,5 +115,8 @@ fn module(file: &Path) -> Result<(String, String), BuildError> {
     }
     let derivation = modelmill_codegen::derive(&loaded.mechanism)
         .map_err(|error| BuildError(format!("{}: {error}\n", file.display())))?;
-    Ok((loaded.mechanism.name.clone(), modelmill_codegen::emit(&derivation).module()))
+    Ok((
+        loaded.mechanism.name.clone(),
+        modelmill_codegen::emit(&derivation).module(),
+    ))
 }

@@ -4,7 +4,8 @@ use modelmill_spec::Mechanism;
 
 use crate::Derivation;
 use crate::exact::Monomial;
-use crate::expr::{Atom, ExprId, Graph};
+use crate::expr::print::Formula;
+use crate::expr::{Atom, ExprId, Graph, Rational};
 use crate::reduce::Reduction;
 
 /// One base parameter, for people and programs.
@@ -23,7 +24,10 @@ pub struct BaseParameter {
 impl Derivation {
     /// Indices of the active and of the passive coordinates.
     pub fn coordinates(&self) -> (Vec<usize>, Vec<usize>) {
-        (self.equations.projection.active.clone(), self.equations.projection.passive.clone())
+        (
+            self.equations.projection.active.clone(),
+            self.equations.projection.passive.clone(),
+        )
     }
 
     /// The base parameters in the order of p_min.
@@ -35,7 +39,7 @@ impl Derivation {
                 BaseParameter {
                     name: format!("p{}_min", k + 1),
                     retained: product.text(&self.mechanism),
-                    expression: reduction.base_text(&self.mechanism, k),
+                    expression: crate::review::base_expression(self, k).text(),
                     unit: unit(&self.mechanism, product),
                 }
             })
@@ -44,7 +48,20 @@ impl Derivation {
 
     /// Eq. (6), one line per dependent product: `h[m2] = d1*h[m1*dc1] + ...`.
     pub fn dependency_texts(&self) -> Vec<String> {
-        self.reduction.dependencies.iter().map(|line| line.text(&self.mechanism, &self.reduction)).collect()
+        let column = |product: usize| {
+            format!(
+                "h[{}]",
+                self.reduction.products[product].text(&self.mechanism)
+            )
+        };
+        let lines = self.reduction.dependencies.iter().map(|line| {
+            let terms = line.equals.iter().map(|(k, factor)| {
+                let retained = Formula::name(column(self.reduction.retained[*k]));
+                Formula::product(Rational::ONE, [factor.formula(&self.mechanism), retained])
+            });
+            format!("{} = {}", column(line.product), Formula::sum(terms).text())
+        });
+        lines.collect()
     }
 
     /// Values of the base parameters for given parameters and constants, both in the order of the model file.
@@ -62,7 +79,12 @@ impl Derivation {
 
     /// Values of the base parameters for the model file's values.
     pub fn nominal_base_values(&self) -> Vec<f64> {
-        let parameters: Vec<f64> = self.mechanism.parameters.iter().map(|p| p.nominal).collect();
+        let parameters: Vec<f64> = self
+            .mechanism
+            .parameters
+            .iter()
+            .map(|p| p.nominal)
+            .collect();
         let constants: Vec<f64> = self.mechanism.constants.iter().map(|c| c.value).collect();
         self.base_values(&parameters, &constants)
     }
@@ -71,15 +93,22 @@ impl Derivation {
 /// The base parameters as expressions of the graph: eq. (7) carried out.
 pub(crate) fn expressions(graph: &mut Graph, reduction: &Reduction) -> Vec<ExprId> {
     let product = |graph: &mut Graph, m: &Monomial| {
-        let factors: Vec<_> = m
-            .0
-            .iter()
-            .map(|(p, n)| (graph.atom(Atom::Parameter(*p)), i32::try_from(*n).expect("a small power")))
-            .collect();
+        let factors: Vec<_> =
+            m.0.iter()
+                .map(|(p, n)| {
+                    (
+                        graph.atom(Atom::Parameter(*p)),
+                        i32::try_from(*n).expect("a small power"),
+                    )
+                })
+                .collect();
         graph.product(&factors)
     };
-    let mut terms: Vec<Vec<ExprId>> =
-        reduction.retained.iter().map(|k| vec![product(graph, &reduction.products[*k])]).collect();
+    let mut terms: Vec<Vec<ExprId>> = reduction
+        .retained
+        .iter()
+        .map(|k| vec![product(graph, &reduction.products[*k])])
+        .collect();
     for line in &reduction.dependencies {
         let value = product(graph, &reduction.products[line.product]);
         for (k, factor) in &line.equals {
@@ -95,7 +124,12 @@ pub(crate) fn unit(mechanism: &Mechanism, product: &Monomial) -> String {
     let factors: Vec<(&str, i32)> = product
         .0
         .iter()
-        .map(|(p, n)| (mechanism.parameters[*p].unit.as_str(), i32::try_from(*n).expect("a small power")))
+        .map(|(p, n)| {
+            (
+                mechanism.parameters[*p].unit.as_str(),
+                i32::try_from(*n).expect("a small power"),
+            )
+        })
         .collect();
     modelmill_spec::unit_product(&factors)
 }

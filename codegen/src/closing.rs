@@ -130,7 +130,11 @@ impl Closing {
                 let mut parts = AngleParts {
                     known: AngleSum::NONE.plus(&rest.known, -sign),
                     pi12: -sign * rest.pi12,
-                    solved: rest.solved.into_iter().map(|(s, n)| (s, -n * sign)).collect(),
+                    solved: rest
+                        .solved
+                        .into_iter()
+                        .map(|(s, n)| (s, -n * sign))
+                        .collect(),
                 };
                 parts.solved.push((first + k, *sign));
                 self.angle_of.insert(*i, parts);
@@ -158,7 +162,11 @@ impl Closing {
                 _ => known = known.plus(&AngleSum::new([(*atom, 1)]), *n),
             }
         }
-        AngleParts { known, pi12, solved: solved.into_iter().filter(|(_, n)| *n != 0).collect() }
+        AngleParts {
+            known,
+            pi12,
+            solved: solved.into_iter().filter(|(_, n)| *n != 0).collect(),
+        }
     }
 
     /// Cosine and sine of a sum of angles, by the addition theorem.
@@ -211,7 +219,12 @@ impl Closing {
     }
 
     /// Closes some expressions over the active coordinates and lowers them.
-    pub(crate) fn program(&self, graph: &mut Graph, equations: &Equations, outputs: &[ExprId]) -> Program {
+    pub(crate) fn program(
+        &self,
+        graph: &mut Graph,
+        equations: &Equations,
+        outputs: &[ExprId],
+    ) -> Program {
         let projection = &equations.projection;
         let rates: BTreeMap<ExprId, ExprId> = projection
             .passive

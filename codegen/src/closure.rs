@@ -166,7 +166,13 @@ fn close(graph: &mut Graph, name: String, path: &[Stretch]) -> Closure {
     }
     let residual: Vec<ExprId> = total.into_iter().filter(|r| *r != Graph::ZERO).collect();
     let coordinates = coordinates_of(graph, &residual);
-    Closure { name, residual, chain, relations: Vec::new(), coordinates }
+    Closure {
+        name,
+        residual,
+        chain,
+        relations: Vec::new(),
+        coordinates,
+    }
 }
 
 /// Coordinates on which some expressions depend.

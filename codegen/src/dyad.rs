@@ -49,7 +49,12 @@ pub(crate) fn solve(
 ) -> Option<Solved> {
     if !closure.relations.is_empty() {
         let relations = closure.relations.clone();
-        return Some(Solved { angles: Vec::new(), relations, lengths: Vec::new(), root: None });
+        return Some(Solved {
+            angles: Vec::new(),
+            relations,
+            lengths: Vec::new(),
+            root: None,
+        });
     }
     let legs = closure.chain.as_ref()?;
     let mut known = [Graph::ZERO; 2];

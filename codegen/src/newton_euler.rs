@@ -108,29 +108,51 @@ pub(crate) fn forward(graph: &mut Graph, tree: &Tree, gravity: &Vector, style: S
         let (mut omega, mut alpha, turning) = match style {
             Style::LinkByLink => {
                 let (omega, alpha) = (parent.omega, parent.alpha);
-                (tree.to_link(graph, i, &omega), tree.to_link(graph, i, &alpha), link.turns.clone())
+                (
+                    tree.to_link(graph, i, &omega),
+                    tree.to_link(graph, i, &alpha),
+                    link.turns.clone(),
+                )
             }
             Style::AcrossParallelAxes => {
                 let first = &tree.links[link.first_parallel];
                 let fixed = first.parent.map_or(&base, |p| &links[p]);
                 let turns: Vec<Turn> = first.pre.iter().chain([&link.absolute]).cloned().collect();
-                let turned = |graph: &mut Graph, v: &Vector| turns.iter().fold(*v, |v, turn| graph.turn_in(turn, &v));
+                let turned = |graph: &mut Graph, v: &Vector| {
+                    turns.iter().fold(*v, |v, turn| graph.turn_in(turn, &v))
+                };
                 let turning = link
                     .absolute
                     .sum
                     .terms()
                     .iter()
-                    .filter_map(|(atom, n)| if let Atom::Coordinate(c) = atom { Some((*c, *n)) } else { None })
+                    .filter_map(|(atom, n)| {
+                        if let Atom::Coordinate(c) = atom {
+                            Some((*c, *n))
+                        } else {
+                            None
+                        }
+                    })
                     .collect();
-                (turned(graph, &fixed.omega), turned(graph, &fixed.alpha), turning)
+                (
+                    turned(graph, &fixed.omega),
+                    turned(graph, &fixed.alpha),
+                    turning,
+                )
             }
         };
         let sum = |graph: &mut Graph, atom: fn(usize) -> Atom, terms: &[(usize, Rational)]| {
-            let terms: Vec<_> = terms.iter().map(|(c, k)| (graph.atom(atom(*c)), k.clone())).collect();
+            let terms: Vec<_> = terms
+                .iter()
+                .map(|(c, k)| (graph.atom(atom(*c)), k.clone()))
+                .collect();
             graph.sum(&terms)
         };
         // R'omega_parent x z rate = (omega_y, -omega_x, 0) rate
-        let turning: Vec<_> = turning.iter().map(|(c, n)| (*c, Rational::integer(i64::from(*n)))).collect();
+        let turning: Vec<_> = turning
+            .iter()
+            .map(|(c, n)| (*c, Rational::integer(i64::from(*n))))
+            .collect();
         let rate = sum(graph, Atom::Rate, &turning);
         let swing = [graph.mul(omega[1], rate), graph.mul(omega[0], rate)];
         alpha[0] = graph.add(alpha[0], swing[0]);
@@ -293,8 +315,14 @@ fn across(
         force = tree.to_parent(graph, i, &force);
         let [px, py, _] = joint.position;
         let (x, y) = (graph.mul(px, force[1]), graph.mul(py, force[0]));
-        about_z = graph.combine([(about_z, Rational::ONE), (x, Rational::ONE), (y, Rational::MINUS_ONE)]);
-        let parent = joint.parent.expect("a link below the first parallel one has a parent");
+        about_z = graph.combine([
+            (about_z, Rational::ONE),
+            (x, Rational::ONE),
+            (y, Rational::MINUS_ONE),
+        ]);
+        let parent = joint
+            .parent
+            .expect("a link below the first parallel one has a parent");
         let absolute = tree.links[parent].absolute.clone();
         arms.push(graph.turn_out(&absolute, &joint.position));
         i = parent;
@@ -305,6 +333,10 @@ fn across(
     let turned = graph.turn_out(absolute, &wrench.moment);
     let arm = graph.add_vectors(&arms);
     let lever = graph.cross(&arm, &force);
-    let moment = [graph.add(turned[0], lever[0]), graph.add(turned[1], lever[1]), about_z];
+    let moment = [
+        graph.add(turned[0], lever[0]),
+        graph.add(turned[1], lever[1]),
+        about_z,
+    ];
     (first, Wrench { force, moment })
 }

@@ -16,18 +16,28 @@ pub(crate) struct Loops<'a> {
 
 impl<'a> Loops<'a> {
     pub(crate) fn new(graph: &mut Graph, mechanism: &'a Mechanism, residual: &[ExprId]) -> Self {
-        let passive: Vec<usize> =
-            (0..mechanism.coordinates.len()).filter(|i| mechanism.coordinates[*i].passive).collect();
+        let passive: Vec<usize> = (0..mechanism.coordinates.len())
+            .filter(|i| mechanism.coordinates[*i].passive)
+            .collect();
         let mut roots = residual.to_vec();
         for p in &passive {
             roots.extend(graph.differentiate(residual, Atom::Coordinate(*p)));
         }
-        Self { mechanism, passive, n_residuals: residual.len(), tape: Tape::new(graph, &roots) }
+        Self {
+            mechanism,
+            passive,
+            n_residuals: residual.len(),
+            tape: Tape::new(graph, &roots),
+        }
     }
 
     /// Coordinates of the nominal pose.
     pub(crate) fn nominal(&self) -> Vec<f64> {
-        self.mechanism.coordinates.iter().map(|c| c.nominal).collect()
+        self.mechanism
+            .coordinates
+            .iter()
+            .map(|c| c.nominal)
+            .collect()
     }
 
     /// A pose whose active coordinates lie within `reach` of the nominal one, followed from there; `None` if the loops
@@ -36,7 +46,13 @@ impl<'a> Loops<'a> {
         const STEPS: u32 = 8;
         let mut q = self.nominal();
         let moves: Vec<f64> = (0..q.len())
-            .map(|i| if self.passive.contains(&i) { 0.0 } else { reach * symmetric(stream) / f64::from(STEPS) })
+            .map(|i| {
+                if self.passive.contains(&i) {
+                    0.0
+                } else {
+                    reach * symmetric(stream) / f64::from(STEPS)
+                }
+            })
             .collect();
         for _ in 0..STEPS {
             for (x, dx) in q.iter_mut().zip(&moves) {
@@ -62,8 +78,12 @@ impl<'a> Loops<'a> {
                 self.tape.evaluate(&F64(value))?
             };
             let (residual, jacobian) = values.split_at(self.n_residuals);
-            let jacobian = DMatrix::from_column_slice(self.n_residuals, self.passive.len(), jacobian);
-            let step = jacobian.svd(true, true).solve(&DVector::from_column_slice(residual), 1e-12).ok()?;
+            let jacobian =
+                DMatrix::from_column_slice(self.n_residuals, self.passive.len(), jacobian);
+            let step = jacobian
+                .svd(true, true)
+                .solve(&DVector::from_column_slice(residual), 1e-12)
+                .ok()?;
             for (p, dx) in self.passive.iter().zip(step.iter()) {
                 q[*p] -= dx;
             }

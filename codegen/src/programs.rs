@@ -8,9 +8,9 @@ use std::collections::BTreeMap;
 use modelmill_spec::Mechanism;
 
 use crate::DeriveError;
+use crate::closing::Closing;
 use crate::exact::Monomial;
 use crate::expr::{Atom, ExprId, Graph};
-use crate::closing::Closing;
 use crate::lower::{Program, Request, lower};
 use crate::reduce::{Reduction, Unknowns, plan};
 use crate::regressor::Equations;
@@ -78,7 +78,9 @@ pub(crate) fn programs(
         .collect();
     let base_value = |m: &Monomial| base.get(m).copied().unwrap_or(Graph::ZERO);
     let row_by_row = |columns: &[Vec<ExprId>]| -> Vec<ExprId> {
-        (0..n_drives).flat_map(|d| columns.iter().map(move |column| column[d])).collect()
+        (0..n_drives)
+            .flat_map(|d| columns.iter().map(move |column| column[d]))
+            .collect()
     };
     let mut regressors = Vec::new();
     let mut inverse_dynamics = Vec::new();
@@ -129,7 +131,12 @@ pub(crate) fn programs(
         }
     };
     let base = crate::base::expressions(graph, reduction);
-    let request = Request { outputs: &base, reachable: &[], regular: &[], definitions: &[] };
+    let request = Request {
+        outputs: &base,
+        reachable: &[],
+        regular: &[],
+        definitions: &[],
+    };
     let base_parameters = lower(graph, &request);
     let mut program = |outputs: &[ExprId]| closing.program(graph, equations, outputs);
     let regressor = cheapest(regressors.iter().map(|outputs| program(outputs)));
@@ -147,7 +154,9 @@ pub(crate) fn programs(
 
 /// The program that costs least per state; the first of equals.
 fn cheapest(programs: impl Iterator<Item = Program>) -> Program {
-    programs.min_by_key(Program::weight).expect("there is at least one way to write the equations")
+    programs
+        .min_by_key(Program::weight)
+        .expect("there is at least one way to write the equations")
 }
 
 /// Value of an expression at the nominal pose, with the file's constants; rates are zero.

@@ -36,7 +36,11 @@ pub(crate) fn equations(
         exact::expression(graph, &mechanism.gravity[1])?,
         exact::expression(graph, &mechanism.gravity[2])?,
     ];
-    let has_parallel_axes = tree.links.iter().enumerate().any(|(i, link)| link.first_parallel != i);
+    let has_parallel_axes = tree
+        .links
+        .iter()
+        .enumerate()
+        .any(|(i, link)| link.first_parallel != i);
     let styles = [Style::LinkByLink, Style::AcrossParallelAxes];
     let motions = styles
         .into_iter()
@@ -77,7 +81,12 @@ impl Equations {
     }
 
     fn motion(&self, style: Style) -> &Motion {
-        &self.motions.iter().find(|(s, _)| *s == style).unwrap_or(&self.motions[0]).1
+        &self
+            .motions
+            .iter()
+            .find(|(s, _)| *s == style)
+            .unwrap_or(&self.motions[0])
+            .1
     }
 
     /// Forces of the drives for one product of value 1, all others 0.
@@ -88,16 +97,30 @@ impl Equations {
         product: &Monomial,
         style: Style,
     ) -> Result<Vec<ExprId>, DeriveError> {
-        let bodies: Vec<_> = self.inertia.of(product).map(|(link, inertia)| (link, *inertia)).collect();
+        let bodies: Vec<_> = self
+            .inertia
+            .of(product)
+            .map(|(link, inertia)| (link, *inertia))
+            .collect();
         let motion = self.motion(style);
-        let wrenches: Vec<_> =
-            bodies.iter().map(|(link, inertia)| (*link, motion.wrench(graph, *link, inertia))).collect();
+        let wrenches: Vec<_> = bodies
+            .iter()
+            .map(|(link, inertia)| (*link, motion.wrench(graph, *link, inertia)))
+            .collect();
         let n = mechanism.coordinates.len();
         let on_tree = match style {
             Style::LinkByLink => newton_euler::backward(graph, &self.tree, n, wrenches),
-            Style::AcrossParallelAxes => newton_euler::backward_across(graph, &self.tree, n, wrenches),
+            Style::AcrossParallelAxes => {
+                newton_euler::backward_across(graph, &self.tree, n, wrenches)
+            }
         };
-        let value = |m: &Monomial| if m == product { Graph::ONE } else { Graph::ZERO };
+        let value = |m: &Monomial| {
+            if m == product {
+                Graph::ONE
+            } else {
+                Graph::ZERO
+            }
+        };
         self.forces(graph, mechanism, on_tree, &value)
     }
 
@@ -111,9 +134,12 @@ impl Equations {
     ) -> Result<Vec<ExprId>, DeriveError> {
         let inertia = self.inertia.total(graph, value);
         let motion = self.motion(style);
-        let wrenches: Vec<_> =
-            inertia.iter().map(|(link, inertia)| (*link, motion.wrench(graph, *link, inertia))).collect();
-        let on_tree = newton_euler::backward(graph, &self.tree, mechanism.coordinates.len(), wrenches);
+        let wrenches: Vec<_> = inertia
+            .iter()
+            .map(|(link, inertia)| (*link, motion.wrench(graph, *link, inertia)))
+            .collect();
+        let on_tree =
+            newton_euler::backward(graph, &self.tree, mechanism.coordinates.len(), wrenches);
         self.forces(graph, mechanism, on_tree, value)
     }
 

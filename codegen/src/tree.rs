@@ -235,7 +235,9 @@ impl Builder {
     fn close(&mut self, links: &mut Vec<Link>) {
         let fresh = Self::new(Some(links.len()));
         let done = std::mem::replace(self, fresh);
-        let parallel = done.parent.filter(|_| done.pre.iter().all(|turn| turn.axis == Axis::Z));
+        let parallel = done
+            .parent
+            .filter(|_| done.pre.iter().all(|turn| turn.axis == Axis::Z));
         let mut absolute = NO_TURN;
         let mut first_parallel = links.len();
         if let Some(parent) = parallel {

@@ -122,5 +122,19 @@ macro_rules! real {
     };
 }
 
-real!(f64, libm::sincos, libm::sqrt, libm::atan2, libm::tanh, libm::exp);
-real!(f32, libm::sincosf, libm::sqrtf, libm::atan2f, libm::tanhf, libm::expf);
+real!(
+    f64,
+    libm::sincos,
+    libm::sqrt,
+    libm::atan2,
+    libm::tanh,
+    libm::exp
+);
+real!(
+    f32,
+    libm::sincosf,
+    libm::sqrtf,
+    libm::atan2f,
+    libm::tanhf,
+    libm::expf
+);

@@ -6,7 +6,10 @@ use crate::{PoseError, Real};
 ///
 /// # Errors
 /// [`PoseError::Singular`] if a pivot is zero or no number.
-pub fn solve<T: Real, const N: usize>(mut matrix: [[T; N]; N], mut rhs: [T; N]) -> Result<[T; N], PoseError> {
+pub fn solve<T: Real, const N: usize>(
+    mut matrix: [[T; N]; N],
+    mut rhs: [T; N],
+) -> Result<[T; N], PoseError> {
     let zero = T::from_f64(0.0);
     for column in 0..N {
         let mut pivot = column;
@@ -46,7 +49,11 @@ mod tests {
 
     #[test]
     fn a_system_that_needs_pivoting_is_solved() {
-        let x = solve([[0.0, 2.0, 1.0], [1.0, 1.0, 0.0], [3.0, 0.0, -1.0]], [7.0, 3.0, 0.0]).unwrap();
+        let x = solve(
+            [[0.0, 2.0, 1.0], [1.0, 1.0, 0.0], [3.0, 0.0, -1.0]],
+            [7.0, 3.0, 0.0],
+        )
+        .unwrap();
         for (found, expected) in x.iter().zip([1.0, 2.0, 3.0]) {
             assert!((found - expected).abs() < 1e-12_f64);
         }
@@ -54,7 +61,10 @@ mod tests {
 
     #[test]
     fn a_singular_system_is_an_error() {
-        assert_eq!(solve([[1.0, 2.0], [2.0, 4.0]], [1.0, 1.0_f64]), Err(PoseError::Singular));
+        assert_eq!(
+            solve([[1.0, 2.0], [2.0, 4.0]], [1.0, 1.0_f64]),
+            Err(PoseError::Singular)
+        );
         assert_eq!(solve([[f64::NAN]], [1.0]), Err(PoseError::Singular));
     }
 }

@@ -30,7 +30,12 @@ impl<'a> Body<'a> {
                 op.for_each_operand(|v| needed[v.index()] = true);
             }
         }
-        for v in program.outputs.iter().copied().chain(program.guards.iter().map(|g| g.value())) {
+        for v in program
+            .outputs
+            .iter()
+            .copied()
+            .chain(program.guards.iter().map(|g| g.value()))
+        {
             needed[v.index()] = true;
         }
         let handed = (0..program.ops.len())
@@ -38,7 +43,12 @@ impl<'a> Body<'a> {
             .filter(|i| !matches!(program.ops[*i], Op::Number(_)))
             .map(|i| ValueId(u32::try_from(i).expect("program below 4G operations")))
             .collect();
-        Self { program, input, names, handed }
+        Self {
+            program,
+            input,
+            names,
+            handed,
+        }
     }
 
     /// How many values the fixed stage hands over.
@@ -78,15 +88,16 @@ impl<'a> Body<'a> {
     fn statements(&self, stage: Stage) -> Vec<TokenStream> {
         let mut statements = Vec::new();
         let mut guards: Vec<&Guard> = self.program.guards.iter().collect();
-        let emit_guards = |upto: usize, statements: &mut Vec<TokenStream>, guards: &mut Vec<&Guard>| {
-            guards.retain(|guard| {
-                let ready = guard.value().index() <= upto;
-                if ready {
-                    statements.push(self.guard(**guard));
-                }
-                !ready
-            });
-        };
+        let emit_guards =
+            |upto: usize, statements: &mut Vec<TokenStream>, guards: &mut Vec<&Guard>| {
+                guards.retain(|guard| {
+                    let ready = guard.value().index() <= upto;
+                    if ready {
+                        statements.push(self.guard(**guard));
+                    }
+                    !ready
+                });
+            };
         for (i, op) in self.program.ops.iter().enumerate() {
             if self.program.stages[i] == stage && !matches!(op, Op::Number(_)) {
                 statements.extend(self.statement(stage, i, op));
@@ -150,7 +161,9 @@ impl<'a> Body<'a> {
         let value = self.operand(Stage::State, guard.value());
         match guard {
             // Written so that what is no number fails as well.
-            Guard::Reachable(_) => quote! { if !(#value >= T::from_f64(0.0)) { return Err(PoseError::OutOfReach); } },
+            Guard::Reachable(_) => {
+                quote! { if !(#value >= T::from_f64(0.0)) { return Err(PoseError::OutOfReach); } }
+            }
             Guard::Regular(_, limit) => {
                 let limit = Literal::f64_unsuffixed(limit);
                 quote! { if !(#value.abs() > T::from_f64(#limit)) { return Err(PoseError::Singular); } }
@@ -163,7 +176,11 @@ impl<'a> Body<'a> {
             return number(value);
         }
         if stage == Stage::State && self.program.stages[v.index()] == Stage::Fixed {
-            let place = self.handed.iter().position(|h| *h == v).expect("a fixed value that is used is handed over");
+            let place = self
+                .handed
+                .iter()
+                .position(|h| *h == v)
+                .expect("a fixed value that is used is handed over");
             return quote! { fixed[#place] };
         }
         let name = &self.names[v.index()];
@@ -178,5 +195,9 @@ fn binary(a: &TokenStream, operator: &TokenStream, b: &TokenStream) -> TokenStre
 /// A number as a value of the type parameter.
 pub(super) fn number(value: &Rational) -> TokenStream {
     let magnitude = Literal::f64_unsuffixed(value.to_f64().abs());
-    if value.is_negative() { quote! { T::from_f64(-#magnitude) } } else { quote! { T::from_f64(#magnitude) } }
+    if value.is_negative() {
+        quote! { T::from_f64(-#magnitude) }
+    } else {
+        quote! { T::from_f64(#magnitude) }
+    }
 }

@@ -60,13 +60,18 @@ impl quote::ToTokens for Lints {
 fn doc_lines(doc: &str, inner: bool) -> TokenStream {
     let lines = doc.lines().map(|line| {
         let line = format!(" {line}");
-        if inner { quote! { #![doc = #line] } } else { quote! { #[doc = #line] } }
+        if inner {
+            quote! { #![doc = #line] }
+        } else {
+            quote! { #[doc = #line] }
+        }
     });
     quote! { #(#lines)* }
 }
 
 fn print(tokens: &TokenStream) -> String {
-    let file = syn::parse2(tokens.clone()).unwrap_or_else(|error| panic!("emitted tokens do not parse: {error}\n{tokens}"));
+    let file = syn::parse2(tokens.clone())
+        .unwrap_or_else(|error| panic!("emitted tokens do not parse: {error}\n{tokens}"));
     prettyplease::unparse(&file)
 }
 

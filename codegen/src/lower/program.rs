@@ -177,7 +177,12 @@ impl Program {
     /// The same program without the operations that no output and no guard needs.
     pub(crate) fn without_dead_code(self) -> Self {
         let mut needed = vec![false; self.ops.len()];
-        for value in self.outputs.iter().copied().chain(self.guards.iter().map(|g| g.value())) {
+        for value in self
+            .outputs
+            .iter()
+            .copied()
+            .chain(self.guards.iter().map(|g| g.value()))
+        {
             needed[value.index()] = true;
         }
         for i in (0..self.ops.len()).rev() {
@@ -195,7 +200,8 @@ impl Program {
             if let Some(name) = self.names.get(&i) {
                 kept.names.insert(kept.ops.len(), name.clone());
             }
-            kept.ops.push(op.map_operands(|operand| new[operand.index()]));
+            kept.ops
+                .push(op.map_operands(|operand| new[operand.index()]));
             kept.stages.push(self.stages[i]);
         }
         kept.outputs = self.outputs.iter().map(|v| new[v.index()]).collect();

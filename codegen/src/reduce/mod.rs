@@ -5,12 +5,11 @@
 //! of the model's constants. A wrong answer has a probability below 1e-15 (Schwartz 1980, Zippel 1979).
 
 mod eliminate;
-mod print;
 mod numeric;
+mod print;
 mod rational_function;
 mod reconstruct;
 mod sample;
-mod text;
 mod univariate;
 
 use modelmill_spec::Mechanism;
@@ -300,7 +299,9 @@ impl Reduction {
                 points += 1;
             }
         }
-        self.method = Method::Exact { confirmed_at: points };
+        self.method = Method::Exact {
+            confirmed_at: points,
+        };
         Ok(())
     }
 }

@@ -39,14 +39,18 @@ pub(super) fn reduce(
             continue;
         }
         effective.push(k);
-        let basis = DMatrix::from_fn(w.nrows(), kept.len(), |i, j| w[(i, kept[j])] / norms[kept[j]]);
+        let basis = DMatrix::from_fn(w.nrows(), kept.len(), |i, j| {
+            w[(i, kept[j])] / norms[kept[j]]
+        });
         let column: DVector<f64> = w.column(k) / norms[k];
         let factors = if kept.is_empty() {
             DVector::zeros(0)
         } else {
             let qr = basis.clone().qr();
             let rotated = qr.q().transpose() * &column;
-            qr.r().solve_upper_triangular(&rotated).ok_or(DeriveError::RankChanged)?
+            qr.r()
+                .solve_upper_triangular(&rotated)
+                .ok_or(DeriveError::RankChanged)?
         };
         let left = (&column - &basis * &factors).norm();
         if left > DEPENDENT {
@@ -54,11 +58,23 @@ pub(super) fn reduce(
             kept.push(k);
         } else {
             most_dropped = most_dropped.max(left);
-            lines.push((k, factors.iter().zip(&kept).map(|(f, j)| f * norms[k] / norms[*j]).collect()));
+            lines.push((
+                k,
+                factors
+                    .iter()
+                    .zip(&kept)
+                    .map(|(f, j)| f * norms[k] / norms[*j])
+                    .collect(),
+            ));
         }
     }
     effective.sort_unstable();
-    let at = |k: usize| effective.iter().position(|x| *x == k).expect("an effective column has a position");
+    let at = |k: usize| {
+        effective
+            .iter()
+            .position(|x| *x == k)
+            .expect("an effective column has a position")
+    };
     let mut sorted = kept.clone();
     sorted.sort_unstable();
     let mut dependencies: Vec<Dependency> = lines
@@ -69,18 +85,33 @@ pub(super) fn reduce(
                 .iter()
                 .zip(factors)
                 .filter(|(_, f)| f.abs() > 1e-9)
-                .map(|(j, f)| (sorted.iter().position(|x| x == j).expect("a kept column is kept"), decimal(*f)))
+                .map(|(j, f)| {
+                    (
+                        sorted
+                            .iter()
+                            .position(|x| x == j)
+                            .expect("a kept column is kept"),
+                        decimal(*f),
+                    )
+                })
                 .collect(),
         })
         .collect();
     dependencies.sort_by_key(|line| line.product);
     let products: Vec<Monomial> = effective.iter().map(|k| candidates[*k].clone()).collect();
     Ok(Reduction {
-        without_effect: candidates.iter().filter(|c| !products.contains(c)).cloned().collect(),
+        without_effect: candidates
+            .iter()
+            .filter(|c| !products.contains(c))
+            .cloned()
+            .collect(),
         retained: sorted.iter().map(|k| at(*k)).collect(),
         products,
         dependencies,
-        method: Method::Numeric { least_kept, most_dropped },
+        method: Method::Numeric {
+            least_kept,
+            most_dropped,
+        },
     })
 }
 
@@ -105,10 +136,16 @@ fn sample(
     columns: &[Vec<ExprId>],
 ) -> Result<DMatrix<f64>, DeriveError> {
     let n_drives = projection.drives.len();
-    let outputs: Vec<ExprId> = (0..n_drives).flat_map(|d| columns.iter().map(move |c| c[d])).collect();
+    let outputs: Vec<ExprId> = (0..n_drives)
+        .flat_map(|d| columns.iter().map(move |c| c[d]))
+        .collect();
     let loops = Loops::new(graph, mechanism, &projection.residual);
-    let [rates, accelerations, outputs] =
-        [&projection.passive_rates, &projection.passive_accelerations, &outputs].map(|roots| Tape::new(graph, roots));
+    let [rates, accelerations, outputs] = [
+        &projection.passive_rates,
+        &projection.passive_accelerations,
+        &outputs,
+    ]
+    .map(|roots| Tape::new(graph, roots));
     let mut stream = Stream::new(super::SEED);
     let n_coordinates = mechanism.coordinates.len();
     let mut rows: Vec<f64> = Vec::new();
@@ -116,10 +153,18 @@ fn sample(
     let (mut n_points, mut tries) = (0, 0);
     while n_points < wanted && tries < 20 * wanted {
         tries += 1;
-        let Some(q) = loops.random(REACH, &mut stream) else { continue };
-        let mut qd: Vec<f64> = (0..n_coordinates).map(|_| 2.0 * symmetric(&mut stream)).collect();
-        let mut qdd: Vec<f64> = (0..n_coordinates).map(|_| 5.0 * symmetric(&mut stream)).collect();
-        let load: Vec<f64> = (0..n_drives).map(|_| 100.0 * symmetric(&mut stream)).collect();
+        let Some(q) = loops.random(REACH, &mut stream) else {
+            continue;
+        };
+        let mut qd: Vec<f64> = (0..n_coordinates)
+            .map(|_| 2.0 * symmetric(&mut stream))
+            .collect();
+        let mut qdd: Vec<f64> = (0..n_coordinates)
+            .map(|_| 5.0 * symmetric(&mut stream))
+            .collect();
+        let load: Vec<f64> = (0..n_drives)
+            .map(|_| 100.0 * symmetric(&mut stream))
+            .collect();
         let evaluate = |tape: &Tape, qd: &[f64], qdd: &[f64]| {
             tape.evaluate(&F64(|atom: Atom| match atom {
                 Atom::Constant(i) => mechanism.constants[i].value,
@@ -131,15 +176,21 @@ fn sample(
                 Atom::Base(_) => 0.0,
             }))
         };
-        let Some(found) = evaluate(&rates, &qd, &qdd) else { continue };
+        let Some(found) = evaluate(&rates, &qd, &qdd) else {
+            continue;
+        };
         for (p, value) in projection.passive.iter().zip(found) {
             qd[*p] = value;
         }
-        let Some(found) = evaluate(&accelerations, &qd, &qdd) else { continue };
+        let Some(found) = evaluate(&accelerations, &qd, &qdd) else {
+            continue;
+        };
         for (p, value) in projection.passive.iter().zip(found) {
             qdd[*p] = value;
         }
-        let Some(values) = evaluate(&outputs, &qd, &qdd) else { continue };
+        let Some(values) = evaluate(&outputs, &qd, &qdd) else {
+            continue;
+        };
         if values.iter().all(|v| v.is_finite()) {
             rows.extend(values);
             n_points += 1;
@@ -148,5 +199,9 @@ fn sample(
     if n_points < wanted {
         return Err(DeriveError::NoPointFound { draws: tries });
     }
-    Ok(DMatrix::from_row_slice(n_points * n_drives, columns.len(), &rows))
+    Ok(DMatrix::from_row_slice(
+        n_points * n_drives,
+        columns.len(),
+        &rows,
+    ))
 }

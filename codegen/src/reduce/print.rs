@@ -64,10 +64,7 @@ impl RationalFunction {
     /// The number in front and the function without it, so that equal functions up to a number can be recognised.
     pub(crate) fn split_number(&self) -> (Rational, Self) {
         let Some((_, leading)) = ordered(&self.numerator).into_iter().next() else {
-            return (
-                Rational::ZERO,
-                Self::constant(Rational::ONE),
-            );
+            return (Rational::ZERO, Self::constant(Rational::ONE));
         };
         let mut content = content(&self.numerator);
         if leading.is_negative() {
@@ -92,8 +89,7 @@ impl RationalFunction {
 
 /// The largest number that divides all coefficients.
 fn content(p: &Polynomial) -> Rational {
-    p.values()
-        .fold(Rational::ZERO, |c, k| c.content_with(k))
+    p.values().fold(Rational::ZERO, |c, k| c.content_with(k))
 }
 
 /// Powers as factors.
@@ -111,11 +107,7 @@ fn variables(powers: &Powers, mechanism: &Mechanism) -> Vec<Formula> {
 fn ordered(p: &Polynomial) -> Vec<(&Powers, &Rational)> {
     let degree = |powers: &Powers| powers.iter().map(|(_, n)| *n).sum::<u32>();
     let mut terms: Vec<_> = p.iter().collect();
-    terms.sort_by(|(a, _), (b, _)| {
-        degree(b)
-            .cmp(&degree(a))
-            .then_with(|| compare_powers(a, b))
-    });
+    terms.sort_by(|(a, _), (b, _)| degree(b).cmp(&degree(a)).then_with(|| compare_powers(a, b)));
     terms
 }
 
@@ -167,9 +159,12 @@ fn with_squares(p: &Polynomial, mechanism: &Mechanism) -> Formula {
     let mut squares: BTreeMap<Variable, Formula> = BTreeMap::new();
     for square in factor::squares(p) {
         let first = square.linear[0].0;
-        let sum = Formula::sum(square.linear.iter().map(|(v, k)| {
-            Formula::product(k.clone(), [v.formula(mechanism)])
-        }));
+        let sum = Formula::sum(
+            square
+                .linear
+                .iter()
+                .map(|(v, k)| Formula::product(k.clone(), [v.formula(mechanism)])),
+        );
         squares.insert(first, Formula::product(square.number, [sum.power(2)]));
         for used in &square.terms {
             rest.remove(used);

@@ -81,10 +81,19 @@ fn search(
             for (i, a) in candidates.iter().enumerate() {
                 choices.extend(candidates[i + 1..].iter().map(|b| vec![*a, *b]));
             }
-            choices.sort_by_key(|pair| pair.iter().filter(|c| !projection.passive.contains(c)).count());
+            choices.sort_by_key(|pair| {
+                pair.iter()
+                    .filter(|c| !projection.passive.contains(c))
+                    .count()
+            });
         } else {
             let related: Vec<usize> = closure.relations.iter().map(|r| r.coordinate).collect();
-            choices.extend(related.iter().all(|c| candidates.contains(c)).then_some(related));
+            choices.extend(
+                related
+                    .iter()
+                    .all(|c| candidates.contains(c))
+                    .then_some(related),
+            );
         }
         for unknown in choices {
             let is_known = |c: &usize| {

@@ -9,7 +9,7 @@ use crate::base::unit;
 use crate::exact::Monomial;
 use crate::expr::Rational;
 use crate::expr::print::{Formula, Symbol};
-use crate::reduce::RationalFunction;
+use crate::reduce::{Method, RationalFunction};
 
 /// Base parameter `k` written out term by term: what a script reads.
 pub fn base_expression(derivation: &Derivation, k: usize) -> Formula {
@@ -18,7 +18,10 @@ pub fn base_expression(derivation: &Derivation, k: usize) -> Formula {
         reduction,
         ..
     } = derivation;
-    let mut terms = vec![product(mechanism, &reduction.products[reduction.retained[k]])];
+    let mut terms = vec![product(
+        mechanism,
+        &reduction.products[reduction.retained[k]],
+    )];
     for line in &reduction.dependencies {
         let factors = factors(mechanism, &reduction.products[line.product]);
         for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
@@ -35,7 +38,10 @@ pub fn base_grouped(derivation: &Derivation, k: usize) -> Formula {
         reduction,
         ..
     } = derivation;
-    let mut terms = vec![product(mechanism, &reduction.products[reduction.retained[k]])];
+    let mut terms = vec![product(
+        mechanism,
+        &reduction.products[reduction.retained[k]],
+    )];
     let mut groups: Vec<(RationalFunction, Vec<(Rational, Formula)>)> = Vec::new();
     for line in &reduction.dependencies {
         let what = product(mechanism, &reduction.products[line.product]);
@@ -113,7 +119,10 @@ pub(super) fn products(page: &mut Document, derivation: &Derivation) {
         .enumerate()
         .map(|(k, m)| {
             let fate = match reduction.retained.iter().position(|r| *r == k) {
-                Some(at) => vec![text("retained, "), Inline::Math(Formula::name(base_name(at)))],
+                Some(at) => vec![
+                    text("retained, "),
+                    Inline::Math(Formula::name(base_name(at))),
+                ],
                 None => cell(text("follows from retained columns")),
             };
             vec![
@@ -133,7 +142,9 @@ pub(super) fn products(page: &mut Document, derivation: &Derivation) {
         },
     );
     if !reduction.without_effect.is_empty() {
-        let mut line: Line = vec![text("Without any effect on the drives, and so not in p_g: ")];
+        let mut line: Line = vec![text(
+            "Without any effect on the drives, and so not in p_g: ",
+        )];
         for (i, m) in reduction.without_effect.iter().enumerate() {
             if i > 0 {
                 line.push(text(", "));
@@ -159,11 +170,17 @@ pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
         )]);
         return;
     }
-    page.paragraph([text(format!(
-        "Columns that are constant combinations of retained ones at every state, eq. (6). \
-         They were found in exact arithmetic and confirmed at {} further states with other values of the constants.",
-        reduction.confirmed_at
-    ))]);
+    page.paragraph([text(match reduction.method {
+        Method::Exact { confirmed_at } => format!(
+            "Columns that are constant combinations of retained ones at every state, eq. (6). \
+             They were found in exact arithmetic and confirmed at {confirmed_at} further states with other values of the constants."
+        ),
+        Method::Numeric { least_kept, most_dropped } => format!(
+            "Columns that are constant combinations of retained ones, eq. (6), found numerically on the values of this file: \
+             the loops cannot be sampled exactly. The factors are rounded. \
+             Of every retained column the others leave at least {least_kept:.1e}, of every dependent one at most {most_dropped:.1e}."
+        ),
+    })]);
     let lines = reduction
         .dependencies
         .iter()
@@ -221,10 +238,7 @@ pub(super) fn base_parameters(
         left: Formula::name(base_name(k)),
         right,
         tag: format!("16.{}", k + 1),
-        remark: Some(unit(
-            mechanism,
-            &reduction.products[reduction.retained[k]],
-        )),
+        remark: Some(unit(mechanism, &reduction.products[reduction.retained[k]])),
     };
     let grouped = (0..rank)
         .map(|k| equation(k, base_grouped(derivation, k)))
@@ -245,7 +259,12 @@ pub(super) fn base_parameters(
     page.table(
         "values",
         Table {
-            head: vec!["base parameter", "retained product", "nominal value", "unit"],
+            head: vec![
+                "base parameter",
+                "retained product",
+                "nominal value",
+                "unit",
+            ],
             rows,
         },
     );

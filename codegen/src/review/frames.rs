@@ -178,13 +178,25 @@ pub(super) fn bodies(page: &mut Document, mechanism: &Mechanism) {
             "Parts by mass, centre of mass, and inertia about the centre along the frame's axes; what is not listed is zero.",
         )]);
         let head = vec!["part", "frame", "mass, kg", "centre, m", "inertia, kg m^2"];
-        page.table("parts", Table { head, rows: about_centre });
+        page.table(
+            "parts",
+            Table {
+                head,
+                rows: about_centre,
+            },
+        );
     }
     if !linear.is_empty() {
         page.paragraph([text(
             "Parts by mass, first moment, and inertia about the frame's origin; what is not listed is zero.",
         )]);
-        let head = vec!["part", "frame", "mass, kg", "first moment, kg m", "inertia, kg m^2"];
+        let head = vec![
+            "part",
+            "frame",
+            "mass, kg",
+            "first moment, kg m",
+            "inertia, kg m^2",
+        ];
         page.table("parts", Table { head, rows: linear });
     }
     lumped_masses(page, mechanism);
@@ -225,7 +237,11 @@ fn lumped_masses(page: &mut Document, mechanism: &Mechanism) {
     ];
     page.table("lumped masses", Table { head, rows });
     if apart > 0 {
-        let n = if apart == 1 { "one mass".to_owned() } else { format!("{apart} masses") };
+        let n = if apart == 1 {
+            "one mass".to_owned()
+        } else {
+            format!("{apart} masses")
+        };
         page.paragraph([text(format!(
             "Note: the balance of forces and the balance of moments see {n} at different places. \
              This is no rigid body; the file asks for it."

@@ -243,4 +243,3 @@ fn angle_name(formula: &Formula) -> Option<String> {
         _ => None,
     }
 }
-

@@ -16,9 +16,15 @@ fn names(mechanism: &Mechanism, coordinates: &[usize]) -> Line {
     let mut line = Line::new();
     for (i, c) in coordinates.iter().enumerate() {
         if i > 0 {
-            line.push(text(if i + 1 == coordinates.len() { " and " } else { ", " }));
+            line.push(text(if i + 1 == coordinates.len() {
+                " and "
+            } else {
+                ", "
+            }));
         }
-        line.push(Inline::Math(Formula::name(&*mechanism.coordinates[*c].name)));
+        line.push(Inline::Math(Formula::name(
+            &*mechanism.coordinates[*c].name,
+        )));
     }
     line
 }
@@ -90,9 +96,15 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
         "Their rates and accelerations follow from the differentiated closure equations, which are linear in them",
     )];
     let determinants = &projection.determinants;
-    match determinants.iter().map(|id| shown(graph, mechanism, *id)).collect::<Option<Vec<_>>>() {
+    match determinants
+        .iter()
+        .map(|id| shown(graph, mechanism, *id))
+        .collect::<Option<Vec<_>>>()
+    {
         Some(formulas) if !formulas.is_empty() => {
-            line.push(text("; the model is singular where one of these vanishes: "));
+            line.push(text(
+                "; the model is singular where one of these vanishes: ",
+            ));
             for (i, f) in formulas.into_iter().enumerate() {
                 if i > 0 {
                     line.push(text("; "));
@@ -101,7 +113,9 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
             }
             line.push(text("."));
         }
-        _ => line.push(text("; a pose where their matrix is singular is reported as such.")),
+        _ => line.push(text(
+            "; a pose where their matrix is singular is reported as such.",
+        )),
     }
     page.paragraph(line);
 }
@@ -114,10 +128,14 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
         ..
     } = derivation;
     let mut graph = graph.clone();
-    let mut positive = |graph: &Graph, id: ExprId| {
-        nominal_value(graph, mechanism, id).is_none_or(|v| v >= 0.0)
-    };
-    let Some(plan) = plan(&mut graph, &equations.projection, Unknowns::Passive, &mut positive) else {
+    let mut positive =
+        |graph: &Graph, id: ExprId| nominal_value(graph, mechanism, id).is_none_or(|v| v >= 0.0);
+    let Some(plan) = plan(
+        &mut graph,
+        &equations.projection,
+        Unknowns::Passive,
+        &mut positive,
+    ) else {
         return;
     };
     for step in &plan.steps {
@@ -128,7 +146,11 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
             _ => " follow from two linear equations",
         }));
         if let Some(root) = step.solved.root {
-            let sign = if positive(&graph, root.witness) { "positive" } else { "negative" };
+            let sign = if positive(&graph, root.witness) {
+                "positive"
+            } else {
+                "negative"
+            };
             line.push(text(format!(
                 "; the nominal pose chooses the {sign} root. Where the radicand is negative the pose is out of reach"
             )));
@@ -176,7 +198,13 @@ pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
             vec![cell(code(&*drive.name)), acts]
         })
         .collect();
-    page.table("drives", Table { head: vec!["drive", "acts as"], rows });
+    page.table(
+        "drives",
+        Table {
+            head: vec!["drive", "acts as"],
+            rows,
+        },
+    );
     let mut lines = Vec::new();
     for (d, drive) in mechanism.drives.iter().enumerate() {
         if matches!(drive.kind, DriveKind::Joint(_)) {

@@ -21,9 +21,7 @@ mod render_text;
 mod tests;
 
 pub use base::{base_expression, base_grouped};
-pub use equations::{
-    BaseLine, DependencyLine, Equations, NumericRank, Operations, Rank,
-};
+pub use equations::{BaseLine, DependencyLine, Equations, NumericRank, Operations, Rank};
 
 use crate::Derivation;
 use document::Document;

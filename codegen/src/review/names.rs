@@ -90,7 +90,11 @@ fn generic_state(
             .map(|_| 1.3 + uniform(stream))
             .collect::<Vec<f64>>()
     });
-    let load: Vec<f64> = mechanism.drives.iter().map(|_| 1.7 + uniform(stream)).collect();
+    let load: Vec<f64> = mechanism
+        .drives
+        .iter()
+        .map(|_| 1.7 + uniform(stream))
+        .collect();
     let motion = {
         fn slices(values: &[f64]) -> Vec<&[f64]> {
             values.iter().map(std::slice::from_ref).collect()
@@ -241,7 +245,10 @@ fn rates(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
     for (k, p) in projection.passive.iter().enumerate() {
         let name = &*mechanism.coordinates[*p].name;
         named.push((Symbol::derived(name, 1), projection.passive_rates[k]));
-        named.push((Symbol::derived(name, 2), projection.passive_accelerations[k]));
+        named.push((
+            Symbol::derived(name, 2),
+            projection.passive_accelerations[k],
+        ));
     }
     for (d, drive) in mechanism.drives.iter().enumerate() {
         if matches!(drive.kind, DriveKind::Joint(_)) {
@@ -254,7 +261,10 @@ fn rates(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
         named.push((Symbol::derived(&*name, 2), motion.acceleration));
         for (a, slope) in projection.active.iter().zip(&projection.drive_jacobian[d]) {
             let coordinate = &mechanism.coordinates[*a].name;
-            named.push((Symbol::new(format!("J_{}_{coordinate}", drive.name)), *slope));
+            named.push((
+                Symbol::new(format!("J_{}_{coordinate}", drive.name)),
+                *slope,
+            ));
         }
     }
     for (k, id) in projection.determinants.iter().enumerate() {

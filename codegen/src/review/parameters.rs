@@ -104,7 +104,11 @@ pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
             vec![
                 cell(name(&c.name)),
                 cell(text(kind)),
-                cell(text(format!("{:.6}", c.nominal).trim_end_matches('0').trim_end_matches('.'))),
+                cell(text(
+                    format!("{:.6}", c.nominal)
+                        .trim_end_matches('0')
+                        .trim_end_matches('.'),
+                )),
                 cell(text(unit)),
                 cell(text(role)),
             ]

@@ -39,8 +39,15 @@ pub(super) fn programs(page: &mut Document, derivation: &Derivation) {
             }
             let mut row = vec![cell(text(what)), cell(text(when))];
             row.extend(
-                [count.add, count.mul, count.div, count.sqrt, count.sincos, count.other]
-                    .map(|n| cell(text(n.to_string()))),
+                [
+                    count.add,
+                    count.mul,
+                    count.div,
+                    count.sqrt,
+                    count.sincos,
+                    count.other,
+                ]
+                .map(|n| cell(text(n.to_string()))),
             );
             rows.push(row);
         }
@@ -84,34 +91,62 @@ pub(super) fn programs(page: &mut Document, derivation: &Derivation) {
                     .map(move |p| Symbol::derived(&*mechanism.coordinates[*p].name, order))
             })
             .collect();
-        fold(page, "Passive coordinates, their rates and accelerations", list(&programs.passive, &outputs, "P"));
+        fold(
+            page,
+            "Passive coordinates, their rates and accelerations",
+            list(&programs.passive, &outputs, "P"),
+        );
     }
     let drive = |d: &str| format!("l_{d}");
     let mut outputs: Vec<Symbol> = Vec::new();
     for order in 0..2 {
-        outputs.extend(mechanism.drives.iter().map(|d| Symbol::derived(drive(&d.name), order)));
+        outputs.extend(
+            mechanism
+                .drives
+                .iter()
+                .map(|d| Symbol::derived(drive(&d.name), order)),
+        );
     }
     for d in &mechanism.drives {
-        outputs.extend(active.iter().map(|a| {
-            Symbol::new(format!("J_{}_{}", d.name, mechanism.coordinates[*a].name))
-        }));
+        outputs.extend(
+            active
+                .iter()
+                .map(|a| Symbol::new(format!("J_{}_{}", d.name, mechanism.coordinates[*a].name))),
+        );
     }
-    fold(page, "Drives and their Jacobian", list(&programs.drives, &outputs, "D"));
+    fold(
+        page,
+        "Drives and their Jacobian",
+        list(&programs.drives, &outputs, "D"),
+    );
     let rank = reduction.retained.len();
     let outputs: Vec<Symbol> = (0..mechanism.drives.len())
         .flat_map(|d| (0..rank).map(move |k| Symbol::new(format!("H_{}_{}", d + 1, k + 1))))
         .collect();
     let title = format!(
         "Regressor H_min: row by drive ({}), column by base parameter ({})",
-        mechanism.drives.iter().map(|d| &*d.name).collect::<Vec<_>>().join(", "),
-        if rank == 1 { base_name(0) } else { format!("{} to {}", base_name(0), base_name(rank.max(1) - 1)) },
+        mechanism
+            .drives
+            .iter()
+            .map(|d| &*d.name)
+            .collect::<Vec<_>>()
+            .join(", "),
+        if rank == 1 {
+            base_name(0)
+        } else {
+            format!("{} to {}", base_name(0), base_name(rank.max(1) - 1))
+        },
     );
     fold(page, &title, list(&programs.regressor, &outputs, "H"));
 }
 
 /// Whether a name is that of a coordinate's or drive's motion rather than of an entry of H_min.
 fn is_motion(derivation: &Derivation, symbol: &Symbol) -> bool {
-    derivation.mechanism.coordinates.iter().any(|c| c.name == symbol.name)
+    derivation
+        .mechanism
+        .coordinates
+        .iter()
+        .any(|c| c.name == symbol.name)
         || symbol.name.starts_with("l_")
         || symbol.name.starts_with("J_")
 }

@@ -76,10 +76,9 @@ fn write_table(out: &mut String, table: &Table) {
 
 /// An equation in display style, long sums broken; `end` stands after its last line.
 pub(super) fn aligned(equation: &Equation, end: &str) -> String {
-    let remark = equation
-        .remark
-        .as_ref()
-        .map_or_else(String::new, |r| format!(" \\quad [\\mathrm{{{}}}]", unit(r)));
+    let remark = equation.remark.as_ref().map_or_else(String::new, |r| {
+        format!(" \\quad [\\mathrm{{{}}}]", unit(r))
+    });
     let lines = broken(&equation.right);
     let left = equation.left.latex();
     if let [line] = lines.as_slice() {

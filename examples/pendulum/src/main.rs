@@ -8,11 +8,18 @@ fn main() {
     let geometry = Geometry::<f64>::default();
     let base = base_parameters(&geometry, &Parameters::default());
     for (parameter, value) in BASE_PARAMETERS.iter().zip(&base) {
-        println!("{} = {} = {value:.4} {}", parameter.name, parameter.expression, parameter.unit);
+        println!(
+            "{} = {} = {value:.4} {}",
+            parameter.name, parameter.expression, parameter.unit
+        );
     }
     let dynamics = InverseDynamics::new(&geometry, &base);
     for q in [0.0, 0.5, 1.0] {
-        match dynamics.forces(&State { q: [q], qd: [0.0], qdd: [1.0] }) {
+        match dynamics.forces(&State {
+            q: [q],
+            qd: [0.0],
+            qdd: [1.0],
+        }) {
             Ok([torque]) => println!("q = {q:.1} rad, 1 rad/s^2: {torque:.4} N m"),
             Err(error) => println!("q = {q:.1} rad: {error}"),
         }
@@ -26,10 +33,21 @@ mod tests {
     #[test]
     fn the_torque_is_that_of_the_textbook() {
         let geometry = Geometry::<f64>::default();
-        let p = Parameters { m: 1.5, c: 0.4, I: 0.07, fv_motor: 0.2 };
+        let p = Parameters {
+            m: 1.5,
+            c: 0.4,
+            I: 0.07,
+            fv_motor: 0.2,
+        };
         let dynamics = InverseDynamics::new(&geometry, &base_parameters(&geometry, &p));
         let (q, qd, qdd) = (0.7_f64, -1.3, 2.1);
-        let [torque] = dynamics.forces(&State { q: [q], qd: [qd], qdd: [qdd] }).unwrap();
+        let [torque] = dynamics
+            .forces(&State {
+                q: [q],
+                qd: [qd],
+                qdd: [qdd],
+            })
+            .unwrap();
         let expected = (p.I + p.m * p.c * p.c) * qdd + p.m * p.c * 9.81 * q.cos() + p.fv_motor * qd;
         assert!((torque - expected).abs() < 1e-12 * expected.abs());
     }

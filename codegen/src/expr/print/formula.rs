@@ -213,7 +213,14 @@ impl Formula {
             (base, 1) => base,
             (Self::Number(value), m) => Self::Number(value.pow(i32::try_from(m).unwrap_or(1))),
             (Self::Power(base, k), m) => Self::Power(base, k * m),
-            (Self::Term { factor, above, below }, m) => {
+            (
+                Self::Term {
+                    factor,
+                    above,
+                    below,
+                },
+                m,
+            ) => {
                 let exponent = i32::try_from(m).unwrap_or(1);
                 let raise = |x: Vec<Self>| -> Vec<Self> {
                     x.into_iter().map(|one| one.power(exponent)).collect()

@@ -171,7 +171,12 @@ fn magnitude(out: &mut String, formula: &Formula) {
             } else {
                 let one = Rational::ONE.to_string();
                 let d = d.unwrap_or(one);
-                _ = write!(out, "\\frac{{{}}}{{{}}}", line(&n, above, false), line(&d, below, false));
+                _ = write!(
+                    out,
+                    "\\frac{{{}}}{{{}}}",
+                    line(&n, above, false),
+                    line(&d, below, false)
+                );
             }
         }
         other => write(out, other, false),

@@ -184,9 +184,9 @@ pub(super) fn squares(p: &Polynomial) -> Vec<Square> {
         }
         let whole = linear.iter().enumerate().all(|(i, (u, k))| {
             coefficient(&vec![(*u, 2)]) == &number * &(k * k)
-                && linear[i + 1..].iter().all(|(v, l)| {
-                    cross(*u, *v) == &(&number * &Rational::integer(2)) * &(k * l)
-                })
+                && linear[i + 1..]
+                    .iter()
+                    .all(|(v, l)| cross(*u, *v) == &(&number * &Rational::integer(2)) * &(k * l))
         });
         if linear.len() < 2 || !whole {
             continue;
