@@ -85,12 +85,9 @@ pub(crate) fn parse(text: &str, file: usize, log: &mut Log) -> Table {
     if text.len() > LARGEST_FILE {
         log.syntax_broken = true;
         log.push(
-            Diagnostic::error(
-                whole,
-                format!("the file has {} bytes, which is too large", text.len()),
-            )
-            .label(format!("a model file has at most {LARGEST_FILE} bytes"))
-            .help("model files hold a mechanism; recordings belong into CSV files"),
+            Diagnostic::error(whole, "this file is too large")
+                .label(format!("a model file has at most {LARGEST_FILE} bytes"))
+                .help("model files hold a mechanism; recordings belong into CSV files"),
         );
         return Table::new();
     }

@@ -1,5 +1,6 @@
 //! Reads a model file and those that it extends, and makes the mechanism that they describe.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::build::build;
@@ -64,14 +65,7 @@ impl std::error::Error for Failure {}
 ///
 /// Fails with every finding about the files, each with its place.
 pub fn load_file(path: &Path) -> Result<Loaded, Failure> {
-    let mut read = |path: &Path| -> std::io::Result<String> {
-        if std::fs::metadata(path)?.len() > LARGEST_FILE as u64 {
-            return Err(std::io::Error::other(format!(
-                "it is larger than {LARGEST_FILE} bytes"
-            )));
-        }
-        std::fs::read_to_string(path)
-    };
+    let mut read = read_limited;
     match read(path) {
         Ok(text) => load(&path.to_string_lossy(), &text, &mut read),
         Err(error) => Err(Failure {
@@ -88,6 +82,15 @@ pub fn load_file(path: &Path) -> Result<Loaded, Failure> {
             sources: Sources::default(),
         }),
     }
+}
+
+/// Reads a file, but no more than a model file may hold: what the path leads to may never end.
+fn read_limited(path: &Path) -> std::io::Result<String> {
+    let mut text = String::new();
+    std::fs::File::open(path)?
+        .take(LARGEST_FILE as u64 + 1)
+        .read_to_string(&mut text)?;
+    Ok(text)
 }
 
 /// Reads a model from its text; `read` fetches the files that it extends.

@@ -148,3 +148,12 @@ fn a_file_that_cannot_be_read() {
             .contains("cannot read `no/such/model.toml`")
     );
 }
+
+#[test]
+fn line_ends_and_marks_of_other_systems() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/two_link.toml");
+    let text = std::fs::read_to_string(path).unwrap().replace('\n', "\r\n");
+    let mut none = |_: &Path| Err(std::io::Error::other("none"));
+    assert!(load("model.toml", &text, &mut none).is_ok());
+    assert!(load("model.toml", &format!("\u{feff}{text}"), &mut none).is_ok());
+}
