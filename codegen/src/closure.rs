@@ -57,6 +57,22 @@ fn stretches(tree: &Tree, links: &[usize], start: &[Turn], at: &Vector) -> Vec<S
     path
 }
 
+/// The fixed rotations from the root of a path to the axis of its first turning joint; `None` if nothing turns.
+fn fixed_turns(tree: &Tree, links: &[usize]) -> Option<Vec<Turn>> {
+    let mut turns = Vec::new();
+    for &i in links {
+        let link = &tree.links[i];
+        for turn in &link.pre {
+            push_turn(&mut turns, turn);
+        }
+        if !link.turns.is_empty() {
+            return Some(turns);
+        }
+        push_turn(&mut turns, &link.joint);
+    }
+    None
+}
+
 fn sum_of(graph: &mut Graph, path: &[Stretch]) -> Vector {
     let vectors: Vec<Vector> = path
         .iter()
@@ -107,9 +123,10 @@ pub(crate) fn closures(
             let (pa, pb) = (path(a.frame), path(b.frame));
             let common = pa.iter().zip(&pb).take_while(|(x, y)| x == y).count();
             let (pa, pb) = (&pa[common..], &pb[common..]);
-            // The first link's fixed rotation leads into the plane of the loop, if it has one.
-            let first = pa.first().or(pb.first());
-            let into: Vec<Turn> = first.map_or(Vec::new(), |i| tree.links[*i].pre.clone());
+            // What stands still before the first turning joint leads into the plane of the loop, if it has one.
+            let into = fixed_turns(tree, pa)
+                .or_else(|| fixed_turns(tree, pb))
+                .unwrap_or_default();
             let back: Vec<Turn> = into
                 .iter()
                 .rev()

@@ -217,36 +217,48 @@ impl Shape {
         if self.lost {
             return Ok(None);
         }
+        // A quotient of degree 2k in half the tangent is a quotient of trigonometric polynomials of degree k.
         let angle_degree = self
             .degrees
             .iter()
             .filter(|((_, is_angle), _)| *is_angle)
             .map(|(_, (n, d))| n.max(d).div_ceil(2))
             .max();
+        let angle_degree = angle_degree.unwrap_or(0);
         let root_powers = root_products(roots);
-        // The share of the angles in the denominator is raised until a function fits; lengths are known already.
-        for angle_in_denominator in 0..=angle_degree.unwrap_or(0) {
-            let with_roots = |monomials: Vec<Powers>| -> Vec<Powers> {
-                monomials
-                    .iter()
-                    .flat_map(|m| {
-                        root_powers.iter().map(move |r| {
-                            let mut powers = m.clone();
-                            powers.extend(r.iter().copied());
-                            powers.sort_unstable();
-                            powers
-                        })
+        let with_roots = |monomials: Vec<Powers>| -> Vec<Powers> {
+            monomials
+                .iter()
+                .flat_map(|m| {
+                    root_powers.iter().map(move |r| {
+                        let mut powers = m.clone();
+                        powers.extend(r.iter().copied());
+                        powers.sort_unstable();
+                        powers
                     })
-                    .collect()
-            };
-            let numerator = with_roots(self.monomials(true, 2 * angle_degree.unwrap_or(0)));
-            let denominator = self.monomials(false, angle_in_denominator);
+                })
+                .collect()
+        };
+        // The share of the angles in the denominator is raised until a function fits; lengths are known already.
+        // Roots in the denominator are the last resort: without angles they can always be moved to the numerator.
+        let mut attempts: Vec<(usize, bool)> = (0..=angle_degree).map(|d| (d, false)).collect();
+        if !roots.is_empty() {
+            attempts.extend((1..=angle_degree).map(|d| (d, true)));
+        }
+        for (angle_in_denominator, roots_in_denominator) in attempts {
+            let numerator = with_roots(self.monomials(true, angle_degree));
+            let mut denominator = self.monomials(false, angle_in_denominator);
+            if roots_in_denominator {
+                denominator = with_roots(denominator);
+            }
             let unknowns = numerator.len() + denominator.len();
             if unknowns > MOST_UNKNOWNS {
-                return Ok(None);
+                continue;
             }
-            samples.at_least(unknowns + 4, stream)?;
-            let rows = samples.points[..unknowns + 4]
+            // Roots take either sign by chance; every combination of signs must come up.
+            let n_points = unknowns + 4 + 20 * (root_powers.len() - 1);
+            samples.at_least(n_points, stream)?;
+            let rows = samples.points[..n_points]
                 .iter()
                 .map(|(point, values)| {
                     let top = numerator.iter().map(|m| monomial_value(m, point));
@@ -274,11 +286,10 @@ impl Shape {
         for ((index, is_angle), degrees) in &self.degrees {
             let mut extended = Vec::new();
             if *is_angle {
-                let bound = angle_bound.min(degrees.0.max(degrees.1));
-                let most_sine = usize::from(numerator);
+                let bound = angle_bound.min(degrees.0.max(degrees.1).div_ceil(2));
                 for (powers, total) in &monomials {
                     for cosine in 0..=bound {
-                        for sine in 0..=most_sine.min(bound - cosine) {
+                        for sine in 0..=1.min(bound - cosine) {
                             let mut powers = powers.clone();
                             push_power(&mut powers, Variable::Cos(*index), cosine);
                             push_power(&mut powers, Variable::Sin(*index), sine);
