@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use modelmill_codegen::review::base_expression;
 use modelmill_codegen::{BaseParameter, Derivation};
 use modelmill_identify::{FitFile, ParameterInfo};
 use modelmill_spec::{Loaded, PlaceQuantity, Symbol};
@@ -72,10 +73,19 @@ pub(crate) fn derive_loaded(path: &str, loaded: &Loaded) -> Outcome<Model> {
         ),
         path: path.to_owned(),
         files: loaded.sources.paths().map(Path::to_owned).collect(),
-        base: derivation.base_parameters(),
+        base: base(&derivation),
         nominal: derivation.nominal_base_values(),
         derivation,
     })
+}
+
+/// The base parameters, with expressions as the page of equations writes them out.
+fn base(derivation: &Derivation) -> Vec<BaseParameter> {
+    let mut base = derivation.base_parameters();
+    for (k, one) in base.iter_mut().enumerate() {
+        one.expression = base_expression(derivation, k).text();
+    }
+    base
 }
 
 impl Model {

@@ -2,8 +2,9 @@
 //! numeric rank of the stacked regressor comes out. A statement about these values and samples,
 //! beside the exact one about all values.
 
-use modelmill_codegen::{Evaluator, States};
-use modelmill_identify::numeric_rank::{NumericRank, numeric_rank};
+use modelmill_codegen::review::NumericRank;
+use modelmill_codegen::{Evaluator, PoseFault, States};
+use modelmill_identify::numeric_rank::numeric_rank;
 use modelmill_spec::Motion;
 
 use crate::model::Model;
@@ -17,17 +18,8 @@ const RATE: f64 = 2.0;
 const ACCELERATION: f64 = 5.0;
 const LOAD: f64 = 100.0;
 
-/// A numeric rank and the number of states behind it.
-#[derive(Debug, Clone)]
-pub(crate) struct SampledRank {
-    /// Rank, singular values and condition numbers.
-    pub(crate) rank: NumericRank,
-    /// Random states.
-    pub(crate) samples: usize,
-}
-
 /// The rank of H on the file's values; the reason in words if there is none.
-pub(crate) fn sampled_rank(model: &Model) -> Result<SampledRank, String> {
+pub(crate) fn sampled_rank(model: &Model) -> Result<NumericRank, String> {
     let mechanism = &model.derivation.mechanism;
     let active: Vec<(f64, Motion)> = mechanism
         .coordinates
@@ -97,11 +89,17 @@ pub(crate) fn sampled_rank(model: &Model) -> Result<SampledRank, String> {
         qdd: slices(2),
         load: slices(3),
     };
-    let matrix = evaluator
-        .full_regressor(&states)
-        .map_err(|fault| fault.to_string())?;
-    let rank = numeric_rank(&matrix).map_err(|error| error.to_string())?;
-    Ok(SampledRank { rank, samples })
+    let rank_of = |matrix: Result<_, PoseFault>| {
+        let matrix = matrix.map_err(|fault| fault.to_string())?;
+        numeric_rank(&matrix).map_err(|error| error.to_string())
+    };
+    let full = rank_of(evaluator.full_regressor(&states))?;
+    let retained = rank_of(evaluator.regressor(&states))?;
+    Ok(NumericRank {
+        rank: full.rank,
+        samples,
+        condition: Some(retained.condition_number).filter(|c| c.is_finite()),
+    })
 }
 
 /// Uniform numbers in (-1, 1), the same on every machine (Steele et al., `SplitMix`, 2014).

@@ -1,7 +1,9 @@
 //! Results in text, for people: parameters, figures and regions.
 
+use modelmill_codegen::review::base_grouped;
 use modelmill_identify::{Figures, FitParameter, Region};
 
+use crate::model::Model;
 use crate::table::{Align, number, percent, significant, table};
 
 /// Identified base parameters beside their nominal values.
@@ -44,14 +46,17 @@ pub(crate) fn parameters(parameters: &[FitParameter]) -> Vec<String> {
     )
 }
 
-/// Which name stands for which expression, `p1_min = ...`.
-pub(crate) fn expressions<'a>(
-    indent: usize,
-    pairs: impl IntoIterator<Item = (&'a str, &'a str)>,
-) -> Vec<String> {
-    pairs
-        .into_iter()
-        .map(|(name, expression)| format!("{}{name} = {expression}", " ".repeat(indent)))
+/// Which name stands for which expression, common factors collected: `p1_min = ...`.
+pub(crate) fn expressions(indent: usize, model: &Model) -> Vec<String> {
+    let indent = " ".repeat(indent);
+    model
+        .base
+        .iter()
+        .enumerate()
+        .map(|(k, base)| {
+            let grouped = base_grouped(&model.derivation, k).text();
+            format!("{indent}{} = {grouped}", base.name)
+        })
         .collect()
 }
 

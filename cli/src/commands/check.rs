@@ -28,16 +28,8 @@ pub(crate) fn run(args: &CheckArgs) -> Outcome {
     let model = model::derive_loaded(&args.model.display().to_string(), &loaded)?;
     let summary = Summary::new(&model.derivation);
     if args.json {
-        let mut object = summary.json(&model.derivation);
-        if let Some(object) = object.as_object_mut() {
-            object.insert("model".to_owned(), json!(model.name));
-            object.insert("valid".to_owned(), json!(true));
-            object.insert(
-                "diagnostics".to_owned(),
-                json!(diagnostics(&loaded.warnings, &loaded.sources)),
-            );
-        }
-        return terminal::print_json(&object);
+        let warnings = diagnostics(&loaded.warnings, &loaded.sources);
+        return terminal::print_json(&summary.json(&model.name, &model.derivation, &warnings));
     }
     terminal::print(&summary.text(&model.name, &model.derivation))
 }
@@ -98,9 +90,9 @@ impl Summary {
         }
     }
 
-    fn json(&self, derivation: &Derivation) -> Value {
+    fn json(&self, name: &str, derivation: &Derivation, warnings: &[Value]) -> Value {
         json!({
-            "model": "",
+            "model": name,
             "valid": true,
             "title": derivation.mechanism.title,
             "bodies": self.bodies,
@@ -113,6 +105,7 @@ impl Summary {
             "parameters": self.parameters,
             "products": derivation.reduction.products.len(),
             "base_parameters": derivation.reduction.retained.len(),
+            "diagnostics": warnings,
         })
     }
 

@@ -1,5 +1,6 @@
 //! `diff`: what a variant changes, for people who review it.
 
+use modelmill_codegen::review::Equations;
 use modelmill_codegen::{OperationCount, Stage};
 use serde_json::{Value, json};
 
@@ -179,18 +180,28 @@ impl Changes {
     }
 }
 
-/// The dependencies by product, without the columns' own names in front.
+/// The dependencies by product: `d1*h[m1*dc1] + d1^2*h[m1*dc1^2]`.
 fn dependencies(model: &Model) -> Vec<(String, String)> {
-    let reduction = &model.derivation.reduction;
-    let mechanism = &model.derivation.mechanism;
-    reduction
+    let equations = Equations::new(&model.derivation, None);
+    equations
         .dependencies
-        .iter()
-        .zip(model.derivation.dependency_texts())
-        .map(|(line, text)| {
-            let name = format!("h[{}]", reduction.products[line.product].text(mechanism));
-            let right = text.split_once(" = ").map_or(text.as_str(), |(_, r)| r);
-            (name, right.to_owned())
+        .into_iter()
+        .filter(|line| !line.equals.is_empty())
+        .map(|line| {
+            let terms: Vec<String> = line
+                .equals
+                .iter()
+                .map(|(retained, factor)| match factor.as_str() {
+                    "1" => format!("h[{retained}]"),
+                    "-1" => format!("-h[{retained}]"),
+                    factor if factor.contains(" + ") || factor.contains(" - ") => {
+                        format!("({factor})*h[{retained}]")
+                    }
+                    factor => format!("{factor}*h[{retained}]"),
+                })
+                .collect();
+            let right = terms.join(" + ").replace("+ -", "- ");
+            (format!("h[{}]", line.parameter), right)
         })
         .collect()
 }

@@ -1,8 +1,47 @@
 //! `equations`: the reduced model for people and programs.
 
-use crate::args::EquationsArgs;
+use modelmill_codegen::review::{Equations, Format, NumericRank, page};
+
+use crate::args::{EquationsArgs, EquationsFormat};
 use crate::failure::Outcome;
-use crate::model::Model;
+use crate::model::{self, Model};
+use crate::output::Target;
+use crate::sampled_rank::sampled_rank;
+use crate::terminal;
+
+/// Prints the equations, or writes them to a file.
+pub(crate) fn run(args: &EquationsArgs) -> Outcome {
+    let model = model::derive(&args.model)?;
+    let target = args
+        .out
+        .as_ref()
+        .map(|path| Target::new(path, model.files.iter().map(AsRef::as_ref)))
+        .transpose()?;
+    let rank = numeric_rank(&model);
+    let format = if args.json {
+        EquationsFormat::Json
+    } else {
+        args.format
+    };
+    let text = match format {
+        EquationsFormat::Text => page(&model.derivation, Format::Text, rank.as_ref()),
+        EquationsFormat::Markdown => page(&model.derivation, Format::Markdown, rank.as_ref()),
+        EquationsFormat::Latex => page(&model.derivation, Format::Latex, rank.as_ref()),
+        EquationsFormat::Html => page(&model.derivation, Format::Html, rank.as_ref()),
+        EquationsFormat::Json => json(&model, rank.as_ref()),
+    };
+    match target {
+        Some(target) => target.write(&text),
+        None => terminal::print(&text),
+    }
+}
+
+/// The equations as the contract of the program's JSON has them.
+fn json(model: &Model, rank: Option<&NumericRank>) -> String {
+    let mut equations = Equations::new(&model.derivation, rank);
+    equations.model.clone_from(&model.name);
+    equations.json()
+}
 
 /// Pages that the tour writes.
 pub(crate) struct Pages {
@@ -12,14 +51,41 @@ pub(crate) struct Pages {
     pub(crate) markdown: String,
 }
 
-pub(crate) fn run(_args: &EquationsArgs) -> Outcome {
-    Ok(())
+/// The pages of a model.
+pub(crate) fn pages(model: &Model) -> Pages {
+    let rank = numeric_rank(model);
+    Pages {
+        html: page(&model.derivation, Format::Html, rank.as_ref()),
+        markdown: page(&model.derivation, Format::Markdown, rank.as_ref()),
+    }
 }
 
-/// The pages of a model.
-pub(crate) fn pages(_model: &Model) -> Outcome<Pages> {
-    Ok(Pages {
-        html: String::new(),
-        markdown: String::new(),
-    })
+/// Eq. (9) on the file's values, with a warning where it says something else than exact reduction.
+fn numeric_rank(model: &Model) -> Option<NumericRank> {
+    let found = match sampled_rank(model) {
+        Ok(found) => found,
+        Err(reason) => {
+            terminal::warn(&format!(
+                "{}: the numeric rank of eq. (9) was not found: {reason}",
+                model.path
+            ));
+            return None;
+        }
+    };
+    let exact = model.base.len();
+    if found.rank < exact {
+        terminal::warn(&format!(
+            "{}: with the file's values the numeric rank is {}, below the exact {exact} for general values; \
+             special lengths or angles make columns coincide, so identification will find {} directions undetermined",
+            model.path,
+            found.rank,
+            exact - found.rank
+        ));
+    } else if found.rank > exact {
+        terminal::warn(&format!(
+            "{}: the numeric rank is {}, above the exact {exact}; please report this model, one of them is wrong",
+            model.path, found.rank
+        ));
+    }
+    Some(found)
 }

@@ -144,12 +144,7 @@ impl Result {
             count(fit.parameters.len(), "base parameter", "base parameters"),
             fit.samples
         ))];
-        lines.extend(show::expressions(
-            2,
-            fit.parameters
-                .iter()
-                .map(|p| (p.name.as_str(), p.expression.as_str())),
-        ));
+        lines.extend(show::expressions(2, model));
         lines.push(String::new());
         lines.extend(show::parameters(&fit.parameters));
         lines.push(String::new());

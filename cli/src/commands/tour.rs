@@ -92,10 +92,10 @@ pub(crate) fn run(args: &TourArgs) -> Outcome {
     story.regions(rods)?;
     let p4 = &rods_paper.result.fit.parameters[3];
     story.say(&format!(
-        "Under the paper's treatment {} is left after {}, but at a price: {} becomes {} {}. \
-         The parameters took over part of what is missing. A smaller error alone does not make a model true.",
-        percent(rods_paper.after()),
+        "Under the paper's treatment the error falls from {} to {}, but at a price: {} becomes {} {}, where the truth is 0. \
+         The parameters took over part of what is missing. A small error alone does not make a model true.",
         percent(rods_paper.before()),
+        percent(rods_paper.after()),
         p4.name,
         number(p4.value),
         p4.unit,
@@ -238,11 +238,7 @@ impl Story {
     }
 
     fn expressions(&mut self, model: &Model) {
-        let pairs = model
-            .base
-            .iter()
-            .map(|b| (b.name.as_str(), b.expression.as_str()));
-        self.lines(&show::expressions(2, pairs));
+        self.lines(&show::expressions(2, model));
     }
 
     fn parameters(&mut self, chapter: &Chapter<'_>) {
@@ -259,10 +255,10 @@ impl Story {
         };
         let result = &chapter.result;
         let rows = [
-            error(Some(&result.nominal_fit), "fit, before"),
-            error(Some(&result.fit.fit), "fit, after"),
-            error(result.nominal_check.as_ref(), "check, before"),
-            error(result.fit.check.as_ref(), "check, after"),
+            error(Some(&result.nominal_fit), "fit, nominal"),
+            error(Some(&result.fit.fit), "fit, identified"),
+            error(result.nominal_check.as_ref(), "check, nominal"),
+            error(result.fit.check.as_ref(), "check, identified"),
         ];
         let drives = chapter.model.drives();
         let mut columns = vec![("error (nrms)", Align::Left), ("all", Align::Right)];
@@ -288,8 +284,18 @@ impl Story {
             .fold(0.0_f64, |m, v| m.max(v.abs()));
         let parts = [
             (format!("{drive}, measured, N"), measured, 6, None),
-            ("error before, N".to_owned(), before, 4, Some(largest)),
-            ("error after, N".to_owned(), after, 4, Some(largest)),
+            (
+                "error with nominal values, N".to_owned(),
+                before,
+                4,
+                Some(largest),
+            ),
+            (
+                "error with identified values, N".to_owned(),
+                after,
+                4,
+                Some(largest),
+            ),
         ];
         for (title, values, height, limit) in parts {
             let title = self.style.dim(&title);
@@ -334,20 +340,23 @@ impl Story {
             .flatten()
             .fold(0.0, f64::max);
         for chapter in chapters {
-            for (when, nrms) in [("before", chapter.before()), ("after", chapter.after())] {
-                let name = if when == "before" {
+            for (when, nrms) in [
+                ("nominal", chapter.before()),
+                ("identified", chapter.after()),
+            ] {
+                let name = if when == "nominal" {
                     chapter.title()
                 } else {
                     String::new()
                 };
                 let bar = bar(nrms.unwrap_or(0.0), largest, 24);
-                let bar = if when == "before" {
+                let bar = if when == "nominal" {
                     self.style.red(&bar)
                 } else {
                     self.style.green(&bar)
                 };
                 self.line(&format!(
-                    "  {name:<28}{when:<8}{:>11}  {bar}",
+                    "  {name:<28}{when:<11}{:>11}  {bar}",
                     percent(nrms)
                 ));
             }
@@ -366,7 +375,7 @@ fn write_files(folder: &Path, models: &[&Model], chapters: &[Chapter<'_>]) -> Ou
         Ok(())
     };
     for model in models {
-        let pages = equations::pages(model)?;
+        let pages = equations::pages(model);
         write(format!("{}-equations.html", model.name), &pages.html)?;
         write(format!("{}-equations.md", model.name), &pages.markdown)?;
     }

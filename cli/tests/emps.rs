@@ -1,0 +1,51 @@
+//! A real ball-screw axis through the program: the published least squares of the EMPS benchmark.
+//!
+//! The data carry no licence and are not copied: they are looked for beside the workspace.
+
+mod common;
+
+use common::{json, model, number, workspace};
+
+#[test]
+fn the_published_four_parameters_come_out() {
+    let folder = workspace("../shared/data/emps");
+    let path = |name: &str| folder.join(name).to_str().expect("plain text").to_owned();
+    if !folder.join("emps_train.csv").is_file() {
+        println!(
+            "EMPS is not tested: there are no recordings in ../shared/data/emps beside the workspace."
+        );
+        return;
+    }
+    let fit = json(&[
+        "identify",
+        &model("emps.toml"),
+        "--data",
+        &path("emps_train.csv"),
+        "--check",
+        &path("emps_pulses.csv"),
+        "--order",
+        "4",
+        "--cutoff",
+        "100",
+        "--trim",
+        "49",
+        "--decimate",
+        "10",
+        "--json",
+    ]);
+    let published = [
+        ("M", 95.1089),
+        ("Fv", 203.5034),
+        ("Fc", 20.3935),
+        ("offset", -3.1648),
+    ];
+    for (k, (expression, value)) in published.iter().enumerate() {
+        let found = &fit["parameters"][k];
+        assert_eq!(found["expression"], *expression);
+        println!("{expression}: {} (published {value})", found["value"]);
+        assert!((number(found, "/value") / value - 1.0).abs() < 0.01);
+    }
+    assert!((number(&fit, "/condition_number") - 25.99).abs() < 0.1);
+    assert!((100.0 * number(&fit, "/fit/nrms") - 4.083).abs() < 0.15);
+    assert!((100.0 * number(&fit, "/check/nrms") - 5.982).abs() < 0.15);
+}
