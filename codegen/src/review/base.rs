@@ -129,7 +129,7 @@ pub(super) fn products(page: &mut Document, derivation: &Derivation) {
                 cell(text((k + 1).to_string())),
                 cell(Inline::Math(product(mechanism, m))),
                 cell(text(unit(mechanism, m))),
-                cell(text(number(m.value(&parameters)))),
+                cell(text(Shown(m.value(&parameters)).to_string())),
                 fate,
             ]
         })
@@ -251,7 +251,7 @@ pub(super) fn base_parameters(
             vec![
                 cell(Inline::Math(Formula::name(base_name(k)))),
                 cell(Inline::Math(product(mechanism, retained))),
-                cell(text(format!("{:.6}", Shown(values[k])))),
+                cell(text(Shown(values[k]).to_string())),
                 cell(text(unit(mechanism, retained))),
             ]
         })

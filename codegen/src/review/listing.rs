@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use modelmill_spec::Mechanism;
 
 use super::document::Equation;
+use super::names::Meaning;
 use crate::expr::Rational;
 use crate::expr::print::{Formula, Function, Symbol, atom};
 use crate::lower::{Op, Program, Stage};
@@ -25,7 +26,7 @@ const MOST_LEAVES: usize = 16;
 pub(super) fn list(
     program: &Program,
     mechanism: &Mechanism,
-    names: &BTreeMap<usize, Symbol>,
+    names: &BTreeMap<usize, Meaning>,
     reserved: &BTreeSet<String>,
     outputs: &[Symbol],
     prefix: &str,
@@ -33,7 +34,6 @@ pub(super) fn list(
     let uses = uses(program);
     let mut lister = Lister {
         mechanism,
-        prefix,
         taken: reserved.clone(),
         formulas: Vec::with_capacity(program.ops.len()),
         angles: BTreeMap::new(),
@@ -43,7 +43,7 @@ pub(super) fn list(
             state: Vec::new(),
         },
     };
-    lister.taken.extend(names.values().map(Symbol::text));
+    lister.taken.extend(names.values().map(|m| m.symbol.text()));
     lister.taken.extend(outputs.iter().map(Symbol::text));
     let is_output = |i: usize| program.outputs.iter().any(|o| o.index() == i);
     for (i, op) in program.ops.iter().enumerate() {
@@ -55,7 +55,7 @@ pub(super) fn list(
         let simple = leaves(&formula) < 2;
         let wanted = match op {
             Op::Number(_) | Op::Input(_) | Op::Neg(_) => None,
-            _ if names.contains_key(&i) => Some(names[&i].clone()),
+            _ if names.contains_key(&i) => Some(names[&i].symbol.clone()),
             Op::Sin(a) | Op::Cos(a) => Some(lister.sine(op, a.index())),
             _ if simple => None,
             // An output used nowhere else is written where the outputs are.
@@ -71,8 +71,10 @@ pub(super) fn list(
         };
         match wanted {
             Some(symbol) => {
-                lister.line(program.stages[i], symbol.clone(), formula);
-                lister.formulas.push(Formula::Symbol(symbol));
+                let negative = names.get(&i).is_some_and(|m| m.negative);
+                let turned = |f: Formula| if negative { f.negated() } else { f };
+                lister.line(program.stages[i], symbol.clone(), turned(formula));
+                lister.formulas.push(turned(Formula::Symbol(symbol)));
             }
             None => lister.formulas.push(formula),
         }
@@ -82,6 +84,10 @@ pub(super) fn list(
         if formula != Formula::Symbol(symbol.clone()) {
             lister.line(Stage::State, symbol.clone(), formula);
         }
+    }
+    let Listing { fixed, state } = &mut lister.listing;
+    for (i, equation) in fixed.iter_mut().chain(state).enumerate() {
+        equation.tag = format!("{prefix}{}", i + 1);
     }
     lister.listing
 }
@@ -115,7 +121,6 @@ fn uses(program: &Program) -> Vec<Uses> {
 
 struct Lister<'a> {
     mechanism: &'a Mechanism,
-    prefix: &'a str,
     taken: BTreeSet<String>,
     /// Per operation what stands for its value.
     formulas: Vec<Formula>,
@@ -128,11 +133,10 @@ struct Lister<'a> {
 
 impl Lister<'_> {
     fn line(&mut self, stage: Stage, left: Symbol, right: Formula) {
-        let number = self.listing.fixed.len() + self.listing.state.len() + 1;
         let equation = Equation {
             left: Formula::Symbol(left),
             right,
-            tag: format!("{}{number}", self.prefix),
+            tag: String::new(),
             remark: None,
         };
         match stage {
@@ -178,7 +182,7 @@ impl Lister<'_> {
             Op::Input(a) => Formula::Symbol(atom(self.mechanism, *a)),
             Op::Add(a, b) if a == b => Formula::product(Rational::integer(2), [at(a)]),
             Op::Add(a, b) => Formula::sum([at(a), at(b)]),
-            Op::Sub(a, b) => Formula::sum([at(a), negated(at(b))]),
+            Op::Sub(a, b) => Formula::sum([at(a), at(b).negated()]),
             Op::Mul(a, b) => Formula::product(Rational::ONE, [at(a), at(b)]),
             Op::Div(a, b) => Formula::quotient(at(a), at(b)),
             Op::Neg(a) => at(a).negated(),
@@ -187,14 +191,6 @@ impl Lister<'_> {
             Op::Cos(a) => Formula::apply(Function::Cos, at(a)),
             Op::Atan2(y, x) => Formula::Apply(Function::Atan2, vec![at(y), at(x)]),
         }
-    }
-}
-
-/// Changes the sign of a sum term by term, so that `a - (b - c)` needs no parentheses.
-fn negated(formula: Formula) -> Formula {
-    match formula {
-        Formula::Sum(terms) => Formula::sum(terms.into_iter().map(Formula::negated)),
-        other => other.negated(),
     }
 }
 

@@ -92,32 +92,28 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
             page.paragraph(line);
         }
     }
-    let mut line = vec![text(
-        "Their rates and accelerations follow from the differentiated closure equations, which are linear in them",
-    )];
-    let determinants = &projection.determinants;
-    match determinants
+    let determinants: Vec<Equation> = projection
+        .determinants
         .iter()
-        .map(|id| shown(graph, mechanism, *id))
-        .collect::<Option<Vec<_>>>()
-    {
-        Some(formulas) if !formulas.is_empty() => {
-            line.push(text(
-                "; the model is singular where one of these vanishes: ",
-            ));
-            for (i, f) in formulas.into_iter().enumerate() {
-                if i > 0 {
-                    line.push(text("; "));
-                }
-                line.push(Inline::Math(f));
-            }
-            line.push(text("."));
-        }
-        _ => line.push(text(
-            "; a pose where their matrix is singular is reported as such.",
-        )),
+        .enumerate()
+        .filter_map(|(k, id)| {
+            Some(Equation {
+                left: Formula::name(format!("Det_{}", k + 1)),
+                right: shown(graph, mechanism, *id)?,
+                tag: format!("L{}", tag + k + 1),
+                remark: None,
+            })
+        })
+        .collect();
+    let mut says = "Their rates and accelerations follow from the differentiated closure equations, which are linear in them."
+        .to_owned();
+    if determinants.is_empty() {
+        says.push_str(" A pose where their matrix is singular is reported as such.");
+    } else {
+        says.push_str(" The mechanism is singular, and the model says so, where a determinant of theirs or of the drives' Jacobian vanishes:");
     }
-    page.paragraph(line);
+    page.paragraph([text(says)]);
+    page.equations("determinants", determinants);
 }
 
 fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
@@ -211,6 +207,9 @@ pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
             continue;
         }
         let mut line = |left: String, id: ExprId| {
+            if id == Graph::ZERO {
+                return None;
+            }
             let right = shown(graph, mechanism, id)?;
             let tag = format!("D{}", lines.len() + 1);
             lines.push(Equation {
@@ -229,7 +228,7 @@ pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
     }
     if any_linear {
         page.paragraph([text(
-            "Lengths of the linear drives, and their derivatives by the independent coordinates, the Jacobian J. \
+            "Lengths of the linear drives, and their derivatives by the independent coordinates, the Jacobian J; what is not listed is zero. \
              By virtual power J' f equals the generalised forces of the independent coordinates.",
         )]);
         page.blocks.push(Block::Equations(lines));

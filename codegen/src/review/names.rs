@@ -20,6 +20,13 @@ pub(super) struct Meanings {
     known: Vec<(Symbol, f64)>,
 }
 
+/// What a value of a program is: a quantity with a name, or its negative.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Meaning {
+    pub(super) symbol: Symbol,
+    pub(super) negative: bool,
+}
+
 /// Relative agreement that counts as equality.
 const AGREES: f64 = 1e-10;
 
@@ -39,8 +46,8 @@ impl Meanings {
         }
     }
 
-    /// Names of a program's values, by position; each name is given once.
-    pub(super) fn of(&self, program: &Program) -> BTreeMap<usize, Symbol> {
+    /// What a program's values are, by position; each name is given once.
+    pub(super) fn of(&self, program: &Program) -> BTreeMap<usize, Meaning> {
         let mut names = BTreeMap::new();
         if self.known.is_empty() {
             return names;
@@ -53,9 +60,11 @@ impl Meanings {
             }
             let found = free
                 .iter()
-                .position(|(_, v)| (value - v).abs() <= AGREES * v.abs());
+                .position(|(_, v)| (value.abs() - v.abs()).abs() <= AGREES * v.abs());
             if let Some(k) = found {
-                names.insert(i, free.remove(k).0.clone());
+                let (symbol, v) = free.remove(k).clone();
+                let negative = (value < &0.0) != (v < 0.0);
+                names.insert(i, Meaning { symbol, negative });
             }
         }
         names
@@ -164,7 +173,7 @@ fn run(program: &Program, atoms: &BTreeMap<Atom, f64>) -> Vec<f64> {
 /// Quantities with a meaning and their values; the first of several equal ones gives the name.
 fn known(derivation: &Derivation, atoms: &BTreeMap<Atom, f64>) -> Vec<(Symbol, f64)> {
     let mut graph = derivation.graph.clone();
-    let mut named = sines(&graph, derivation);
+    let mut named = sines(&mut graph, derivation);
     named.extend(rates(&mut graph, derivation));
     named.extend(links(&mut graph, derivation));
     named.extend(points(&mut graph, derivation));
@@ -181,7 +190,7 @@ fn known(derivation: &Derivation, atoms: &BTreeMap<Atom, f64>) -> Vec<(Symbol, f
         };
         let taken = known
             .iter()
-            .any(|(s, v)| *s == symbol || (value - v).abs() <= AGREES * v.abs());
+            .any(|(s, v)| *s == symbol || (value.abs() - v.abs()).abs() <= AGREES * v.abs());
         if value.is_finite() && value != 0.0 && !taken && !reserved.contains(&symbol.text()) {
             known.push((symbol, value));
         }
@@ -199,7 +208,7 @@ pub(super) fn reserved(mechanism: &Mechanism) -> BTreeSet<String> {
 }
 
 /// Sines and cosines of sums of angles: `c_theta1_gamma1`.
-fn sines(graph: &Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
+fn sines(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
     let projection = &derivation.equations.projection;
     let mechanism = &derivation.mechanism;
     let seen = graph.reachable(&projection.residual);
@@ -212,6 +221,12 @@ fn sines(graph: &Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
             _ => continue,
         };
         named.push((trigonometric(mechanism, letter, angle), id));
+    }
+    for p in &projection.passive {
+        let angle = crate::expr::AngleSum::new([(Atom::Coordinate(*p), 1)]);
+        let (cosine, sine) = graph.cos_sin(&angle, 0);
+        named.push((trigonometric(mechanism, "c", &angle), cosine));
+        named.push((trigonometric(mechanism, "s", &angle), sine));
     }
     named
 }
@@ -295,12 +310,15 @@ fn links(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
         std::array::from_fn(|i| graph.neg(gravity[i])),
     );
     let mut motions: Vec<(Vector, Vector, Vector)> = Vec::new();
+    // Acceleration of the place where the joint acts, along the axes of the parent.
+    let mut before: Vec<Vector> = Vec::new();
     for (i, link) in tree.links.iter().enumerate() {
         let (omega_p, alpha_p, a_p) = link.parent.map_or(still, |p| motions[p]);
         let swing = graph.cross(&omega_p, &link.position);
         let centripetal = graph.cross(&omega_p, &swing);
         let tangential = graph.cross(&alpha_p, &link.position);
         let a = graph.add_vectors(&[a_p, tangential, centripetal]);
+        before.push(a);
         let mut omega = tree.to_link(graph, i, &omega_p);
         let mut alpha = tree.to_link(graph, i, &alpha_p);
         let mut a = tree.to_link(graph, i, &a);
@@ -340,6 +358,8 @@ fn links(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
             named.push((Symbol::new(of("omega")), omega[axis]));
             named.push((Symbol::derived(of("omega"), 1), alpha[axis]));
             named.push((Symbol::new(of("a")), a[axis]));
+        }
+        for axis in 0..3 {
             // The matrix that takes a place of the frame to its acceleration: [alpha]x + [omega]x [omega]x.
             let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
             let entry = |i: usize, j: usize| format!("U_{}_{}{}", frame.name, AXES[i], AXES[j]);
@@ -350,21 +370,58 @@ fn links(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
             named.push((Symbol::new(entry(axis, j)), graph.sub(product, alpha[k])));
             named.push((Symbol::new(entry(j, axis)), graph.add(product, alpha[k])));
         }
+        let parent = &mechanism.frames[frame.parent.0].name;
+        for (axis, id) in AXES.iter().zip(before[*link]) {
+            let name = format!("a_{}_{parent}_{axis}", frame.name);
+            named.push((Symbol::new(name), id));
+        }
     }
     named
 }
 
-/// Places of the points in the base frame.
+/// Places of the points in the base frame, from its origin, from that of their frame, and along the linear drives.
 fn points(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
-    let mechanism = &derivation.mechanism;
+    let mut mechanism = derivation.mechanism.clone();
     let tree = &derivation.equations.tree;
+    let n_points = mechanism.points.len();
+    // The origins of the frames are points like others.
+    for i in 0..mechanism.frames.len() {
+        mechanism.points.push(modelmill_spec::Point {
+            name: mechanism.frames[i].name.clone(),
+            frame: modelmill_spec::FrameIdx(i),
+            at: std::array::from_fn(|_| modelmill_spec::Exact::zero()),
+        });
+    }
+    let places: Option<Vec<Vector>> = (0..mechanism.points.len())
+        .map(|i| crate::closure::position_in_base(graph, &mechanism, tree, i).ok())
+        .collect();
+    let Some(places) = places else {
+        return Vec::new();
+    };
     let mut named = Vec::new();
-    for (i, point) in mechanism.points.iter().enumerate() {
-        let Ok(at) = crate::closure::position_in_base(graph, mechanism, tree, i) else {
-            continue;
-        };
+    let mut name = |start: String, at: Vector| {
         for (axis, id) in AXES.iter().zip(at) {
-            named.push((Symbol::new(format!("r_{}_{axis}", point.name)), id));
+            named.push((Symbol::new(format!("{start}_{axis}")), id));
+        }
+    };
+    for (point, place) in mechanism.points.iter().zip(&places) {
+        name(format!("r_{}", point.name), *place);
+    }
+    for (point, place) in mechanism.points.iter().zip(&places).take(n_points) {
+        let frame = &mechanism.frames[point.frame.0];
+        let from = graph.sub_vectors(place, &places[n_points + point.frame.0]);
+        name(format!("r_{}_{}", frame.name, point.name), from);
+    }
+    for joined in &mechanism.loops {
+        let [a, b] = joined.joins.map(|p| mechanism.points[p.0].frame.0);
+        let between = graph.sub_vectors(&places[n_points + b], &places[n_points + a]);
+        let names = [a, b].map(|f| &*mechanism.frames[f].name);
+        name(format!("r_{}_{}", names[0], names[1]), between);
+    }
+    for drive in &mechanism.drives {
+        if let DriveKind::Linear { from, to } = drive.kind {
+            let along = graph.sub_vectors(&places[to.0], &places[from.0]);
+            name(format!("e_{}", drive.name), along);
         }
     }
     named

@@ -3,7 +3,7 @@
 use super::document::{Block, Document, Equation, Table, cell, code, text};
 use super::equations::base_name;
 use super::listing::{self, Listing};
-use super::names::{Meanings, reserved};
+use super::names::{Meaning, Meanings, reserved};
 use crate::expr::print::Symbol;
 use crate::lower::{OperationCount, Program, Stage};
 use crate::{Derivation, PassivePosition};
@@ -65,19 +65,24 @@ pub(super) fn programs(page: &mut Document, derivation: &Derivation) {
         code("c_"),
         text(
             " are sine and cosine; omega, its derivative and a are angular velocity, angular acceleration and acceleration \
-             of the origin (gravity taken off) of a frame along its own axes; U takes a place in the frame to its \
-             acceleration; r is a place in the base frame; k is computed once per geometry, x is any other intermediate value.",
+             of the origin (gravity taken off) of a frame along its own axes, or along those of the frame named second; U takes a place in the frame to its \
+             acceleration; r is the place of a point in the base frame, or its distance from the origin of a frame along the base frame's axes, \
+             e leads along a linear drive; k is computed once per geometry, x is any other intermediate value.",
         ),
     ]);
     let meanings = Meanings::new(derivation);
     let taken = reserved(mechanism);
     let list = |program: &Program, outputs: &[Symbol], prefix: &str| {
         let mut names = meanings.of(program);
-        names.retain(|_, name| !outputs.contains(name));
+        names.retain(|_, meaning| !outputs.contains(&meaning.symbol));
         for (value, symbol) in program.outputs.iter().zip(outputs) {
             // An output with a meaning is called by it from the start.
             if is_motion(derivation, symbol) && !is_trivial(program, value.index()) {
-                names.insert(value.index(), symbol.clone());
+                let meaning = Meaning {
+                    symbol: symbol.clone(),
+                    negative: false,
+                };
+                names.insert(value.index(), meaning);
             }
         }
         listing::list(program, mechanism, &names, &taken, outputs, prefix)

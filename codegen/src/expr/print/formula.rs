@@ -148,14 +148,31 @@ impl Formula {
             Self::gather(one, &mut inverse, &mut down, &mut up);
         }
         number = &number * &inverse.recip();
+        for one in up.iter_mut().chain(&mut down) {
+            // Signs that all terms of a sum share go outside.
+            if let Self::Sum(terms) = one
+                && terms.iter().all(Self::is_negative)
+            {
+                let turned = std::mem::take(terms).into_iter().map(Self::negated);
+                *terms = turned.collect();
+                number = -&number;
+            }
+        }
         if number.is_zero() {
             return Self::Number(number);
         }
         if up.is_empty() && down.is_empty() {
             return Self::Number(number);
         }
-        if number.is_one() && down.is_empty() && up.len() == 1 {
-            return up.remove(0);
+        if down.is_empty() && up.len() == 1 {
+            match (up.remove(0), number == Rational::MINUS_ONE) {
+                (only, false) if number.is_one() => return only,
+                // The sign of a sum goes to its terms: `b - a` rather than `-(a - b)`.
+                (Self::Sum(terms), true) => {
+                    return Self::sum(terms.into_iter().map(Self::negated));
+                }
+                (only, _) => up.push(only),
+            }
         }
         Self::Term {
             factor: number,
