@@ -86,10 +86,6 @@ impl Polynomial {
         Self(terms)
     }
 
-    pub(crate) fn is_zero(&self) -> bool {
-        self.0.is_empty()
-    }
-
     pub(crate) fn plus(&self, other: &Self, graph: &mut Graph) -> Self {
         let mut terms = self.0.clone();
         for (monomial, value) in &other.0 {

@@ -33,7 +33,7 @@ pub use evaluate::{Evaluator, PoseFault, PoseReason, States};
 pub use exact::Monomial;
 pub use lower::{Guard, Op, OperationCount, Program, Stage, ValueId};
 pub use programs::{PassivePosition, Programs};
-pub use reduce::{Dependency, Method, RationalFunction, Reduction, Variable};
+pub use reduce::{Dependency, Method, Polynomial, Powers, RationalFunction, Reduction, Variable};
 
 use expr::Graph;
 use regressor::Equations;

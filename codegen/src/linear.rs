@@ -142,8 +142,8 @@ impl Minors<'_> {
         let row = rows.trailing_zeros();
         let mut terms = Vec::new();
         let mut sign = Rational::ONE;
-        for column in (0..32).filter(|c| columns & (1 << c) != 0) {
-            let entry = self.matrix[row as usize][column as usize];
+        for column in (0..u32::BITS as usize).filter(|c| columns & (1 << c) != 0) {
+            let entry = self.matrix[row as usize][column];
             if entry != Graph::ZERO {
                 let minor = self.minor(graph, rows & !(1 << row), columns & !(1 << column));
                 terms.push((graph.mul(entry, minor), sign.clone()));

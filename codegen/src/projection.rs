@@ -8,7 +8,7 @@ use modelmill_spec::{DriveKind, Mechanism};
 
 use crate::DeriveError;
 use crate::closure::{self, Closure};
-use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational, Unary};
+use crate::expr::{Atom, ExprId, Graph, Rational, Unary};
 use crate::linear;
 use crate::linear_loops;
 use crate::tree::Tree;

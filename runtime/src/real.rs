@@ -21,17 +21,23 @@ pub trait Real:
     /// Sine and cosine of an angle in rad.
     fn sin_cos(self) -> (Self, Self);
     /// Square root.
+    #[must_use]
     fn sqrt(self) -> Self;
     /// Angle of the point (`x`, `self`) in rad.
+    #[must_use]
     fn atan2(self, x: Self) -> Self;
     /// Absolute value.
+    #[must_use]
     fn abs(self) -> Self;
     /// Hyperbolic tangent.
+    #[must_use]
     fn tanh(self) -> Self;
     /// Exponential.
+    #[must_use]
     fn exp(self) -> Self;
 
     /// -1, 0 or 1.
+    #[must_use]
     fn sign(self) -> Self {
         let zero = Self::from_f64(0.0);
         if self > zero {

@@ -21,8 +21,9 @@ pub fn solve<T: Real, const N: usize>(
         matrix.swap(column, pivot);
         rhs.swap(column, pivot);
         let lead = matrix[column][column];
+        let regular = lead.abs() > zero;
         // A pivot that is no number fails this comparison too.
-        if !(lead.abs() > zero) {
+        if !regular {
             return Err(PoseError::Singular);
         }
         for row in column + 1..N {

@@ -152,7 +152,7 @@ impl Rational {
             }
         }
         let (x, y) = (self.to_big(), other.to_big());
-        let n = num_gcd(x.numer() * y.denom(), y.numer() * x.denom());
+        let n = num_gcd(&(x.numer() * y.denom()), &(y.numer() * x.denom()));
         Self::from(BigRational::new(n, x.denom() * y.denom()))
     }
 
@@ -165,7 +165,7 @@ impl Rational {
     }
 }
 
-fn num_gcd(a: BigInt, b: BigInt) -> BigInt {
+fn num_gcd(a: &BigInt, b: &BigInt) -> BigInt {
     let (mut a, mut b) = (a.abs(), b.abs());
     while !b.is_zero() {
         let r = &a % &b;

@@ -18,7 +18,6 @@ pub(crate) fn cost(graph: &Graph, roots: &[ExprId]) -> usize {
         let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
         total += match graph.node(id) {
             Node::Rational(_) | Node::Atom(_) => 0,
-            Node::Sin(_) | Node::Cos(_) => FUNCTION,
             Node::Sum(terms) => {
                 let n_fixed = terms.iter().filter(|(c, _)| fixed[c.index()]).count();
                 let scaled = terms.iter().filter(|(c, k)| {
@@ -37,7 +36,7 @@ pub(crate) fn cost(graph: &Graph, roots: &[ExprId]) -> usize {
                 factors.len() - n_fixed + n_fixed.min(1) - 1 + powers
             }
             Node::Unary(Unary::Sqrt, _) => DIVISION,
-            Node::Unary(..) => FUNCTION,
+            Node::Sin(_) | Node::Cos(_) | Node::Unary(..) => FUNCTION,
         };
     }
     total

@@ -83,7 +83,7 @@ fn common_pairs(graph: &Graph, roots: &[ExprId]) -> BTreeSet<Pair> {
         if needed && !fixed[i] {
             let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
             pairs_of(graph.node(id), &fixed, |pair| {
-                *counts.entry(pair).or_insert(0) += 1
+                *counts.entry(pair).or_insert(0) += 1;
             });
         }
     }
@@ -124,10 +124,7 @@ fn replace(graph: &mut Graph, roots: &[ExprId], pairs: &BTreeSet<Pair>) -> Vec<E
                 {
                     let k = terms[i].1.clone();
                     let joined = graph.sum(&[(*a, Rational::ONE), (*b, ratio.clone())]);
-                    terms = terms
-                        .into_iter()
-                        .filter(|(t, _)| t != a && t != b)
-                        .collect();
+                    terms.retain(|(t, _)| t != a && t != b);
                     terms.push((joined, k));
                 }
             }
@@ -137,7 +134,7 @@ fn replace(graph: &mut Graph, roots: &[ExprId], pairs: &BTreeSet<Pair>) -> Vec<E
             let mut factors = factors.clone();
             for pair in pairs {
                 let Pair::Factors(a, b) = pair else { continue };
-                let has = |id: ExprId| factors.iter().any(|f| *f == (id, 1));
+                let has = |id: ExprId| factors.contains(&(id, 1));
                 if factors.len() > 2 && has(*a) && has(*b) {
                     let joined = graph.mul(*a, *b);
                     factors.retain(|(f, _)| f != a && f != b);
