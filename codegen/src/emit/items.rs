@@ -4,11 +4,11 @@ use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
 use super::body::Body;
+use super::functions::{inverse_dynamics, model};
 use super::identifier;
 use crate::Derivation;
 use crate::expr::Atom;
 use crate::lower::{Op, OperationCount, Program, Stage};
-use crate::programs::PassivePosition;
 
 /// What the module says of itself.
 pub(super) fn module_doc(derivation: &Derivation) -> String {
@@ -57,7 +57,7 @@ pub(super) fn module_doc(derivation: &Derivation) -> String {
     doc
 }
 
-fn count(program: &Program) -> OperationCount {
+pub(super) fn count(program: &Program) -> OperationCount {
     program.count(Stage::State)
 }
 
@@ -164,7 +164,7 @@ fn tables(derivation: &Derivation) -> TokenStream {
     }
 }
 
-fn signed(value: f64) -> TokenStream {
+pub(super) fn signed(value: f64) -> TokenStream {
     let magnitude = Literal::f64_unsuffixed(value.abs());
     if value.is_sign_negative() {
         quote! { -#magnitude }
@@ -233,7 +233,7 @@ fn state(derivation: &Derivation) -> TokenStream {
 }
 
 /// How the inputs of a program are written inside the functions of the model.
-fn input(derivation: &Derivation) -> impl Fn(Atom) -> TokenStream {
+pub(super) fn input(derivation: &Derivation) -> impl Fn(Atom) -> TokenStream {
     let (active, passive) = derivation.coordinates();
     let constants: Vec<_> = derivation
         .mechanism
@@ -294,332 +294,6 @@ fn base_parameters(derivation: &Derivation) -> TokenStream {
             let _ = (geometry, parameters);
             #statements
             [#(#outputs),*]
-        }
-    }
-}
-
-fn rows(body: &Body<'_>, first: usize, rows: usize, columns: usize) -> TokenStream {
-    let rows = (0..rows).map(|r| {
-        let entries = (0..columns).map(|c| body.output(first + r * columns + c));
-        quote! { [#(#entries),*] }
-    });
-    quote! { [#(#rows),*] }
-}
-
-fn list(body: &Body<'_>, first: usize, n: usize) -> TokenStream {
-    let entries = (first..first + n).map(|k| body.output(k));
-    quote! { [#(#entries),*] }
-}
-
-/// Statements that provide `passive` where a program reads it.
-fn passive_needed(derivation: &Derivation, program: &Program, model: &TokenStream) -> TokenStream {
-    let (_, passive) = derivation.coordinates();
-    let reads = program
-        .ops
-        .iter()
-        .any(|op| matches!(op, Op::Input(Atom::Coordinate(i)) if passive.contains(i)));
-    if reads {
-        quote! { let passive = #model.passive_position(&state.q)?; }
-    } else {
-        TokenStream::new()
-    }
-}
-
-fn model(derivation: &Derivation) -> TokenStream {
-    let programs = &derivation.programs;
-    let input = input(derivation);
-    let (active, passive) = derivation.coordinates();
-    let (n_active, n_passive) = (active.len(), passive.len());
-    let n_drives = derivation.mechanism.drives.len();
-    let n_base = derivation.reduction.retained.len();
-    let regressor = Body::new(&programs.regressor, &input);
-    let drives = Body::new(&programs.drives, &input);
-    let motion = Body::new(&programs.passive, &input);
-    let fields = [&regressor, &drives, &motion].map(Body::n_fixed);
-    let [n_regressor, n_drive, n_motion] = fields;
-    let [fixed_regressor, fixed_drives, fixed_motion] =
-        [&regressor, &drives, &motion].map(Body::fixed);
-    let [state_regressor, state_drives, state_motion] =
-        [&regressor, &drives, &motion].map(Body::state);
-    let [needs_regressor, needs_drives, needs_motion] =
-        [&programs.regressor, &programs.drives, &programs.passive]
-            .map(|p| passive_needed(derivation, p, &quote! { self }));
-    let h = rows(&regressor, 0, n_drives, n_base);
-    let (lengths, speeds) = (
-        list(&drives, 0, n_drives),
-        list(&drives, n_drives, n_drives),
-    );
-    let jacobian = rows(&drives, 2 * n_drives, n_drives, n_active);
-    let regressor_doc = format!(
-        " H_min: one row per drive, one column per base parameter. {}.",
-        count(&programs.regressor)
-    );
-    let newton = newton(derivation);
-    let passive_function = (n_passive > 0).then(|| {
-        let (q, qd, qdd) = (
-            list(&motion, 0, n_passive),
-            list(&motion, n_passive, n_passive),
-            list(&motion, 2 * n_passive, n_passive),
-        );
-        quote! {
-            /// Passive coordinates with their rates and accelerations.
-            ///
-            /// # Errors
-            /// A pose out of reach or singular.
-            pub fn passive(&self, state: &State<T>) -> Result<Passive<T>, PoseError> {
-                let fixed = &self.motion;
-                #needs_motion
-                #state_motion
-                Ok(Passive { q: #q, qd: #qd, qdd: #qdd })
-            }
-        }
-    });
-    let passive_struct = (n_passive > 0).then(|| {
-        quote! {
-            /// Motion of the passive coordinates.
-            #[derive(Clone, Copy, Debug, PartialEq)]
-            pub struct Passive<T> {
-                /// Coordinates.
-                pub q: [T; N_PASSIVE],
-                /// Rates.
-                pub qd: [T; N_PASSIVE],
-                /// Accelerations.
-                pub qdd: [T; N_PASSIVE],
-            }
-        }
-    });
-    let (newton_field, newton_init) = match &programs.passive_position {
-        PassivePosition::Newton { residual } => {
-            let body = Body::new(residual, &input);
-            let (n, fixed) = (body.n_fixed(), body.fixed());
-            (
-                Some(quote! { residual: [T; #n], }),
-                Some(quote! { residual: { #fixed }, }),
-            )
-        }
-        _ => (None, None),
-    };
-    let motion_field = (n_passive > 0).then(|| quote! { motion: [T; #n_motion], });
-    let motion_init = (n_passive > 0).then(|| quote! { motion: { #fixed_motion }, });
-    quote! {
-        #passive_struct
-
-        /// Motion of the drives.
-        #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct Drives<T> {
-            /// Lengths or angles.
-            pub coordinate: [T; N_DRIVES],
-            /// Their rates.
-            pub rate: [T; N_DRIVES],
-            /// Derivatives of the lengths by the independent coordinates.
-            pub jacobian: [[T; N_ACTIVE]; N_DRIVES],
-        }
-
-        /// The model for one geometry; what depends on the geometry alone is computed once.
-        #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct Model<T> {
-            regressor: [T; #n_regressor],
-            drives: [T; #n_drive],
-            #motion_field
-            #newton_field
-        }
-
-        impl<T: Real> Default for Model<T> {
-            fn default() -> Self {
-                Self::new(&Geometry::default())
-            }
-        }
-
-        impl<T: Real> Model<T> {
-            /// Prepares the model of a geometry.
-            pub fn new(geometry: &Geometry<T>) -> Self {
-                let _ = geometry;
-                Self {
-                    regressor: { #fixed_regressor },
-                    drives: { #fixed_drives },
-                    #motion_init
-                    #newton_init
-                }
-            }
-
-            #[doc = #regressor_doc]
-            ///
-            /// # Errors
-            /// A pose out of reach or singular.
-            pub fn regressor(&self, state: &State<T>) -> Result<[[T; N_BASE]; N_DRIVES], PoseError> {
-                let fixed = &self.regressor;
-                #needs_regressor
-                #state_regressor
-                Ok(#h)
-            }
-
-            /// Lengths or angles of the drives, their rates, and their Jacobian.
-            ///
-            /// # Errors
-            /// A pose out of reach or singular.
-            pub fn drives(&self, state: &State<T>) -> Result<Drives<T>, PoseError> {
-                let fixed = &self.drives;
-                #needs_drives
-                #state_drives
-                Ok(Drives { coordinate: #lengths, rate: #speeds, jacobian: #jacobian })
-            }
-
-            #passive_function
-            #newton
-        }
-    }
-}
-
-/// Newton's method on the loops, where there is no closed form.
-fn newton(derivation: &Derivation) -> Option<TokenStream> {
-    let PassivePosition::Newton { residual } = &derivation.programs.passive_position else {
-        return None;
-    };
-    let (active, passive) = derivation.coordinates();
-    let n = passive.len();
-    let input = {
-        let (active, passive) = (active.clone(), passive.clone());
-        let other = input(derivation);
-        move |atom: Atom| match atom {
-            Atom::Coordinate(i) => match active.iter().position(|a| *a == i) {
-                Some(k) => quote! { q[#k] },
-                None => {
-                    let k = passive
-                        .iter()
-                        .position(|p| *p == i)
-                        .expect("a coordinate is active or passive");
-                    quote! { passive[#k] }
-                }
-            },
-            _ => other(atom),
-        }
-    };
-    let body = Body::new(residual, &input);
-    let statements = body.state();
-    let (values, jacobian) = (list(&body, 0, n), rows(&body, n, n, n));
-    let nominal = |indices: &[usize]| -> Vec<TokenStream> {
-        indices
-            .iter()
-            .map(|i| signed(derivation.mechanism.coordinates[*i].nominal))
-            .collect()
-    };
-    let (nominal_active, nominal_passive) = (nominal(&active), nominal(&passive));
-    Some(quote! {
-        /// Passive coordinates of a pose, in the assembly mode of the nominal pose, followed from there in small steps.
-        ///
-        /// # Errors
-        /// A pose out of reach or singular.
-        pub fn passive_position(&self, q: &[T; N_ACTIVE]) -> Result<[T; N_PASSIVE], PoseError> {
-            let nominal: [T; N_ACTIVE] = [#(T::from_f64(#nominal_active)),*];
-            self.passive_position_from(&nominal, [#(T::from_f64(#nominal_passive)),*], q)
-        }
-
-        /// Passive coordinates of a pose, followed from a known pose near by: for control, the one of the last cycle.
-        ///
-        /// # Errors
-        /// A pose out of reach or singular.
-        pub fn passive_position_from(
-            &self,
-            from: &[T; N_ACTIVE],
-            mut passive: [T; N_PASSIVE],
-            to: &[T; N_ACTIVE],
-        ) -> Result<[T; N_PASSIVE], PoseError> {
-            let mut steps = 1_u32;
-            let mut reach = T::from_f64(0.1);
-            let mut far = T::from_f64(0.0);
-            for (a, b) in from.iter().zip(to) {
-                let distance = (*b - *a).abs();
-                if distance > far {
-                    far = distance;
-                }
-            }
-            while far > reach && steps < 1000 {
-                steps += 1;
-                reach = reach + T::from_f64(0.1);
-            }
-            for step in 1..=steps {
-                let share = T::from_f64(f64::from(step) / f64::from(steps));
-                let mut q = *to;
-                for k in 0..N_ACTIVE {
-                    q[k] = from[k] + share * (to[k] - from[k]);
-                }
-                passive = self.close(&q, passive)?;
-            }
-            Ok(passive)
-        }
-
-        fn close(&self, q: &[T; N_ACTIVE], mut passive: [T; N_PASSIVE]) -> Result<[T; N_PASSIVE], PoseError> {
-            let mut smallest = T::from_f64(1e30);
-            for _ in 0..40 {
-                let (residual, jacobian) = self.loops(q, &passive);
-                let step = modelmill_runtime::solve(jacobian, residual)?;
-                let mut size = T::from_f64(0.0);
-                for k in 0..N_PASSIVE {
-                    let most = T::from_f64(0.5);
-                    let bounded = if step[k] > most { most } else if step[k] < -most { -most } else { step[k] };
-                    passive[k] = passive[k] - bounded;
-                    size = size + step[k].abs();
-                }
-                if !(size < T::from_f64(1e30)) {
-                    return Err(PoseError::Singular);
-                }
-                // Rounding ends the convergence: the steps stop shrinking once they are tiny.
-                if size < T::from_f64(1e-3) && !(size < smallest * T::from_f64(0.5)) || !(size > T::from_f64(1e-14)) {
-                    return Ok(passive);
-                }
-                smallest = size;
-            }
-            Err(PoseError::OutOfReach)
-        }
-
-        /// Residuals of the loops and their Jacobian by the passive coordinates.
-        fn loops(&self, q: &[T; N_ACTIVE], passive: &[T; N_PASSIVE]) -> ([T; N_PASSIVE], [[T; N_PASSIVE]; N_PASSIVE]) {
-            let fixed = &self.residual;
-            #statements
-            (#values, #jacobian)
-        }
-    })
-}
-
-fn inverse_dynamics(derivation: &Derivation) -> TokenStream {
-    let input = input(derivation);
-    let program = &derivation.programs.inverse_dynamics;
-    let body = Body::new(program, &input);
-    let (n, fixed, state) = (body.n_fixed(), body.fixed(), body.state());
-    let forces = list(&body, 0, derivation.mechanism.drives.len());
-    let needs = passive_needed(derivation, program, &quote! { self.model });
-    let doc = format!(" Forces of the drives, N or N m. {}.", count(program));
-    let is_newton = matches!(
-        derivation.programs.passive_position,
-        PassivePosition::Newton { .. }
-    );
-    let model_field = is_newton.then(|| quote! { model: Model<T>, });
-    let model_init = is_newton.then(|| quote! { model: Model::new(geometry), });
-    quote! {
-        /// Inverse dynamics for one geometry and one set of base parameters.
-        #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct InverseDynamics<T> {
-            fixed: [T; #n],
-            #model_field
-        }
-
-        impl<T: Real> InverseDynamics<T> {
-            /// Prepares the recursion: what does not depend on the state is computed once.
-            pub fn new(geometry: &Geometry<T>, base: &[T; N_BASE]) -> Self {
-                let _ = (geometry, base);
-                Self { fixed: { #fixed }, #model_init }
-            }
-
-            #[doc = #doc]
-            ///
-            /// # Errors
-            /// A pose out of reach or singular.
-            pub fn forces(&self, state: &State<T>) -> Result<[T; N_DRIVES], PoseError> {
-                let fixed = &self.fixed;
-                #needs
-                #state
-                Ok(#forces)
-            }
         }
     }
 }

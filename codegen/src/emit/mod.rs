@@ -4,7 +4,9 @@
 //! for `f32` and `f64`.
 
 mod body;
+mod functions;
 mod items;
+mod newton;
 
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};

@@ -11,6 +11,14 @@ pub(crate) struct Echelon {
     pub(crate) rows: Vec<Vec<Element>>,
 }
 
+impl Echelon {
+    /// The entry of a column in the row of a pivot; `None` if that column holds no pivot.
+    pub(crate) fn entry(&self, pivot: usize, column: usize) -> Option<Element> {
+        let row = self.pivots.iter().position(|p| *p == pivot)?;
+        Some(self.rows[row][column])
+    }
+}
+
 /// Reduces `rows`, looking for pivots in the columns in the given order.
 pub(crate) fn echelon(mut rows: Vec<Vec<Element>>, order: &[usize]) -> Echelon {
     let mut pivots = Vec::new();

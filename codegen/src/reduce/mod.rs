@@ -111,7 +111,7 @@ pub(crate) fn independent_functions(
 
 /// Reduces the columns `columns[k][d]` (product by drive) to a base.
 ///
-/// `retain` names products that should be retained if they can, most wanted first.
+/// Products that the model file wants to retain are tried first, then all others in order.
 pub(crate) fn reduce(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -122,157 +122,212 @@ pub(crate) fn reduce(
     let effective: Vec<usize> = (0..columns.len())
         .filter(|k| columns[*k].iter().any(|x| *x != Graph::ZERO))
         .collect();
-    let n_drives = projection.drives.len();
-    let outputs: Vec<ExprId> = (0..n_drives)
-        .flat_map(|d| effective.iter().map(move |k| (d, *k)))
-        .map(|(d, k)| columns[k][d])
+    let order = preference(mechanism, candidates, &effective);
+    let outputs: Vec<ExprId> = (0..projection.drives.len())
+        .flat_map(|d| effective.iter().map(move |k| columns[*k][d]))
         .collect();
-    let roots = root_radicands(graph, &outputs, projection);
     let sampler = match Sampler::new(graph, mechanism, projection, &outputs) {
         Err(DeriveError::LoopsNotSampled { .. }) => {
-            let order = preference(mechanism, candidates, &effective);
             let order: Vec<usize> = order.into_iter().map(|k| effective[k]).collect();
             return numeric::reduce(graph, mechanism, projection, candidates, columns, &order);
         }
         sampler => sampler?,
     };
+    let regressor = SampledRegressor {
+        sampler,
+        n_columns: effective.len(),
+        // A sign takes only two values: that two of them agree by chance at all points must be out of the question.
+        least_points: if has_sign(graph, &outputs) { 80 } else { 0 },
+    };
     let mut stream = Stream::new(SEED);
-    let n = effective.len();
-
-    // A sign takes only two values: that two of them agree by chance at all points must be out of the question.
-    let least_points = if has_sign(graph, &outputs) { 80 } else { 0 };
-    // Rows of W for one set of constants, enough of them to show `rank` and a few more.
-    let rows_at = |constants: &FieldPoint,
-                   rank: usize,
-                   stream: &mut Stream|
-     -> Result<Vec<Vec<Element>>, DeriveError> {
-        let mut rows = Vec::new();
-        let mut points = 0;
-        while rows.len() < rank + 6 || points < least_points {
-            let values = sampler.draw(constants, stream)?;
-            rows.extend(values.chunks(n.max(1)).map(<[Element]>::to_vec));
-            points += 1;
-        }
-        Ok(rows)
-    };
-
-    let constants = sampler.constants(&mut stream);
-    let rows = if n == 0 {
-        Vec::new()
-    } else {
-        rows_at(&constants, n, &mut stream)?
-    };
-    let is_zero: Vec<bool> = (0..n)
-        .map(|k| rows.iter().all(|row| row[k] == Element::ZERO))
-        .collect();
-    let preferred = preference(mechanism, candidates, &effective);
-    let echelon = eliminate::echelon(rows, &preferred);
-    let mut pivots = echelon.pivots.clone();
-    pivots.sort_unstable();
-    let order: Vec<usize> = pivots.clone();
-    let rank = pivots.len();
-    let dependent: Vec<usize> = (0..n)
-        .filter(|k| !is_zero[*k] && !pivots.contains(k))
-        .collect();
-
-    // The factors that do not vanish, found again at any other constants.
-    let row_of = |echelon: &eliminate::Echelon, pivot: usize| {
-        echelon.pivots.iter().position(|p| *p == pivot)
-    };
-    let wanted: Vec<(usize, usize)> = dependent
-        .iter()
-        .flat_map(|j| pivots.iter().map(move |p| (*j, *p)))
-        .filter(|(j, p)| row_of(&echelon, *p).is_some_and(|r| echelon.rows[r][*j] != Element::ZERO))
-        .collect();
-    let mut sampling = stream.clone();
-    let mut oracle = |constants: &FieldPoint| -> Result<Vec<Element>, DeriveError> {
-        let rows = rows_at(constants, rank, &mut sampling)?;
-        let echelon = eliminate::echelon(rows, &order);
-        wanted
-            .iter()
-            .map(|(j, p)| {
-                row_of(&echelon, *p)
-                    .map(|r| echelon.rows[r][*j])
-                    .ok_or(DeriveError::RankChanged)
-            })
-            .collect()
-    };
+    let pattern = Pattern::find(&regressor, &order, &mut stream)?;
+    let roots = root_radicands(graph, &outputs, projection);
     let used = graph.atoms(&outputs);
-    let variables: Vec<(usize, bool)> = mechanism
-        .constants
-        .iter()
-        .enumerate()
-        .filter(|(i, _)| used.contains(&Atom::Constant(*i)))
-        .map(|(i, c)| (i, c.is_angle))
+    let variables: Vec<(usize, bool)> = (0..mechanism.constants.len())
+        .filter(|i| used.contains(&Atom::Constant(*i)))
+        .map(|i| (i, mechanism.constants[i].is_angle))
         .collect();
-    let draw = |stream: &mut Stream| sampler.constants(stream);
-    let functions = if wanted.is_empty() {
-        Vec::new()
-    } else {
-        reconstruct::reconstruct(&mut oracle, &variables, &roots, &draw, &mut stream)?
+    let factors = pattern.factors(&regressor, &variables, &roots, &mut stream)?;
+    let names = |k: usize| candidates[effective[k]].clone();
+    let mut reduction = pattern.reduction(mechanism, candidates, &names, factors)?;
+    reduction.method = Method::Exact {
+        confirmed_at: reduction.confirm(&regressor, &pattern.shown, &mut stream)?,
     };
-
-    let position: Vec<Option<usize>> = {
-        let kept: Vec<usize> = (0..n).filter(|k| !is_zero[*k]).collect();
-        (0..n).map(|k| kept.iter().position(|x| *x == k)).collect()
-    };
-    let at = |k: usize| position[k].expect("a column with an effect has a position");
-    let mut dependencies: Vec<Dependency> = dependent
-        .iter()
-        .map(|j| Dependency {
-            product: at(*j),
-            equals: Vec::new(),
-        })
-        .collect();
-    for ((j, p), function) in wanted.iter().zip(functions) {
-        let k = pivots
-            .iter()
-            .position(|x| x == p)
-            .expect("a wanted pivot is one");
-        let line = dependent
-            .iter()
-            .position(|x| x == j)
-            .expect("a wanted column is dependent");
-        let function = function.ok_or_else(|| DeriveError::FactorNotRecovered {
-            product: candidates[effective[*j]].text(mechanism),
-            retained: candidates[effective[*p]].text(mechanism),
-        })?;
-        dependencies[line].equals.push((k, function));
-    }
-    let products: Vec<Monomial> = (0..n)
-        .filter(|k| !is_zero[*k])
-        .map(|k| candidates[effective[k]].clone())
-        .collect();
-    let without_effect = candidates
-        .iter()
-        .filter(|c| !products.contains(c))
-        .cloned()
-        .collect();
-    let retained: Vec<usize> = pivots.iter().map(|p| at(*p)).collect();
-    let mut reduction = Reduction {
-        products,
-        without_effect,
-        retained,
-        dependencies,
-        method: Method::Exact { confirmed_at: 0 },
-    };
-    let shown: Vec<usize> = (0..n).filter(|k| !is_zero[*k]).collect();
-    reduction.confirm(&sampler, n, &shown, &mut stream)?;
     Ok(reduction)
 }
 
+/// The regressor's effective columns at random points of motion.
+struct SampledRegressor {
+    sampler: Sampler,
+    n_columns: usize,
+    least_points: usize,
+}
+
+impl SampledRegressor {
+    /// The rows of H at one random point.
+    fn point(
+        &self,
+        constants: &FieldPoint,
+        stream: &mut Stream,
+    ) -> Result<Vec<Vec<Element>>, DeriveError> {
+        let values = self.sampler.draw(constants, stream)?;
+        Ok(values
+            .chunks(self.n_columns.max(1))
+            .map(<[Element]>::to_vec)
+            .collect())
+    }
+
+    /// Rows of W for one set of constants, enough of them to show `rank` and a few more.
+    fn rows(
+        &self,
+        constants: &FieldPoint,
+        rank: usize,
+        stream: &mut Stream,
+    ) -> Result<Vec<Vec<Element>>, DeriveError> {
+        let mut rows = Vec::new();
+        let mut points = 0;
+        while self.n_columns > 0 && (rows.len() < rank + 6 || points < self.least_points) {
+            rows.extend(self.point(constants, stream)?);
+            points += 1;
+        }
+        Ok(rows)
+    }
+}
+
+/// Which columns depend on which, as seen for one random set of constants; columns by position among the effective ones.
+struct Pattern {
+    /// Columns that are not identically zero.
+    shown: Vec<usize>,
+    /// Retained columns, sorted.
+    pivots: Vec<usize>,
+    /// Columns that depend on them.
+    dependent: Vec<usize>,
+    /// Pairs of a dependent and a retained column with a factor that does not vanish.
+    wanted: Vec<(usize, usize)>,
+}
+
+impl Pattern {
+    fn find(
+        regressor: &SampledRegressor,
+        order: &[usize],
+        stream: &mut Stream,
+    ) -> Result<Self, DeriveError> {
+        let n = regressor.n_columns;
+        let constants = regressor.sampler.constants(stream);
+        let rows = regressor.rows(&constants, n, stream)?;
+        let shown: Vec<usize> = (0..n)
+            .filter(|k| rows.iter().any(|row| row[*k] != Element::ZERO))
+            .collect();
+        let echelon = eliminate::echelon(rows, order);
+        let mut pivots = echelon.pivots.clone();
+        pivots.sort_unstable();
+        let dependent: Vec<usize> = shown
+            .iter()
+            .copied()
+            .filter(|k| !pivots.contains(k))
+            .collect();
+        let wanted = dependent
+            .iter()
+            .flat_map(|j| pivots.iter().map(move |p| (*j, *p)))
+            .filter(|(j, p)| echelon.entry(*p, *j).is_some_and(|x| x != Element::ZERO))
+            .collect();
+        Ok(Self {
+            shown,
+            pivots,
+            dependent,
+            wanted,
+        })
+    }
+
+    /// The wanted factors as rational functions of the constants, found again at any other constants.
+    fn factors(
+        &self,
+        regressor: &SampledRegressor,
+        variables: &[(usize, bool)],
+        roots: &[i64],
+        stream: &mut Stream,
+    ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
+        if self.wanted.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut sampling = stream.clone();
+        let mut oracle = |constants: &FieldPoint| -> Result<Vec<Element>, DeriveError> {
+            let rows = regressor.rows(constants, self.pivots.len(), &mut sampling)?;
+            let echelon = eliminate::echelon(rows, &self.pivots);
+            self.wanted
+                .iter()
+                .map(|(j, p)| echelon.entry(*p, *j).ok_or(DeriveError::RankChanged))
+                .collect()
+        };
+        let draw = |stream: &mut Stream| regressor.sampler.constants(stream);
+        reconstruct::reconstruct(&mut oracle, variables, roots, &draw, stream)
+    }
+
+    fn reduction(
+        &self,
+        mechanism: &Mechanism,
+        candidates: &[Monomial],
+        name: &dyn Fn(usize) -> Monomial,
+        factors: Vec<Option<RationalFunction>>,
+    ) -> Result<Reduction, DeriveError> {
+        let position = |k: usize| {
+            self.shown
+                .iter()
+                .position(|x| *x == k)
+                .expect("a column with an effect is shown")
+        };
+        let mut dependencies: Vec<Dependency> = self
+            .dependent
+            .iter()
+            .map(|j| Dependency {
+                product: position(*j),
+                equals: Vec::new(),
+            })
+            .collect();
+        for ((j, p), factor) in self.wanted.iter().zip(factors) {
+            let retained = self
+                .pivots
+                .iter()
+                .position(|x| x == p)
+                .expect("a wanted pivot is one");
+            let line = self
+                .dependent
+                .iter()
+                .position(|x| x == j)
+                .expect("a wanted column is dependent");
+            let factor = factor.ok_or_else(|| DeriveError::FactorNotRecovered {
+                product: name(*j).text(mechanism),
+                retained: name(*p).text(mechanism),
+            })?;
+            dependencies[line].equals.push((retained, factor));
+        }
+        let products: Vec<Monomial> = self.shown.iter().map(|k| name(*k)).collect();
+        Ok(Reduction {
+            without_effect: candidates
+                .iter()
+                .filter(|c| !products.contains(c))
+                .cloned()
+                .collect(),
+            retained: self.pivots.iter().map(|p| position(*p)).collect(),
+            products,
+            dependencies,
+            method: Method::Exact { confirmed_at: 0 },
+        })
+    }
+}
+
 impl Reduction {
-    /// Shows `H p_g = H_min p_min` for random parameters at fresh points of motion with fresh constants.
+    /// Shows `H p_g = H_min p_min` for random parameters at fresh points of motion with fresh constants; returns how many.
     fn confirm(
-        &mut self,
-        sampler: &Sampler,
-        n: usize,
+        &self,
+        regressor: &SampledRegressor,
         shown: &[usize],
         stream: &mut Stream,
-    ) -> Result<(), DeriveError> {
-        let mut points = 0;
-        for _ in 0..4 {
-            let constants = sampler.constants(stream);
+    ) -> Result<usize, DeriveError> {
+        const CONSTANTS: usize = 4;
+        const POINTS: usize = 2;
+        for _ in 0..CONSTANTS {
+            let constants = regressor.sampler.constants(stream);
             let parameters: Vec<Element> = self.products.iter().map(|_| stream.element()).collect();
             let mut base: Vec<Element> = self.retained.iter().map(|k| parameters[*k]).collect();
             for line in &self.dependencies {
@@ -281,28 +336,24 @@ impl Reduction {
                     base[*k] = base[*k] + factor * parameters[line.product];
                 }
             }
-            for _ in 0..2 {
-                for row in sampler.draw(&constants, stream)?.chunks(n.max(1)) {
-                    let full = shown
-                        .iter()
-                        .zip(&parameters)
-                        .fold(Element::ZERO, |s, (k, p)| s + row[*k] * *p);
-                    let reduced = self
+            for _ in 0..POINTS {
+                for row in regressor.point(&constants, stream)? {
+                    let sum = |terms: &mut dyn Iterator<Item = (usize, Element)>| {
+                        terms.fold(Element::ZERO, |s, (k, p)| s + row[k] * p)
+                    };
+                    let full = sum(&mut shown.iter().copied().zip(parameters.iter().copied()));
+                    let reduced = sum(&mut self
                         .retained
                         .iter()
-                        .zip(&base)
-                        .fold(Element::ZERO, |s, (k, p)| s + row[shown[*k]] * *p);
+                        .map(|k| shown[*k])
+                        .zip(base.iter().copied()));
                     if full != reduced {
                         return Err(DeriveError::NotConfirmed);
                     }
                 }
-                points += 1;
             }
         }
-        self.method = Method::Exact {
-            confirmed_at: points,
-        };
-        Ok(())
+        Ok(CONSTANTS * POINTS)
     }
 }
 
