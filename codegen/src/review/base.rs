@@ -2,7 +2,9 @@
 
 use modelmill_spec::Mechanism;
 
-use super::document::{Document, Equation, Inline, Line, Table, cell, number, text};
+use super::document::{
+    self, Document, Equation, Inline, Line, Table, cell, linear_model, name, number, text,
+};
 use super::equations::{NumericRank, base_name};
 use crate::Derivation;
 use crate::base::unit;
@@ -108,10 +110,14 @@ pub(super) fn products(page: &mut Document, derivation: &Derivation) {
         ..
     } = derivation;
     page.heading("Products of dynamic parameters");
-    page.paragraph([text(
-        "The forces of the drives are linear in the following products of dynamic parameters, p_g of eq. (5): \
-         tau = H(q, q', q'') p_g, where column h of H belongs to one product.",
-    )]);
+    let mut line = vec![text("The forces of the drives are linear in products of dynamic parameters, eq. (5): ")];
+    line.extend(linear_model("H", "p_g"));
+    line.push(text(". Each column "));
+    line.push(name("h"));
+    line.push(text(" of "));
+    line.push(name("H"));
+    line.push(text(" belongs to one product."));
+    page.paragraph(line);
     let parameters: Vec<f64> = mechanism.parameters.iter().map(|p| p.nominal).collect();
     let rows = reduction
         .products
@@ -128,7 +134,7 @@ pub(super) fn products(page: &mut Document, derivation: &Derivation) {
             vec![
                 cell(text((k + 1).to_string())),
                 cell(Inline::Math(product(mechanism, m))),
-                cell(text(unit(mechanism, m))),
+                cell(document::unit(unit(mechanism, m))),
                 cell(text(Shown(m.value(&parameters)).to_string())),
                 fate,
             ]
@@ -143,7 +149,7 @@ pub(super) fn products(page: &mut Document, derivation: &Derivation) {
     );
     if !reduction.without_effect.is_empty() {
         let mut line: Line = vec![text(
-            "Without any effect on the drives, and so not in p_g: ",
+            "Without any effect on the drives, and so left out: ",
         )];
         for (i, m) in reduction.without_effect.iter().enumerate() {
             if i > 0 {
@@ -195,7 +201,7 @@ pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
                 )
             })),
             tag: format!("6.{}", i + 1),
-            remark: None,
+            unit: None,
         })
         .collect();
     page.equations("dependent columns", lines);
@@ -214,10 +220,12 @@ pub(super) fn base_parameters(
     } = derivation;
     page.heading("Base parameters");
     let rank = reduction.retained.len();
-    let mut says = format!(
-        "With eq. (6) the {} products regroup to {rank} base parameters, eq. (16): tau = H_min p_min.",
+    let mut line = vec![text(format!(
+        "With eq. (6) the {} products regroup to {rank} base parameters, eq. (16): ",
         reduction.products.len()
-    );
+    ))];
+    line.extend(linear_model("H_min", "p_min"));
+    let mut says = ".".to_owned();
     if let Some(n) = numeric {
         says.push_str(&format!(
             " On the file's values the numeric rank of eq. (9) over {} states is {}{}.",
@@ -233,12 +241,13 @@ pub(super) fn base_parameters(
             says.push_str(&format!(" The condition number is {condition:.3}."));
         }
     }
-    page.paragraph([text(says)]);
+    line.push(text(says));
+    page.paragraph(line);
     let equation = |k: usize, right: Formula| Equation {
         left: Formula::name(base_name(k)),
         right,
         tag: format!("16.{}", k + 1),
-        remark: Some(unit(mechanism, &reduction.products[reduction.retained[k]])),
+        unit: Some(unit(mechanism, &reduction.products[reduction.retained[k]])),
     };
     let grouped = (0..rank)
         .map(|k| equation(k, base_grouped(derivation, k)))
@@ -252,7 +261,7 @@ pub(super) fn base_parameters(
                 cell(Inline::Math(Formula::name(base_name(k)))),
                 cell(Inline::Math(product(mechanism, retained))),
                 cell(text(Shown(values[k]).to_string())),
-                cell(text(unit(mechanism, retained))),
+                cell(document::unit(unit(mechanism, retained))),
             ]
         })
         .collect();

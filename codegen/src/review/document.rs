@@ -8,18 +8,20 @@ pub(super) enum Inline {
     Text(String),
     Code(String),
     Math(Formula),
+    /// A unit such as `kg m^2`.
+    Unit(String),
 }
 
 /// A line of text.
 pub(super) type Line = Vec<Inline>;
 
-/// `left = right`, with a tag in parentheses and perhaps a remark such as a unit.
+/// `left = right`, with a tag in parentheses and perhaps a unit.
 #[derive(Clone, Debug)]
 pub(super) struct Equation {
     pub(super) left: Formula,
     pub(super) right: Formula,
     pub(super) tag: String,
-    pub(super) remark: Option<String>,
+    pub(super) unit: Option<String>,
 }
 
 /// A table; every row has as many cells as the head.
@@ -97,6 +99,28 @@ pub(super) fn code(text: impl Into<String>) -> Inline {
 
 pub(super) fn name(name: &str) -> Inline {
     Inline::Math(Formula::Symbol(Symbol::new(name)))
+}
+
+pub(super) fn unit(unit: impl Into<String>) -> Inline {
+    Inline::Unit(unit.into())
+}
+
+/// `tau = H(q, q', q'') p`
+pub(super) fn linear_model(matrix: &str, parameters: &str) -> Vec<Inline> {
+    let motion = |order| Inline::Math(Formula::Symbol(Symbol::derived("q", order)));
+    vec![
+        name("tau"),
+        text(" = "),
+        name(matrix),
+        text("("),
+        motion(0),
+        text(", "),
+        motion(1),
+        text(", "),
+        motion(2),
+        text(") "),
+        name(parameters),
+    ]
 }
 
 /// A cell of one stretch.

@@ -137,7 +137,7 @@ impl Lister<'_> {
             left: Formula::Symbol(left),
             right,
             tag: String::new(),
-            remark: None,
+            unit: None,
         };
         match stage {
             Stage::Fixed => self.listing.fixed.push(equation),

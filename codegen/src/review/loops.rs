@@ -73,7 +73,7 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
                     left: Formula::integer(0),
                     right: shown(graph, mechanism, *id)?,
                     tag: format!("L{tag}"),
-                    remark: None,
+                    unit: None,
                 })
             })
             .collect();
@@ -98,10 +98,10 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
         .enumerate()
         .filter_map(|(k, id)| {
             Some(Equation {
-                left: Formula::name(format!("Det_{}", k + 1)),
+                left: Formula::name(format!("Delta_{}", k + 1)),
                 right: shown(graph, mechanism, *id)?,
                 tag: format!("L{}", tag + k + 1),
-                remark: None,
+                unit: None,
             })
         })
         .collect();
@@ -216,7 +216,7 @@ pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
                 left: Formula::name(left),
                 right,
                 tag,
-                remark: None,
+                unit: None,
             });
             Some(())
         };

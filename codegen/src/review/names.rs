@@ -283,9 +283,9 @@ fn rates(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
         }
     }
     for (k, id) in projection.determinants.iter().enumerate() {
-        named.push((Symbol::new(format!("Det_{}", k + 1)), *id));
+        named.push((Symbol::new(format!("Delta_{}", k + 1)), *id));
         let inverse = graph.pow(*id, -1);
-        named.push((Symbol::new(format!("Det_inv_{}", k + 1)), inverse));
+        named.push((Symbol::new(format!("Delta_inv_{}", k + 1)), inverse));
     }
     named
 }

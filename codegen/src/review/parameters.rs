@@ -2,7 +2,7 @@
 
 use modelmill_spec::{Mechanism, Motion};
 
-use super::document::{Document, Inline, Table, cell, code, name, number, text};
+use super::document::{Document, Inline, Table, cell, code, name, number, text, unit};
 use crate::Derivation;
 use crate::expr::print::{Formula, exact};
 
@@ -50,7 +50,7 @@ pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
             vec![
                 cell(name(&c.name)),
                 cell(text(number(c.value))),
-                cell(text(&*c.unit)),
+                cell(unit(&*c.unit)),
                 remark(&c.note),
             ]
         })
@@ -69,7 +69,9 @@ pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
             y,
             text(", "),
             z,
-            text(") m/s^2."),
+            text(") "),
+            unit("m/s^2"),
+            text("."),
         ]);
     }
     page.heading("Dynamic parameters");
@@ -80,7 +82,7 @@ pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
             vec![
                 cell(name(&p.name)),
                 cell(text(number(p.nominal))),
-                cell(text(&*p.unit)),
+                cell(unit(&*p.unit)),
                 remark(&p.note),
             ]
         })
@@ -92,7 +94,7 @@ pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
         .coordinates
         .iter()
         .map(|c| {
-            let (kind, unit) = match c.motion {
+            let (kind, in_unit) = match c.motion {
                 Motion::Revolute => ("angle", "rad"),
                 Motion::Prismatic => ("length", "m"),
             };
@@ -109,7 +111,7 @@ pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
                         .trim_end_matches('0')
                         .trim_end_matches('.'),
                 )),
-                cell(text(unit)),
+                cell(unit(in_unit)),
                 cell(text(role)),
             ]
         })

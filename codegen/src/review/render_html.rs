@@ -93,22 +93,47 @@ fn write_equation(out: &mut String, equation: &Equation) {
     for (i, term) in terms(&equation.right).iter().enumerate() {
         let (sign, term) = match (i, term.is_negative()) {
             (0, _) => ("", term.clone()),
-            (_, true) => ("<mo form=\"infix\">&#x2212;</mo>", term.clone().negated()),
-            (_, false) => ("<mo form=\"infix\">+</mo>", term.clone()),
+            (_, true) => ("<mo lspace=\"0\" rspace=\"0.22em\">&#x2212;</mo>", term.clone().negated()),
+            (_, false) => ("<mo lspace=\"0\" rspace=\"0.22em\">+</mo>", term.clone()),
         };
         if i > 0 {
             out.push(' ');
         }
         out.push_str(&math(&format!("{sign}{}", term.mathml())));
     }
-    if let Some(remark) = &equation.remark {
-        _ = write!(out, " <span class=\"unit\">{}</span>", escape(remark));
+    if let Some(text) = &equation.unit {
+        _ = write!(out, " <span class=\"unit\">{}</span>", unit(text));
     }
     _ = writeln!(
         out,
         "</span><span class=\"tag\">({})</span></div>",
         escape(&equation.tag)
     );
+}
+
+/// A unit with its exponents raised.
+fn unit(text: &str) -> String {
+    let mut out = String::new();
+    let mut raised = false;
+    for c in text.chars() {
+        if c == '^' {
+            out.push_str("<sup>");
+            raised = true;
+            continue;
+        }
+        if raised && !(c.is_ascii_digit() || c == '-') {
+            out.push_str("</sup>");
+            raised = false;
+        }
+        match c {
+            ' ' => out.push_str("&#x202F;"),
+            c => out.push_str(&escape(c.encode_utf8(&mut [0; 4]))),
+        }
+    }
+    if raised {
+        out.push_str("</sup>");
+    }
+    out
 }
 
 fn math(content: &str) -> String {
@@ -119,6 +144,7 @@ fn inlines(line: &Line) -> String {
     line.iter()
         .map(|inline| match inline {
             Inline::Text(text) => escape(text),
+            Inline::Unit(text) => unit(text),
             Inline::Code(text) => format!("<code>{}</code>", escape(text)),
             Inline::Math(Formula::Number(n)) => n.to_string().replace('-', "\u{2212}"),
             Inline::Math(formula) => math(&formula.mathml()),

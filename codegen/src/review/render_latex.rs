@@ -76,16 +76,17 @@ fn write_table(out: &mut String, table: &Table) {
 
 /// An equation in display style, long sums broken; `end` stands after its last line.
 pub(super) fn aligned(equation: &Equation, end: &str) -> String {
-    let remark = equation.remark.as_ref().map_or_else(String::new, |r| {
-        format!(" \\quad [\\mathrm{{{}}}]", unit(r))
-    });
+    let unit = equation
+        .unit
+        .as_ref()
+        .map_or_else(String::new, |text| format!(" \\quad [{}]", unit(text)));
     let lines = broken(&equation.right);
     let left = equation.left.latex();
     if let [line] = lines.as_slice() {
-        return format!("{left} = {line}{remark}{end}");
+        return format!("{left} = {line}{unit}{end}");
     }
     format!(
-        "\\begin{{aligned}}\n{left} &= {}{remark}\n\\end{{aligned}}{end}",
+        "\\begin{{aligned}}\n{left} &= {}{unit}\n\\end{{aligned}}{end}",
         lines.join(" \\\\\n&\\quad ")
     )
 }
@@ -123,16 +124,16 @@ fn broken(formula: &Formula) -> Vec<String> {
         .collect()
 }
 
-fn unit(text: &str) -> String {
-    text.replace(' ', "\\,")
-        .replace('^', "^")
-        .replace('%', "\\%")
+/// A unit in upright letters.
+pub(super) fn unit(text: &str) -> String {
+    format!("\\mathrm{{{}}}", text.replace(' ', "\\,"))
 }
 
 fn inlines(line: &Line) -> String {
     line.iter()
         .map(|inline| match inline {
             Inline::Text(text) => escape(text),
+            Inline::Unit(text) => format!("${}$", unit(text)),
             Inline::Code(text) => format!("\\texttt{{{}}}", escape(text)),
             Inline::Math(formula) => format!("${}$", formula.latex()),
         })

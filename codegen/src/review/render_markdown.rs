@@ -61,6 +61,7 @@ fn inlines(line: &Line) -> String {
     line.iter()
         .map(|inline| match inline {
             Inline::Text(text) => escape(text),
+            Inline::Unit(unit) => format!("${}$", render_latex::unit(unit)),
             Inline::Code(text) => format!("`{text}`"),
             Inline::Math(formula) => format!("${}$", formula.latex().replace('|', "\\vert ")),
         })

@@ -47,7 +47,7 @@ fn blocks(out: &mut String, blocks: &[Block]) {
 pub(super) fn plain(line: &Line) -> String {
     line.iter()
         .map(|inline| match inline {
-            Inline::Text(text) | Inline::Code(text) => text.clone(),
+            Inline::Text(text) | Inline::Code(text) | Inline::Unit(text) => text.clone(),
             Inline::Math(formula) => formula.text(),
         })
         .collect()
@@ -115,8 +115,8 @@ pub(super) fn lines(equations: &[Equation]) -> String {
         let start = format!("  {tag:>widest$}  {} = ", equation.left);
         let indent = start.chars().count();
         let mut body = equation.right.text();
-        if let Some(remark) = &equation.remark {
-            _ = write!(body, "   [{remark}]");
+        if let Some(unit) = &equation.unit {
+            _ = write!(body, "   [{unit}]");
         }
         // Terms are kept whole: their blanks are those around signs.
         out.push_str(&start);

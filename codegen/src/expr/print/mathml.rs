@@ -36,6 +36,11 @@ const TIMES: &str = "<mo lspace=\"0\" rspace=\"0.12em\">&#x2062;</mo>";
 impl Symbol {
     /// As a MathML element.
     pub fn mathml(&self) -> String {
+        self.mathml_raised(None)
+    }
+
+    /// With an exponent above the index.
+    fn mathml_raised(&self, exponent: Option<u32>) -> String {
         let set = typeset(&self.name);
         let mut base = glyphs(&set.base);
         if let Some(dots) = match self.order {
@@ -46,7 +51,10 @@ impl Symbol {
             base = format!("<mover accent=\"true\">{base}<mo>{dots}</mo></mover>");
         }
         if set.index.is_empty() {
-            return base;
+            return match exponent {
+                Some(n) => format!("<msup>{base}<mn>{n}</mn></msup>"),
+                None => base,
+            };
         }
         let parts: Vec<String> = set
             .index
@@ -54,7 +62,10 @@ impl Symbol {
             .map(|part| part.iter().map(glyphs).collect::<String>())
             .collect();
         let index = parts.join("<mo lspace=\"0\" rspace=\"0\">,</mo>");
-        format!("<msub>{base}<mrow>{index}</mrow></msub>")
+        match exponent {
+            Some(n) => format!("<msubsup>{base}<mrow>{index}</mrow><mn>{n}</mn></msubsup>"),
+            None => format!("<msub>{base}<mrow>{index}</mrow></msub>"),
+        }
     }
 }
 
@@ -120,7 +131,8 @@ fn power(out: &mut String, base: &Formula, n: u32) {
         Formula::Apply(f @ (Function::Sin | Function::Cos | Function::Tanh), operands) => {
             apply(out, *f, Some(n), operands);
         }
-        Formula::Symbol(_) | Formula::Indexed(..) | Formula::Apply(Function::Abs, _) => {
+        Formula::Symbol(symbol) => out.push_str(&symbol.mathml_raised(Some(n))),
+        Formula::Indexed(..) | Formula::Apply(Function::Abs, _) => {
             out.push_str("<msup>");
             out.push_str("<mrow>");
             write(out, base, true);
