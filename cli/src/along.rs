@@ -101,7 +101,9 @@ pub(crate) fn regions(
         .iter()
         .map(|(name, values)| (name.as_str(), values.as_slice()))
         .collect();
-    let mut regions = locate(&errors, &variables, &LocateOptions::default());
+    let mut regions = watched("looking where the error lives", 0, |_| {
+        locate(&errors, &variables, &LocateOptions::default())
+    });
     regions.extend(in_time);
     Ok(regions)
 }
@@ -161,20 +163,24 @@ fn columns(
     mut evaluate: impl FnMut(&States<'_>) -> Result<Vec<Vec<f64>>, modelmill_codegen::PoseFault>,
 ) -> Outcome<Vec<Vec<f64>>> {
     let mut columns: Vec<Vec<f64>> = Vec::new();
-    watched(&data.run.file, data.samples(), |done| {
-        data.for_each_block(model, |states| {
-            Ok::<_, Failure>(evaluate(states).map(|block| {
-                done.add(states.len());
-                if columns.is_empty() {
-                    columns = block;
-                } else {
-                    for (column, more) in columns.iter_mut().zip(block) {
-                        column.extend(more);
+    watched(
+        &format!("evaluating {}", data.run.file),
+        data.samples(),
+        |done| {
+            data.for_each_block(model, |states| {
+                Ok::<_, Failure>(evaluate(states).map(|block| {
+                    done.add(states.len());
+                    if columns.is_empty() {
+                        columns = block;
+                    } else {
+                        for (column, more) in columns.iter_mut().zip(block) {
+                            column.extend(more);
+                        }
                     }
-                }
-            }))
-        })
-    })?;
+                }))
+            })
+        },
+    )?;
     Ok(columns)
 }
 

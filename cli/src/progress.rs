@@ -1,15 +1,21 @@
 //! Progress on standard error for whatever takes longer than a second, on a terminal only.
 
 use std::io::IsTerminal;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// How long a job may take before anything is shown.
+/// How long the program may be silent before anything is shown.
 const PATIENCE: Duration = Duration::from_secs(1);
+/// How long a single job may be silent once the program's patience is over.
+const SHORT_PATIENCE: Duration = Duration::from_millis(300);
 const TICK: Duration = Duration::from_millis(100);
+
+/// When the first job began.
+static START: OnceLock<Instant> = OnceLock::new();
 
 /// How far a job has come.
 #[derive(Debug, Default)]
@@ -22,20 +28,22 @@ impl Done {
     }
 }
 
-/// Runs a job; if it takes longer than a second on a terminal, a line says what is going on:
-/// a bar if the job has `total` steps and counts them, a spinner if it is 0.
+/// Runs a job; once the program has been busy for a second on a terminal, a line says what is
+/// going on: a bar if the job has `total` steps and counts them, a spinner if it is 0.
 pub(crate) fn watched<T>(message: &str, total: usize, job: impl FnOnce(&Done) -> T) -> T {
     let done = Done::default();
     if !std::io::stderr().is_terminal() {
         return job(&done);
     }
     let (finished, waiting) = channel::<()>();
+    let start = *START.get_or_init(Instant::now);
+    let first_look = PATIENCE.saturating_sub(start.elapsed()).max(SHORT_PATIENCE);
     let counter = &done;
     std::thread::scope(|scope| {
         scope.spawn(move || {
             let mut bar: Option<ProgressBar> = None;
             loop {
-                let patience = if bar.is_none() { PATIENCE } else { TICK };
+                let patience = if bar.is_none() { first_look } else { TICK };
                 match waiting.recv_timeout(patience) {
                     Err(RecvTimeoutError::Timeout) => {
                         let bar = bar.get_or_insert_with(|| new_bar(message, total));

@@ -4,7 +4,7 @@ mod common;
 
 use common::{json, model, number, printed, run, scratch};
 
-/// Four masses, lengths and inertias of Table 1 in the expressions of p_min, by hand.
+/// Four masses, lengths and inertias of Table 1 in the expressions of `p_min`, by hand.
 fn nominal_consistent() -> [f64; 4] {
     let (m1, m2, m3, m4) = (50.9597, 7.9538, 14.5773, 12.4560);
     let (dc1, dc3, ic12, ic32) = (0.565, 0.515, 6.3195, 1.6173);

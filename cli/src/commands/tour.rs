@@ -387,7 +387,7 @@ fn write_files(folder: &Path, models: &[&Model], chapters: &[Chapter<'_>]) -> Ou
             figure.panel(&format!("{drive}, N"), &[("measured", &measured[d])]);
             figure.panel(
                 &format!("{drive}, error, N"),
-                &[("before", &before[d]), ("after", &after[d])],
+                &[("nominal", &before[d]), ("identified", &after[d])],
             );
         }
         let name = format!(

@@ -7,22 +7,22 @@ use std::process::{Command, Output};
 use serde_json::Value;
 
 /// A path below the workspace.
-pub fn workspace(path: &str) -> PathBuf {
+pub(crate) fn workspace(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
 }
 
 /// A model file by name.
-pub fn model(name: &str) -> String {
+pub(crate) fn model(name: &str) -> String {
     text(&workspace("model-spec/models").join(name))
 }
 
 /// A bundled recording by name.
-pub fn run(name: &str) -> String {
+pub(crate) fn run(name: &str) -> String {
     text(&workspace("recordings/spidermill-mbs").join(name))
 }
 
 /// A fresh path for a file that a test writes.
-pub fn scratch(name: &str) -> String {
+pub(crate) fn scratch(name: &str) -> String {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = std::fs::remove_file(&path);
     text(&path)
@@ -33,21 +33,21 @@ fn text(path: &Path) -> String {
 }
 
 /// The program, not yet started.
-pub fn modelmill(args: &[&str]) -> Command {
+pub(crate) fn modelmill(args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_modelmill"));
     command.args(args).env_remove("NO_COLOR");
     command
 }
 
 /// What a run printed and how it ended.
-pub struct Ran {
-    pub status: i32,
-    pub out: String,
-    pub err: String,
+pub(crate) struct Ran {
+    pub(crate) status: i32,
+    pub(crate) out: String,
+    pub(crate) err: String,
 }
 
 /// Runs the program to its end.
-pub fn ran(args: &[&str]) -> Ran {
+pub(crate) fn ran(args: &[&str]) -> Ran {
     let Output {
         status,
         stdout,
@@ -62,7 +62,7 @@ pub fn ran(args: &[&str]) -> Ran {
 
 /// Standard output of a run that must succeed.
 #[track_caller]
-pub fn printed(args: &[&str]) -> String {
+pub(crate) fn printed(args: &[&str]) -> String {
     let ran = ran(args);
     assert_eq!(ran.status, 0, "{args:?}: {}", ran.err);
     assert!(
@@ -74,7 +74,7 @@ pub fn printed(args: &[&str]) -> String {
 
 /// The one JSON object that a run prints.
 #[track_caller]
-pub fn json(args: &[&str]) -> Value {
+pub(crate) fn json(args: &[&str]) -> Value {
     let out = printed(args);
     let value: Value = serde_json::from_str(&out).expect("exactly one JSON value");
     assert!(value.is_object(), "{value}");
@@ -83,7 +83,7 @@ pub fn json(args: &[&str]) -> Value {
 
 /// Message of a run that must end with the given status and print nothing on standard output.
 #[track_caller]
-pub fn refused(status: i32, args: &[&str]) -> String {
+pub(crate) fn refused(status: i32, args: &[&str]) -> String {
     let ran = ran(args);
     assert_eq!(ran.status, status, "{args:?}: {}{}", ran.out, ran.err);
     assert_eq!(ran.out, "", "{args:?}");
@@ -93,7 +93,7 @@ pub fn refused(status: i32, args: &[&str]) -> String {
 
 /// A number of a JSON object by its path.
 #[track_caller]
-pub fn number(value: &Value, pointer: &str) -> f64 {
+pub(crate) fn number(value: &Value, pointer: &str) -> f64 {
     value
         .pointer(pointer)
         .and_then(Value::as_f64)
