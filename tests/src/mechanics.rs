@@ -170,7 +170,9 @@ impl<'a> Numbers<'a> {
 
     /// Value of an expression over constants and parameters.
     pub fn value(&self, exact: &Exact) -> f64 {
-        self.value_at(exact, &|_| unreachable!("no quantity of a place stands here"))
+        self.value_at(exact, &|_| {
+            unreachable!("no quantity of a place stands here")
+        })
     }
 
     fn value_at(&self, exact: &Exact, place: &dyn Fn(PlaceQuantity) -> f64) -> f64 {
@@ -216,16 +218,13 @@ impl<'a> Numbers<'a> {
             for step in &frame.steps {
                 pose = pose.then(&match step {
                     Step::Rotate(axis, angle) => {
-                        let mut total =
-                            Jet::constant(rational(&angle.pi) * std::f64::consts::PI);
+                        let mut total = Jet::constant(rational(&angle.pi) * std::f64::consts::PI);
                         for (symbol, n) in &angle.terms {
                             let factor = Jet::constant(f64::from(*n));
                             total = total
                                 + factor
                                     * match symbol {
-                                        Symbol::Constant(i) => {
-                                            Jet::constant(self.constants[i.0])
-                                        }
+                                        Symbol::Constant(i) => Jet::constant(self.constants[i.0]),
                                         Symbol::Coordinate(i) => coordinates[i.0],
                                         _ => unreachable!("an angle is made of angles"),
                                     };
@@ -294,12 +293,7 @@ impl<'a> Numbers<'a> {
 
     /// What the drives must supply per unit of the virtual motion `direction` (one rate per coordinate), in W:
     /// inertia, weight and effects. The direction must satisfy the loops.
-    pub fn virtual_power(
-        &self,
-        coordinates: &[Jet],
-        direction: &[f64],
-        load: &[f64],
-    ) -> Balance {
+    pub fn virtual_power(&self, coordinates: &[Jet], direction: &[f64], load: &[f64]) -> Balance {
         let poses = self.poses(coordinates);
         let moved: Vec<Jet> = coordinates
             .iter()
@@ -374,8 +368,7 @@ impl<'a> Numbers<'a> {
                 if let Place::Point(p) = place {
                     let point = &self.mechanism.points[p.0];
                     for term in &effect.terms {
-                        let mass =
-                            self.parameters[term.parameter.0] * self.value(&term.expression);
+                        let mass = self.parameters[term.parameter.0] * self.value(&term.expression);
                         let at = Vector3::from(self.vector(&point.at));
                         bodies.push((point.frame.0, point_mass(mass, at)));
                     }
@@ -492,8 +485,22 @@ fn add_body(
 fn spread([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> Matrix4<f64> {
     let half = 0.5 * (xx + yy + zz);
     Matrix4::new(
-        half - xx, -xy, -xz, 0.0, -xy, half - yy, -yz, 0.0, -xz, -yz, half - zz, 0.0, 0.0, 0.0,
-        0.0, 0.0,
+        half - xx,
+        -xy,
+        -xz,
+        0.0,
+        -xy,
+        half - yy,
+        -yz,
+        0.0,
+        -xz,
+        -yz,
+        half - zz,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
     )
 }
 

@@ -36,9 +36,7 @@ fn number(value: Rational) -> Polynomial {
 fn plus(a: &Polynomial, b: &Polynomial) -> Polynomial {
     let mut sum = a.clone();
     for (powers, k) in b {
-        let total = sum
-            .get(powers)
-            .map_or_else(|| k.clone(), |there| there + k);
+        let total = sum.get(powers).map_or_else(|| k.clone(), |there| there + k);
         sum.insert(powers.clone(), total);
     }
     sum.retain(|_, k| !k.is_zero());

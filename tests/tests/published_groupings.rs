@@ -9,7 +9,13 @@ use modelmill_tests::published::Map;
 /// with the published choice asked for, every factor must be the same rational function.
 #[track_caller]
 fn check(name: &str) {
-    let text = std::fs::read_to_string(fixtures().join(format!("published/{name}.txt")))
+    check_model(name, name);
+}
+
+/// Compares a model with the published map of another that should have the same.
+#[track_caller]
+fn check_model(name: &str, map: &str) {
+    let text = std::fs::read_to_string(fixtures().join(format!("published/{map}.txt")))
         .expect("a published map");
     let mut mechanism = model(name);
     let published = Map::parse(&text, &mechanism);
@@ -57,6 +63,11 @@ fn tied_five_bar_has_the_set_of_a_two_link_arm() {
 #[test]
 fn tied_three_rrr_groups_as_published() {
     check("three_rrr-tied");
+}
+
+#[test]
+fn a_parallelogram_closed_by_a_loop_groups_like_one_whose_angles_are_written_down() {
+    check_model("parallelogram-loop", "parallelogram");
 }
 
 #[test]

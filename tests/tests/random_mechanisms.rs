@@ -25,14 +25,10 @@ fn loops_of(matter: Matter, n: u64) -> Cases {
         .collect()
 }
 
-static TREES_OF_ANYTHING: LazyLock<Cases> =
-    LazyLock::new(|| trees_of(Matter::Anything, TREES));
-static LOOPS_OF_ANYTHING: LazyLock<Cases> =
-    LazyLock::new(|| loops_of(Matter::Anything, LOOPS));
-static PHYSICAL_TREES: LazyLock<Cases> =
-    LazyLock::new(|| trees_of(Matter::Physical, PHYSICAL));
-static PHYSICAL_LOOPS: LazyLock<Cases> =
-    LazyLock::new(|| loops_of(Matter::Physical, PHYSICAL));
+static TREES_OF_ANYTHING: LazyLock<Cases> = LazyLock::new(|| trees_of(Matter::Anything, TREES));
+static LOOPS_OF_ANYTHING: LazyLock<Cases> = LazyLock::new(|| loops_of(Matter::Anything, LOOPS));
+static PHYSICAL_TREES: LazyLock<Cases> = LazyLock::new(|| trees_of(Matter::Physical, PHYSICAL));
+static PHYSICAL_LOOPS: LazyLock<Cases> = LazyLock::new(|| loops_of(Matter::Physical, PHYSICAL));
 
 /// Checks a law on all cases; reports every breach.
 #[track_caller]
@@ -80,7 +76,10 @@ fn forces_satisfy_dalemberts_principle() {
 
 #[test]
 fn loops_stay_closed_with_their_rates_and_accelerations() {
-    check(&[&LOOPS_OF_ANYTHING, &PHYSICAL_LOOPS], Case::loops_stay_closed);
+    check(
+        &[&LOOPS_OF_ANYTHING, &PHYSICAL_LOOPS],
+        Case::loops_stay_closed,
+    );
 }
 
 #[test]

@@ -113,7 +113,9 @@ fn check_table(name: &str, table: &str) {
     for (d, drive) in mechanism.drives.iter().enumerate() {
         for (k, product) in products(&derivation).iter().enumerate() {
             let column = format!("H[{};{product}]", drive.name);
-            close(&column, table.column(&column), &|i| h[(i * n_drives + d, k)]);
+            close(&column, table.column(&column), &|i| {
+                h[(i * n_drives + d, k)]
+            });
             compared += 1;
         }
     }

@@ -15,6 +15,7 @@ use modelmill_spec::{
 use nalgebra::{Matrix3, Vector3};
 use num_rational::BigRational;
 
+use crate::mechanics::{Numbers, along};
 use crate::stream::Stream;
 
 /// What a random mechanism may hold.
@@ -343,6 +344,17 @@ impl Draft {
         }
     }
 
+    /// Whether every drive moves with its joint at the nominal pose.
+    fn drives_move(&self) -> bool {
+        let mechanism = &self.mechanism;
+        let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
+        let numbers = Numbers::new(mechanism, Vec::new());
+        let active = (0..nominal.len()).filter(|i| !mechanism.coordinates[*i].passive);
+        active
+            .enumerate()
+            .all(|(d, i)| numbers.drives(&along(&nominal, i))[d].0[1].abs() > 0.2)
+    }
+
     /// Up to three effects of the usual kinds.
     fn effects(&mut self) {
         for _ in 0..self.stream.below(4) {
@@ -353,7 +365,12 @@ impl Draft {
                 let point = self.point(frame, at);
                 let value = self.stream.between(0.2, 1.0);
                 let parameter = self.parameter("dm", value);
-                self.effect("point_mass", vec![Place::Point(point)], parameter, number(1));
+                self.effect(
+                    "point_mass",
+                    vec![Place::Point(point)],
+                    parameter,
+                    number(1),
+                );
                 continue;
             }
             let symbol = |quantity| Exact::Symbol(Symbol::Place(quantity));
@@ -364,15 +381,15 @@ impl Draft {
                 ("coulomb_friction", sign.clone()),
                 ("drive_inertia", symbol(PlaceQuantity::Acceleration)),
                 ("force_offset", number(1)),
-                ("spring", symbol(PlaceQuantity::Coordinate)),
-                (
-                    "load_friction",
-                    Exact::Product(vec![symbol(PlaceQuantity::Load), sign]),
-                ),
+                if on_drive {
+                    // A coordinate carries no load of its own.
+                    let friction = Exact::Product(vec![symbol(PlaceQuantity::Load), sign]);
+                    ("load_friction", friction)
+                } else {
+                    ("spring", symbol(PlaceQuantity::Coordinate))
+                },
             ];
-            // A coordinate carries no load of its own.
-            let n = if on_drive { 6 } else { 5 };
-            let (kind, expression) = choices[self.stream.below(n)].clone();
+            let (kind, expression) = self.stream.pick(&choices).clone();
             let count = 1 + self.stream.below(2);
             let mut places: Vec<Place> = Vec::new();
             for _ in 0..count {

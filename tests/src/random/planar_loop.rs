@@ -31,7 +31,10 @@ fn draw(seed: u64, matter: Matter) -> Option<Mechanism> {
     let mut joints = Vec::new();
     let left = draft.chain(FrameIdx(0), n_left, &mut joints);
     // The right chain hangs on a base frame whose place follows when all else is known.
-    let (x, y) = (draft.constant("bx", 0.0, "m"), draft.constant("by", 0.0, "m"));
+    let (x, y) = (
+        draft.constant("bx", 0.0, "m"),
+        draft.constant("by", 0.0, "m"),
+    );
     let symbol = |i| Exact::Symbol(Symbol::Constant(i));
     let base_steps = vec![shift(Axis::X, symbol(x)), shift(Axis::Y, symbol(y))];
     let base = draft.frame(FrameIdx(0), base_steps);
@@ -55,7 +58,7 @@ fn draw(seed: u64, matter: Matter) -> Option<Mechanism> {
     for passive in [first, second] {
         draft.mechanism.coordinates[joints[passive].0.0].passive = true;
     }
-    if regularity(&draft.mechanism) < REGULAR {
+    if regularity(&draft.mechanism) < REGULAR || stands_still(&draft.mechanism) {
         return None;
     }
     draft.gravity(true);
@@ -64,10 +67,27 @@ fn draw(seed: u64, matter: Matter) -> Option<Mechanism> {
         draft.lumps(true);
     }
     draft.drives(&joints, true);
+    if !draft.drives_move() {
+        return None;
+    }
     if matter == Matter::Anything {
         draft.effects();
     }
     Some(draft.mechanism)
+}
+
+/// Whether a passive joint keeps its angle or length whatever the active ones do: a structure within the mechanism.
+fn stands_still(mechanism: &Mechanism) -> bool {
+    let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
+    let jacobian = Numbers::new(mechanism, Vec::new()).gap_jacobian(&nominal);
+    let (passive, active): (Vec<usize>, Vec<usize>) =
+        (0..nominal.len()).partition(|i| mechanism.coordinates[*i].passive);
+    let rates = jacobian
+        .select_columns(&passive)
+        .svd(true, true)
+        .solve(&jacobian.select_columns(&active), 1e-12)
+        .expect("both factors were asked for");
+    rates.row_iter().any(|row| row.amax() < 1e-3)
 }
 
 /// Sine of the angle between the velocities that the two passive joints give the closing point, at the nominal pose.

@@ -6,6 +6,17 @@ use super::{Draft, Matter, ZERO, ratio, shift, slide, small};
 
 /// A random tree of one to four joints; twists are multiples of pi/12 (mostly of pi/2) or symbols.
 pub fn tree(seed: u64, matter: Matter) -> Mechanism {
+    (0..)
+        .find_map(|attempt| {
+            let seed_of_attempt = seed.wrapping_mul(1000).wrapping_add(attempt);
+            let mut mechanism = draw(seed_of_attempt, matter)?;
+            mechanism.name = format!("tree_{seed}");
+            Some(mechanism)
+        })
+        .expect("a tree whose drives move it comes up")
+}
+
+fn draw(seed: u64, matter: Matter) -> Option<Mechanism> {
     let mut draft = Draft::new("tree", seed);
     let n = 1 + draft.stream.below(4);
     let mut joints: Vec<(CoordinateIdx, FrameIdx)> = Vec::new();
@@ -23,10 +34,13 @@ pub fn tree(seed: u64, matter: Matter) -> Mechanism {
         draft.lumps(false);
     }
     draft.drives(&joints, false);
+    if !draft.drives_move() {
+        return None;
+    }
     if matter == Matter::Anything {
         draft.effects();
     }
-    draft.mechanism
+    Some(draft.mechanism)
 }
 
 const AXES: [Axis; 3] = [Axis::X, Axis::Y, Axis::Z];
