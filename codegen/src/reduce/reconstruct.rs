@@ -240,10 +240,10 @@ impl Shape {
                 .collect()
         };
         // The share of the angles in the denominator is raised until a function fits; lengths are known already.
-        // Roots in the denominator are the last resort: without angles they can always be moved to the numerator.
+        // Roots in the denominator are the last resort: most often they can be moved to the numerator.
         let mut attempts: Vec<(usize, bool)> = (0..=angle_degree).map(|d| (d, false)).collect();
         if !roots.is_empty() {
-            attempts.extend((1..=angle_degree).map(|d| (d, true)));
+            attempts.extend((0..=angle_degree).map(|d| (d, true)));
         }
         for (angle_in_denominator, roots_in_denominator) in attempts {
             let numerator = with_roots(self.monomials(true, angle_degree));
