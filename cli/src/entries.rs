@@ -5,28 +5,40 @@ use modelmill_spec::{
     Step, Symbol,
 };
 
-/// All entries in the order of the file, each named by its table and its own name.
-pub(crate) fn entries(m: &Mechanism) -> Vec<(String, String)> {
-    let mut list = Vec::new();
-    let mut add = |kind: &str, name: &str, text: String| {
+/// Entries as they are collected.
+#[derive(Default)]
+struct Entries(Vec<(String, String)>);
+
+impl Entries {
+    /// Entries of the same name are told apart by their place in the file.
+    fn add(&mut self, kind: &str, name: &str, text: String) {
         let mut key = format!("{kind} {name}").trim().to_owned();
-        // Entries of the same name are told apart by their place in the file.
         let mut twin = 1;
-        while list.iter().any(|(other, _)| *other == key) {
+        while self.0.iter().any(|(other, _)| *other == key) {
             twin += 1;
             key = format!("{kind} {name} ({twin})");
         }
-        list.push((key, text));
-    };
-    let exact = |e: &Exact| text(m, e);
-    let triple =
-        |v: &[Exact; 3]| format!("({})", v.iter().map(exact).collect::<Vec<_>>().join(", "));
-    add("gravity", "", triple(&m.gravity));
+        self.0.push((key, text));
+    }
+}
+
+/// All entries in the order of the file, each named by its table and its own name.
+pub(crate) fn entries(m: &Mechanism) -> Vec<(String, String)> {
+    let mut entries = Entries::default();
+    quantities(m, &mut entries);
+    geometry(m, &mut entries);
+    bodies(m, &mut entries);
+    actuation(m, &mut entries);
+    entries.0
+}
+
+fn quantities(m: &Mechanism, entries: &mut Entries) {
+    entries.add("gravity", "", triple(m, &m.gravity));
     for c in &m.constants {
-        add("constant", &c.name, format!("{} {}", c.value, c.unit));
+        entries.add("constant", &c.name, format!("{} {}", c.value, c.unit));
     }
     for p in &m.parameters {
-        add("parameter", &p.name, format!("{} {}", p.nominal, p.unit));
+        entries.add("parameter", &p.name, format!("{} {}", p.nominal, p.unit));
     }
     for c in &m.coordinates {
         let motion = match c.motion {
@@ -34,12 +46,12 @@ pub(crate) fn entries(m: &Mechanism) -> Vec<(String, String)> {
             Motion::Prismatic => "prismatic",
         };
         let passive = if c.passive { ", passive" } else { "" };
-        add(
-            "coordinate",
-            &c.name,
-            format!("{motion}{passive}, nominal {}", c.nominal),
-        );
+        let what = format!("{motion}{passive}, nominal {}", c.nominal);
+        entries.add("coordinate", &c.name, what);
     }
+}
+
+fn geometry(m: &Mechanism, entries: &mut Entries) {
     for f in &m.frames {
         if f.convention == Convention::Base {
             continue;
@@ -50,19 +62,16 @@ pub(crate) fn entries(m: &Mechanism) -> Vec<(String, String)> {
         } else {
             steps.join(" ")
         };
-        add(
-            "frame",
-            &f.name,
-            format!("on {}, {steps}", m.frames[f.parent.0].name),
-        );
+        let what = format!("on {}, {steps}", m.frames[f.parent.0].name);
+        entries.add("frame", &f.name, what);
     }
     for p in &m.points {
-        add(
-            "point",
-            &p.name,
-            format!("on {} at {}", m.frames[p.frame.0].name, triple(&p.at)),
-        );
+        let what = format!("on {} at {}", m.frames[p.frame.0].name, triple(m, &p.at));
+        entries.add("point", &p.name, what);
     }
+}
+
+fn bodies(m: &Mechanism, entries: &mut Entries) {
     for p in &m.parts {
         let inertial = match &p.inertial {
             Inertial::AboutCentre {
@@ -71,8 +80,8 @@ pub(crate) fn entries(m: &Mechanism) -> Vec<(String, String)> {
                 inertia,
             } => format!(
                 "mass {}, centre {}, inertia about it {}",
-                exact(mass),
-                triple(centre),
+                text(m, mass),
+                triple(m, centre),
                 tensor(m, inertia)
             ),
             Inertial::Linear {
@@ -81,62 +90,61 @@ pub(crate) fn entries(m: &Mechanism) -> Vec<(String, String)> {
                 inertia,
             } => format!(
                 "mass {}, first moment {}, inertia about the origin {}",
-                exact(mass),
-                triple(first_moment),
+                text(m, mass),
+                triple(m, first_moment),
                 tensor(m, inertia)
             ),
         };
-        add(
-            "part",
-            &p.name,
-            format!("on {}, {inertial}", m.frames[p.frame.0].name),
-        );
+        let what = format!("on {}, {inertial}", m.frames[p.frame.0].name);
+        entries.add("part", &p.name, what);
     }
     for l in &m.lumped_masses {
         let places = if l.force_at == l.moment_at {
-            format!("at {}", triple(&l.force_at))
+            format!("at {}", triple(m, &l.force_at))
         } else {
             format!(
                 "at {} for the balance of forces and at {} for the balance of moments",
-                triple(&l.force_at),
-                triple(&l.moment_at)
+                triple(m, &l.force_at),
+                triple(m, &l.moment_at)
             )
         };
         let frame = &m.frames[l.frame.0].name;
-        let what = format!("{} of {} on {frame}, {places}", l.share, exact(&l.mass));
-        add("lumped mass on", frame, what);
+        let what = format!("{} of {} on {frame}, {places}", l.share, text(m, &l.mass));
+        entries.add("lumped mass on", frame, what);
     }
+}
+
+fn actuation(m: &Mechanism, entries: &mut Entries) {
     for l in &m.loops {
         let [a, b] = l.joins.map(|p| m.points[p.0].name.clone());
-        add("loop", &l.name, format!("joins {a} and {b}"));
+        entries.add("loop", &l.name, format!("joins {a} and {b}"));
     }
     for d in &m.drives {
         let how = match d.kind {
             DriveKind::Joint(i) => format!("on the joint {}", m.coordinates[i.0].name),
-            DriveKind::Linear { from, to } => {
-                format!(
-                    "linear, from {} to {}",
-                    m.points[from.0].name, m.points[to.0].name
-                )
-            }
+            DriveKind::Linear { from, to } => format!(
+                "linear, from {} to {}",
+                m.points[from.0].name, m.points[to.0].name
+            ),
         };
-        add("drive", &d.name, how);
+        entries.add("drive", &d.name, how);
     }
     for e in &m.effects {
-        add(
-            "effect",
-            &format!("{} at {}", e.kind, places(m, e)),
-            terms(m, e),
-        );
+        let name = format!("{} at {}", e.kind, places(m, e));
+        entries.add("effect", &name, terms(m, e));
     }
     let retained: Vec<String> = m.retain.iter().map(|powers| product(m, powers)).collect();
     if !retained.is_empty() {
-        add("retain", "", retained.join(", "));
+        entries.add("retain", "", retained.join(", "));
     }
     for (ours, theirs) in &m.recording.columns {
-        add("column", ours, theirs.clone());
+        entries.add("column", ours, theirs.clone());
     }
-    list
+}
+
+fn triple(m: &Mechanism, vector: &[Exact; 3]) -> String {
+    let entries: Vec<String> = vector.iter().map(|e| text(m, e)).collect();
+    format!("({})", entries.join(", "))
 }
 
 fn text(m: &Mechanism, exact: &Exact) -> String {

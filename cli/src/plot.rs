@@ -15,6 +15,9 @@ pub(crate) const WIDTH: usize = 66;
 /// Width of the scale at the left.
 const SCALE: usize = 9;
 
+/// The two columns of dots in a Braille character, from the top.
+const DOTS: [[u8; 4]; 2] = [[0x01, 0x02, 0x04, 0x40], [0x08, 0x10, 0x20, 0x80]];
+
 impl Curve<'_> {
     /// The curve with its scale, line by line: each column of dots spans the least and the
     /// largest value that fall into it.
@@ -23,8 +26,6 @@ impl Curve<'_> {
         let limit = self.limit.unwrap_or(own).max(f64::MIN_POSITIVE);
         let (dots_x, dots_y) = (2 * WIDTH, 4 * self.height);
         let mut cells = vec![vec![0_u8; WIDTH]; self.height];
-        // The two columns of dots in a Braille character, from the top.
-        const DOTS: [[u8; 4]; 2] = [[0x01, 0x02, 0x04, 0x40], [0x08, 0x10, 0x20, 0x80]];
         let n = self.values.len();
         // Zero has a row of dots of its own, so that a curve around zero does not flicker.
         let half = (dots_y / 2).max(1);
@@ -105,7 +106,7 @@ pub(crate) fn bar(value: f64, limit: f64, width: usize) -> String {
     )]
     let eighths = (share * (8 * width) as f64).round() as usize;
     let mut text = "█".repeat(eighths / 8);
-    if eighths % 8 > 0 {
+    if !eighths.is_multiple_of(8) {
         text.push(PARTS[eighths % 8]);
     }
     text

@@ -28,10 +28,11 @@ pub(crate) fn table(indent: usize, columns: &[(&str, Align)], rows: &[Vec<String
             for (j, (_, align)) in columns.iter().enumerate() {
                 let cell = row.get(j).map_or("", String::as_str);
                 let fill = " ".repeat(widths[j] - cell.chars().count());
-                match align {
-                    Align::Left => line.push_str(&format!("{cell}{fill}")),
-                    Align::Right => line.push_str(&format!("{fill}{cell}")),
-                }
+                let parts = match align {
+                    Align::Left => [cell, &fill],
+                    Align::Right => [&fill, cell],
+                };
+                line.extend(parts);
                 line.push_str("  ");
             }
             line.trim_end().to_owned()
@@ -68,7 +69,7 @@ pub(crate) fn significant(value: f64, digits: usize) -> String {
 pub(crate) fn percent(value: Option<f64>) -> String {
     match value {
         None => "-".to_owned(),
-        Some(value) if value == 0.0 => "0 %".to_owned(),
+        Some(0.0) => "0 %".to_owned(),
         Some(value) => format!("{} %", short(100.0 * value)),
     }
 }

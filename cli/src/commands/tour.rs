@@ -1,5 +1,7 @@
 //! `tour`: the main job on bundled recordings, told as a short story with figures.
 
+mod story;
+
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -12,15 +14,13 @@ use crate::data::{self, Data};
 use crate::failure::{Failure, Outcome};
 use crate::model::{self, Model};
 use crate::output;
-use crate::plot::{Curve, bar, time_axis};
-use crate::show;
 use crate::svg;
-use crate::table::{Align, count, number, percent, table};
-use crate::terminal::{self, Style};
+use crate::table::{count, number, percent};
+use crate::terminal;
+use story::Story;
 
 /// Tells the story; with `--out`, writes the equations and the figures as files.
 pub(crate) fn run(args: &TourArgs) -> Outcome {
-    let style = terminal::style();
     let folder = args.out.as_deref();
     if let Some(folder) = folder {
         std::fs::create_dir_all(folder).map_err(|error| {
@@ -32,10 +32,7 @@ pub(crate) fn run(args: &TourArgs) -> Outcome {
     }
     let consistent = load("spidermill.toml")?;
     let paper = load("spidermill-paper.toml")?;
-    let mut story = Story {
-        text: String::new(),
-        style,
-    };
+    let mut story = Story::new(terminal::style());
     story.mill(&consistent, &paper);
 
     let chapters = [
@@ -170,198 +167,6 @@ impl<'a> Chapter<'a> {
 
     fn title(&self) -> String {
         format!("{}, {}", self.model.name, self.runs.name)
-    }
-}
-
-/// The text as it grows.
-struct Story {
-    text: String,
-    style: Style,
-}
-
-impl Story {
-    fn line(&mut self, line: &str) {
-        self.text.push_str(line.trim_end());
-        self.text.push('\n');
-    }
-
-    fn lines(&mut self, lines: &[String]) {
-        for line in lines {
-            self.line(line);
-        }
-    }
-
-    fn heading(&mut self, text: &str) {
-        let heading = self.style.bold(text);
-        self.line("");
-        self.line(&heading);
-        self.line("");
-    }
-
-    /// A paragraph, wrapped.
-    fn say(&mut self, text: &str) {
-        let mut line = String::new();
-        for word in text.split_whitespace() {
-            if line.chars().count() + word.chars().count() > 76 {
-                self.line(&line);
-                line.clear();
-            }
-            if !line.is_empty() {
-                line.push(' ');
-            }
-            line.push_str(word);
-        }
-        self.line(&line);
-        self.line("");
-    }
-
-    /// What the mill makes of the two model files.
-    fn mill(&mut self, consistent: &Model, paper: &Model) {
-        self.heading("1  From a model file to base parameters");
-        let mechanism = &consistent.derivation.mechanism;
-        self.say(&format!(
-            "spidermill.toml describes a parallel robot: {}, {}, {}. Its forces are linear in {} of dynamic parameters, \
-             p_g; many of their columns depend on one another. What remains, exactly and in symbols, is p_min:",
-            count(mechanism.parts.len(), "body", "bodies"),
-            count(mechanism.loops.len(), "loop", "loops"),
-            count(mechanism.drives.len(), "ball screw", "ball screws"),
-            count(consistent.derivation.reduction.products.len(), "product", "products"),
-        ));
-        self.expressions(consistent);
-        self.line("");
-        self.say(&format!(
-            "spidermill-paper.toml is a variant of it that splits the platform's mass as the paper does, with {} in p_g \
-             (eq. 5). Its p_min is eq. (16) of the paper:",
-            count(paper.derivation.reduction.products.len(), "product", "products"),
-        ));
-        self.expressions(paper);
-    }
-
-    fn expressions(&mut self, model: &Model) {
-        self.lines(&show::expressions(2, model));
-    }
-
-    fn parameters(&mut self, chapter: &Chapter<'_>) {
-        let title = self.style.cyan(&chapter.title());
-        self.line(&format!("  {title}: {}", chapter.runs.about));
-        self.lines(&show::parameters(&chapter.result.fit.parameters));
-        let error = |figures: Option<&modelmill_identify::Figures>, name: &str| -> Vec<String> {
-            let mut row = vec![name.to_owned()];
-            if let Some(figures) = figures {
-                row.push(percent(figures.nrms));
-                row.extend(figures.channels.values().map(|c| percent(c.nrms)));
-            }
-            row
-        };
-        let result = &chapter.result;
-        let rows = [
-            error(Some(&result.nominal_fit), "fit, nominal"),
-            error(Some(&result.fit.fit), "fit, identified"),
-            error(result.nominal_check.as_ref(), "check, nominal"),
-            error(result.fit.check.as_ref(), "check, identified"),
-        ];
-        let drives = chapter.model.drives();
-        let mut columns = vec![("error (nrms)", Align::Left), ("all", Align::Right)];
-        columns.extend(drives.iter().map(|d| (d.as_str(), Align::Right)));
-        self.line("");
-        self.lines(&table(2, &columns, &rows));
-        self.line("");
-    }
-
-    /// Measured force of the first drive, and the errors before and after on one scale.
-    fn forces(&mut self, chapter: &Chapter<'_>) -> Outcome {
-        let [measured, before, after] = chapter.curves()?;
-        let time = chapter.check.time();
-        let drive = chapter.model.drives().first().cloned().unwrap_or_default();
-        let (Some(measured), Some(before), Some(after)) =
-            (measured.first(), before.first(), after.first())
-        else {
-            return Ok(());
-        };
-        let largest = before
-            .iter()
-            .chain(after)
-            .fold(0.0_f64, |m, v| m.max(v.abs()));
-        let parts = [
-            (format!("{drive}, measured, N"), measured, 6, None),
-            (
-                "error with nominal values, N".to_owned(),
-                before,
-                4,
-                Some(largest),
-            ),
-            (
-                "error with identified values, N".to_owned(),
-                after,
-                4,
-                Some(largest),
-            ),
-        ];
-        for (title, values, height, limit) in parts {
-            let title = self.style.dim(&title);
-            self.line(&format!("{:>9}  {title}", ""));
-            let curve = Curve {
-                values,
-                height,
-                limit,
-            };
-            self.lines(&curve.lines());
-        }
-        self.line(&time_axis(&time));
-        self.line("");
-        Ok(())
-    }
-
-    /// Where the error after identification lives.
-    fn regions(&mut self, chapter: &Chapter<'_>) -> Outcome {
-        let measured = [along::measured(&chapter.check)?];
-        let forces = [along::forces(
-            chapter.model,
-            &chapter.check,
-            &chapter.result.values(),
-        )?];
-        let regions = along::regions(
-            chapter.model,
-            std::slice::from_ref(&chapter.check),
-            &measured,
-            &forces,
-        )?;
-        self.line("Where what is left lives, on the check:");
-        self.lines(&show::regions(&regions));
-        self.line("");
-        Ok(())
-    }
-
-    /// All errors on the checks as bars.
-    fn overview(&mut self, chapters: &[Chapter<'_>]) {
-        let largest = chapters
-            .iter()
-            .flat_map(|c| [c.before(), c.after()])
-            .flatten()
-            .fold(0.0, f64::max);
-        for chapter in chapters {
-            for (when, nrms) in [
-                ("nominal", chapter.before()),
-                ("identified", chapter.after()),
-            ] {
-                let name = if when == "nominal" {
-                    chapter.title()
-                } else {
-                    String::new()
-                };
-                let bar = bar(nrms.unwrap_or(0.0), largest, 24);
-                let bar = if when == "nominal" {
-                    self.style.red(&bar)
-                } else {
-                    self.style.green(&bar)
-                };
-                self.line(&format!(
-                    "  {name:<28}{when:<11}{:>11}  {bar}",
-                    percent(nrms)
-                ));
-            }
-        }
-        self.line("");
     }
 }
 
