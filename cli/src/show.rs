@@ -1,6 +1,5 @@
 //! Results in text, for people: parameters, figures and regions.
 
-use modelmill_codegen::review::base_grouped;
 use modelmill_identify::{Figures, FitParameter, Region};
 
 use crate::model::Model;
@@ -46,17 +45,12 @@ pub(crate) fn parameters(parameters: &[FitParameter]) -> Vec<String> {
     )
 }
 
-/// Which name stands for which expression, common factors collected: `p1_min = ...`.
+/// Which name stands for which expression, as JSON and fits write it: `p1_min = ...`.
 pub(crate) fn expressions(indent: usize, model: &Model) -> Vec<String> {
     let indent = " ".repeat(indent);
-    model
-        .base
-        .iter()
-        .enumerate()
-        .map(|(k, base)| {
-            let grouped = base_grouped(&model.derivation, k).text();
-            format!("{indent}{} = {grouped}", base.name)
-        })
+    let lines = model.base.iter();
+    lines
+        .map(|base| format!("{indent}{} = {}", base.name, base.expression))
         .collect()
 }
 
