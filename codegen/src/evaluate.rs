@@ -177,7 +177,7 @@ impl<'a> Evaluator<'a> {
             Atom::Rate(i) => states.qd[self.position(i)],
             Atom::Acceleration(i) => states.qdd[self.position(i)],
             Atom::Load(d) => states.load[d],
-            Atom::Constant(_) | Atom::Parameter(_) | Atom::Base(_) => {
+            Atom::Pi | Atom::Constant(_) | Atom::Parameter(_) | Atom::Base(_) => {
                 unreachable!("fixed atoms are no inputs of a state")
             }
         })
@@ -192,6 +192,7 @@ impl<'a> Evaluator<'a> {
 
     fn fixed(&self, atom: Atom, base: &[f64]) -> f64 {
         match atom {
+            Atom::Pi => std::f64::consts::PI,
             Atom::Constant(i) => self.constants[i],
             Atom::Parameter(i) => self.mechanism.parameters[i].nominal,
             Atom::Base(k) => base[k],
@@ -451,6 +452,8 @@ fn scalar(op: &Op, value: impl Fn(usize) -> f64) -> f64 {
                 Unary::Abs => a.abs(),
                 Unary::Tanh => a.tanh(),
                 Unary::Exp => a.exp(),
+                Unary::Sin => a.sin(),
+                Unary::Cos => a.cos(),
             }
         }
     }

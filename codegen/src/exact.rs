@@ -193,12 +193,7 @@ fn polynomial_at(
         Exact::Rational(value) => {
             Polynomial::constant(graph.rational(Rational::from(value.clone())))
         }
-        Exact::Pi => {
-            return Err(DeriveError::unsupported(
-                "pi may stand only inside an angle, sin or cos",
-                exact,
-            ));
-        }
+        Exact::Pi => Polynomial::constant(graph.atom(Atom::Pi)),
         Exact::Symbol(Symbol::Parameter(i)) => {
             Polynomial(BTreeMap::from([(Monomial(vec![(i.0, 1)]), Graph::ONE)]))
         }
@@ -251,11 +246,15 @@ fn polynomial_at(
             })
         }
         Exact::Apply(function @ (Function::Sin | Function::Cos), a) => {
-            let mut angle = AngleParts::default();
-            angle.collect(a, &Rational::ONE, exact)?;
-            let (sum, pi12) = angle.finish(exact)?;
-            let (c, s) = graph.cos_sin(&sum, pi12);
-            Polynomial::constant(if *function == Function::Sin { s } else { c })
+            let is_sine = *function == Function::Sin;
+            let value = if let Some((sum, pi12)) = AngleParts::of(a) {
+                let (c, s) = graph.cos_sin(&sum, pi12);
+                if is_sine { s } else { c }
+            } else {
+                let argument = expression_at(graph, a, place)?;
+                graph.unary(if is_sine { Unary::Sin } else { Unary::Cos }, argument)
+            };
+            Polynomial::constant(value)
         }
         Exact::Apply(function, a) => {
             let argument = expression_at(graph, a, place)?;
@@ -279,12 +278,22 @@ struct AngleParts {
 }
 
 impl AngleParts {
-    fn collect(
-        &mut self,
-        exact: &Exact,
-        factor: &Rational,
-        whole: &Exact,
-    ) -> Result<(), DeriveError> {
+    /// An expression as an exact angle; `None` if it is no sum of integer multiples of angles and of pi/12.
+    fn of(exact: &Exact) -> Option<(AngleSum, i32)> {
+        let mut parts = Self::default();
+        parts.collect(exact, &Rational::ONE)?;
+        let integer = |value: &Rational| {
+            let (n, _) = value.as_small().filter(|(_, d)| *d == 1)?;
+            i32::try_from(n).ok()
+        };
+        let twelfths = &parts.pi * &Rational::integer(12);
+        let (n, _) = twelfths.as_small().filter(|(_, d)| *d == 1)?;
+        let pi12 = i32::try_from(n.rem_euclid(24)).ok()?;
+        let atoms: Option<Vec<_>> = parts.atoms.iter().map(|(a, k)| Some((*a, integer(k)?))).collect();
+        Some((AngleSum::new(atoms?), pi12))
+    }
+
+    fn collect(&mut self, exact: &Exact, factor: &Rational) -> Option<()> {
         match exact {
             Exact::Rational(value) if Rational::from(value.clone()).is_zero() => {}
             Exact::Pi => self.pi = &self.pi + factor,
@@ -293,16 +302,15 @@ impl AngleParts {
             }
             Exact::Sum(operands) => {
                 for operand in operands {
-                    self.collect(operand, factor, whole)?;
+                    self.collect(operand, factor)?;
                 }
             }
-            Exact::Negative(a) => self.collect(a, &-factor, whole)?,
+            Exact::Negative(a) => self.collect(a, &-factor)?,
             Exact::Quotient(a, b) => match b.as_ref() {
                 Exact::Rational(value) if !Rational::from(value.clone()).is_zero() => {
-                    let factor = factor * &Rational::from(value.clone()).recip();
-                    self.collect(a, &factor, whole)?;
+                    self.collect(a, &(factor * &Rational::from(value.clone()).recip()))?;
                 }
-                _ => return Err(Self::refuse(whole)),
+                _ => return None,
             },
             Exact::Product(operands) => {
                 let mut factor = factor.clone();
@@ -311,45 +319,14 @@ impl AngleParts {
                     match operand {
                         Exact::Rational(value) => factor = &factor * &Rational::from(value.clone()),
                         _ if rest.is_none() => rest = Some(operand),
-                        _ => return Err(Self::refuse(whole)),
+                        _ => return None,
                     }
                 }
-                match rest {
-                    Some(rest) => self.collect(rest, &factor, whole)?,
-                    None => return Err(Self::refuse(whole)),
-                }
+                self.collect(rest?, &factor)?;
             }
-            _ => return Err(Self::refuse(whole)),
+            _ => return None,
         }
-        Ok(())
-    }
-
-    fn finish(self, whole: &Exact) -> Result<(AngleSum, i32), DeriveError> {
-        let twelfths = &self.pi * &Rational::integer(12);
-        let pi12 = twelfths
-            .as_small()
-            .filter(|(_, d)| *d == 1)
-            .map(|(n, _)| n.rem_euclid(24));
-        let atoms: Option<Vec<_>> = self
-            .atoms
-            .iter()
-            .map(|(a, k)| {
-                k.as_small()
-                    .filter(|(_, d)| *d == 1)
-                    .and_then(|(n, _)| Some((*a, i32::try_from(n).ok()?)))
-            })
-            .collect();
-        match (pi12.and_then(|n| i32::try_from(n).ok()), atoms) {
-            (Some(pi12), Some(atoms)) => Ok((AngleSum::new(atoms), pi12)),
-            _ => Err(Self::refuse(whole)),
-        }
-    }
-
-    fn refuse(whole: &Exact) -> DeriveError {
-        DeriveError::unsupported(
-            "the argument of sin and cos must be a sum of integer multiples of angles and a multiple of pi/12",
-            whole,
-        )
+        Some(())
     }
 }
 

@@ -131,6 +131,8 @@ impl<'a> Body<'a> {
                     Unary::Abs => quote! { #a.abs() },
                     Unary::Tanh => quote! { #a.tanh() },
                     Unary::Exp => quote! { #a.exp() },
+                    Unary::Sin => quote! { #a.sin_cos().0 },
+                    Unary::Cos => quote! { #a.sin_cos().1 },
                 }
             }
             Op::Atan2(y, x) => {

@@ -278,6 +278,7 @@ pub(super) fn input(derivation: &Derivation) -> impl Fn(Atom) -> TokenStream {
                 quote! { state.qdd[#k] }
             }
             Atom::Load(d) => quote! { state.load[#d] },
+            Atom::Pi => quote! { T::from_f64(core::f64::consts::PI) },
         }
     }
 }

@@ -148,17 +148,17 @@ impl Graph {
                     return self.integer(sign);
                 }
                 Unary::Abs => return self.rational(value.abs()),
-                Unary::Tanh if value.is_zero() => return Self::ZERO,
-                Unary::Exp if value.is_zero() => return Self::ONE,
+                Unary::Tanh | Unary::Sin if value.is_zero() => return Self::ZERO,
+                Unary::Exp | Unary::Cos if value.is_zero() => return Self::ONE,
                 _ => {}
             }
         }
         let (base, k) = self.split_factor(a);
         match function {
-            Unary::Sign | Unary::Tanh | Unary::Abs if k.is_negative() => {
+            Unary::Sign | Unary::Tanh | Unary::Abs | Unary::Sin | Unary::Cos if k.is_negative() => {
                 let positive = self.neg(a);
                 let value = self.unary(function, positive);
-                if function == Unary::Abs {
+                if matches!(function, Unary::Abs | Unary::Cos) {
                     value
                 } else {
                     self.neg(value)

@@ -99,6 +99,11 @@ impl Graph {
                 self.sub(Self::ONE, square)
             }
             Unary::Exp => value,
+            Unary::Sin => self.unary(Unary::Cos, argument),
+            Unary::Cos => {
+                let sine = self.unary(Unary::Sin, argument);
+                self.neg(sine)
+            }
         }
     }
 }

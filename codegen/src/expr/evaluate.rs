@@ -151,6 +151,8 @@ impl<F: Fn(Atom) -> f64> Domain for F64<F> {
             Unary::Abs => Some(a.abs()),
             Unary::Tanh => Some(a.tanh()),
             Unary::Exp => Some(a.exp()),
+            Unary::Sin => Some(a.sin()),
+            Unary::Cos => Some(a.cos()),
         }
     }
     fn atom(&self, atom: Atom) -> Option<f64> {
@@ -200,6 +202,16 @@ impl FieldPoint {
     }
 }
 
+impl FieldPoint {
+    /// Cosine and sine of an opaque angle: even and odd, on the unit circle.
+    fn opaque_circle(&self, a: Element) -> (Element, Element) {
+        let (key, odd) = canonical(a);
+        let seed = field::hashed(self.seed ^ 0x0073_696E, key).representative();
+        let (c, s) = field::Stream::new(seed).circle();
+        (c, if odd { -s } else { s })
+    }
+}
+
 /// The smaller of `a` and `-a`, and whether it was `-a`.
 fn canonical(a: Element) -> (Element, bool) {
     if (-a) < a { (-a, true) } else { (a, false) }
@@ -241,6 +253,8 @@ impl Domain for FieldPoint {
                 Some(if odd { -value } else { value })
             }
             Unary::Exp => Some(field::hashed(self.seed ^ 0x0065_7870, *a)),
+            Unary::Cos => Some(self.opaque_circle(*a).0),
+            Unary::Sin => Some(self.opaque_circle(*a).1),
         }
     }
     fn atom(&self, atom: Atom) -> Option<Element> {
@@ -297,7 +311,7 @@ impl Domain for RationalPoint {
                 let root = num_rational::BigRational::new(n, d);
                 (&root * &root == big).then(|| Rational::from(root))
             }
-            Unary::Tanh | Unary::Exp => None,
+            Unary::Tanh | Unary::Exp | Unary::Sin | Unary::Cos => None,
         }
     }
     fn atom(&self, atom: Atom) -> Option<Rational> {

@@ -33,6 +33,8 @@ impl ExprId {
 /// A quantity that an expression does not look into.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Atom {
+    /// The ratio of a circle's circumference to its diameter, where it stands outside an angle.
+    Pi,
     /// A constant of the model file.
     Constant(usize),
     /// A dynamic parameter.
@@ -62,6 +64,10 @@ pub enum Unary {
     Tanh,
     /// Exponential.
     Exp,
+    /// Sine of an argument that is no sum of angles, such as `2*pi*x/pitch`.
+    Sin,
+    /// Cosine of such an argument.
+    Cos,
 }
 
 /// One node of the graph.

@@ -16,7 +16,7 @@ use crate::expr::{Atom, ExprId, Graph};
 
 /// Whether an atom is known once the geometry and the parameters are.
 pub(crate) fn is_fixed(atom: Atom) -> bool {
-    matches!(atom, Atom::Constant(_) | Atom::Parameter(_) | Atom::Base(_))
+    matches!(atom, Atom::Pi | Atom::Constant(_) | Atom::Parameter(_) | Atom::Base(_))
 }
 
 /// What a program computes.

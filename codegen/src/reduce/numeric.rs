@@ -173,6 +173,7 @@ fn sample(
                 Atom::Rate(i) => qd[i],
                 Atom::Acceleration(i) => qdd[i],
                 Atom::Load(d) => load[d],
+                Atom::Pi => std::f64::consts::PI,
                 Atom::Base(_) => 0.0,
             }))
         };

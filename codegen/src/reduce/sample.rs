@@ -227,6 +227,7 @@ impl Sampler {
             root_seed: stream.element().representative(),
             ..FieldPoint::default()
         };
+        point.values.insert(Atom::Pi, stream.element());
         for (atom, is_angle) in &self.constants {
             point.values.insert(*atom, stream.element());
             if *is_angle {

@@ -42,6 +42,8 @@ impl From<crate::expr::Unary> for Function {
             Unary::Abs => Self::Abs,
             Unary::Tanh => Self::Tanh,
             Unary::Exp => Self::Exp,
+            Unary::Sin => Self::Sin,
+            Unary::Cos => Self::Cos,
         }
     }
 }

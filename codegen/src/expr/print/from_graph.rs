@@ -15,6 +15,7 @@ pub fn atom(mechanism: &Mechanism, atom: Atom) -> Symbol {
         Atom::Coordinate(i) => Symbol::new(&*mechanism.coordinates[i].name),
         Atom::Rate(i) => Symbol::derived(&*mechanism.coordinates[i].name, 1),
         Atom::Acceleration(i) => Symbol::derived(&*mechanism.coordinates[i].name, 2),
+        Atom::Pi => Symbol::new("pi"),
         Atom::Load(d) => Symbol::new(format!("load_{}", mechanism.drives[d].name)),
     }
 }
