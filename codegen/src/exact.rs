@@ -289,7 +289,11 @@ impl AngleParts {
         let twelfths = &parts.pi * &Rational::integer(12);
         let (n, _) = twelfths.as_small().filter(|(_, d)| *d == 1)?;
         let pi12 = i32::try_from(n.rem_euclid(24)).ok()?;
-        let atoms: Option<Vec<_>> = parts.atoms.iter().map(|(a, k)| Some((*a, integer(k)?))).collect();
+        let atoms: Option<Vec<_>> = parts
+            .atoms
+            .iter()
+            .map(|(a, k)| Some((*a, integer(k)?)))
+            .collect();
         Some((AngleSum::new(atoms?), pi12))
     }
 

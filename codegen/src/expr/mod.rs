@@ -12,6 +12,8 @@ mod evaluate;
 pub mod print;
 mod rational;
 mod substitute;
+#[cfg(test)]
+mod tests;
 
 use std::collections::{BTreeSet, HashMap};
 

@@ -8,6 +8,8 @@ mod flatten;
 mod program;
 mod schedule;
 mod share;
+#[cfg(test)]
+mod tests;
 
 pub use program::{Guard, Op, OperationCount, Program, Stage, ValueId};
 pub(crate) use schedule::Definition;
@@ -16,7 +18,10 @@ use crate::expr::{Atom, ExprId, Graph};
 
 /// Whether an atom is known once the geometry and the parameters are.
 pub(crate) fn is_fixed(atom: Atom) -> bool {
-    matches!(atom, Atom::Pi | Atom::Constant(_) | Atom::Parameter(_) | Atom::Base(_))
+    matches!(
+        atom,
+        Atom::Pi | Atom::Constant(_) | Atom::Parameter(_) | Atom::Base(_)
+    )
 }
 
 /// What a program computes.

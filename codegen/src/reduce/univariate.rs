@@ -120,10 +120,14 @@ mod tests {
                 .map(|x| value(&p, *x) * value(&q, *x).inverse().unwrap())
                 .collect();
             assert_eq!(degrees(&x, &y), Some((a, b)));
-            assert_eq!(
-                degrees(&x[..a + b + 1], &y[..a + b + 1]).is_some(),
-                a + b == 0 && y[0] == y[0]
-            );
+            if a + b > 0 {
+                let few = a + b + 2;
+                assert_eq!(
+                    degrees(&x[..few], &y[..few]),
+                    None,
+                    "two points must confirm"
+                );
+            }
         }
     }
 }
