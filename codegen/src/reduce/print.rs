@@ -175,3 +175,6 @@ fn with_squares(p: &Polynomial, mechanism: &Mechanism) -> Formula {
         .map(|(powers, k)| Formula::product(k.clone(), variables(powers, mechanism)));
     Formula::sum(squares.into_values().chain(terms))
 }
+
+#[cfg(test)]
+mod tests;

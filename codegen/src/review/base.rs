@@ -110,7 +110,9 @@ pub(super) fn products(page: &mut Document, derivation: &Derivation) {
         ..
     } = derivation;
     page.heading("Products of dynamic parameters");
-    let mut line = vec![text("The forces of the drives are linear in products of dynamic parameters, eq. (5): ")];
+    let mut line = vec![text(
+        "The forces of the drives are linear in products of dynamic parameters, eq. (5): ",
+    )];
     line.extend(linear_model("H", "p_g"));
     line.push(text(". Each column "));
     line.push(name("h"));
@@ -148,9 +150,7 @@ pub(super) fn products(page: &mut Document, derivation: &Derivation) {
         },
     );
     if !reduction.without_effect.is_empty() {
-        let mut line: Line = vec![text(
-            "Without any effect on the drives, and so left out: ",
-        )];
+        let mut line: Line = vec![text("Without any effect on the drives, and so left out: ")];
         for (i, m) in reduction.without_effect.iter().enumerate() {
             if i > 0 {
                 line.push(text(", "));
@@ -225,23 +225,21 @@ pub(super) fn base_parameters(
         reduction.products.len()
     ))];
     line.extend(linear_model("H_min", "p_min"));
-    let mut says = ".".to_owned();
+    line.push(text("."));
     if let Some(n) = numeric {
-        says.push_str(&format!(
-            " On the file's values the numeric rank of eq. (9) over {} states is {}{}.",
-            n.samples,
-            n.rank,
-            if n.rank == rank {
-                ", the same"
-            } else {
-                ": this geometry is special, some base parameters cannot be told apart"
-            }
-        ));
+        let verdict = if n.rank == rank {
+            ", the same"
+        } else {
+            ": this geometry is special, and some base parameters cannot be told apart"
+        };
+        line.push(text(format!(
+            " On the file's values the numeric rank of eq. (9) over {} states is {}{verdict}.",
+            n.samples, n.rank
+        )));
         if let Some(condition) = n.condition {
-            says.push_str(&format!(" The condition number is {condition:.3}."));
+            line.push(text(format!(" The condition number is {condition:.3}.")));
         }
     }
-    line.push(text(says));
     page.paragraph(line);
     let equation = |k: usize, right: Formula| Equation {
         left: Formula::name(base_name(k)),

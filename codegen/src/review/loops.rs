@@ -3,14 +3,14 @@
 use modelmill_spec::{DriveKind, Mechanism, Motion, Place};
 
 use super::document::{Block, Document, Equation, Inline, Line, Table, cell, code, text};
-use crate::expr::print::{Formula, exact, formula, tree_size};
-use crate::expr::{ExprId, Graph};
+use crate::expr::print::{Formula, angle_sum, exact, formula, tree_size};
+use crate::expr::{ExprId, Graph, Rational};
 use crate::programs::nominal_value;
 use crate::reduce::{Unknowns, plan};
 use crate::{Derivation, PassivePosition};
 
 /// Expressions with more nodes than this are shown in a program rather than in one line.
-const LONGEST: usize = 120;
+const LONGEST: usize = 70;
 
 fn names(mechanism: &Mechanism, coordinates: &[usize]) -> Line {
     let mut line = Line::new();
@@ -134,7 +134,23 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
     ) else {
         return;
     };
+    let mut related = Vec::new();
     for step in &plan.steps {
+        for relation in &step.solved.relations {
+            let offset = Rational::new(i64::from(relation.pi12), 12);
+            related.push(Equation {
+                left: Formula::name(&*mechanism.coordinates[relation.coordinate].name),
+                right: Formula::sum([
+                    angle_sum(mechanism, &relation.sum),
+                    Formula::product(offset, [Formula::name("pi")]),
+                ]),
+                tag: format!("P{}", related.len() + 1),
+                unit: None,
+            });
+        }
+        if !step.solved.relations.is_empty() {
+            continue;
+        }
         let mut line = names(mechanism, &step.unknown);
         line.push(text(match step.solved.lengths.len() {
             0 => " follow in closed form as the intersection of two circles",
@@ -153,6 +169,12 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
         }
         line.push(text("."));
         page.paragraph(line);
+    }
+    if !related.is_empty() {
+        page.paragraph([text(
+            "Around the nominal pose these passive angles are tied to others outright, which closes their loops identically:",
+        )]);
+        page.equations("relations", related);
     }
 }
 
@@ -266,7 +288,7 @@ pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
             let sum = Formula::sum(effect.terms.iter().map(|term| {
                 let parameter = Formula::name(&*mechanism.parameters[term.parameter.0].name);
                 Formula::product(
-                    crate::expr::Rational::ONE,
+                    Rational::ONE,
                     [parameter, exact(mechanism, &term.expression)],
                 )
             }));

@@ -18,7 +18,7 @@ mod render_markdown;
 mod render_text;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub use base::{base_expression, base_grouped};
 pub use equations::{BaseLine, DependencyLine, Equations, NumericRank, Operations, Rank};

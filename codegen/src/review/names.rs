@@ -16,7 +16,7 @@ use crate::{Derivation, Evaluator, States};
 
 /// A state with all its atoms' values, and the quantities with a meaning there.
 pub(super) struct Meanings {
-    atoms: BTreeMap<Atom, f64>,
+    pub(super) atoms: BTreeMap<Atom, f64>,
     known: Vec<(Symbol, f64)>,
 }
 
@@ -146,7 +146,7 @@ fn generic_state(
 }
 
 /// Values of all operations of a program at a state.
-fn run(program: &Program, atoms: &BTreeMap<Atom, f64>) -> Vec<f64> {
+pub(super) fn run(program: &Program, atoms: &BTreeMap<Atom, f64>) -> Vec<f64> {
     use crate::expr::{Domain, Unary};
     let mut values: Vec<f64> = Vec::with_capacity(program.ops.len());
     for op in &program.ops {

@@ -93,7 +93,10 @@ fn write_equation(out: &mut String, equation: &Equation) {
     for (i, term) in terms(&equation.right).iter().enumerate() {
         let (sign, term) = match (i, term.is_negative()) {
             (0, _) => ("", term.clone()),
-            (_, true) => ("<mo lspace=\"0\" rspace=\"0.22em\">&#x2212;</mo>", term.clone().negated()),
+            (_, true) => (
+                "<mo lspace=\"0\" rspace=\"0.22em\">&#x2212;</mo>",
+                term.clone().negated(),
+            ),
             (_, false) => ("<mo lspace=\"0\" rspace=\"0.22em\">+</mo>", term.clone()),
         };
         if i > 0 {

@@ -1,1 +1,335 @@
+//! The page and the JSON say what the derivation found: their text read again has the values of the reduction and of
+//! the programs.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use modelmill_spec::Mechanism;
+
+use super::names::{Meanings, run};
+use super::{Equations, Format, NumericRank, base_expression, base_grouped, page, programs};
+use crate::expr::Atom;
+use crate::expr::print::parse::parse;
+use crate::expr::print::tests::{latex_is_balanced, markup_is_balanced};
+use crate::expr::print::{Formula, atom};
+use crate::{Derivation, derive};
+
+const MODELS: [&str; 8] = [
+    "spidermill-paper",
+    "spidermill",
+    "two_link",
+    "four_bar",
+    "five_bar",
+    "three_rrr",
+    "stanford",
+    "emps",
+];
+
+pub(crate) fn model(name: &str) -> Mechanism {
+    let path: PathBuf = [
+        env!("CARGO_MANIFEST_DIR"),
+        "../model-spec/models",
+        &format!("{name}.toml"),
+    ]
+    .iter()
+    .collect();
+    modelmill_spec::load_file(&path)
+        .unwrap_or_else(|failure| panic!("{failure}"))
+        .mechanism
+}
+
+fn derivation(name: &str) -> Derivation {
+    derive(&model(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+/// Values of constants and parameters that are nobody's in particular.
+fn values(derivation: &Derivation) -> (Vec<f64>, Vec<f64>, BTreeMap<String, f64>) {
+    let odd = |i: usize| 0.7 + ((i * 37 + 11) % 29) as f64 / 17.0;
+    let mechanism = &derivation.mechanism;
+    let constants: Vec<f64> = (0..mechanism.constants.len()).map(odd).collect();
+    let parameters: Vec<f64> = (0..mechanism.parameters.len())
+        .map(|i| odd(i + 5))
+        .collect();
+    let mut names = BTreeMap::new();
+    for (c, v) in mechanism.constants.iter().zip(&constants) {
+        names.insert(c.name.clone(), *v);
+    }
+    for (p, v) in mechanism.parameters.iter().zip(&parameters) {
+        names.insert(p.name.clone(), *v);
+    }
+    (constants, parameters, names)
+}
+
+fn assert_close(a: f64, b: f64, what: &str) {
+    assert!((a - b).abs() <= 1e-9 * (1.0 + b.abs()), "{what}: {a} {b}");
+}
+
+#[test]
+fn base_parameters_read_again_have_the_values_of_the_reduction() {
+    for name in MODELS {
+        let derivation = derivation(name);
+        let (constants, parameters, names) = values(&derivation);
+        let expected = derivation.base_values(&parameters, &constants);
+        let equations = Equations::new(&derivation, None);
+        for (k, expected) in expected.iter().enumerate() {
+            let expanded = &equations.base[k].expression;
+            assert_close(parse(expanded).value_f64(&names), *expected, expanded);
+            assert_eq!(*expanded, base_expression(&derivation, k).text());
+            let grouped = base_grouped(&derivation, k).text();
+            assert_close(parse(&grouped).value_f64(&names), *expected, &grouped);
+        }
+    }
+}
+
+#[test]
+fn factors_read_again_have_the_values_of_the_reduction() {
+    for name in MODELS {
+        let derivation = derivation(name);
+        let (constants, _, names) = values(&derivation);
+        let equations = Equations::new(&derivation, None);
+        let lines = &derivation.reduction.dependencies;
+        assert_eq!(
+            equations.dependencies.len(),
+            lines.len() + equations.without_effect.len()
+        );
+        for (line, printed) in lines.iter().zip(&equations.dependencies) {
+            assert_eq!(line.equals.len(), printed.equals.len());
+            for ((_, factor), (_, text)) in line.equals.iter().zip(&printed.equals) {
+                let expected = factor.value_f64(&constants);
+                assert_close(parse(text).value_f64(&names), expected, text);
+                let factored = factor.formula(&derivation.mechanism).text();
+                assert_close(parse(&factored).value_f64(&names), expected, &factored);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_product_is_retained_or_depends_on_retained_ones() {
+    for name in MODELS {
+        let equations = Equations::new(&derivation(name), None);
+        let retained: BTreeSet<&String> = equations.base.iter().map(|b| &b.retained).collect();
+        let dependent: BTreeSet<&String> = equations
+            .dependencies
+            .iter()
+            .map(|d| &d.parameter)
+            .collect();
+        for product in &equations.parameters {
+            assert!(retained.contains(product) != dependent.contains(product));
+        }
+        for line in &equations.dependencies {
+            let vanishes = equations.without_effect.contains(&line.parameter);
+            assert_eq!(vanishes, line.equals.is_empty());
+            assert!(line.equals.iter().all(|(r, _)| retained.contains(r)));
+        }
+        assert_eq!(equations.rank.exact, equations.base.len());
+    }
+}
+
+/// The listings, read again and carried out line by line, give what the programs give.
+#[test]
+fn listed_programs_compute_what_the_programs_compute() {
+    for name in MODELS {
+        let derivation = derivation(name);
+        let mechanism = &derivation.mechanism;
+        let meanings = Meanings::new(&derivation);
+        assert!(!meanings.atoms.is_empty(), "{name}: no state was found");
+        for (title, outputs, program, listing) in programs::listings(&derivation) {
+            let mut known: BTreeMap<String, f64> = meanings
+                .atoms
+                .iter()
+                // Passive motion is computed; where it is not, it is an input.
+                .filter(|(a, _)| program.ops.contains(&crate::Op::Input(**a)))
+                .map(|(a, v)| (atom(mechanism, *a).text(), *v))
+                .collect();
+            for line in listing.fixed.iter().chain(&listing.state) {
+                let Formula::Symbol(left) = &line.left else {
+                    panic!("{}", line.left)
+                };
+                let value = parse(&line.right.text()).value_f64(&known);
+                let before = known.insert(left.text(), value);
+                assert_eq!(before, None, "{name}, {title}: {} twice", left.text());
+            }
+            let expected = run(program, &meanings.atoms);
+            for (symbol, value) in outputs.iter().zip(&program.outputs) {
+                let found = known[&symbol.text()];
+                assert_close(found, expected[value.index()], &symbol.text());
+            }
+        }
+    }
+}
+
+/// A value that has a meaning carries the value of its meaning.
+#[test]
+fn named_values_are_what_they_are_called() {
+    let derivation = derivation("spidermill");
+    let meanings = Meanings::new(&derivation);
+    let (_, _, program, listing) = programs::listings(&derivation)
+        .pop()
+        .expect("the regressor is last");
+    let lines: BTreeSet<String> = listing.state.iter().map(|e| e.left.text()).collect();
+    for wanted in [
+        "c_theta1",
+        "omega_S3_z",
+        "omega_S3_z_d",
+        "c_gamma1",
+        "l_spindle_left",
+    ] {
+        assert!(lines.contains(wanted), "{wanted} in {lines:?}");
+    }
+    let values = run(program, &meanings.atoms);
+    let rate = |i: usize| meanings.atoms[&Atom::Rate(i)];
+    let names = meanings.of(program);
+    let (at, meaning) = names
+        .iter()
+        .find(|(_, m)| m.symbol.text() == "omega_S3_z")
+        .expect("a name in the listing");
+    let sign = if meaning.negative { -1.0 } else { 1.0 };
+    let (theta1, gamma1) = (0, 2);
+    assert_close(
+        sign * values[*at],
+        rate(theta1) + rate(gamma1),
+        "omega_S3_z",
+    );
+}
+
+#[test]
+fn pages_are_whole_and_the_same_every_time() {
+    let numeric = NumericRank {
+        rank: 5,
+        samples: 40,
+        condition: Some(12.5),
+    };
+    for name in ["spidermill-paper", "two_link", "three_rrr"] {
+        let (one, two) = (derivation(name), derivation(name));
+        for format in [
+            Format::Text,
+            Format::Markdown,
+            Format::Latex,
+            Format::Html,
+            Format::Json,
+        ] {
+            let text = page(&one, format, Some(&numeric));
+            assert_eq!(
+                text,
+                page(&two, format, Some(&numeric)),
+                "{name} {format:?}"
+            );
+            assert!(text.ends_with('\n'));
+        }
+        let html = page(&one, Format::Html, None);
+        assert!(markup_is_balanced(&html), "{name}");
+        assert!(!html.contains("<script") && !html.contains("http") && !html.contains("<link"));
+        let latex = page(&one, Format::Latex, None);
+        assert!(latex_is_balanced(
+            &latex.replace("\\{", "").replace("\\}", "")
+        ));
+        let count = |what: &str| latex.matches(what).count();
+        assert_eq!(count("\\begin{"), count("\\end{"));
+    }
+}
+
+#[test]
+fn json_has_the_fields_of_the_contract() {
+    let numeric = NumericRank {
+        rank: 5,
+        samples: 40,
+        condition: None,
+    };
+    let text = Equations::new(&derivation("spidermill-paper"), Some(&numeric)).json();
+    let json: serde_json::Value = serde_json::from_str(&text).expect("valid JSON");
+    let keys: Vec<&String> = json.as_object().expect("an object").keys().collect();
+    assert_eq!(
+        keys,
+        [
+            "model",
+            "parameters",
+            "without_effect",
+            "dependencies",
+            "base",
+            "rank",
+            "operations"
+        ]
+    );
+    assert_eq!(
+        json["rank"],
+        serde_json::json!({"exact": 5, "numeric": 5, "samples": 40})
+    );
+    for program in ["regressor", "inverse_dynamics"] {
+        for operation in ["add", "mul", "div", "sqrt", "sincos"] {
+            assert!(json["operations"][program][operation].is_u64());
+        }
+    }
+    let last = json["dependencies"].as_array().and_then(|d| d.last());
+    assert_eq!(
+        last,
+        Some(&serde_json::json!({"parameter": "m1", "equals": {}}))
+    );
+}
+
+/// Eq. (5), (6) and (16) in a few lines.
+fn summary(name: &str) -> String {
+    let derivation = derivation(name);
+    let equations = Equations::new(&derivation, None);
+    let mut lines = vec![
+        format!("p_g: {}", equations.parameters.join(", ")),
+        format!("without effect: {}", equations.without_effect.join(", ")),
+    ];
+    for line in equations
+        .dependencies
+        .iter()
+        .filter(|d| !d.equals.is_empty())
+    {
+        let right: Vec<String> = line
+            .equals
+            .iter()
+            .map(|(r, k)| format!("({k}) h[{r}]"))
+            .collect();
+        lines.push(format!("h[{}] = {}", line.parameter, right.join(" + ")));
+    }
+    for (k, base) in equations.base.iter().enumerate() {
+        lines.push(format!("{} = {}", base.name, base.expression));
+        let grouped = base_grouped(&derivation, k).text();
+        if grouped != base.expression {
+            lines.push(format!("       = {grouped}"));
+        }
+    }
+    lines.join("\n")
+}
+
+#[test]
+fn equations_of_the_spidermill_paper() {
+    insta::assert_snapshot!(summary("spidermill-paper"), @r"
+    p_g: m1*dc1, m1*dc1^2, m2, m3, m3*dc3, m3*dc3^2, m4, m4*dc3, m4*dc3^2, Ic12, Ic32
+    without effect: m1
+    h[m2] = (d1) h[m1*dc1] + (d1^2) h[m1*dc1^2]
+    h[m3] = (d1) h[m1*dc1] + (d1^2) h[m1*dc1^2]
+    h[m3*dc3^2] = (2) h[m4*dc3^2]
+    h[m4*dc3] = (1/2*d1/d3) h[m1*dc1] + (1/2*d1^2/d3) h[m1*dc1^2] + (1/2) h[m3*dc3] + (-1/d3) h[m4]
+    h[Ic12] = (1) h[m1*dc1^2]
+    h[Ic32] = (2) h[m4*dc3^2]
+    p1_min = m1*dc1 + d1*m2 + d1*m3 + 1/2*d1*m4*dc3/d3
+           = m1*dc1 + d1*(m2 + m3) + 1/2*d1*m4*dc3/d3
+    p2_min = m1*dc1^2 + d1^2*m2 + d1^2*m3 + 1/2*d1^2*m4*dc3/d3 + Ic12
+           = m1*dc1^2 + d1^2*(m2 + m3) + 1/2*d1^2*m4*dc3/d3 + Ic12
+    p3_min = m3*dc3 + 1/2*m4*dc3
+    p4_min = m4 - m4*dc3/d3
+    p5_min = m4*dc3^2 + 2*m3*dc3^2 + 2*Ic32
+           = m4*dc3^2 + 2*(m3*dc3^2 + Ic32)
+    ");
+}
+
+#[test]
+fn equations_of_the_two_link_arm() {
+    insta::assert_snapshot!(summary("two_link"), @r"
+    p_g: ZZ1, MX1, MY1, ZZ2, MX2, MY2, M2
+    without effect: M1
+    h[M2] = (L^2) h[ZZ1] + (L) h[MX1]
+    p1_min = ZZ1 + L^2*M2
+    p2_min = MX1 + L*M2
+    p3_min = MY1
+    p4_min = ZZ2
+    p5_min = MX2
+    p6_min = MY2
+    ");
+}

@@ -192,8 +192,12 @@ impl Formula {
                 below: down,
             } => {
                 *number = &*number * &factor;
-                up.into_iter().for_each(|x| Self::multiply(above, x));
-                down.into_iter().for_each(|x| Self::multiply(below, x));
+                for one in up {
+                    Self::multiply(above, one);
+                }
+                for one in down {
+                    Self::multiply(below, one);
+                }
             }
             other => Self::multiply(above, other),
         }

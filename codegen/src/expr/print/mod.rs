@@ -10,14 +10,17 @@ mod from_exact;
 mod from_graph;
 mod latex;
 mod mathml;
+#[cfg(test)]
+pub(crate) mod parse;
 mod symbol;
 mod text;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub use formula::{Formula, Function};
 pub use from_exact::{angle, exact, length};
+pub(crate) use from_graph::angle_sum;
 pub use from_graph::{atom, formula, tree_size};
 pub use mathml::escape;
 pub use symbol::Symbol;

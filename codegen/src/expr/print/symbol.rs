@@ -93,7 +93,7 @@ fn greek(word: &str) -> Option<Glyphs> {
         .map(|(name, letter)| Glyphs::Greek(name, *letter))
 }
 
-/// The longest run of letters without digits from which more than three letters make a word.
+/// Letters in a row up to this number are a letter with an index; more are a word.
 const LONGEST_SYMBOL: usize = 3;
 
 /// Splits an identifier into its letter and its index.
@@ -107,9 +107,7 @@ pub(crate) fn typeset(name: &str) -> Typeset {
     let upper = letters.len() > 1 && letters.chars().all(char::is_uppercase);
     let (base, rest) = if let Some(letter) = greek(letters) {
         (letter, "")
-    } else if upper {
-        (Glyphs::Word(letters.to_owned()), "")
-    } else if letters.chars().count() > LONGEST_SYMBOL {
+    } else if upper || letters.chars().count() > LONGEST_SYMBOL {
         (Glyphs::Word(letters.to_owned()), "")
     } else {
         let first = letters.chars().next().map_or(0, char::len_utf8);

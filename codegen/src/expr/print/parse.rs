@@ -1,0 +1,232 @@
+//! Reads printed text again, for tests: a formula means what its text says.
+
+use std::collections::BTreeMap;
+
+use crate::expr::{AngleSum, Atom, Domain, Rational, Unary};
+
+/// What was read.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Read {
+    Number(Rational),
+    Name(String),
+    Add(Box<Read>, Box<Read>),
+    Sub(Box<Read>, Box<Read>),
+    Mul(Box<Read>, Box<Read>),
+    Div(Box<Read>, Box<Read>),
+    Negative(Box<Read>),
+    Power(Box<Read>, i32),
+    Apply(String, Vec<Read>),
+}
+
+/// Reads a whole text; panics with the text where it cannot.
+pub(crate) fn parse(text: &str) -> Read {
+    let mut reader = Reader {
+        text,
+        rest: text.trim(),
+    };
+    let read = reader.sum();
+    assert!(
+        reader.rest.is_empty(),
+        "left over in {text}: {}",
+        reader.rest
+    );
+    read
+}
+
+struct Reader<'a> {
+    text: &'a str,
+    rest: &'a str,
+}
+
+impl Reader<'_> {
+    fn take(&mut self, wanted: char) -> bool {
+        let found = self.rest.starts_with(wanted);
+        if found {
+            self.rest = self.rest[wanted.len_utf8()..].trim_start();
+        }
+        found
+    }
+
+    fn expect(&mut self, wanted: char) {
+        assert!(
+            self.take(wanted),
+            "no {wanted} in {} at {}",
+            self.text,
+            self.rest
+        );
+    }
+
+    fn word(&mut self, belongs: fn(char) -> bool) -> String {
+        let end = self.rest.find(|c| !belongs(c)).unwrap_or(self.rest.len());
+        let (word, rest) = self.rest.split_at(end);
+        let word = word.to_owned();
+        self.rest = rest.trim_start();
+        word
+    }
+
+    fn sum(&mut self) -> Read {
+        let mut total = if self.take('-') {
+            Read::Negative(Box::new(self.product()))
+        } else {
+            self.product()
+        };
+        loop {
+            if self.take('+') {
+                total = Read::Add(Box::new(total), Box::new(self.product()));
+            } else if self.take('-') {
+                total = Read::Sub(Box::new(total), Box::new(self.product()));
+            } else {
+                return total;
+            }
+        }
+    }
+
+    fn product(&mut self) -> Read {
+        let mut total = self.power();
+        loop {
+            if self.take('*') {
+                total = Read::Mul(Box::new(total), Box::new(self.power()));
+            } else if self.take('/') {
+                total = Read::Div(Box::new(total), Box::new(self.power()));
+            } else {
+                return total;
+            }
+        }
+    }
+
+    fn power(&mut self) -> Read {
+        let base = self.single();
+        if self.take('^') {
+            let n = self.word(|c| c.is_ascii_digit());
+            return Read::Power(Box::new(base), n.parse().expect("an exponent"));
+        }
+        base
+    }
+
+    fn single(&mut self) -> Read {
+        if self.take('(') {
+            let inner = self.sum();
+            self.expect(')');
+            return inner;
+        }
+        if self.rest.starts_with(|c: char| c.is_ascii_digit()) {
+            let digits = self.word(|c| c.is_ascii_digit());
+            return Read::Number(Rational::integer(digits.parse().expect("digits")));
+        }
+        let name = self.word(|c| c.is_alphanumeric() || c == '_');
+        assert!(
+            !name.is_empty(),
+            "no operand in {} at {}",
+            self.text,
+            self.rest
+        );
+        if !self.take('(') {
+            return Read::Name(name);
+        }
+        let mut operands = vec![self.sum()];
+        while self.take(',') {
+            operands.push(self.sum());
+        }
+        self.expect(')');
+        Read::Apply(name, operands)
+    }
+}
+
+impl Read {
+    /// Its value in floating point; unknown names panic.
+    pub(crate) fn value_f64(&self, names: &BTreeMap<String, f64>) -> f64 {
+        let of = |r: &Self| r.value_f64(names);
+        match self {
+            Self::Number(n) => n.to_f64(),
+            Self::Name(name) => *names
+                .get(name)
+                .unwrap_or_else(|| panic!("{name} has no value yet")),
+            Self::Add(a, b) => of(a) + of(b),
+            Self::Sub(a, b) => of(a) - of(b),
+            Self::Mul(a, b) => of(a) * of(b),
+            Self::Div(a, b) => of(a) / of(b),
+            Self::Negative(a) => -of(a),
+            Self::Power(a, n) => of(a).powi(*n),
+            Self::Apply(function, operands) => {
+                let x = of(&operands[0]);
+                match function.as_str() {
+                    "sin" => x.sin(),
+                    "cos" => x.cos(),
+                    "sqrt" => x.sqrt(),
+                    "abs" => x.abs(),
+                    "sign" => f64::from(u8::from(x > 0.0)) - f64::from(u8::from(x < 0.0)),
+                    "tanh" => x.tanh(),
+                    "exp" => x.exp(),
+                    "atan2" => x.atan2(of(&operands[1])),
+                    other => panic!("unknown function {other}"),
+                }
+            }
+        }
+    }
+
+    /// Its value in any domain; `None` where it has none.
+    pub(crate) fn value<D: Domain>(
+        &self,
+        domain: &D,
+        names: &BTreeMap<String, Atom>,
+    ) -> Option<D::Value> {
+        let of = |r: &Self| r.value(domain, names);
+        let scaled =
+            |a: D::Value, k: i64| Some(domain.mul(&domain.rational(&Rational::integer(k))?, &a));
+        match self {
+            Self::Number(n) => domain.rational(n),
+            Self::Name(name) => domain.atom(names[name]),
+            Self::Add(a, b) => Some(domain.add(&of(a)?, &of(b)?)),
+            Self::Sub(a, b) => Some(domain.add(&of(a)?, &scaled(of(b)?, -1)?)),
+            Self::Mul(a, b) => Some(domain.mul(&of(a)?, &of(b)?)),
+            Self::Div(a, b) => Some(domain.mul(&of(a)?, &domain.power(&of(b)?, -1)?)),
+            Self::Negative(a) => scaled(of(a)?, -1),
+            Self::Power(a, n) => domain.power(&of(a)?, *n),
+            Self::Apply(function, operands) => {
+                let unary = match function.as_str() {
+                    "sin" | "cos" => {
+                        let mut terms = Vec::new();
+                        operands[0].angle(1, names, &mut terms);
+                        let (c, s) = domain.cos_sin(&AngleSum::new(terms))?;
+                        return Some(if function == "sin" { s } else { c });
+                    }
+                    "sqrt" => Unary::Sqrt,
+                    "abs" => Unary::Abs,
+                    "sign" => Unary::Sign,
+                    "tanh" => Unary::Tanh,
+                    "exp" => Unary::Exp,
+                    other => panic!("unknown function {other}"),
+                };
+                domain.unary(unary, &of(&operands[0])?)
+            }
+        }
+    }
+
+    /// Reads an integer combination of angles.
+    fn angle(&self, factor: i32, names: &BTreeMap<String, Atom>, terms: &mut Vec<(Atom, i32)>) {
+        match self {
+            Self::Name(name) => terms.push((names[name], factor)),
+            Self::Add(a, b) => {
+                a.angle(factor, names, terms);
+                b.angle(factor, names, terms);
+            }
+            Self::Sub(a, b) => {
+                a.angle(factor, names, terms);
+                b.angle(-factor, names, terms);
+            }
+            Self::Negative(a) => a.angle(-factor, names, terms),
+            Self::Mul(a, b) => match a.as_ref() {
+                Self::Number(n) => {
+                    let (n, _) = n.as_small().expect("a small factor");
+                    b.angle(
+                        factor * i32::try_from(n).expect("a small factor"),
+                        names,
+                        terms,
+                    );
+                }
+                other => panic!("no integer factor of an angle: {other:?}"),
+            },
+            other => panic!("no sum of angles: {other:?}"),
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! Factored text read again equals the function; what people expect to see factored is.
+
+use std::collections::BTreeMap;
+
+use proptest::prelude::*;
+
+use super::super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
+use crate::expr::print::parse::parse;
+use crate::expr::{Atom, FieldPoint, Rational};
+use crate::field::Stream;
+use crate::review::tests::model;
+
+fn multiply(a: &Polynomial, b: &Polynomial) -> Polynomial {
+    let mut product: BTreeMap<Powers, Rational> = BTreeMap::new();
+    for (p, k) in a {
+        for (q, l) in b {
+            let mut powers: BTreeMap<Variable, u32> = p.iter().copied().collect();
+            for (v, n) in q {
+                *powers.entry(*v).or_insert(0) += n;
+            }
+            let slot = product
+                .entry(powers.into_iter().collect())
+                .or_insert(Rational::ZERO);
+            *slot = &*slot + &(k * l);
+        }
+    }
+    product.retain(|_, k| !k.is_zero());
+    product
+}
+
+/// `sum of k * product of constants`, the constants by position in the model file.
+fn polynomial(terms: &[(i64, &[usize])]) -> Polynomial {
+    let mut sum = Polynomial::new();
+    for (k, factors) in terms {
+        let mut powers: BTreeMap<Variable, u32> = BTreeMap::new();
+        for i in *factors {
+            *powers.entry(Variable::Constant(*i)).or_insert(0) += 1;
+        }
+        sum.insert(powers.into_iter().collect(), Rational::integer(*k));
+    }
+    sum
+}
+
+fn linear() -> impl Strategy<Value = Polynomial> {
+    prop::collection::vec((0..5usize, -3..4i64), 1..4).prop_map(|terms| {
+        let mut sum = Polynomial::new();
+        for (i, k) in terms {
+            if k != 0 {
+                sum.insert(vec![(Variable::Constant(i), 1)], Rational::integer(k));
+            }
+        }
+        sum
+    })
+}
+
+fn product() -> impl Strategy<Value = Polynomial> {
+    prop::collection::vec(linear(), 1..4).prop_map(|factors| {
+        factors
+            .iter()
+            .fold(polynomial(&[(1, &[])]), |p, f| multiply(&p, f))
+    })
+}
+
+fn sum_of_products() -> impl Strategy<Value = Polynomial> {
+    (product(), product(), any::<bool>()).prop_map(|(a, b, both)| {
+        let mut sum = a;
+        if both {
+            for (powers, k) in b {
+                let there = sum.remove(&powers).unwrap_or(Rational::ZERO);
+                let total = &there + &k;
+                if !total.is_zero() {
+                    sum.insert(powers, total);
+                }
+            }
+        }
+        sum
+    })
+}
+
+proptest! {
+    #[test]
+    fn printed_factors_read_again_are_the_function(
+        numerator in sum_of_products(),
+        denominator in sum_of_products(),
+    ) {
+        prop_assume!(!denominator.is_empty());
+        let mechanism = model("spidermill-paper");
+        let function = RationalFunction::new(numerator, denominator);
+        let mut stream = Stream::new(3);
+        let mut at = FieldPoint::default();
+        let mut names = BTreeMap::new();
+        for (i, c) in mechanism.constants.iter().enumerate() {
+            at.values.insert(Atom::Constant(i), stream.element());
+            names.insert(c.name.clone(), Atom::Constant(i));
+        }
+        let expected = function.value(&at);
+        for printed in [function.formula(&mechanism), function.expanded(&mechanism)] {
+            let text = printed.text();
+            prop_assert_eq!(parse(&text).value(&at, &names), expected, "{}", text);
+        }
+        if !function.is_zero() {
+            let (number, rest) = function.split_number();
+            let number = crate::field::Element::from_rational(&number).expect("a small number");
+            prop_assert_eq!(rest.value(&at).map(|v| v * number), expected);
+        }
+    }
+}
+
+/// Constants of the model are d1, d3, b, dA, Bx, ... in this order.
+fn check(numerator: &Polynomial, denominator: &Polynomial, expected: &str) {
+    let mechanism = model("spidermill-paper");
+    let function = RationalFunction::new(numerator.clone(), denominator.clone());
+    assert_eq!(function.formula(&mechanism).text(), expected);
+}
+
+#[test]
+fn numbers_and_powers_stand_outside() {
+    check(
+        &polynomial(&[(2, &[0, 0, 1]), (4, &[0, 1, 1])]),
+        &polynomial(&[(6, &[2])]),
+        "1/3*d1*d3*(d1 + 2*d3)/b",
+    );
+    check(
+        &polynomial(&[(-1, &[0])]),
+        &polynomial(&[(2, &[1])]),
+        "-1/2*d1/d3",
+    );
+}
+
+#[test]
+fn squares_and_their_differences_are_seen() {
+    let one = polynomial(&[(1, &[])]);
+    check(
+        &polynomial(&[(1, &[0, 0]), (-1, &[1, 1])]),
+        &one,
+        "(d1 + d3)*(d1 - d3)",
+    );
+    check(
+        &polynomial(&[(1, &[0, 0]), (2, &[0, 1]), (1, &[1, 1])]),
+        &one,
+        "(d1 + d3)^2",
+    );
+    // The puma's (d2 + d3)^2 + a2^2.
+    check(
+        &polynomial(&[(1, &[0, 0]), (2, &[0, 1]), (1, &[1, 1]), (1, &[2, 2])]),
+        &one,
+        "(d1 + d3)^2 + b^2",
+    );
+    check(
+        &polynomial(&[(1, &[0, 0]), (1, &[1, 1])]),
+        &one,
+        "d1^2 + d3^2",
+    );
+}
