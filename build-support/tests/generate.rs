@@ -1,0 +1,97 @@
+//! What a build script sees: modules for sound models, the models' own diagnostics for faulty ones.
+
+use std::path::{Path, PathBuf};
+
+use modelmill_build::try_generate;
+
+const PENDULUM: &str = r#"
+schema = 1
+name = "pendulum"
+gravity = [0, "-g", 0]
+constants = { g = { value = 9.81, unit = "m/s^2" } }
+coordinates = { q = {} }
+frame = [{ name = "arm", on = "base", modified_dh = { theta = "q" } }]
+part = [{ on = "arm", linear = { planar = "1" } }]
+drive = [{ name = "motor", joint = "q" }]
+"#;
+
+/// A fresh folder with some files in it.
+fn folder(name: &str, files: &[(&str, &str)]) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    for (file, text) in files {
+        std::fs::write(folder.join(file), text).unwrap();
+    }
+    folder
+}
+
+fn generate(folder: &Path) -> Result<String, String> {
+    let out = folder.join("models.rs");
+    try_generate(&format!("{}/*.toml", folder.display()), &out)
+        .map_err(|error| error.to_string())?;
+    Ok(std::fs::read_to_string(out).unwrap())
+}
+
+#[test]
+fn a_sound_model_becomes_a_module_and_the_same_one_every_time() {
+    let folder = folder("sound", &[("pendulum.toml", PENDULUM)]);
+    let first = generate(&folder).unwrap();
+    assert!(first.contains("pub mod pendulum {"));
+    assert!(first.contains("expression: \"ZZ1\""), "{first}");
+    assert_eq!(generate(&folder).unwrap(), first);
+}
+
+#[test]
+fn an_unchanged_module_keeps_its_date() {
+    let folder = folder("unchanged", &[("pendulum.toml", PENDULUM)]);
+    generate(&folder).unwrap();
+    let date = |folder: &Path| {
+        std::fs::metadata(folder.join("models.rs"))
+            .unwrap()
+            .modified()
+            .unwrap()
+    };
+    let before = date(&folder);
+    generate(&folder).unwrap();
+    assert_eq!(date(&folder), before);
+}
+
+#[test]
+fn faults_of_all_models_come_together_with_their_places() {
+    let typing_error = PENDULUM.replace("joint = \"q\"", "joint = \"p\"");
+    let wrong_unit = PENDULUM.replace("m/s^2", "kg");
+    let folder = folder(
+        "faulty",
+        &[("a.toml", &typing_error), ("b.toml", &wrong_unit)],
+    );
+    let error = generate(&folder).unwrap_err();
+    assert!(error.contains("a.toml:9:"), "{error}");
+    assert!(error.contains("known names: `q`"), "{error}");
+    assert!(error.contains("b.toml:"), "{error}");
+    assert!(
+        !folder.join("models.rs").exists(),
+        "nothing is written for faulty models"
+    );
+}
+
+#[test]
+fn two_models_of_one_name_are_refused() {
+    let folder = folder("twice", &[("a.toml", PENDULUM), ("b.toml", PENDULUM)]);
+    let error = generate(&folder).unwrap_err();
+    assert!(
+        error.contains("another model is called `pendulum` too"),
+        "{error}"
+    );
+}
+
+#[test]
+fn an_empty_or_missing_folder_is_said() {
+    let folder = folder("empty", &[]);
+    assert!(generate(&folder).unwrap_err().contains("no model file"));
+    assert!(
+        generate(&folder.join("missing"))
+            .unwrap_err()
+            .contains("cannot read folder")
+    );
+}
