@@ -177,7 +177,7 @@ pub(super) fn bodies(page: &mut Document, mechanism: &Mechanism) {
         page.paragraph([text(
             "Parts by mass, centre of mass, and inertia about the centre along the frame's axes; what is not listed is zero.",
         )]);
-        let head = vec!["part", "frame", "mass, kg", "centre, m", "inertia, kg m^2"];
+        let head = vec!["part", "frame", "mass, kg", "centre, m", "inertia, kg m²"];
         page.table(
             "parts",
             Table {
@@ -195,7 +195,7 @@ pub(super) fn bodies(page: &mut Document, mechanism: &Mechanism) {
             "frame",
             "mass, kg",
             "first moment, kg m",
-            "inertia, kg m^2",
+            "inertia, kg m²",
         ];
         page.table("parts", Table { head, rows: linear });
     }

@@ -138,14 +138,33 @@ pub(super) fn lines(equations: &[Equation]) -> String {
     out
 }
 
-/// Splits before every sign that stands between blanks.
+/// Splits before every sign between blanks outside parentheses, and inside them only where a piece is too long.
 fn pieces(text: &str) -> Vec<&str> {
+    split(text, 0)
+        .into_iter()
+        .flat_map(|piece| {
+            if piece.len() > WIDTH - 40 {
+                split(piece, usize::MAX)
+            } else {
+                vec![piece]
+            }
+        })
+        .collect()
+}
+
+/// Splits before signs that stand in at most so many parentheses.
+fn split(text: &str, deepest: usize) -> Vec<&str> {
     let mut found = Vec::new();
-    let mut start = 0;
-    for (i, pair) in text.as_bytes().windows(3).enumerate() {
-        if pair[0] == b' ' && pair[2] == b' ' && matches!(pair[1], b'+' | b'-') {
-            found.push(&text[start..i]);
-            start = i + 1;
+    let (mut start, mut depth) = (0, 0usize);
+    for (i, triple) in text.as_bytes().windows(3).enumerate() {
+        match triple[0] {
+            b'(' => depth += 1,
+            b')' => depth = depth.saturating_sub(1),
+            b' ' if triple[2] == b' ' && matches!(triple[1], b'+' | b'-') && depth <= deepest => {
+                found.push(&text[start..i]);
+                start = i + 1;
+            }
+            _ => {}
         }
     }
     found.push(&text[start..]);

@@ -36,10 +36,11 @@ pub fn formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Formula {
         Node::Product(factors) => {
             let mut factors = factors.clone();
             factors.sort_by_key(|(id, _)| rank(graph, *id));
-            Formula::product(
+            let product = Formula::product(
                 Rational::ONE,
                 factors.iter().map(|(base, n)| of(*base).power(*n)),
-            )
+            );
+            in_order(product)
         }
         Node::Unary(function, inner) => Formula::apply((*function).into(), of(*inner)),
     }
@@ -69,7 +70,7 @@ pub(crate) fn angle_sum(mechanism: &Mechanism, angle: &AngleSum) -> Formula {
     }))
 }
 
-/// Place of a factor in a product: known quantities first, then what moves, then parentheses and functions.
+/// Place of a factor in a product: known quantities first, then what moves, then functions and parentheses.
 fn rank(graph: &Graph, id: ExprId) -> usize {
     match graph.node(id) {
         Node::Rational(_) => 0,
@@ -77,7 +78,35 @@ fn rank(graph: &Graph, id: ExprId) -> usize {
         Node::Atom(Atom::Parameter(_) | Atom::Base(_)) => 2,
         Node::Atom(_) => 3,
         Node::Unary(..) => 4,
-        Node::Sum(_) | Node::Product(_) => 5,
-        Node::Sin(_) | Node::Cos(_) => 6,
+        Node::Sin(_) | Node::Cos(_) => 5,
+        Node::Sum(_) | Node::Product(_) => 6,
+    }
+}
+
+/// Orders the factors that came out of nested products: names, functions, parentheses.
+fn in_order(product: Formula) -> Formula {
+    fn rank(factor: &Formula) -> usize {
+        match factor {
+            Formula::Apply(..) => 1,
+            Formula::Sum(_) => 2,
+            Formula::Power(base, _) => rank(base),
+            _ => 0,
+        }
+    }
+    match product {
+        Formula::Term {
+            factor,
+            mut above,
+            mut below,
+        } => {
+            above.sort_by_key(rank);
+            below.sort_by_key(rank);
+            Formula::Term {
+                factor,
+                above,
+                below,
+            }
+        }
+        other => other,
     }
 }

@@ -43,12 +43,13 @@ impl Symbol {
     fn mathml_raised(&self, exponent: Option<u32>) -> String {
         let set = typeset(&self.name);
         let mut base = glyphs(&set.base);
+        // As accents the dots would touch letters without ascenders.
         if let Some(dots) = match self.order {
             0 => None,
             1 => Some("&#x2D9;"),
             _ => Some("&#xA8;"),
         } {
-            base = format!("<mover accent=\"true\">{base}<mo>{dots}</mo></mover>");
+            base = format!("<mover>{base}<mo scriptlevel=\"0\">{dots}</mo></mover>");
         }
         if set.index.is_empty() {
             return match exponent {
