@@ -5,6 +5,8 @@ use modelmill_generated as generated;
 use modelmill_runtime::{PoseError, Real};
 use modelmill_tests::base_parameters;
 use modelmill_tests::fixtures::{Table, derived};
+use modelmill_tests::laws::Case;
+use modelmill_tests::random::{self, Matter};
 use modelmill_tests::sample::Sample;
 use modelmill_tests::stream::Stream;
 use nalgebra::DMatrix;
@@ -34,20 +36,20 @@ fn state_of<T: Real, const N: usize>(columns: &[Vec<f64>], i: usize) -> [T; N] {
     std::array::from_fn(|k| T::from_f64(columns[k][i]))
 }
 
-/// Runs the module `$model` in numbers of type `$T`.
+/// Runs the module `$models::$model` in numbers of type `$T`.
 macro_rules! run {
-    ($model:ident, $T:ty, $sample:expr) => {
-        run!(@ $model, $T, $sample, |_, _| Vec::new())
+    ($models:ident, $model:ident, $T:ty, $sample:expr) => {
+        run!(@ $models, $model, $T, $sample, |_, _| Vec::new())
     };
-    ($model:ident, $T:ty, $sample:expr, passive) => {
-        run!(@ $model, $T, $sample, |model: &generated::$model::Model<$T>, state| {
+    ($models:ident, $model:ident, $T:ty, $sample:expr, passive) => {
+        run!(@ $models, $model, $T, $sample, |model: &$models::$model::Model<$T>, state| {
             let passive = model.passive(state).expect("a reachable state");
             let all = passive.q.iter().chain(&passive.qd).chain(&passive.qdd);
             all.map(|x| x.to_f64()).collect::<Vec<f64>>()
         })
     };
-    (@ $model:ident, $T:ty, $sample:expr, $passive:expr) => {{
-        use generated::$model as module;
+    (@ $models:ident, $model:ident, $T:ty, $sample:expr, $passive:expr) => {{
+        use $models::$model as module;
         let geometry = module::Geometry::<$T>::default();
         let base = module::base_parameters(&geometry, &module::Parameters::default());
         let model = module::Model::new(&geometry);
@@ -158,8 +160,8 @@ macro_rules! agrees {
         fn $test() {
             let derivation = derived($name);
             let sample = sample_of(&derivation);
-            check(&derivation, &sample, &run!($model, f64, &sample $(, $passive)?), 1e-12);
-            check(&derivation, &sample, &run!($model, f32, &sample $(, $passive)?), 5e-3);
+            check(&derivation, &sample, &run!(generated, $model, f64, &sample $(, $passive)?), 1e-12);
+            check(&derivation, &sample, &run!(generated, $model, f32, &sample $(, $passive)?), 5e-3);
         })+
     };
 }
@@ -178,6 +180,31 @@ agrees! {
     stanford_agrees_with_the_evaluator: stanford "stanford";
     three_rrr_agrees_with_the_evaluator: three_rrr "three_rrr" passive;
     two_link_agrees_with_the_evaluator: two_link "two_link";
+}
+
+/// Modules of random mechanisms, see `build.rs`.
+#[macro_use]
+#[expect(unreachable_pub, reason = "emitted for a crate of its own")]
+mod random_models {
+    include!(concat!(env!("OUT_DIR"), "/random_models.rs"));
+}
+
+/// A test that a random mechanism's module agrees with the evaluator.
+macro_rules! agrees_at_random {
+    ($($model:ident: $function:ident $seed:literal $($passive:ident)?;)+) => {
+        $(#[test]
+        fn $model() {
+            let mechanism = random::$function($seed, Matter::Anything);
+            let case = Case::new(&mechanism, 60, 0.3).expect("regular states");
+            let found = run!(random_models, $model, f64, &case.sample $(, $passive)?);
+            check(&case.derivation, &case.sample, &found, 1e-11);
+        })+
+    };
+}
+
+mod random_models_agree_with_the_evaluator {
+    use super::*;
+    for_each_random_model!(agrees_at_random);
 }
 
 /// Compares a module with an independent table: passive angles, every column of H, forces.
@@ -236,14 +263,14 @@ fn check_table(name: &str, table: &str, run: impl Fn(&Sample) -> Outputs) {
 #[test]
 fn the_papers_emitted_model_agrees_with_the_independent_table_to_1e_11() {
     check_table("spidermill-paper", "spidermill-paper-H", |sample| {
-        run!(spidermill_paper, f64, sample, passive)
+        run!(generated, spidermill_paper, f64, sample, passive)
     });
 }
 
 #[test]
 fn the_consistent_emitted_model_agrees_with_the_independent_table_to_1e_11() {
     check_table("spidermill", "spidermill-consistent-H", |sample| {
-        run!(spidermill, f64, sample, passive)
+        run!(generated, spidermill, f64, sample, passive)
     });
 }
 

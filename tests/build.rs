@@ -1,0 +1,51 @@
+//! Emits modules of random mechanisms, so that tests can hold emitted code against the evaluator beyond the bundled
+//! models.
+
+#![allow(dead_code, unreachable_pub, missing_docs)]
+
+#[path = "src/mechanics.rs"]
+mod mechanics;
+#[path = "src/random/mod.rs"]
+mod random;
+#[path = "src/stream.rs"]
+mod stream;
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use modelmill_spec::Mechanism;
+use random::Matter;
+
+/// Mechanisms of each kind; loops with effects of the load would need another state.
+const EACH: usize = 8;
+
+fn main() {
+    println!("cargo::rerun-if-changed=src");
+    println!("cargo::rerun-if-changed=build.rs");
+    let kinds: [fn(u64, Matter) -> Mechanism; 2] = [random::tree, random::planar_loop];
+    let (mut modules, mut list) = (String::new(), String::new());
+    for kind in kinds {
+        let mechanisms = (0..)
+            .map(|seed| (seed, kind(seed, Matter::Anything)))
+            .filter(|(_, m)| m.effects.iter().all(|e| e.kind != "load_friction"));
+        for (seed, mechanism) in mechanisms.take(EACH) {
+            let derivation = modelmill_codegen::derive(&mechanism)
+                .unwrap_or_else(|error| panic!("{}: {error}", mechanism.name));
+            modules.push_str(&modelmill_codegen::emit(&derivation).module());
+            let name = &mechanism.name;
+            let (function, passive) = if mechanism.loops.is_empty() {
+                ("tree", "")
+            } else {
+                ("planar_loop", " passive")
+            };
+            _ = writeln!(list, "        {name}: {function} {seed}{passive};");
+        }
+    }
+    let text = format!(
+        "{modules}\n/// Calls a macro with every module: name, the function that makes its mechanism, the seed.\n\
+         macro_rules! for_each_random_model {{\n    ($then:ident) => {{\n        $then! {{\n{list}        }}\n    }};\n}}\n"
+    );
+    let folder = std::env::var_os("OUT_DIR").expect("cargo sets OUT_DIR");
+    std::fs::write(Path::new(&folder).join("random_models.rs"), text)
+        .expect("OUT_DIR can be written");
+}
