@@ -1,7 +1,8 @@
 //! Emits modules of random mechanisms, so that tests can hold emitted code against the evaluator beyond the bundled
 //! models.
 
-#![allow(dead_code, unreachable_pub, missing_docs)]
+// The modules of the tests' library are built into this script, which needs only part of them.
+#![allow(dead_code, unreachable_pub, unused_imports)]
 
 #[path = "src/mechanics.rs"]
 mod mechanics;

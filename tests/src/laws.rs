@@ -461,7 +461,7 @@ fn with_turned_base(mechanism: &Mechanism) -> Mechanism {
         frame.parent = moved(frame.parent);
     }
     let mut base_frame = turned.frames[0].clone();
-    base_frame.name = "turned_base".to_owned();
+    "turned_base".clone_into(&mut base_frame.name);
     base_frame.steps = steps;
     turned.frames.insert(1, base_frame);
     for part in &mut turned.parts {

@@ -184,7 +184,7 @@ agrees! {
 
 /// Modules of random mechanisms, see `build.rs`.
 #[macro_use]
-#[expect(unreachable_pub, reason = "emitted for a crate of its own")]
+#[expect(unreachable_pub, dead_code, reason = "emitted for a crate of its own")]
 mod random_models {
     include!(concat!(env!("OUT_DIR"), "/random_models.rs"));
 }
