@@ -12,10 +12,9 @@ use crate::preparation::PreparationArgs;
     name = "modelmill",
     version,
     about,
-    disable_help_subcommand = true,
     after_help = "Start here:\n  \
         modelmill tour                              the whole story on bundled recordings\n  \
-        modelmill equations models/two_link.toml    the reduced model of a file of yours\n\n\
+        modelmill help COMMAND                       options and examples of one command\n\n\
         Exit status: 0 done, 1 the input is at fault (with the place and what to do), 2 wrong usage."
 )]
 pub(crate) struct Cli {

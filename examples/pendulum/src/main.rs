@@ -37,7 +37,7 @@ mod tests {
             m: 1.5,
             c: 0.4,
             I: 0.07,
-            fv_motor: 0.2,
+            Fv_motor: 0.2,
         };
         let dynamics = InverseDynamics::new(&geometry, &base_parameters(&geometry, &p));
         let (q, qd, qdd) = (0.7_f64, -1.3, 2.1);
@@ -48,7 +48,7 @@ mod tests {
                 qdd: [qdd],
             })
             .unwrap();
-        let expected = (p.I + p.m * p.c * p.c) * qdd + p.m * p.c * 9.81 * q.cos() + p.fv_motor * qd;
+        let expected = (p.I + p.m * p.c * p.c) * qdd + p.m * p.c * 9.81 * q.cos() + p.Fv_motor * qd;
         assert!((torque - expected).abs() < 1e-12 * expected.abs());
     }
 }
