@@ -54,7 +54,7 @@ pub(crate) fn reconstruct(
     let mut found = Vec::with_capacity(n);
     for (k, shape) in shape.iter().enumerate() {
         if !varying.contains(&k)
-            && let Some(value) = at_origin[k].to_rational().filter(|r| is_plausible(r))
+            && let Some(value) = at_origin[k].to_rational().filter(is_plausible)
         {
             found.push(Some(RationalFunction::constant(value)));
             continue;
