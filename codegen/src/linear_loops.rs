@@ -4,12 +4,14 @@
 //! by square roots would mix them. Which branch is meant is seen numerically around the nominal pose; that the relation
 //! then closes the loop identically is shown exactly.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use modelmill_spec::{Mechanism, Motion};
 use nalgebra::{DMatrix, DVector};
 
 use crate::closure::Closure;
 use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Node, Tape};
-use crate::field::{Element, Stream};
+use crate::field::{Element, MODULUS, Stream};
 use crate::numeric_pose::Loops;
 
 /// A passive angle that equals `sum + pi12 * pi/12`.
@@ -39,35 +41,35 @@ pub(crate) fn find(graph: &mut Graph, mechanism: &Mechanism, closures: &mut [Clo
         if passive.len() != closure.residual.len() {
             continue;
         }
-        let relations: Option<Vec<Relation>> = passive
+        let fixed = fixed_angles(graph, &closure.residual);
+        let candidates: Vec<Vec<Relation>> = passive
             .iter()
-            .map(|p| relation(mechanism, &poses, &closure.coordinates, *p))
+            .map(|p| relations(mechanism, &poses, &closure.coordinates, &fixed, *p))
             .collect();
-        if let Some(relations) = relations
-            && closes(graph, closure, &relations)
-        {
-            closure.residual = relations.iter().map(|r| residual(graph, r)).collect();
+        let relations =
+            combinations(&candidates).find(|relations| closes(graph, closure, relations));
+        if let Some(relations) = relations {
+            closure.residual = relations.iter().map(|r| r.residual(graph)).collect();
             closure.relations = relations;
             closure.chain = None;
         }
     }
 }
 
-/// The relation as an equation; its fixed part does not matter to derivatives.
-fn residual(graph: &mut Graph, relation: &Relation) -> ExprId {
-    let terms = relation
-        .sum
-        .terms()
-        .iter()
-        .map(|(atom, n)| (*atom, -i64::from(*n)));
-    let terms: Vec<_> = std::iter::once((Atom::Coordinate(relation.coordinate), 1))
-        .chain(terms)
-        .collect();
-    let terms: Vec<_> = terms
-        .into_iter()
-        .map(|(atom, n)| (graph.atom(atom), crate::expr::Rational::integer(n)))
-        .collect();
-    graph.sum(&terms)
+impl Relation {
+    /// The angle that it gives, as a number.
+    pub(crate) fn value(&self, graph: &mut Graph) -> ExprId {
+        graph.angle(&self.sum, self.pi12)
+    }
+
+    /// The relation as an equation.
+    fn residual(&self, graph: &mut Graph) -> ExprId {
+        let (coordinate, value) = (
+            graph.atom(Atom::Coordinate(self.coordinate)),
+            self.value(graph),
+        );
+        graph.sub(coordinate, value)
+    }
 }
 
 /// Coordinates at the nominal pose and at some poses around it; `None` if the loops cannot be followed there.
@@ -88,13 +90,103 @@ fn poses(graph: &mut Graph, mechanism: &Mechanism, closures: &[Closure]) -> Opti
     Some(found)
 }
 
-/// The relation that a passive angle keeps to at all poses: with the active coordinates of its loop.
-fn relation(
+/// Constants in sines and cosines.
+fn fixed_angles(graph: &Graph, roots: &[ExprId]) -> Vec<usize> {
+    let mut found = BTreeSet::new();
+    for node in graph.nodes_of(roots) {
+        if let Node::Sin(angle) | Node::Cos(angle) = node {
+            found.extend(angle.atoms().filter_map(|atom| match atom {
+                Atom::Constant(i) => Some(i),
+                _ => None,
+            }));
+        }
+    }
+    found.into_iter().collect()
+}
+
+/// One candidate of each list, in all combinations; only the first few.
+fn combinations(candidates: &[Vec<Relation>]) -> impl Iterator<Item = Vec<Relation>> {
+    const MOST: usize = 64;
+    let n = candidates
+        .iter()
+        .try_fold(1usize, |n, list| n.checked_mul(list.len()))
+        .unwrap_or(MOST);
+    (0..n.min(MOST)).map(move |mut k| {
+        candidates
+            .iter()
+            .map(|list| {
+                let chosen = list[k % list.len()].clone();
+                k /= list.len();
+                chosen
+            })
+            .collect()
+    })
+}
+
+/// Relations that a passive angle keeps to at all poses: with the active angles of its loop, and in its fixed part with
+/// multiples of constant angles. The simplest come first.
+fn relations(
+    mechanism: &Mechanism,
+    poses: &[Vec<f64>],
+    coordinates: &[usize],
+    fixed: &[usize],
+    p: usize,
+) -> Vec<Relation> {
+    let Some((turning, offset)) = turning(mechanism, poses, coordinates, p) else {
+        return Vec::new();
+    };
+    multiples(fixed.len())
+        .into_iter()
+        .filter_map(|factors| {
+            let rest = fixed.iter().zip(&factors).fold(offset, |rest, (c, n)| {
+                rest - f64::from(*n) * mechanism.constants[*c].value
+            });
+            let twelfths = rest * 12.0 / std::f64::consts::PI;
+            if (twelfths - twelfths.round()).abs() > 1e-6 || twelfths.abs() > 1e6 {
+                return None;
+            }
+            #[expect(clippy::cast_possible_truncation, reason = "small and rounded")]
+            let pi12 = twelfths.round() as i32;
+            let constants = fixed.iter().zip(&factors);
+            let constants = AngleSum::new(constants.map(|(c, n)| (Atom::Constant(*c), *n)));
+            Some(Relation {
+                coordinate: p,
+                sum: turning.plus(&constants, 1),
+                pi12,
+            })
+        })
+        .collect()
+}
+
+/// Small factors of `n` constants, sorted by size.
+fn multiples(n: usize) -> Vec<Vec<i32>> {
+    /// More constants than this are left out.
+    const MOST: usize = 3;
+    let mut found: Vec<Vec<i32>> = vec![Vec::new()];
+    for k in 0..n {
+        let range = if k < MOST { -2..=2 } else { 0..=0 };
+        found = found
+            .iter()
+            .flat_map(|head| {
+                range.clone().map(|x| {
+                    let mut longer = head.clone();
+                    longer.push(x);
+                    longer
+                })
+            })
+            .collect();
+    }
+    found.sort_by_key(|factors| factors.iter().map(|n| n.abs()).sum::<i32>());
+    found
+}
+
+/// The active angles with which a passive one turns, and what it is beside them.
+fn turning(
     mechanism: &Mechanism,
     poses: &[Vec<f64>],
     coordinates: &[usize],
     p: usize,
-) -> Option<Relation> {
+) -> Option<(AngleSum, f64)> {
     let others: Vec<usize> = coordinates
         .iter()
         .copied()
@@ -118,42 +210,21 @@ fn relation(
     };
     let rounded: DVector<f64> = factors.map(f64::round);
     if (&factors - &rounded).iter().any(|x| x.abs() > 1e-5)
+        || rounded.iter().any(|x| x.abs() > 100.0)
         || (a * &rounded - b).iter().any(|x| x.abs() > TOLERANCE)
     {
         return None;
     }
-    let offset = nominal[p]
-        - others
-            .iter()
-            .zip(rounded.iter())
-            .map(|(c, n)| n * nominal[*c])
-            .sum::<f64>();
-    let twelfths = offset * 12.0 / std::f64::consts::PI;
-    if (twelfths - twelfths.round()).abs() > 1e-6 || twelfths.abs() > 1e6 {
-        return None;
-    }
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "both are small and rounded"
-    )]
-    let (pi12, integers): (i32, Vec<i32>) = (
-        twelfths.round() as i32,
-        rounded
-            .iter()
-            .map(|n| n.clamp(-100.0, 100.0) as i32)
-            .collect(),
-    );
-    let sum = AngleSum::new(
-        others
-            .iter()
-            .zip(integers)
-            .map(|(c, n)| (Atom::Coordinate(*c), n)),
-    );
-    Some(Relation {
-        coordinate: p,
-        sum,
-        pi12: pi12.rem_euclid(24),
-    })
+    let offset = others
+        .iter()
+        .zip(rounded.iter())
+        .fold(nominal[p], |rest, (c, n)| rest - n * nominal[*c]);
+    #[expect(clippy::cast_possible_truncation, reason = "small and rounded")]
+    let terms = others
+        .iter()
+        .zip(rounded.iter())
+        .map(|(c, n)| (Atom::Coordinate(*c), *n as i32));
+    Some((AngleSum::new(terms), offset))
 }
 
 /// Whether the relations close the loop at every pose: shown at random points of the field.
@@ -163,7 +234,7 @@ fn closes(graph: &mut Graph, closure: &Closure, relations: &[Relation]) -> bool 
     let atoms = graph.atoms(&closed);
     let mut stream = Stream::new(2);
     (0..8).all(|_| {
-        let mut point = FieldPoint::default();
+        let mut point = FieldPoint::<MODULUS>::default();
         for atom in &atoms {
             point.values.insert(*atom, stream.element());
             point.angles.insert(*atom, stream.circle());
@@ -180,7 +251,7 @@ fn put_in(graph: &mut Graph, relations: &[Relation], roots: &[ExprId]) -> Vec<Ex
         .filter(|n| matches!(n, Node::Sin(_) | Node::Cos(_)))
         .cloned()
         .collect();
-    let mut replacements = std::collections::BTreeMap::new();
+    let mut replacements = BTreeMap::new();
     for node in nodes {
         let (Node::Sin(angle) | Node::Cos(angle)) = &node else {
             continue;

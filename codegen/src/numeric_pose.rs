@@ -4,7 +4,7 @@ use modelmill_spec::Mechanism;
 use nalgebra::{DMatrix, DVector};
 
 use crate::expr::{Atom, ExprId, F64, Graph, Tape};
-use crate::field::{MODULUS, Stream};
+use crate::field::Stream;
 
 /// Residuals of loops with their derivatives by the passive coordinates.
 pub(crate) struct Loops<'a> {
@@ -73,6 +73,7 @@ impl<'a> Loops<'a> {
                 let value = |atom: Atom| match atom {
                     Atom::Constant(i) => self.mechanism.constants[i].value,
                     Atom::Coordinate(i) => q[i],
+                    Atom::Pi => std::f64::consts::PI,
                     _ => 0.0,
                 };
                 self.tape.evaluate(&F64(value))?
@@ -97,5 +98,5 @@ impl<'a> Loops<'a> {
 
 /// A number between -1 and 1.
 pub(crate) fn symmetric(stream: &mut Stream) -> f64 {
-    2.0 * (stream.element().representative() as f64 / MODULUS as f64) - 1.0
+    2.0 * (stream.bits() as f64 / u64::MAX as f64) - 1.0
 }

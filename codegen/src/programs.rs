@@ -165,6 +165,7 @@ pub(crate) fn nominal_value(graph: &Graph, mechanism: &Mechanism, id: ExprId) ->
         Atom::Constant(i) => mechanism.constants[i].value,
         Atom::Coordinate(i) => mechanism.coordinates[i].nominal,
         Atom::Parameter(i) => mechanism.parameters[i].nominal,
+        Atom::Pi => std::f64::consts::PI,
         _ => 0.0,
     };
     crate::expr::Tape::new(graph, &[id])

@@ -76,6 +76,19 @@ impl Graph {
         (self.sub(cc, ss), self.add(sc, cs))
     }
 
+    /// `sum + pi12 * pi/12` as a number.
+    pub fn angle(&mut self, sum: &AngleSum, pi12: i32) -> ExprId {
+        let mut terms: Vec<(ExprId, Rational)> = sum
+            .terms()
+            .iter()
+            .map(|(atom, n)| (self.atom(*atom), Rational::integer(i64::from(*n))))
+            .collect();
+        if pi12 != 0 {
+            terms.push((self.atom(Atom::Pi), Rational::new(i64::from(pi12), 12)));
+        }
+        self.sum(&terms)
+    }
+
     /// Cosine and sine of `k * pi/12`, exactly.
     fn cos_sin_fixed(&mut self, k: i32) -> (ExprId, ExprId) {
         let quarter = k.div_euclid(6).rem_euclid(4);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{AngleSum, Atom, ExprId, Graph, Node, Rational, Unary};
-use crate::field::{self, Element};
+use crate::field::{self, Element, MODULUS};
 
 /// A number system in which expressions can be evaluated. `None` means that the value does not exist there:
 /// a division by zero, a root that is not in the field, a function that the domain does not know.
@@ -173,19 +173,19 @@ impl<F: Fn(Atom) -> f64> Domain for F64<F> {
 /// Functions that are not algebraic are opaque: equal arguments get equal random values. They keep the laws that
 /// matter for dependence: `sign` is odd with square 1, `abs(x) = x sign(x)`, `tanh` is odd.
 #[derive(Clone, Debug, Default)]
-pub struct FieldPoint {
-    /// Values of atoms that are not angles.
-    pub values: BTreeMap<Atom, Element>,
-    /// Cosine and sine of angle atoms.
-    pub angles: BTreeMap<Atom, (Element, Element)>,
+pub struct FieldPoint<const P: u64 = MODULUS> {
+    /// Values of atoms outside sines and cosines of sums of angles.
+    pub values: BTreeMap<Atom, Element<P>>,
+    /// Cosine and sine of atoms in sums of angles.
+    pub angles: BTreeMap<Atom, (Element<P>, Element<P>)>,
     /// Seed of the opaque functions.
     pub seed: u64,
     /// Seed of the choice between the two roots of a square.
     pub root_seed: u64,
 }
 
-impl FieldPoint {
-    fn sign(&self, a: Element) -> Element {
+impl<const P: u64> FieldPoint<P> {
+    fn sign(&self, a: Element<P>) -> Element<P> {
         let (key, odd) = canonical(a);
         let value = if field::hashed(self.seed, key).representative() & 1 == 0 {
             Element::ONE
@@ -202,39 +202,39 @@ impl FieldPoint {
     }
 }
 
-impl FieldPoint {
+impl<const P: u64> FieldPoint<P> {
     /// Cosine and sine of an opaque angle: even and odd, on the unit circle.
-    fn opaque_circle(&self, a: Element) -> (Element, Element) {
+    fn opaque_circle(&self, a: Element<P>) -> (Element<P>, Element<P>) {
         let (key, odd) = canonical(a);
         let seed = field::hashed(self.seed ^ 0x0073_696E, key).representative();
-        let (c, s) = field::Stream::new(seed).circle();
+        let (c, s) = field::Stream::new(seed).circle::<P>();
         (c, if odd { -s } else { s })
     }
 }
 
 /// The smaller of `a` and `-a`, and whether it was `-a`.
-fn canonical(a: Element) -> (Element, bool) {
+fn canonical<const P: u64>(a: Element<P>) -> (Element<P>, bool) {
     if (-a) < a { (-a, true) } else { (a, false) }
 }
 
-impl Domain for FieldPoint {
-    type Value = Element;
-    fn rational(&self, value: &Rational) -> Option<Element> {
+impl<const P: u64> Domain for FieldPoint<P> {
+    type Value = Element<P>;
+    fn rational(&self, value: &Rational) -> Option<Element<P>> {
         if value.is_one() {
             return Some(Element::ONE);
         }
         Element::from_rational(value)
     }
-    fn add(&self, a: &Element, b: &Element) -> Element {
+    fn add(&self, a: &Element<P>, b: &Element<P>) -> Element<P> {
         *a + *b
     }
-    fn mul(&self, a: &Element, b: &Element) -> Element {
+    fn mul(&self, a: &Element<P>, b: &Element<P>) -> Element<P> {
         *a * *b
     }
-    fn power(&self, a: &Element, n: i32) -> Option<Element> {
+    fn power(&self, a: &Element<P>, n: i32) -> Option<Element<P>> {
         a.integer_power(n)
     }
-    fn unary(&self, function: Unary, a: &Element) -> Option<Element> {
+    fn unary(&self, function: Unary, a: &Element<P>) -> Option<Element<P>> {
         match function {
             // One fixed choice per radicand: equal radicands must have equal roots.
             Unary::Sqrt => a.square_root().map(|root| {
@@ -257,10 +257,10 @@ impl Domain for FieldPoint {
             Unary::Sin => Some(self.opaque_circle(*a).1),
         }
     }
-    fn atom(&self, atom: Atom) -> Option<Element> {
+    fn atom(&self, atom: Atom) -> Option<Element<P>> {
         self.values.get(&atom).copied()
     }
-    fn cos_sin(&self, angle: &AngleSum) -> Option<(Element, Element)> {
+    fn cos_sin(&self, angle: &AngleSum) -> Option<(Element<P>, Element<P>)> {
         let mut total = (Element::ONE, Element::ZERO);
         for (atom, n) in angle.terms() {
             let (c, s) = *self.angles.get(atom)?;

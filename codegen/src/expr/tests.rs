@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::{
     AngleSum, Atom, Domain, ExprId, F64, FieldPoint, Graph, Rational, RationalPoint, Tape, Unary,
 };
-use crate::field::Element;
+use crate::field::{Element, MODULUS};
 
 /// A random expression as a program for the constructors: each step uses values made before.
 #[derive(Clone, Debug)]
@@ -186,7 +186,7 @@ proptest! {
                 prop_assert!((a - b.to_f64()).abs() <= 1e-6 * size * size, "{a} {b}");
             }
         }
-        let element = |x: &Rational| Element::from_rational(x).expect("no denominator is the modulus");
+        let element = |x: &Rational| Element::<MODULUS>::from_rational(x).expect("no denominator is the modulus");
         let field = FieldPoint {
             values: exact.values.iter().map(|(a, x)| (*a, element(x))).collect(),
             angles: exact.angles.iter().map(|(a, (c, s))| (*a, (element(c), element(s)))).collect(),

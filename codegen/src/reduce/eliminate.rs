@@ -1,64 +1,88 @@
-//! Gaussian elimination in the prime field.
+//! Gaussian elimination in the prime field, row by row.
 
 use crate::field::Element;
 
-/// A matrix in reduced row echelon form.
+/// The reduced row echelon form of the rows seen so far. It does not depend on their order.
 #[derive(Clone, Debug)]
-pub(crate) struct Echelon {
-    /// Columns that hold a pivot, in the order in which they were taken.
+pub(crate) struct Echelon<const P: u64> {
+    /// In which order columns are tried as pivots; others hold none.
+    order: Vec<usize>,
+    /// Columns that hold a pivot, in the order in which their rows came.
     pub(crate) pivots: Vec<usize>,
     /// One row per pivot.
-    pub(crate) rows: Vec<Vec<Element>>,
+    rows: Vec<Vec<Element<P>>>,
 }
 
-impl Echelon {
+impl<const P: u64> Echelon<P> {
+    /// No rows yet.
+    pub(crate) fn new(order: &[usize]) -> Self {
+        Self {
+            order: order.to_vec(),
+            pivots: Vec::new(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// Takes a row; tells whether it says anything new.
+    pub(crate) fn insert(&mut self, mut row: Vec<Element<P>>) -> bool {
+        for (pivot, known) in self.pivots.iter().zip(&self.rows) {
+            let factor = -row[*pivot];
+            add_multiple(&mut row, factor, known);
+        }
+        let Some(pivot) = self
+            .order
+            .iter()
+            .copied()
+            .find(|c| row[*c] != Element::ZERO)
+        else {
+            return false;
+        };
+        let inverse = row[pivot].inverse().expect("a pivot is not zero");
+        for x in &mut row {
+            *x = *x * inverse;
+        }
+        for known in &mut self.rows {
+            let factor = -known[pivot];
+            add_multiple(known, factor, &row);
+        }
+        self.pivots.push(pivot);
+        self.rows.push(row);
+        true
+    }
+
+    /// Whether a column has shown any value but zero. Rows that say nothing new cannot be the first to show one.
+    pub(crate) fn is_seen(&self, column: usize) -> bool {
+        self.rows.iter().any(|row| row[column] != Element::ZERO)
+    }
+
     /// The entry of a column in the row of a pivot; `None` if that column holds no pivot.
-    pub(crate) fn entry(&self, pivot: usize, column: usize) -> Option<Element> {
+    pub(crate) fn entry(&self, pivot: usize, column: usize) -> Option<Element<P>> {
         let row = self.pivots.iter().position(|p| *p == pivot)?;
         Some(self.rows[row][column])
     }
 }
 
-/// Reduces `rows`, looking for pivots in the columns in the given order.
-pub(crate) fn echelon(mut rows: Vec<Vec<Element>>, order: &[usize]) -> Echelon {
-    let mut pivots = Vec::new();
-    let mut rank = 0;
-    for &column in order {
-        let Some(found) = (rank..rows.len()).find(|r| rows[*r][column] != Element::ZERO) else {
-            continue;
-        };
-        rows.swap(rank, found);
-        let inverse = rows[rank][column].inverse().expect("a pivot is not zero");
-        for x in &mut rows[rank] {
-            *x = *x * inverse;
-        }
-        let pivot_row = std::mem::take(&mut rows[rank]);
-        for (r, row) in rows.iter_mut().enumerate() {
-            if r == rank || row[column] == Element::ZERO {
-                continue;
-            }
-            let factor = -row[column];
-            for (x, y) in row.iter_mut().zip(&pivot_row) {
-                if *y != Element::ZERO {
-                    *x = *x + factor * *y;
-                }
-            }
-        }
-        rows[rank] = pivot_row;
-        pivots.push(column);
-        rank += 1;
-        if rank == rows.len() {
-            break;
+fn add_multiple<const P: u64>(row: &mut [Element<P>], factor: Element<P>, other: &[Element<P>]) {
+    if factor == Element::ZERO {
+        return;
+    }
+    for (x, y) in row.iter_mut().zip(other) {
+        if *y != Element::ZERO {
+            *x = *x + factor * *y;
         }
     }
-    rows.truncate(rank);
-    Echelon { pivots, rows }
 }
 
 /// A basis of the solutions of `rows * x = 0`, one vector per column without pivot.
-pub(crate) fn null_space(rows: Vec<Vec<Element>>, n_columns: usize) -> Vec<Vec<Element>> {
+pub(crate) fn null_space<const P: u64>(
+    rows: Vec<Vec<Element<P>>>,
+    n_columns: usize,
+) -> Vec<Vec<Element<P>>> {
     let order: Vec<usize> = (0..n_columns).collect();
-    let echelon = echelon(rows, &order);
+    let mut echelon = Echelon::new(&order);
+    for row in rows {
+        echelon.insert(row);
+    }
     (0..n_columns)
         .filter(|c| !echelon.pivots.contains(c))
         .map(|free| {

@@ -5,12 +5,15 @@
 //! of the model's constants. A wrong answer has a probability below 1e-15 (Schwartz 1980, Zippel 1979).
 
 mod eliminate;
+mod lift;
 mod numeric;
 mod print;
 mod rational_function;
 mod reconstruct;
 mod sample;
 mod univariate;
+
+use std::collections::BTreeSet;
 
 use modelmill_spec::Mechanism;
 
@@ -20,12 +23,21 @@ pub(crate) use sample::{Plan, Unknowns, plan};
 use crate::DeriveError;
 use crate::exact::Monomial;
 use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Tape, Unary};
-use crate::field::{Element, Stream};
+use crate::field::{Element, MODULUS, PRIMES, Stream};
 use crate::projection::Projection;
+use eliminate::Echelon;
 use sample::Sampler;
 
 /// Seed of the draws: the same model gives the same text on any machine.
 const SEED: u64 = 0x6D6F_6465_6C6D_696C;
+
+/// How many points in a row must show nothing new. At a random point the rows of H leave a space that is not yet all of
+/// theirs with certainty but for a chance of about 2^-55, so that one would do.
+const IDLE: usize = 2;
+
+/// The same where signs occur, which take only two values: that two of them agree by chance at all points must be out of
+/// the question.
+const IDLE_WITH_SIGNS: usize = 80;
 
 /// The result: which columns are kept and how the others follow from them.
 #[derive(Clone, Debug)]
@@ -79,34 +91,41 @@ pub(crate) fn independent_functions(
     let tape = Tape::new(graph, roots);
     let atoms = graph.atoms(roots);
     let mut stream = Stream::new(SEED);
-    let mut constants = FieldPoint::default();
+    let mut constants = FieldPoint::<MODULUS> {
+        seed: stream.bits(),
+        root_seed: stream.bits(),
+        ..FieldPoint::default()
+    };
     let mut draw = |point: &mut FieldPoint, fixed: bool| {
         for atom in &atoms {
-            if matches!(atom, Atom::Constant(_)) == fixed {
+            if matches!(atom, Atom::Constant(_) | Atom::Pi) == fixed {
                 point.values.insert(*atom, stream.element());
                 point.angles.insert(*atom, stream.circle());
             }
         }
     };
     draw(&mut constants, true);
-    let mut rows = Vec::new();
+    let order: Vec<usize> = (0..roots.len()).collect();
+    let mut echelon = eliminate::Echelon::new(&order);
+    let mut idle = 0;
     for _ in 0..50 * roots.len() {
         let mut point = constants.clone();
         draw(&mut point, false);
-        rows.extend(tape.evaluate(&point));
-        if rows.len() >= roots.len() + 4 {
-            break;
+        if let Some(row) = tape.evaluate(&point) {
+            idle = if echelon.insert(row) { 0 } else { idle + 1 };
+        } else {
+            // Roots of constants that are not in the field: others may be.
+            draw(&mut constants, true);
+        }
+        if idle >= IDLE {
+            let mut kept = echelon.pivots;
+            kept.sort_unstable();
+            return Ok(kept);
         }
     }
-    if rows.len() < roots.len() {
-        return Err(DeriveError::NoPointFound {
-            draws: 50 * roots.len(),
-        });
-    }
-    let order: Vec<usize> = (0..roots.len()).collect();
-    let mut kept = eliminate::echelon(rows, &order).pivots;
-    kept.sort_unstable();
-    Ok(kept)
+    Err(DeriveError::NoPointFound {
+        draws: 50 * roots.len(),
+    })
 }
 
 /// Reduces the columns `columns[k][d]` (product by drive) to a base.
@@ -126,27 +145,46 @@ pub(crate) fn reduce(
     let outputs: Vec<ExprId> = (0..projection.drives.len())
         .flat_map(|d| effective.iter().map(move |k| columns[*k][d]))
         .collect();
-    let sampler = match Sampler::new(graph, mechanism, projection, &outputs) {
-        Err(DeriveError::LoopsNotSampled { .. }) => {
+    let exact = reduce_exactly(
+        graph, mechanism, projection, candidates, &effective, &order, &outputs,
+    );
+    match exact {
+        Err(
+            DeriveError::LoopsNotSampled { .. }
+            | DeriveError::FactorNotRecovered { .. }
+            | DeriveError::NoPointFound { .. }
+            | DeriveError::NotConfirmed
+            | DeriveError::RankChanged,
+        ) => {
             let order: Vec<usize> = order.into_iter().map(|k| effective[k]).collect();
-            return numeric::reduce(graph, mechanism, projection, candidates, columns, &order);
+            numeric::reduce(graph, mechanism, projection, candidates, columns, &order)
         }
-        sampler => sampler?,
-    };
+        exact => exact,
+    }
+}
+
+fn reduce_exactly(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    projection: &Projection,
+    candidates: &[Monomial],
+    effective: &[usize],
+    order: &[usize],
+    outputs: &[ExprId],
+) -> Result<Reduction, DeriveError> {
     let regressor = SampledRegressor {
-        sampler,
+        sampler: Sampler::new(graph, mechanism, projection, outputs)?,
         n_columns: effective.len(),
-        // A sign takes only two values: that two of them agree by chance at all points must be out of the question.
-        least_points: if has_sign(graph, &outputs) { 80 } else { 0 },
+        idle: if has_sign(graph, outputs) {
+            IDLE_WITH_SIGNS
+        } else {
+            IDLE
+        },
     };
     let mut stream = Stream::new(SEED);
-    let pattern = Pattern::find(&regressor, &order, &mut stream)?;
-    let roots = root_radicands(graph, &outputs, projection);
-    let used = graph.atoms(&outputs);
-    let variables: Vec<(usize, bool)> = (0..mechanism.constants.len())
-        .filter(|i| used.contains(&Atom::Constant(*i)))
-        .map(|i| (i, mechanism.constants[i].is_angle))
-        .collect();
+    let pattern = Pattern::find(&regressor, order, &mut stream)?;
+    let roots = root_radicands(graph, outputs, projection);
+    let variables = occurrences(graph, outputs, projection);
     let factors = pattern.factors(&regressor, &variables, &roots, &mut stream)?;
     let names = |k: usize| candidates[effective[k]].clone();
     let mut reduction = pattern.reduction(mechanism, candidates, &names, factors)?;
@@ -156,41 +194,71 @@ pub(crate) fn reduce(
     Ok(reduction)
 }
 
+/// In which ways the constants occur in the columns and in the loops.
+fn occurrences(
+    graph: &Graph,
+    outputs: &[ExprId],
+    projection: &Projection,
+) -> Vec<reconstruct::Occurrence> {
+    let mut roots = outputs.to_vec();
+    roots.extend(&projection.residual);
+    let mut found = BTreeSet::new();
+    for node in graph.nodes_of(&roots) {
+        match node {
+            Node::Atom(Atom::Constant(i)) => _ = found.insert((*i, false)),
+            Node::Sin(angle) | Node::Cos(angle) => {
+                found.extend(angle.atoms().filter_map(|atom| match atom {
+                    Atom::Constant(i) => Some((i, true)),
+                    _ => None,
+                }));
+            }
+            _ => {}
+        }
+    }
+    found.into_iter().collect()
+}
+
 /// The regressor's effective columns at random points of motion.
 struct SampledRegressor {
     sampler: Sampler,
     n_columns: usize,
-    least_points: usize,
+    /// How many points in a row must show nothing new.
+    idle: usize,
 }
 
 impl SampledRegressor {
     /// The rows of H at one random point.
-    fn point(
+    fn point<const P: u64>(
         &self,
-        constants: &FieldPoint,
+        constants: &FieldPoint<P>,
         stream: &mut Stream,
-    ) -> Result<Vec<Vec<Element>>, DeriveError> {
+    ) -> Result<Vec<Vec<Element<P>>>, DeriveError> {
         let values = self.sampler.draw(constants, stream)?;
         Ok(values
             .chunks(self.n_columns.max(1))
-            .map(<[Element]>::to_vec)
+            .map(<[Element<P>]>::to_vec)
             .collect())
     }
 
-    /// Rows of W for one set of constants, enough of them to show `rank` and a few more.
-    fn rows(
+    /// Rows of W for one set of constants, reduced, until they show nothing new or `rank` is reached.
+    fn echelon<const P: u64>(
         &self,
-        constants: &FieldPoint,
-        rank: usize,
+        constants: &FieldPoint<P>,
+        order: &[usize],
+        rank: Option<usize>,
         stream: &mut Stream,
-    ) -> Result<Vec<Vec<Element>>, DeriveError> {
-        let mut rows = Vec::new();
-        let mut points = 0;
-        while self.n_columns > 0 && (rows.len() < rank + 6 || points < self.least_points) {
-            rows.extend(self.point(constants, stream)?);
-            points += 1;
+    ) -> Result<Echelon<P>, DeriveError> {
+        let mut echelon = Echelon::new(order);
+        let mut idle = 0;
+        while self.n_columns > 0 && idle < self.idle && Some(echelon.pivots.len()) != rank {
+            idle += 1;
+            for row in self.point(constants, stream)? {
+                if echelon.insert(row) {
+                    idle = 0;
+                }
+            }
         }
-        Ok(rows)
+        Ok(echelon)
     }
 }
 
@@ -213,12 +281,9 @@ impl Pattern {
         stream: &mut Stream,
     ) -> Result<Self, DeriveError> {
         let n = regressor.n_columns;
-        let constants = regressor.sampler.constants(stream);
-        let rows = regressor.rows(&constants, n, stream)?;
-        let shown: Vec<usize> = (0..n)
-            .filter(|k| rows.iter().any(|row| row[*k] != Element::ZERO))
-            .collect();
-        let echelon = eliminate::echelon(rows, order);
+        let constants = regressor.sampler.constants::<MODULUS>(stream)?;
+        let echelon = regressor.echelon(&constants, order, None, stream)?;
+        let shown: Vec<usize> = (0..n).filter(|k| echelon.is_seen(*k)).collect();
         let mut pivots = echelon.pivots.clone();
         pivots.sort_unstable();
         let dependent: Vec<usize> = shown
@@ -243,24 +308,19 @@ impl Pattern {
     fn factors(
         &self,
         regressor: &SampledRegressor,
-        variables: &[(usize, bool)],
+        variables: &[reconstruct::Occurrence],
         roots: &[i64],
         stream: &mut Stream,
     ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
         if self.wanted.is_empty() {
             return Ok(Vec::new());
         }
-        let mut sampling = stream.clone();
-        let mut oracle = |constants: &FieldPoint| -> Result<Vec<Element>, DeriveError> {
-            let rows = regressor.rows(constants, self.pivots.len(), &mut sampling)?;
-            let echelon = eliminate::echelon(rows, &self.pivots);
-            self.wanted
-                .iter()
-                .map(|(j, p)| echelon.entry(*p, *j).ok_or(DeriveError::RankChanged))
-                .collect()
+        let mut factors = Factors {
+            regressor,
+            pattern: self,
+            sampling: stream.clone(),
         };
-        let draw = |stream: &mut Stream| regressor.sampler.constants(stream);
-        reconstruct::reconstruct(&mut oracle, variables, roots, &draw, stream)
+        reconstruct::reconstruct(&mut factors, variables, roots, stream)
     }
 
     fn reduction(
@@ -316,6 +376,34 @@ impl Pattern {
     }
 }
 
+/// The wanted factors of a pattern as functions of the constants.
+struct Factors<'a> {
+    regressor: &'a SampledRegressor,
+    pattern: &'a Pattern,
+    sampling: Stream,
+}
+
+impl reconstruct::Oracle for Factors<'_> {
+    fn constants<const P: u64>(&self, stream: &mut Stream) -> Result<FieldPoint<P>, DeriveError> {
+        self.regressor.sampler.constants(stream)
+    }
+
+    fn values<const P: u64>(
+        &mut self,
+        constants: &FieldPoint<P>,
+    ) -> Result<Vec<Element<P>>, DeriveError> {
+        let Pattern { pivots, wanted, .. } = self.pattern;
+        let rank = Some(pivots.len());
+        let echelon = self
+            .regressor
+            .echelon(constants, pivots, rank, &mut self.sampling)?;
+        wanted
+            .iter()
+            .map(|(j, p)| echelon.entry(*p, *j).ok_or(DeriveError::RankChanged))
+            .collect()
+    }
+}
+
 impl Reduction {
     /// Shows `H p_g = H_min p_min` for random parameters at fresh points of motion with fresh constants; returns how many.
     fn confirm(
@@ -326,10 +414,14 @@ impl Reduction {
     ) -> Result<usize, DeriveError> {
         const CONSTANTS: usize = 4;
         const POINTS: usize = 2;
+        /// A field that had no part in finding it.
+        const FRESH: u64 = PRIMES[PRIMES.len() - 1];
         for _ in 0..CONSTANTS {
-            let constants = regressor.sampler.constants(stream);
-            let parameters: Vec<Element> = self.products.iter().map(|_| stream.element()).collect();
-            let mut base: Vec<Element> = self.retained.iter().map(|k| parameters[*k]).collect();
+            let constants = regressor.sampler.constants::<FRESH>(stream)?;
+            let parameters: Vec<Element<FRESH>> =
+                self.products.iter().map(|_| stream.element()).collect();
+            let mut base: Vec<Element<FRESH>> =
+                self.retained.iter().map(|k| parameters[*k]).collect();
             for line in &self.dependencies {
                 for (k, factor) in &line.equals {
                     let factor = factor.value(&constants).ok_or(DeriveError::RankChanged)?;
@@ -338,7 +430,7 @@ impl Reduction {
             }
             for _ in 0..POINTS {
                 for row in regressor.point(&constants, stream)? {
-                    let sum = |terms: &mut dyn Iterator<Item = (usize, Element)>| {
+                    let sum = |terms: &mut dyn Iterator<Item = (usize, Element<FRESH>)>| {
                         terms.fold(Element::ZERO, |s, (k, p)| s + row[k] * p)
                     };
                     let full = sum(&mut shown.iter().copied().zip(parameters.iter().copied()));

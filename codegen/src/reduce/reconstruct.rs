@@ -1,81 +1,71 @@
-//! Rational functions from their values in the prime field: which constants a factor depends on, its degree in each and
-//! in all together, then its coefficients from one linear system, and a confirmation at fresh points.
+//! Rational functions from their values in prime fields: which constants a factor depends on, its degree in each and
+//! in all together, then its coefficients from one linear system. Long coefficients take several fields.
 
 use std::collections::BTreeMap;
 
 use super::eliminate;
+use super::lift::lift;
 use super::rational_function::{Polynomial, Powers, RationalFunction, Variable, monomial_value};
 use super::univariate;
 use crate::DeriveError;
-use crate::expr::{Atom, FieldPoint};
-use crate::field::{Element, Stream};
+use crate::expr::{Atom, FieldPoint, Rational};
+use crate::field::{Element, MODULUS, PRIMES, Stream};
 
 /// Points at which degrees are looked for, at most.
 const MOST_POINTS: usize = 26;
 
-/// A black box: values of all functions at given constants.
-pub(crate) type Oracle<'a> = dyn FnMut(&FieldPoint) -> Result<Vec<Element>, DeriveError> + 'a;
+/// A black box in every prime field.
+pub(crate) trait Oracle {
+    /// Random constants.
+    fn constants<const P: u64>(&self, stream: &mut Stream) -> Result<FieldPoint<P>, DeriveError>;
+    /// Values of all functions at given constants.
+    fn values<const P: u64>(
+        &mut self,
+        constants: &FieldPoint<P>,
+    ) -> Result<Vec<Element<P>>, DeriveError>;
+}
 
-/// Reconstructs every function that `oracle` evaluates; `constants` are drawn by `draw`.
+/// A way in which a constant occurs, by index and whether inside sines and cosines. A constant that occurs in both ways
+/// counts as two: no rational function ties a number to its sine.
+pub(crate) type Occurrence = (usize, bool);
+
+/// Reconstructs every function that `oracle` evaluates.
 ///
-/// A function that resists (of a degree beyond all reason) comes back as `None`.
-pub(crate) fn reconstruct(
-    oracle: &mut Oracle<'_>,
-    constants: &[(usize, bool)],
+/// A function that resists (of a degree beyond all reason, or not rational) comes back as `None`.
+pub(crate) fn reconstruct<O: Oracle>(
+    oracle: &mut O,
+    constants: &[Occurrence],
     roots: &[i64],
-    draw: &dyn Fn(&mut Stream) -> FieldPoint,
     stream: &mut Stream,
 ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
-    let origin = draw(stream);
-    let at_origin = oracle(&origin)?;
-    let elsewhere = oracle(&draw(stream))?;
+    let origin = oracle.constants(stream)?;
+    let at_origin = oracle.values(&origin)?;
+    let elsewhere = oracle.constants(stream)?;
+    let elsewhere = oracle.values(&elsewhere)?;
     let n = at_origin.len();
     let mut shape: Vec<Shape> = vec![Shape::default(); n];
     let varying: Vec<usize> = (0..n).filter(|k| at_origin[*k] != elsewhere[*k]).collect();
     if !varying.is_empty() {
-        for &(index, is_angle) in constants {
+        for &constant in constants {
             probe(
-                oracle,
-                &origin,
-                &at_origin,
-                (index, is_angle),
-                &varying,
-                &mut shape,
-                stream,
+                oracle, &origin, &at_origin, constant, &varying, &mut shape, stream,
             )?;
         }
         total_degrees(oracle, &origin, constants, &varying, &mut shape, stream)?;
     }
-    let mut samples = Samples {
-        oracle,
-        draw,
-        points: Vec::new(),
-    };
+    let mut fields = Fields::new();
     let mut found = Vec::with_capacity(n);
-    for (k, shape) in shape.iter().enumerate() {
-        if !varying.contains(&k)
-            && let Some(value) = at_origin[k].to_rational().filter(is_plausible)
-        {
-            found.push(Some(RationalFunction::constant(value)));
-            continue;
-        }
-        found.push(shape.fit(&mut samples, k, roots, stream)?);
+    for shape in &shape {
+        found.push(shape.fit(&mut fields, oracle, found.len(), roots, stream)?);
     }
     Ok(found)
-}
-
-/// A coefficient of a mechanism's equations is a small number; a random element of the field almost never is.
-fn is_plausible(value: &crate::expr::Rational) -> bool {
-    value
-        .as_small()
-        .is_some_and(|(n, d)| n.abs() < 1 << 20 && d < 1 << 20)
 }
 
 /// What is known about one function before its coefficients are.
 #[derive(Clone, Debug, Default)]
 struct Shape {
     /// Degrees of numerator and denominator in each constant that matters; in half the tangent for angles.
-    degrees: BTreeMap<(usize, bool), (usize, usize)>,
+    degrees: BTreeMap<Occurrence, (usize, usize)>,
     /// Degrees in all lengths together.
     total: Option<(usize, usize)>,
     /// Some degree could not be found.
@@ -83,11 +73,11 @@ struct Shape {
 }
 
 /// Degrees in one constant, with all others at the origin.
-fn probe(
-    oracle: &mut Oracle<'_>,
+fn probe<O: Oracle>(
+    oracle: &mut O,
     origin: &FieldPoint,
     at_origin: &[Element],
-    (index, is_angle): (usize, bool),
+    constant: Occurrence,
     varying: &[usize],
     shape: &mut [Shape],
     stream: &mut Stream,
@@ -98,9 +88,9 @@ fn probe(
     while !open.is_empty() && x.len() < MOST_POINTS {
         let mut point = origin.clone();
         let t = stream.element();
-        set(&mut point, index, is_angle, t);
+        set(&mut point, constant, t);
         x.push(t);
-        y.push(oracle(&point)?);
+        y.push(oracle.values(&point)?);
         if x.len() == 1 {
             open.retain(|k| y[0][*k] != at_origin[*k]);
             continue;
@@ -112,7 +102,7 @@ fn probe(
             let values: Vec<Element> = y.iter().map(|row| row[*k]).collect();
             match univariate::degrees(&x, &values) {
                 Some(degrees) => {
-                    shape[*k].degrees.insert((index, is_angle), degrees);
+                    shape[*k].degrees.insert(constant, degrees);
                     false
                 }
                 None => true,
@@ -126,17 +116,17 @@ fn probe(
 }
 
 /// Degrees in all lengths together, along a random line.
-fn total_degrees(
-    oracle: &mut Oracle<'_>,
+fn total_degrees<O: Oracle>(
+    oracle: &mut O,
     origin: &FieldPoint,
-    constants: &[(usize, bool)],
+    constants: &[Occurrence],
     varying: &[usize],
     shape: &mut [Shape],
     stream: &mut Stream,
 ) -> Result<(), DeriveError> {
     let lengths: Vec<usize> = constants
         .iter()
-        .filter(|(_, is_angle)| !is_angle)
+        .filter(|(_, in_angle)| !in_angle)
         .map(|(i, _)| *i)
         .collect();
     let direction: Vec<Element> = lengths.iter().map(|_| stream.element()).collect();
@@ -149,7 +139,7 @@ fn total_degrees(
             shape[*k]
                 .degrees
                 .keys()
-                .filter(|(_, is_angle)| !is_angle)
+                .filter(|(_, in_angle)| !in_angle)
                 .count()
                 > 1
         })
@@ -162,7 +152,7 @@ fn total_degrees(
             point.values.insert(Atom::Constant(*index), value);
         }
         x.push(t);
-        y.push(oracle(&point)?);
+        y.push(oracle.values(&point)?);
         if x.len() < 4 || x.len() % 2 == 1 {
             continue;
         }
@@ -175,41 +165,143 @@ fn total_degrees(
     Ok(())
 }
 
-/// Sets a constant; an angle by half its tangent.
-fn set(point: &mut FieldPoint, index: usize, is_angle: bool, t: Element) {
-    point.values.insert(Atom::Constant(index), t);
-    if is_angle && let Some(scale) = (Element::ONE + t * t).inverse() {
-        point.angles.insert(
-            Atom::Constant(index),
-            ((Element::ONE - t * t) * scale, (t + t) * scale),
-        );
+/// Sets a constant; inside sines and cosines by half the tangent.
+fn set(point: &mut FieldPoint, (index, in_angle): Occurrence, t: Element) {
+    let atom = Atom::Constant(index);
+    if !in_angle {
+        point.values.insert(atom, t);
+    } else if let Some(scale) = (Element::ONE + t * t).inverse() {
+        point
+            .angles
+            .insert(atom, ((Element::ONE - t * t) * scale, (t + t) * scale));
     }
 }
 
-/// Random points with the values of all functions, shared between the fits.
-struct Samples<'a, 'b> {
-    oracle: &'a mut Oracle<'b>,
-    draw: &'a dyn Fn(&mut Stream) -> FieldPoint,
-    points: Vec<(FieldPoint, Vec<Element>)>,
+/// Random points of one field with the values of all functions, shared between the fits.
+struct Samples<const P: u64> {
+    points: Vec<(FieldPoint<P>, Vec<Element<P>>)>,
 }
 
-impl Samples<'_, '_> {
-    fn at_least(&mut self, n: usize, stream: &mut Stream) -> Result<(), DeriveError> {
-        while self.points.len() < n {
-            let point = (self.draw)(stream);
-            let values = (self.oracle)(&point)?;
+/// An ansatz for one function.
+struct Ansatz {
+    function: usize,
+    numerator: Vec<Powers>,
+    denominator: Vec<Powers>,
+    n_points: usize,
+}
+
+/// A field in which an ansatz can be solved; solutions are residues, scaled so that the last coefficient of the
+/// denominator is 1. `None` where a root or an inverse is missing.
+trait Solve<O> {
+    fn modulus(&self) -> u64;
+    fn solutions(
+        &mut self,
+        ansatz: &Ansatz,
+        oracle: &mut O,
+        stream: &mut Stream,
+    ) -> Result<Option<Vec<Vec<u64>>>, DeriveError>;
+}
+
+impl<O: Oracle, const P: u64> Solve<O> for Samples<P> {
+    fn modulus(&self) -> u64 {
+        P
+    }
+
+    fn solutions(
+        &mut self,
+        ansatz: &Ansatz,
+        oracle: &mut O,
+        stream: &mut Stream,
+    ) -> Result<Option<Vec<Vec<u64>>>, DeriveError> {
+        while self.points.len() < ansatz.n_points {
+            let point = oracle.constants(stream)?;
+            let values = oracle.values(&point)?;
             self.points.push((point, values));
         }
-        Ok(())
+        let n_top = ansatz.numerator.len();
+        let rows: Option<Vec<Vec<Element<P>>>> = self.points[..ansatz.n_points]
+            .iter()
+            .map(|(point, values)| {
+                let value = values[ansatz.function];
+                let top = ansatz.numerator.iter().map(|m| monomial_value(m, point));
+                let bottom = ansatz
+                    .denominator
+                    .iter()
+                    .map(|m| monomial_value(m, point).map(|x| -(x * value)));
+                top.chain(bottom).collect()
+            })
+            .collect();
+        let Some(rows) = rows else { return Ok(None) };
+        let solutions = eliminate::null_space(rows, n_top + ansatz.denominator.len());
+        Ok(Some(
+            solutions
+                .into_iter()
+                .filter_map(|x| {
+                    let last = x[n_top..].iter().rev().find(|x| **x != Element::ZERO)?;
+                    let scale = last.inverse()?;
+                    Some(x.iter().map(|x| (*x * scale).representative()).collect())
+                })
+                .collect(),
+        ))
+    }
+}
+
+/// All fields, with what was sampled in each.
+struct Fields<O>(Vec<Box<dyn Solve<O>>>);
+
+impl<O: Oracle> Fields<O> {
+    fn new() -> Self {
+        fn field<O: Oracle, const P: u64>() -> Box<dyn Solve<O>> {
+            Box::new(Samples::<P> { points: Vec::new() })
+        }
+        const { assert!(PRIMES[0] == MODULUS) };
+        Self(vec![
+            field::<O, { PRIMES[0] }>(),
+            field::<O, { PRIMES[1] }>(),
+            field::<O, { PRIMES[2] }>(),
+            field::<O, { PRIMES[3] }>(),
+            field::<O, { PRIMES[4] }>(),
+            field::<O, { PRIMES[5] }>(),
+            field::<O, { PRIMES[6] }>(),
+        ])
+    }
+
+    /// Coefficients that solve an ansatz, over the rationals.
+    fn solve(
+        &mut self,
+        ansatz: &Ansatz,
+        oracle: &mut O,
+        stream: &mut Stream,
+    ) -> Result<Option<Vec<Rational>>, DeriveError> {
+        let mut residues: Vec<Vec<(u64, u64)>> = Vec::new();
+        for field in &mut self.0 {
+            let modulus = field.modulus();
+            let Some(solutions) = field.solutions(ansatz, oracle, stream)? else {
+                return Ok(None);
+            };
+            let Some(solution) = solutions.into_iter().next() else {
+                return Ok(None);
+            };
+            residues.resize(solution.len(), Vec::new());
+            for (all, residue) in residues.iter_mut().zip(solution) {
+                all.push((modulus, residue));
+            }
+            let lifted: Option<Vec<Rational>> = residues.iter().map(|r| lift(r)).collect();
+            if lifted.is_some() {
+                return Ok(lifted);
+            }
+        }
+        Ok(None)
     }
 }
 
 impl Shape {
     /// Coefficients of numerator and denominator from `numerator - value * denominator = 0` at many points.
-    fn fit(
+    fn fit<O: Oracle>(
         &self,
-        samples: &mut Samples<'_, '_>,
-        k: usize,
+        fields: &mut Fields<O>,
+        oracle: &mut O,
+        function: usize,
         roots: &[i64],
         stream: &mut Stream,
     ) -> Result<Option<RationalFunction>, DeriveError> {
@@ -221,7 +313,7 @@ impl Shape {
         let angle_degree = self
             .degrees
             .iter()
-            .filter(|((_, is_angle), _)| *is_angle)
+            .filter(|((_, in_angle), _)| *in_angle)
             .map(|(_, (n, d))| n.max(d).div_ceil(2))
             .max();
         let angle_degree = angle_degree.unwrap_or(0);
@@ -257,23 +349,26 @@ impl Shape {
             }
             // Roots take either sign by chance; every combination of signs must come up.
             let n_points = unknowns + 4 + 20 * (root_powers.len() - 1);
-            samples.at_least(n_points, stream)?;
-            let rows = samples.points[..n_points]
-                .iter()
-                .map(|(point, values)| {
-                    let top = numerator.iter().map(|m| monomial_value(m, point));
-                    let bottom = denominator
+            let ansatz = Ansatz {
+                function,
+                numerator,
+                denominator,
+                n_points,
+            };
+            if let Some(coefficients) = fields.solve(&ansatz, oracle, stream)? {
+                let (top, bottom) = coefficients.split_at(ansatz.numerator.len());
+                let polynomial = |monomials: &[Powers], values: &[Rational]| -> Polynomial {
+                    monomials
                         .iter()
-                        .map(|m| monomial_value(m, point).map(|x| -(x * values[k])));
-                    top.chain(bottom).collect::<Option<Vec<_>>>()
-                })
-                .collect::<Option<Vec<_>>>();
-            let Some(rows) = rows else { return Ok(None) };
-            let solutions = eliminate::null_space(rows, unknowns);
-            for solution in solutions {
-                if let Some(function) = rational_coefficients(&solution, &numerator, &denominator) {
-                    return Ok(Some(function));
-                }
+                        .zip(values)
+                        .filter(|(_, k)| !k.is_zero())
+                        .map(|(powers, k)| (powers.clone(), k.clone()))
+                        .collect()
+                };
+                return Ok(Some(RationalFunction::new(
+                    polynomial(&ansatz.numerator, top),
+                    polynomial(&ansatz.denominator, bottom),
+                )));
             }
         }
         Ok(None)
@@ -283,9 +378,9 @@ impl Shape {
     fn monomials(&self, numerator: bool, angle_bound: usize) -> Vec<Powers> {
         let pick = |(n, d): (usize, usize)| if numerator { n } else { d };
         let mut monomials: Vec<(Powers, usize)> = vec![(Powers::new(), 0)];
-        for ((index, is_angle), degrees) in &self.degrees {
+        for ((index, in_angle), degrees) in &self.degrees {
             let mut extended = Vec::new();
-            if *is_angle {
+            if *in_angle {
                 let bound = angle_bound.min(degrees.0.max(degrees.1).div_ceil(2));
                 for (powers, total) in &monomials {
                     for cosine in 0..=bound {
@@ -336,34 +431,4 @@ fn root_products(roots: &[i64]) -> Vec<Powers> {
         });
         products.iter().cloned().chain(with).collect()
     })
-}
-
-/// Scales a solution so that all coefficients are small rationals.
-fn rational_coefficients(
-    solution: &[Element],
-    numerator: &[Powers],
-    denominator: &[Powers],
-) -> Option<RationalFunction> {
-    let (top, bottom) = solution.split_at(numerator.len());
-    let lead = bottom
-        .iter()
-        .rev()
-        .find(|x| **x != Element::ZERO)?
-        .inverse()?;
-    let polynomial = |monomials: &[Powers], values: &[Element]| -> Option<Polynomial> {
-        let mut p = Polynomial::new();
-        for (powers, value) in monomials.iter().zip(values) {
-            if *value != Element::ZERO {
-                p.insert(
-                    powers.clone(),
-                    (*value * lead).to_rational().filter(is_plausible)?,
-                );
-            }
-        }
-        Some(p)
-    };
-    Some(RationalFunction::new(
-        polynomial(numerator, top)?,
-        polynomial(denominator, bottom)?,
-    ))
 }

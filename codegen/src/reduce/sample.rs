@@ -4,11 +4,14 @@
 //! Which coordinates are drawn freely does not matter for linear dependence, so those are drawn that make every loop
 //! a dyad.
 
+use std::collections::BTreeSet;
+
 use modelmill_spec::{Mechanism, Motion};
 
 use crate::DeriveError;
+use crate::closure::Closure;
 use crate::dyad::{self, Solved};
-use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Tape};
+use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Node, Tape, Unary};
 use crate::field::{Element, Stream};
 use crate::projection::Projection;
 
@@ -38,107 +41,96 @@ pub(crate) enum Unknowns {
 }
 
 /// Looks for a plan; `positive` says which root a loop takes, from an expression that equals the signed root.
+///
+/// Given coordinates only become more from loop to loop, so for [`Unknowns::Passive`] any loop that can be solved may be
+/// solved next. With [`Unknowns::Any`] a loop's unknowns must not be needed by the loops before it, so the plan is made
+/// from its end: any loop with two unknowns of its own among those left may be the last of them.
 pub(crate) fn plan(
     graph: &mut Graph,
     projection: &Projection,
     unknowns: Unknowns,
     positive: &mut dyn FnMut(&Graph, ExprId) -> bool,
 ) -> Option<Plan> {
-    let mut steps = Vec::new();
-    let mut fixed = Vec::new();
+    let mut steps: Vec<PlanStep> = Vec::new();
     let mut todo: Vec<usize> = (0..projection.closures.len()).collect();
-    search(
-        graph, projection, unknowns, positive, &mut todo, &mut fixed, &mut steps,
-    )
-    .then_some(Plan { steps })
+    let mut known: BTreeSet<usize> = projection.active.iter().copied().collect();
+    while !todo.is_empty() {
+        let next = todo.iter().enumerate().find_map(|(position, index)| {
+            let closure = &projection.closures[*index];
+            let free: Vec<usize> = closure
+                .coordinates
+                .iter()
+                .copied()
+                .filter(|c| match unknowns {
+                    Unknowns::Passive => !known.contains(c),
+                    Unknowns::Any => !todo.iter().any(|other| {
+                        other != index && projection.closures[*other].coordinates.contains(c)
+                    }),
+                })
+                .collect();
+            choices(closure, &free, projection, unknowns)
+                .into_iter()
+                .find_map(|unknown| solve(graph, closure, unknown, positive))
+                .map(|step| (position, step))
+        });
+        let (position, step) = next?;
+        let index = todo.remove(position);
+        known.extend(&projection.closures[index].coordinates);
+        steps.push(step);
+    }
+    if unknowns == Unknowns::Any {
+        steps.reverse();
+    }
+    Some(Plan { steps })
 }
 
-fn search(
-    graph: &mut Graph,
+/// Sets of coordinates for which a loop may be solved; passive ones first.
+fn choices(
+    closure: &Closure,
+    free: &[usize],
     projection: &Projection,
     unknowns: Unknowns,
-    positive: &mut dyn FnMut(&Graph, ExprId) -> bool,
-    todo: &mut Vec<usize>,
-    fixed: &mut Vec<usize>,
-    steps: &mut Vec<PlanStep>,
-) -> bool {
-    if todo.is_empty() {
-        return true;
+) -> Vec<Vec<usize>> {
+    if !closure.relations.is_empty() {
+        let related: Vec<usize> = closure.relations.iter().map(|r| r.coordinate).collect();
+        let all = match unknowns {
+            Unknowns::Passive => free.iter().all(|c| related.contains(c)),
+            Unknowns::Any => related.iter().all(|c| free.contains(c)),
+        };
+        return if all { vec![related] } else { Vec::new() };
     }
-    let may_be_unknown = |c: usize| unknowns == Unknowns::Any || projection.passive.contains(&c);
-    for position in 0..todo.len() {
-        let index = todo[position];
-        let closure = &projection.closures[index];
-        let coordinates = closure.coordinates.clone();
-        // Coordinates that a later loop solves for must not be needed here.
-        let candidates: Vec<usize> = coordinates
-            .iter()
-            .copied()
-            .filter(|c| may_be_unknown(*c) && !fixed.contains(c))
-            .collect();
-        let mut choices: Vec<Vec<usize>> = Vec::new();
-        if closure.relations.is_empty() {
-            for (i, a) in candidates.iter().enumerate() {
-                choices.extend(candidates[i + 1..].iter().map(|b| vec![*a, *b]));
-            }
-            choices.sort_by_key(|pair| {
-                pair.iter()
-                    .filter(|c| !projection.passive.contains(c))
-                    .count()
-            });
+    if unknowns == Unknowns::Passive {
+        return if free.len() == 2 {
+            vec![free.to_vec()]
         } else {
-            let related: Vec<usize> = closure.relations.iter().map(|r| r.coordinate).collect();
-            choices.extend(
-                related
-                    .iter()
-                    .all(|c| candidates.contains(c))
-                    .then_some(related),
-            );
-        }
-        for unknown in choices {
-            let is_known = |c: &usize| {
-                unknowns == Unknowns::Any
-                    || projection.active.contains(c)
-                    || unknown.contains(c)
-                    || fixed.contains(c)
-            };
-            if !coordinates.iter().all(is_known) {
-                continue;
-            }
-            let closure = projection.closures[index].clone();
-            let Some(mut solved) = dyad::solve(graph, &closure, &unknown, true) else {
-                continue;
-            };
-            if let Some(root) = solved.root
-                && !positive(graph, root.witness)
-            {
-                let Some(negative) = dyad::solve(graph, &closure, &unknown, false) else {
-                    continue;
-                };
-                solved = negative;
-            }
-            let known_before = fixed.len();
-            fixed.extend(
-                coordinates
-                    .iter()
-                    .filter(|c| !fixed.contains(c))
-                    .copied()
-                    .collect::<Vec<_>>(),
-            );
-            todo.remove(position);
-            steps.push(PlanStep {
-                unknown: unknown.clone(),
-                solved,
-            });
-            if search(graph, projection, unknowns, positive, todo, fixed, steps) {
-                return true;
-            }
-            steps.pop();
-            todo.insert(position, index);
-            fixed.truncate(known_before);
-        }
+            Vec::new()
+        };
     }
-    false
+    let mut pairs: Vec<Vec<usize>> = Vec::new();
+    for (i, a) in free.iter().enumerate() {
+        pairs.extend(free[i + 1..].iter().map(|b| vec![*a, *b]));
+    }
+    pairs.sort_by_key(|pair| {
+        pair.iter()
+            .filter(|c| !projection.passive.contains(c))
+            .count()
+    });
+    pairs
+}
+
+fn solve(
+    graph: &mut Graph,
+    closure: &Closure,
+    unknown: Vec<usize>,
+    positive: &mut dyn FnMut(&Graph, ExprId) -> bool,
+) -> Option<PlanStep> {
+    let mut solved = dyad::solve(graph, closure, &unknown, true)?;
+    if let Some(root) = solved.root
+        && !positive(graph, root.witness)
+    {
+        solved = dyad::solve(graph, closure, &unknown, false)?;
+    }
+    Some(PlanStep { unknown, solved })
 }
 
 /// Draws points.
@@ -147,7 +139,9 @@ pub(crate) struct Sampler {
     n_drives: usize,
     active: Vec<usize>,
     passive: Vec<usize>,
-    constants: Vec<(Atom, bool)>,
+    n_constants: usize,
+    /// Functions of constants that exist only for some of them.
+    of_constants: Tape,
     steps: Vec<SolveStep>,
     rates: Tape,
     accelerations: Tape,
@@ -157,8 +151,9 @@ pub(crate) struct Sampler {
 struct SolveStep {
     unknown: Vec<usize>,
     angles: Vec<AngleSum>,
-    lengths: Vec<usize>,
-    /// Cosines and sines of the angles in pairs, then the lengths.
+    /// Coordinates whose values follow: lengths, and angles that are combinations of known ones.
+    numbers: Vec<usize>,
+    /// Cosines and sines of the angles in pairs, then the numbers.
     tape: Tape,
 }
 
@@ -175,23 +170,29 @@ impl Sampler {
                 loops: projection.closures.iter().map(|c| c.name.clone()).collect(),
             }
         })?;
+        let mut all = outputs.to_vec();
+        all.extend(&projection.passive_rates);
+        all.extend(&projection.passive_accelerations);
         let steps = plan
             .steps
             .into_iter()
             .map(|step| {
                 let solved = step.solved;
                 let mut angles: Vec<(AngleSum, [ExprId; 2])> = solved.angles;
+                let mut numbers: Vec<(usize, ExprId)> = solved.lengths;
                 for relation in &solved.relations {
                     let (c, s) = graph.cos_sin(&relation.sum, relation.pi12);
                     let angle = AngleSum::new([(Atom::Coordinate(relation.coordinate), 1)]);
                     angles.push((angle, [c, s]));
+                    numbers.push((relation.coordinate, relation.value(graph)));
                 }
                 let mut roots: Vec<ExprId> = angles.iter().flat_map(|(_, cs)| *cs).collect();
-                roots.extend(solved.lengths.iter().map(|(_, value)| *value));
+                roots.extend(numbers.iter().map(|(_, value)| *value));
+                all.extend(&roots);
                 SolveStep {
                     unknown: step.unknown,
                     angles: angles.into_iter().map(|(angle, _)| angle).collect(),
-                    lengths: solved.lengths.iter().map(|(i, _)| *i).collect(),
+                    numbers: numbers.iter().map(|(i, _)| *i).collect(),
                     tape: Tape::new(graph, &roots),
                 }
             })
@@ -202,18 +203,14 @@ impl Sampler {
             .enumerate()
             .map(|(i, c)| (i, c.motion))
             .collect();
-        let constants = mechanism
-            .constants
-            .iter()
-            .enumerate()
-            .map(|(i, c)| (Atom::Constant(i), c.is_angle))
-            .collect();
+        let of_constants = functions_of_constants(graph, &all);
         Ok(Self {
             coordinates,
             n_drives: mechanism.drives.len(),
             active: projection.active.clone(),
             passive: projection.passive.clone(),
-            constants,
+            n_constants: mechanism.constants.len(),
+            of_constants,
             steps,
             rates: Tape::new(graph, &projection.passive_rates),
             accelerations: Tape::new(graph, &projection.passive_accelerations),
@@ -221,36 +218,46 @@ impl Sampler {
         })
     }
 
-    /// Random constants.
-    pub(crate) fn constants(&self, stream: &mut Stream) -> FieldPoint {
-        let mut point = FieldPoint {
-            root_seed: stream.element().representative(),
-            ..FieldPoint::default()
-        };
-        point.values.insert(Atom::Pi, stream.element());
-        for (atom, is_angle) in &self.constants {
-            point.values.insert(*atom, stream.element());
-            if *is_angle {
-                point.angles.insert(*atom, stream.circle());
-            }
-        }
-        point
+    /// Random constants whose functions that do not depend on the motion all exist.
+    pub(crate) fn constants<const P: u64>(
+        &self,
+        stream: &mut Stream,
+    ) -> Result<FieldPoint<P>, DeriveError> {
+        (0..MOST_DRAWS)
+            .find_map(|_| {
+                let mut point = FieldPoint {
+                    seed: stream.bits(),
+                    root_seed: stream.bits(),
+                    ..FieldPoint::default()
+                };
+                point.values.insert(Atom::Pi, stream.element());
+                for i in 0..self.n_constants {
+                    let atom = Atom::Constant(i);
+                    point.values.insert(atom, stream.element());
+                    point.angles.insert(atom, stream.circle());
+                }
+                self.of_constants.evaluate(&point).map(|_| point)
+            })
+            .ok_or(DeriveError::NoPointFound { draws: MOST_DRAWS })
     }
 
     /// Values of the outputs at a random point of motion, for the given constants.
-    pub(crate) fn draw(
+    pub(crate) fn draw<const P: u64>(
         &self,
-        constants: &FieldPoint,
+        constants: &FieldPoint<P>,
         stream: &mut Stream,
-    ) -> Result<Vec<Element>, DeriveError> {
+    ) -> Result<Vec<Element<P>>, DeriveError> {
         (0..MOST_DRAWS)
             .find_map(|_| self.try_draw(constants, stream))
             .ok_or(DeriveError::NoPointFound { draws: MOST_DRAWS })
     }
 
-    fn try_draw(&self, constants: &FieldPoint, stream: &mut Stream) -> Option<Vec<Element>> {
+    fn try_draw<const P: u64>(
+        &self,
+        constants: &FieldPoint<P>,
+        stream: &mut Stream,
+    ) -> Option<Vec<Element<P>>> {
         let mut point = constants.clone();
-        point.seed = stream.element().representative();
         for (i, motion) in &self.coordinates {
             if *motion == Motion::Revolute {
                 point.angles.insert(Atom::Coordinate(*i), stream.circle());
@@ -283,19 +290,48 @@ impl Sampler {
     }
 }
 
+/// Functions under `roots` that depend on constants alone and do not exist for all of them.
+fn functions_of_constants(graph: &Graph, roots: &[ExprId]) -> Tape {
+    let mut moves = vec![false; graph.len()];
+    let mut found = Vec::new();
+    for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
+        if !needed {
+            continue;
+        }
+        let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
+        let is_fixed = |atom: Atom| matches!(atom, Atom::Constant(_) | Atom::Pi);
+        let mut moving = match graph.node(id) {
+            Node::Atom(atom) => !is_fixed(*atom),
+            Node::Sin(angle) | Node::Cos(angle) => !angle.atoms().all(is_fixed),
+            _ => false,
+        };
+        graph.for_each_child(id, |child| moving |= moves[child.index()]);
+        moves[i] = moving;
+        let partial = match graph.node(id) {
+            Node::Unary(function, _) => *function == Unary::Sqrt,
+            Node::Product(factors) => factors.iter().any(|(_, n)| *n < 0),
+            _ => false,
+        };
+        if partial && !moving {
+            found.push(id);
+        }
+    }
+    Tape::new(graph, &found)
+}
+
 impl SolveStep {
-    fn solve(&self, point: &mut FieldPoint) -> Option<()> {
+    fn solve<const P: u64>(&self, point: &mut FieldPoint<P>) -> Option<()> {
         let values = self.tape.evaluate(point)?;
-        let lengths = &values[2 * self.angles.len()..];
-        for (i, value) in self.lengths.iter().zip(lengths) {
+        let numbers = &values[2 * self.angles.len()..];
+        for (i, value) in self.numbers.iter().zip(numbers) {
             point.values.insert(Atom::Coordinate(*i), *value);
         }
-        let mut unknown: Vec<usize> = self
-            .unknown
-            .iter()
-            .copied()
-            .filter(|c| !self.lengths.contains(c))
-            .collect();
+        let in_angles = |c: &usize| {
+            self.angles
+                .iter()
+                .any(|a| a.atoms().any(|x| x == Atom::Coordinate(*c)))
+        };
+        let mut unknown: Vec<usize> = self.unknown.iter().copied().filter(in_angles).collect();
         while !unknown.is_empty() {
             let before = unknown.len();
             for (k, angle) in self.angles.iter().enumerate() {

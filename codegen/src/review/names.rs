@@ -73,7 +73,7 @@ impl Meanings {
 
 /// Uniform in `[-1, 1)`.
 fn uniform(stream: &mut Stream) -> f64 {
-    stream.element().representative() as f64 / (1u64 << 60) as f64 - 1.0
+    stream.bits() as f64 / (1u64 << 63) as f64 - 1.0
 }
 
 /// A state near the nominal pose of a mechanism whose constants differ a little from the file's.

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use super::super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
 use crate::expr::print::parse::parse;
 use crate::expr::{Atom, FieldPoint, Rational};
-use crate::field::Stream;
+use crate::field::{MODULUS, Stream};
 use crate::review::tests::model;
 
 fn multiply(a: &Polynomial, b: &Polynomial) -> Polynomial {
@@ -87,7 +87,7 @@ proptest! {
         let mechanism = model("spidermill-paper");
         let function = RationalFunction::new(numerator, denominator);
         let mut stream = Stream::new(3);
-        let mut at = FieldPoint::default();
+        let mut at = FieldPoint::<MODULUS>::default();
         let mut names = BTreeMap::new();
         for (i, c) in mechanism.constants.iter().enumerate() {
             at.values.insert(Atom::Constant(i), stream.element());
