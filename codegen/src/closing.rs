@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use modelmill_spec::Mechanism;
 
+use crate::dyad::turn;
 use crate::expr::{AngleSum, Atom, ExprId, Graph, Node};
 use crate::lower::{Definition, Program, Request, lower};
 use crate::programs::nominal_value;
@@ -32,6 +33,15 @@ struct AngleParts {
     known: AngleSum,
     pi12: i32,
     solved: Vec<(usize, i32)>,
+}
+
+/// The whole number of quarter turns that is nearest to an angle.
+fn quarter_turns(angle: f64) -> i32 {
+    #[expect(clippy::cast_possible_truncation, reason = "bounded")]
+    let quarters = (angle / std::f64::consts::FRAC_PI_2)
+        .round()
+        .clamp(-1e8, 1e8) as i32;
+    quarters
 }
 
 /// A determinant this much smaller than at the nominal pose counts as zero.
@@ -94,10 +104,21 @@ impl Closing {
         }
         for p in &equations.projection.passive {
             if closing.angle_of.contains_key(p) {
+                let parts = &closing.angle_of[p];
+                if parts.solved.is_empty() {
+                    let value = graph.angle(&parts.known, parts.pi12);
+                    let atom = graph.atom(Atom::Coordinate(*p));
+                    closing.position.insert(atom, value);
+                    continue;
+                }
                 let [cosine, sine] =
                     closing.cos_sin(graph, &AngleSum::new([(Atom::Coordinate(*p), 1)]));
+                let quarters = quarter_turns(mechanism.coordinates[*p].nominal);
+                let back = graph.cos_sin(&AngleSum::NONE, -6 * quarters);
+                let [cosine, sine] = turn(graph, [back.0, back.1], [cosine, sine]);
                 closing.definitions.push(Definition {
                     atom: Atom::Coordinate(*p),
+                    quarters,
                     sine,
                     cosine,
                 });

@@ -108,6 +108,81 @@ pub(crate) fn position_in_base(
     Ok(sum_of(graph, &path))
 }
 
+/// The paths of two points from the frame that both hang on, and the points' positions in their own frames.
+struct Between<'a> {
+    paths: [&'a [usize]; 2],
+    at: [Vector; 2],
+}
+
+impl Between<'_> {
+    /// The vector from the second point to the first as stretches, in the common frame turned by `start`.
+    fn stretches(&self, graph: &mut Graph, tree: &Tree, start: &[Turn]) -> Vec<Stretch> {
+        let [first, second] = [0, 1].map(|i| stretches(tree, self.paths[i], start, &self.at[i]));
+        let mut path = first;
+        for mut stretch in second {
+            stretch.vector = stretch.vector.map(|x| graph.neg(x));
+            path.push(stretch);
+        }
+        path
+    }
+}
+
+/// Turns the other way, in the opposite order.
+fn inverse(turns: &[Turn]) -> Vec<Turn> {
+    turns
+        .iter()
+        .rev()
+        .map(|t| Turn {
+            axis: t.axis,
+            sum: AngleSum::NONE.plus(&t.sum, -1),
+            pi12: -t.pi12,
+        })
+        .collect()
+}
+
+/// The square of the distance of two points, written in the frame between them in which it is simplest: along a slide
+/// it is the square of one length.
+pub(crate) fn distance_squared(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    tree: &Tree,
+    points: [usize; 2],
+) -> Result<ExprId, DeriveError> {
+    let points = points.map(|i| &mechanism.points[i]);
+    let at = [point_at(graph, points[0])?, point_at(graph, points[1])?];
+    let paths = points.map(|p| tree.path(tree.link_of(p.frame)));
+    let common = (paths[0].iter().zip(&paths[1]))
+        .take_while(|(x, y)| x == y)
+        .count();
+    let between = Between {
+        paths: [&paths[0][common..], &paths[1][common..]],
+        at,
+    };
+    let mut best: Option<(usize, ExprId)> = None;
+    let mut try_frame = |graph: &mut Graph, turns: &[Turn]| {
+        let path = between.stretches(graph, tree, &inverse(turns));
+        let along = sum_of(graph, &path);
+        let square = graph.dot(&along, &along);
+        let size = graph.nodes_of(&[square]).count();
+        if best.is_none_or(|(least, _)| size < least) {
+            best = Some((size, square));
+        }
+    };
+    try_frame(graph, &[]);
+    for path in between.paths {
+        let mut turns = Vec::new();
+        for &i in path {
+            let link = &tree.links[i];
+            for turn in link.pre.iter().chain([&link.joint]) {
+                push_turn(&mut turns, turn);
+                try_frame(graph, &turns);
+            }
+        }
+    }
+    let (_, square) = best.expect("the common frame was tried");
+    Ok(square)
+}
+
 /// The closure of every loop of the mechanism.
 pub(crate) fn closures(
     graph: &mut Graph,
@@ -127,21 +202,11 @@ pub(crate) fn closures(
             let into = fixed_turns(tree, pa)
                 .or_else(|| fixed_turns(tree, pb))
                 .unwrap_or_default();
-            let back: Vec<Turn> = into
-                .iter()
-                .rev()
-                .map(|t| Turn {
-                    axis: t.axis,
-                    sum: AngleSum::NONE.plus(&t.sum, -1),
-                    pi12: -t.pi12,
-                })
-                .collect();
-            let (at_a, at_b) = (point_at(graph, a)?, point_at(graph, b)?);
-            let mut path = stretches(tree, pa, &back, &at_a);
-            for mut stretch in stretches(tree, pb, &back, &at_b) {
-                stretch.vector = stretch.vector.map(|x| graph.neg(x));
-                path.push(stretch);
-            }
+            let between = Between {
+                paths: [pa, pb],
+                at: [point_at(graph, a)?, point_at(graph, b)?],
+            };
+            let path = between.stretches(graph, tree, &inverse(&into));
             Ok(close(graph, l.name.clone(), &path))
         })
         .collect()

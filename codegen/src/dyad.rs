@@ -149,7 +149,8 @@ fn turned(graph: &mut Graph, leg: &Leg, reference: &AngleSum) -> [ExprId; 2] {
     turn(graph, [c, s], leg.vector)
 }
 
-fn turn(graph: &mut Graph, [c, s]: [ExprId; 2], [x, y]: [ExprId; 2]) -> [ExprId; 2] {
+/// The vector turned by the angle of the given cosine and sine.
+pub(crate) fn turn(graph: &mut Graph, [c, s]: [ExprId; 2], [x, y]: [ExprId; 2]) -> [ExprId; 2] {
     let products = [(c, x), (s, y), (s, x), (c, y)].map(|(a, b)| graph.mul(a, b));
     [
         graph.sub(products[0], products[1]),

@@ -29,6 +29,11 @@ pub enum DeriveError {
         /// The largest size.
         limit: usize,
     },
+    /// Products of sums of parameters, written out, have too many terms.
+    TooManyTerms {
+        /// The most that are taken.
+        limit: usize,
+    },
     /// The loops do not determine the passive coordinates, or determine too much.
     LoopCount {
         /// Independent equations.
@@ -89,6 +94,10 @@ impl fmt::Display for DeriveError {
                     "{what} make a coupled system of {size} unknowns; at most {limit} can be solved in symbols"
                 )
             }
+            Self::TooManyTerms { limit } => write!(
+                f,
+                "powers or products of sums of parameters make more than {limit} products of parameters; write such a sum as one parameter"
+            ),
             Self::LoopCount { equations, passive } => write!(
                 f,
                 "the loops give {equations} independent equations for {passive} passive coordinates; mark as many coordinates passive as there are equations"
@@ -107,7 +116,7 @@ impl fmt::Display for DeriveError {
             Self::NoPointFound { draws } => {
                 write!(
                     f,
-                    "no pose that closes the loops was found in {draws} draws; the loops may contradict each other"
+                    "no pose was found in {draws} draws at which all loops close and every passive joint and drive can move; check that the loops do not contradict each other, that each passive joint moves when the active ones do, and that every drive moves with them"
                 )
             }
             Self::FactorNotRecovered { product, retained } => write!(

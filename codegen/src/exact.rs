@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use modelmill_spec::{Angle, Exact, Function, Length, Mechanism, PlaceQuantity, Symbol};
+use modelmill_spec::{
+    Angle, CoordinateIdx, Exact, Function, Length, Mechanism, PlaceQuantity, Symbol,
+};
 use num_traits::ToPrimitive;
 
 use crate::DeriveError;
@@ -73,6 +75,9 @@ impl Ord for Monomial {
     }
 }
 
+/// A power of a sum of parameters can have more terms than anybody wants to see.
+const MOST_TERMS: usize = 2000;
+
 /// A polynomial in the dynamic parameters whose coefficients are expressions over constants.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Polynomial(pub(crate) BTreeMap<Monomial, ExprId>);
@@ -105,15 +110,27 @@ impl Polynomial {
         )
     }
 
-    pub(crate) fn times(&self, other: &Self, graph: &mut Graph) -> Self {
-        let mut product = Self::default();
+    /// The product; an error where it would have thousands of terms.
+    pub(crate) fn times(&self, other: &Self, graph: &mut Graph) -> Result<Self, DeriveError> {
+        let mut terms: BTreeMap<Monomial, Vec<(ExprId, Rational)>> = BTreeMap::new();
         for (m, a) in &self.0 {
             for (n, b) in &other.0 {
                 let value = graph.mul(*a, *b);
-                product = product.plus(&Self(BTreeMap::from([(m.times(n), value)])), graph);
+                terms
+                    .entry(m.times(n))
+                    .or_default()
+                    .push((value, Rational::ONE));
+                if terms.len() > MOST_TERMS {
+                    return Err(DeriveError::TooManyTerms { limit: MOST_TERMS });
+                }
             }
         }
-        product
+        let mut product: BTreeMap<Monomial, ExprId> = terms
+            .into_iter()
+            .map(|(m, values)| (m, graph.sum(&values)))
+            .collect();
+        product.retain(|_, value| *value != Graph::ZERO);
+        Ok(Self(product))
     }
 }
 
@@ -219,7 +236,7 @@ fn polynomial_at(
             let mut total = Polynomial::constant(Graph::ONE);
             for operand in operands {
                 let operand = polynomial_at(graph, operand, place)?;
-                total = total.times(&operand, graph);
+                total = total.times(&operand, graph)?;
             }
             total
         }
@@ -229,7 +246,7 @@ fn polynomial_at(
                 return Err(DeriveError::unsupported("division by zero", exact));
             }
             let inverse = Polynomial::constant(graph.pow(divisor, -1));
-            polynomial_at(graph, a, place)?.times(&inverse, graph)
+            polynomial_at(graph, a, place)?.times(&inverse, graph)?
         }
         Exact::Negative(a) => polynomial_at(graph, a, place)?.scaled(&Rational::MINUS_ONE, graph),
         Exact::Power(a, n) if *n < 0 => {
@@ -241,33 +258,62 @@ fn polynomial_at(
         }
         Exact::Power(a, n) => {
             let base = polynomial_at(graph, a, place)?;
-            (0..*n).fold(Polynomial::constant(Graph::ONE), |total, _| {
-                total.times(&base, graph)
-            })
-        }
-        Exact::Apply(function @ (Function::Sin | Function::Cos), a) => {
-            let is_sine = *function == Function::Sin;
-            let value = if let Some((sum, pi12)) = AngleParts::of(a) {
-                let (c, s) = graph.cos_sin(&sum, pi12);
-                if is_sine { s } else { c }
-            } else {
-                let argument = expression_at(graph, a, place)?;
-                graph.unary(if is_sine { Unary::Sin } else { Unary::Cos }, argument)
-            };
-            Polynomial::constant(value)
+            let mut power = Polynomial::constant(Graph::ONE);
+            for _ in 0..*n {
+                power = power.times(&base, graph)?;
+            }
+            power
         }
         Exact::Apply(function, a) => {
+            if let (Function::Sin | Function::Cos, Some((sum, pi12))) =
+                (function, AngleParts::of(a))
+            {
+                let (c, s) = graph.cos_sin(&sum, pi12);
+                return Ok(Polynomial::constant(if *function == Function::Sin {
+                    s
+                } else {
+                    c
+                }));
+            }
             let argument = expression_at(graph, a, place)?;
-            let function = match function {
-                Function::Sqrt => Unary::Sqrt,
-                Function::Abs => Unary::Abs,
-                Function::Sign => Unary::Sign,
-                Function::Tanh => Unary::Tanh,
-                Function::Exp | Function::Sin | Function::Cos => Unary::Exp,
-            };
-            Polynomial::constant(graph.unary(function, argument))
+            Polynomial::constant(graph.unary(unary(*function), argument))
         }
     })
+}
+
+/// The expression with a place's coordinate named.
+pub(crate) fn with_coordinate(exact: &Exact, coordinate: CoordinateIdx) -> Exact {
+    let inner = |a: &Exact| Box::new(with_coordinate(a, coordinate));
+    let all = |operands: &[Exact]| {
+        operands
+            .iter()
+            .map(|a| with_coordinate(a, coordinate))
+            .collect()
+    };
+    match exact {
+        Exact::Symbol(Symbol::Place(PlaceQuantity::Coordinate)) => {
+            Exact::Symbol(Symbol::Coordinate(coordinate))
+        }
+        Exact::Rational(_) | Exact::Pi | Exact::Symbol(_) => exact.clone(),
+        Exact::Sum(operands) => Exact::Sum(all(operands)),
+        Exact::Product(operands) => Exact::Product(all(operands)),
+        Exact::Quotient(a, b) => Exact::Quotient(inner(a), inner(b)),
+        Exact::Negative(a) => Exact::Negative(inner(a)),
+        Exact::Power(a, n) => Exact::Power(inner(a), *n),
+        Exact::Apply(function, a) => Exact::Apply(*function, inner(a)),
+    }
+}
+
+fn unary(function: Function) -> Unary {
+    match function {
+        Function::Sin => Unary::Sin,
+        Function::Cos => Unary::Cos,
+        Function::Sqrt => Unary::Sqrt,
+        Function::Abs => Unary::Abs,
+        Function::Sign => Unary::Sign,
+        Function::Tanh => Unary::Tanh,
+        Function::Exp => Unary::Exp,
+    }
 }
 
 /// An angle in the making: multiples of pi and of atoms.

@@ -129,7 +129,7 @@ fn part_elements(
         } => {
             let mass = exact::polynomial(graph, mass)?;
             let centre = polynomials(graph, centre)?;
-            elements = point_elements(graph, &mass, &centre, &centre);
+            elements = point_elements(graph, &mass, &centre, &centre)?;
             for i in 0..6 {
                 let own = exact::polynomial(graph, &inertia[i])?;
                 let slot = &mut elements[Element::Inertia(i).index()];
@@ -148,7 +148,7 @@ fn lump_elements(
     let mass = exact::polynomial(graph, &lump.mass)?.scaled(&share, graph);
     let force_at = polynomials(graph, &lump.force_at)?;
     let moment_at = polynomials(graph, &lump.moment_at)?;
-    Ok(point_elements(graph, &mass, &force_at, &moment_at))
+    point_elements(graph, &mass, &force_at, &moment_at)
 }
 
 fn polynomials(graph: &mut Graph, exact: &[Exact; 3]) -> Result<[Polynomial; 3], DeriveError> {
@@ -165,19 +165,19 @@ fn point_elements(
     mass: &Polynomial,
     force_at: &[Polynomial; 3],
     moment_at: &[Polynomial; 3],
-) -> [Polynomial; ELEMENTS] {
+) -> Result<[Polynomial; ELEMENTS], DeriveError> {
     let mut elements: [Polynomial; ELEMENTS] = Default::default();
     elements[Element::Mass.index()] = mass.clone();
     for i in 0..3 {
-        elements[Element::ForceMoment(i).index()] = mass.times(&force_at[i], graph);
-        elements[Element::MomentMoment(i).index()] = mass.times(&moment_at[i], graph);
+        elements[Element::ForceMoment(i).index()] = mass.times(&force_at[i], graph)?;
+        elements[Element::MomentMoment(i).index()] = mass.times(&moment_at[i], graph)?;
     }
     let mut second = |i: usize, j: usize| {
-        let product = moment_at[i].times(&moment_at[j], graph);
+        let product = moment_at[i].times(&moment_at[j], graph)?;
         mass.times(&product, graph)
     };
-    let squares = [second(0, 0), second(1, 1), second(2, 2)];
-    let pairs = [second(0, 1), second(0, 2), second(1, 2)];
+    let squares = [second(0, 0)?, second(1, 1)?, second(2, 2)?];
+    let pairs = [second(0, 1)?, second(0, 2)?, second(1, 2)?];
     let mut set =
         |position: usize, value: Polynomial| elements[Element::Inertia(position).index()] = value;
     set(0, squares[1].plus(&squares[2], graph));
@@ -186,5 +186,5 @@ fn point_elements(
     for (position, pair) in [1, 2, 4].into_iter().zip(pairs) {
         set(position, pair.scaled(&Rational::MINUS_ONE, graph));
     }
-    elements
+    Ok(elements)
 }

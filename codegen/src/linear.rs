@@ -4,6 +4,9 @@
 
 use std::collections::HashMap;
 
+use petgraph::algo::{maximum_matching, tarjan_scc};
+use petgraph::graph::{DiGraph, NodeIndex, UnGraph};
+
 use crate::DeriveError;
 use crate::expr::{ExprId, Graph, Rational};
 
@@ -29,12 +32,23 @@ pub(crate) fn solve(
     let n_rhs = rhs.first().map_or(0, Vec::len);
     let mut values = vec![vec![Graph::ZERO; n_rhs]; n];
     let mut determinants = Vec::new();
-    for (rows, columns) in blocks(matrix) {
-        if rows.len() != columns.len() {
-            return Err(DeriveError::Singular {
-                what: what.to_owned(),
-            });
+    let singular = || DeriveError::Singular {
+        what: what.to_owned(),
+    };
+    let mut rhs = rhs.to_vec();
+    let mut solved: Vec<usize> = Vec::new();
+    for (rows, columns) in blocks(matrix).ok_or_else(singular)? {
+        for r in &rows {
+            for k in 0..n_rhs {
+                let mut terms = vec![(rhs[*r][k], Rational::ONE)];
+                for c in &solved {
+                    let known = graph.mul(matrix[*r][*c], values[*c][k]);
+                    terms.push((known, Rational::MINUS_ONE));
+                }
+                rhs[*r][k] = graph.sum(&terms);
+            }
         }
+        solved.extend(&columns);
         if rows.len() > LARGEST_BLOCK {
             return Err(DeriveError::TooLarge {
                 what: what.to_owned(),
@@ -53,9 +67,7 @@ pub(crate) fn solve(
         };
         let determinant = minors.minor(graph, all, all);
         if determinant == Graph::ZERO {
-            return Err(DeriveError::Singular {
-                what: what.to_owned(),
-            });
+            return Err(singular());
         }
         let inverse = graph.pow(determinant, -1);
         if determinant.index() > 1 {
@@ -90,39 +102,40 @@ pub(crate) fn solve(
     })
 }
 
-/// Connected components of the matrix's pattern: sets of rows with the columns that they share.
-fn blocks(matrix: &[Vec<ExprId>]) -> Vec<(Vec<usize>, Vec<usize>)> {
-    let n_columns = matrix.first().map_or(0, Vec::len);
-    let mut row_done = vec![false; matrix.len()];
-    let mut column_done = vec![false; n_columns];
-    let mut found = Vec::new();
-    for start in 0..n_columns {
-        if column_done[start] {
-            continue;
+/// Rows with the columns that they determine, such that a block needs only the columns of blocks before it
+/// (Dulmage and Mendelsohn 1963). `None` if no choice of one entry per row and column avoids zeros.
+fn blocks(matrix: &[Vec<ExprId>]) -> Option<Vec<(Vec<usize>, Vec<usize>)>> {
+    let n = matrix.len();
+    let entries = |i: usize| (0..n).filter(move |j| matrix[i][*j] != Graph::ZERO);
+    let mut bipartite = UnGraph::<(), ()>::default();
+    let nodes: Vec<_> = (0..2 * n).map(|_| bipartite.add_node(())).collect();
+    for i in 0..n {
+        for j in entries(i) {
+            bipartite.add_edge(nodes[i], nodes[n + j], ());
         }
-        let (mut rows, mut columns, mut frontier) = (Vec::new(), Vec::new(), vec![start]);
-        column_done[start] = true;
-        while let Some(column) = frontier.pop() {
-            columns.push(column);
-            for (i, row) in matrix.iter().enumerate() {
-                if row[column] == Graph::ZERO || row_done[i] {
-                    continue;
-                }
-                row_done[i] = true;
-                rows.push(i);
-                for (j, entry) in row.iter().enumerate() {
-                    if *entry != Graph::ZERO && !column_done[j] {
-                        column_done[j] = true;
-                        frontier.push(j);
-                    }
-                }
+    }
+    let matching = maximum_matching(&bipartite);
+    let column_of: Vec<usize> = (0..n)
+        .map(|i| matching.mate(nodes[i]).map(|j| j.index() - n))
+        .collect::<Option<_>>()?;
+    let mut needs = DiGraph::<(), ()>::default();
+    let rows: Vec<_> = (0..n).map(|_| needs.add_node(())).collect();
+    for i in 0..n {
+        for k in 0..n {
+            if i != k && matrix[i][column_of[k]] != Graph::ZERO {
+                needs.add_edge(rows[i], rows[k], ());
             }
         }
+    }
+    // Components come with what they need before them.
+    let blocks = tarjan_scc(&needs).into_iter().map(|component| {
+        let mut rows: Vec<usize> = component.into_iter().map(NodeIndex::index).collect();
+        let mut columns: Vec<usize> = rows.iter().map(|i| column_of[*i]).collect();
         rows.sort_unstable();
         columns.sort_unstable();
-        found.push((rows, columns));
-    }
-    found
+        (rows, columns)
+    });
+    Some(blocks.collect())
 }
 
 /// Minors by expansion along their first row, each computed once.

@@ -8,9 +8,10 @@ use modelmill_spec::{DriveKind, Mechanism};
 
 use crate::DeriveError;
 use crate::closure::{self, Closure};
-use crate::expr::{Atom, ExprId, Graph, Rational, Unary};
+use crate::expr::{Atom, ExprId, Graph, Node, Rational, Unary};
 use crate::linear;
 use crate::linear_loops;
+use crate::programs::nominal_value;
 use crate::tree::Tree;
 
 /// Kinematics of a drive.
@@ -236,11 +237,9 @@ impl Projection {
             let coordinate = match drive.kind {
                 DriveKind::Joint(i) => graph.atom(Atom::Coordinate(i.0)),
                 DriveKind::Linear { from, to } => {
-                    let from = closure::position_in_base(graph, mechanism, tree, from.0)?;
-                    let to = closure::position_in_base(graph, mechanism, tree, to.0)?;
-                    let along = graph.sub_vectors(&to, &from);
-                    let square = graph.dot(&along, &along);
-                    graph.unary(Unary::Sqrt, square)
+                    let square = closure::distance_squared(graph, mechanism, tree, [to.0, from.0])?;
+                    let length = graph.unary(Unary::Sqrt, square);
+                    signed_length(graph, mechanism, length)
                 }
             };
             let by_coordinate: Vec<ExprId> = (0..n)
@@ -285,6 +284,17 @@ impl Projection {
         self.determinants.extend(solution.determinants);
         Ok(())
     }
+}
+
+/// A drive's length without the magnitude's bars that it has along a slide: a drive does not reach through its own point,
+/// so that the sign is that of the nominal pose.
+fn signed_length(graph: &mut Graph, mechanism: &Mechanism, length: ExprId) -> ExprId {
+    let (base, factor) = graph.split_factor(length);
+    let Node::Unary(Unary::Abs, inner) = *graph.node(base) else {
+        return length;
+    };
+    let positive = nominal_value(graph, mechanism, inner).is_none_or(|x| x >= 0.0);
+    graph.scale(inner, &if positive { factor } else { -&factor })
 }
 
 /// How every coordinate's rate follows from the rates `y`: for a passive revolute joint `y` is the absolute rate of its

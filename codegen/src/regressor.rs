@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use modelmill_spec::{EffectTerm, Mechanism, Place, PlaceQuantity};
+use modelmill_spec::{
+    DriveKind, EffectTerm, Mechanism, Motion as JointMotion, Place, PlaceQuantity,
+};
 
 use crate::DeriveError;
 use crate::exact::{self, Monomial};
@@ -166,7 +168,7 @@ impl Equations {
                     Place::Drive(d) => &mut on_drives[d.0],
                     Place::Point(_) => continue,
                 };
-                let factor = self.effect_factor(graph, place, term)?;
+                let factor = self.effect_factor(graph, mechanism, place, term)?;
                 let force = graph.mul(factor, value);
                 *slot = graph.add(*slot, force);
             }
@@ -183,6 +185,7 @@ impl Equations {
     fn effect_factor(
         &self,
         graph: &mut Graph,
+        mechanism: &Mechanism,
         place: &Place,
         term: &EffectTerm,
     ) -> Result<ExprId, DeriveError> {
@@ -207,7 +210,22 @@ impl Equations {
             }
             Place::Point(_) => [None; 4],
         };
-        exact::expression_at(graph, &term.expression, &|quantity| match quantity {
+        // An angle stands as itself, so that its sine is that of a joint.
+        let turning = match place {
+            Place::Coordinate(i) => Some(*i),
+            Place::Drive(d) => match mechanism.drives[d.0].kind {
+                DriveKind::Joint(i) => Some(i),
+                DriveKind::Linear { .. } => None,
+            },
+            Place::Point(_) => None,
+        };
+        let turning =
+            turning.filter(|i| mechanism.coordinates[i.0].motion == JointMotion::Revolute);
+        let expression = match turning {
+            Some(i) => exact::with_coordinate(&term.expression, i),
+            None => term.expression.clone(),
+        };
+        exact::expression_at(graph, &expression, &|quantity| match quantity {
             PlaceQuantity::Coordinate => quantities[0],
             PlaceQuantity::Rate => quantities[1],
             PlaceQuantity::Acceleration => quantities[2],

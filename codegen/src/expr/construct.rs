@@ -2,6 +2,39 @@
 
 use super::{Atom, ExprId, Graph, Node, Rational, Unary};
 
+/// The root of a rational, if it is rational.
+fn whole_root(value: &Rational) -> Option<Rational> {
+    root_in_primes(value).and_then(|(root, primes)| primes.is_empty().then_some(root))
+}
+
+/// Writes the root of a positive rational as a rational times the roots of different primes, so that roots of
+/// different numbers that hang together are seen to; a cofactor without small divisors counts as a prime.
+fn root_in_primes(value: &Rational) -> Option<(Rational, Vec<i64>)> {
+    const LARGEST: i64 = 1000;
+    let (n, d) = value.as_small().filter(|(n, _)| *n > 0)?;
+    let mut rest = n.checked_mul(d)?;
+    let (mut factor, mut primes) = (1, Vec::new());
+    let mut p = 2;
+    while p <= LARGEST && p <= rest {
+        while rest % (p * p) == 0 {
+            rest /= p * p;
+            factor *= p;
+        }
+        if rest % p == 0 {
+            rest /= p;
+            primes.push(p);
+        }
+        p += 1;
+    }
+    let whole = rest.isqrt();
+    if whole * whole == rest {
+        factor *= whole;
+    } else {
+        primes.push(rest);
+    }
+    Some((Rational::new(factor, d), primes))
+}
+
 impl Graph {
     /// A rational number.
     pub fn rational(&mut self, value: Rational) -> ExprId {
@@ -142,6 +175,21 @@ impl Graph {
         if let Node::Rational(value) = self.node(a).clone() {
             match function {
                 Unary::Sqrt if value.is_zero() || value.is_one() => return a,
+                Unary::Sqrt => {
+                    if let Some((factor, primes)) = root_in_primes(&value)
+                        && (primes.len() != 1 || !factor.is_one())
+                    {
+                        let roots: Vec<(ExprId, i32)> = primes
+                            .into_iter()
+                            .map(|p| {
+                                let p = self.integer(p);
+                                (self.intern(Node::Unary(Unary::Sqrt, p)), 1)
+                            })
+                            .collect();
+                        let product = self.product(&roots);
+                        return self.scale(product, &factor);
+                    }
+                }
                 Unary::Sign => {
                     let sign =
                         i64::from(!value.is_zero()) * if value.is_negative() { -1 } else { 1 };
@@ -168,6 +216,11 @@ impl Graph {
             Unary::Abs if !k.is_one() => {
                 let value = self.unary(Unary::Abs, base);
                 self.scale(value, &k)
+            }
+            Unary::Sqrt if !k.is_one() && base != Self::ONE && whole_root(&k).is_some() => {
+                let value = self.unary(Unary::Sqrt, base);
+                let factor = whole_root(&k).unwrap_or(Rational::ONE);
+                self.scale(value, &factor)
             }
             Unary::Sqrt => {
                 if let Node::Product(factors) = self.node(a)

@@ -7,10 +7,13 @@ use super::program::{Guard, Op, Program, Stage, ValueId};
 use super::{Request, is_fixed};
 use crate::expr::{AngleSum, Atom, ExprId, Graph, Node, Rational};
 
-/// An atom that is computed: a passive angle from its sine and cosine.
+/// An atom that is computed: a passive angle from the sine and cosine of what it exceeds `quarters` quarter turns by.
+///
+/// The quarter turns are those of the nominal pose: the angle goes on through half a turn, and jumps only far from there.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Definition {
     pub(crate) atom: Atom,
+    pub(crate) quarters: i32,
     pub(crate) sine: ExprId,
     pub(crate) cosine: ExprId,
 }
@@ -37,7 +40,7 @@ pub(crate) fn schedule(graph: &Graph, roots: &[ExprId], request: &Request<'_>) -
             .definitions
             .iter()
             .zip(defined.chunks(2))
-            .map(|(d, pair)| (d.atom, (pair[0], pair[1])))
+            .map(|(d, pair)| (d.atom, (d.quarters, pair[0], pair[1])))
             .collect(),
     };
     for id in reachable {
@@ -96,7 +99,8 @@ struct Scheduler<'a> {
     program: Program,
     known: HashMap<Op, ValueId>,
     values: HashMap<ExprId, ValueId>,
-    defined: HashMap<Atom, (ExprId, ExprId)>,
+    /// Quarter turns, sine and cosine.
+    defined: HashMap<Atom, (i32, ExprId, ExprId)>,
 }
 
 impl Scheduler<'_> {
@@ -184,9 +188,16 @@ impl Scheduler<'_> {
 
     fn atom(&mut self, atom: Atom) -> ValueId {
         match self.defined.get(&atom).copied() {
-            Some((sine, cosine)) => {
+            Some((quarters, sine, cosine)) => {
                 let (y, x) = (self.value(sine), self.value(cosine));
-                self.push(Op::Atan2(y, x))
+                let angle = self.push(Op::Atan2(y, x));
+                if quarters == 0 {
+                    return angle;
+                }
+                let pi = self.push(Op::Input(Atom::Pi));
+                let factor = self.number(Rational::new(i64::from(quarters), 2));
+                let turned = self.commutative(Op::Mul, factor, pi);
+                self.commutative(Op::Add, turned, angle)
             }
             None => self.push(Op::Input(atom)),
         }

@@ -15,6 +15,8 @@ use crate::projection::Projection;
 
 /// What is left of a column, relative to its size, below which it counts as dependent.
 const DEPENDENT: f64 = 1e-9;
+/// A column this much smaller than the largest is rounding.
+const NOTHING: f64 = 1e-13;
 /// How far poses lie from the nominal one, rad or m.
 const REACH: f64 = 0.4;
 
@@ -35,7 +37,7 @@ pub(super) fn reduce(
     let (mut least_kept, mut most_dropped) = (1.0_f64, 0.0_f64);
     let mut effective = Vec::new();
     for &k in order {
-        if norms[k] <= DEPENDENT * largest {
+        if norms[k] <= NOTHING * largest {
             continue;
         }
         effective.push(k);
@@ -58,12 +60,14 @@ pub(super) fn reduce(
             kept.push(k);
         } else {
             most_dropped = most_dropped.max(left);
+            // What contributes less than is dropped is rounding.
+            let felt = |f: f64| if f.abs() > DEPENDENT { f } else { 0.0 };
             lines.push((
                 k,
                 factors
                     .iter()
                     .zip(&kept)
-                    .map(|(f, j)| f * norms[k] / norms[*j])
+                    .map(|(f, j)| felt(*f) * norms[k] / norms[*j])
                     .collect(),
             ));
         }
@@ -84,7 +88,7 @@ pub(super) fn reduce(
             equals: kept
                 .iter()
                 .zip(factors)
-                .filter(|(_, f)| f.abs() > 1e-9)
+                .filter(|(_, f)| **f != 0.0)
                 .map(|(j, f)| {
                     (
                         sorted
@@ -115,13 +119,13 @@ pub(super) fn reduce(
     })
 }
 
-/// A number with ten decimals, as an exact rational, so that everything behind treats it like any other factor.
+/// A number with thirteen decimals, as an exact rational, so that everything behind treats it like any other factor.
 fn decimal(value: f64) -> RationalFunction {
-    const SCALE: f64 = 1e10;
+    const SCALE: f64 = 1e13;
     let scaled = (value * SCALE).round();
     #[expect(clippy::cast_possible_truncation, reason = "checked against the range")]
     let rational = if scaled.abs() < 9e18 {
-        Rational::new(scaled as i64, 10_000_000_000)
+        Rational::new(scaled as i64, 10_000_000_000_000)
     } else {
         num_rational::BigRational::from_float(value).map_or(Rational::ZERO, Rational::from)
     };

@@ -153,6 +153,7 @@ pub(super) fn run(program: &Program, atoms: &BTreeMap<Atom, f64>) -> Vec<f64> {
         let at = |v: &crate::ValueId| values[v.index()];
         let value = match op {
             Op::Number(n) => n.to_f64(),
+            Op::Input(Atom::Pi) => std::f64::consts::PI,
             Op::Input(atom) => atoms.get(atom).copied().unwrap_or(f64::NAN),
             Op::Add(a, b) => at(a) + at(b),
             Op::Sub(a, b) => at(a) - at(b),

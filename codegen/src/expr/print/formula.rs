@@ -1,5 +1,7 @@
 //! The tree that is printed: sums of terms, fractions, powers and functions, as a person would write them.
 
+use num_bigint::BigInt;
+
 use super::symbol::Symbol;
 use crate::expr::Rational;
 
@@ -271,11 +273,36 @@ impl Formula {
     }
 }
 
-/// Numerator and denominator of the magnitude of a number, as decimal digits.
+/// Numerator and denominator of the magnitude of a number, as decimal digits; long finite decimals have no denominator.
 pub(super) fn digits(value: &Rational) -> (String, Option<String>) {
+    if let Some(decimal) = decimal(&value.abs()) {
+        return (decimal, None);
+    }
     let text = value.abs().to_string();
     match text.split_once('/') {
         Some((n, d)) => (n.to_owned(), Some(d.to_owned())),
         None => (text, None),
     }
+}
+
+/// A positive number as a decimal, if it is finite and its denominator has three digits or more: nobody would have
+/// written it as a quotient.
+fn decimal(value: &Rational) -> Option<String> {
+    const MOST_DIGITS: usize = 40;
+    let big = value.to_big();
+    if *big.denom() < BigInt::from(100) {
+        return None;
+    }
+    let ten = BigInt::from(10);
+    let (mut scaled, mut places) = (big.clone(), 0);
+    while !scaled.is_integer() {
+        places += 1;
+        if places > MOST_DIGITS {
+            return None;
+        }
+        scaled *= &ten;
+    }
+    let digits = format!("{:0>width$}", scaled.to_integer(), width = places + 1);
+    let (whole, fraction) = digits.split_at(digits.len() - places);
+    Some(format!("{whole}.{fraction}"))
 }

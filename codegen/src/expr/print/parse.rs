@@ -110,8 +110,13 @@ impl Reader<'_> {
             return inner;
         }
         if self.rest.starts_with(|c: char| c.is_ascii_digit()) {
-            let digits = self.word(|c| c.is_ascii_digit());
-            return Read::Number(Rational::integer(digits.parse().expect("digits")));
+            let digits = self.word(|c| c.is_ascii_digit() || c == '.');
+            let (whole, fraction) = digits.split_once('.').unwrap_or((&digits, ""));
+            let places = u32::try_from(fraction.len()).expect("few places");
+            let all: num_bigint::BigInt = format!("{whole}{fraction}").parse().expect("digits");
+            let scale = num_bigint::BigInt::from(10).pow(places);
+            let value = num_rational::BigRational::new(all, scale);
+            return Read::Number(Rational::from(value));
         }
         let name = self.word(|c| c.is_alphanumeric() || c == '_');
         assert!(
@@ -138,6 +143,7 @@ impl Read {
         let of = |r: &Self| r.value_f64(names);
         match self {
             Self::Number(n) => n.to_f64(),
+            Self::Name(name) if name == "pi" => std::f64::consts::PI,
             Self::Name(name) => *names
                 .get(name)
                 .unwrap_or_else(|| panic!("{name} has no value yet")),

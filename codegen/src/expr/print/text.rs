@@ -40,7 +40,12 @@ fn write_at(f: &mut dyn Write, formula: &Formula, level: Level) -> fmt::Result {
         f.write_char('(')?;
     }
     match formula {
-        Formula::Number(n) => write!(f, "{n}")?,
+        Formula::Number(n) => {
+            if n.is_negative() {
+                f.write_char('-')?;
+            }
+            number(f, n)?;
+        }
         Formula::Symbol(symbol) => f.write_str(&symbol.text())?,
         Formula::Indexed(symbol, index) => match index.as_ref() {
             Formula::Symbol(inner) => write!(f, "{}_{}", symbol.text(), inner.text())?,
@@ -84,10 +89,18 @@ fn write_at(f: &mut dyn Write, formula: &Formula, level: Level) -> fmt::Result {
     Ok(())
 }
 
+/// Writes the magnitude of a number.
+fn number(f: &mut dyn Write, value: &Rational) -> fmt::Result {
+    match digits(value) {
+        (n, Some(d)) => write!(f, "{n}/{d}"),
+        (n, None) => f.write_str(&n),
+    }
+}
+
 /// Writes a term of a sum without its sign.
 fn magnitude(f: &mut dyn Write, formula: &Formula) -> fmt::Result {
     match formula {
-        Formula::Number(n) => write!(f, "{}", n.abs()),
+        Formula::Number(n) => number(f, n),
         Formula::Term {
             factor,
             above,
