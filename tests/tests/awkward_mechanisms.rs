@@ -1,5 +1,7 @@
 //! Mechanisms on which earlier versions of the mill failed or were wrong: the same laws as for random ones.
 
+use std::fmt::Write;
+
 use modelmill_codegen::Method;
 use modelmill_spec::{DriveKind, FrameIdx, Mechanism, PointIdx};
 use modelmill_tests::fixtures::{derive, fixtures};
@@ -104,19 +106,22 @@ fn four_bars(n: usize, in_a_row: bool) -> Mechanism {
         let (a, b, c, d) = (0.4, 0.9 + 0.02 * i as f64, 0.42, 0.9);
         let (coupler, rocker) = assembled(a, b, c, d, crank);
         for (name, value) in [("A", a), ("B", b), ("C", c), ("D", d)] {
-            constants += &format!("{name}{i} = {{ value = {value}, unit = \"m\" }}\n");
+            writeln!(constants, "{name}{i} = {{ value = {value}, unit = \"m\" }}").unwrap();
         }
         let driver = if in_a_row && i > 0 {
             format!("r{}", i - 1)
         } else {
-            coordinates += &format!("q{i} = {{ nominal = {crank} }}\n");
-            rest += &format!("[[drive]]\nname = \"motor{i}\"\njoint = \"q{i}\"\n");
+            writeln!(coordinates, "q{i} = {{ nominal = {crank} }}").unwrap();
+            write!(rest, "[[drive]]\nname = \"motor{i}\"\njoint = \"q{i}\"\n").unwrap();
             format!("q{i}")
         };
-        coordinates += &format!(
+        write!(
+            coordinates,
             "k{i} = {{ nominal = {coupler}, passive = true }}\nr{i} = {{ nominal = {rocker}, passive = true }}\n"
-        );
-        rest += &format!(
+        )
+        .unwrap();
+        write!(
+            rest,
             r#"
             [[frame]]
             name = "crank{i}"
@@ -145,7 +150,8 @@ fn four_bars(n: usize, in_a_row: bool) -> Mechanism {
             on = "rocker{i}"
             linear = {{ planar = {i}, nominal = {{ ZZ = 0.57, MX = 1.2, MY = -0.02, M = 3.5 }} }}
             "#
-        );
+        )
+        .unwrap();
         if in_a_row {
             crank = rocker;
         }
@@ -190,10 +196,9 @@ fn loops_that_drive_loops() {
 #[test]
 fn a_power_of_a_sum_of_parameters_is_refused_before_it_fills_the_memory() {
     let names = ["a", "b", "c", "d", "e", "f"];
-    let parameters: String = names
-        .iter()
-        .map(|n| format!("{n} = {{ nominal = 1, unit = \"1\" }}\n"))
-        .collect();
+    let parameters = names
+        .map(|n| format!("{n} = {{ nominal = 1, unit = \"1\" }}"))
+        .join("\n");
     let text = format!(
         r#"
         schema = 1
