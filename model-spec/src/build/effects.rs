@@ -34,9 +34,42 @@ pub(super) fn effects(
         entries.clone().filter_map(|entry| entry.name.as_ref()),
         log,
     );
+    warn_of_twins(entries.clone(), log);
     entries
         .filter_map(|entry| effect(entry, &kinds, symbols, drives, points, log))
         .collect()
+}
+
+/// Warns of a kind that acts twice at one place with the same constants: the columns are equal, and a variant that means
+/// to override an effect without a name brings this about.
+fn warn_of_twins<'a>(entries: impl Iterator<Item = &'a EffectEntry>, log: &mut Log) {
+    let mut seen: BTreeMap<(&str, &str), (&EffectEntry, &Name)> = BTreeMap::new();
+    for entry in entries.filter(|entry| entry.constants.is_none()) {
+        let Some(kind) = &entry.kind else { continue };
+        for place in entry.at.iter().flat_map(|at| &at.entries) {
+            let known = *seen
+                .entry((&kind.text, &place.text))
+                .or_insert((entry, place));
+            let (first, first_place) = known;
+            if std::ptr::eq(first, entry) {
+                continue;
+            }
+            let remedy = if first.name.is_none() && first_place.span.file != place.span.file {
+                "to override the effect of the extended file, give it a `name` there and here the same one"
+            } else {
+                "delete one of them"
+            };
+            log.push(
+                Diagnostic::warning(
+                    place.span,
+                    format!("`{}` acts twice at `{}`", kind.text, place.text),
+                )
+                .label("the effects add up")
+                .related(first_place.span, "it acts there already")
+                .help(remedy),
+            );
+        }
+    }
 }
 
 /// A kind and whether it is sound.
