@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::build::bodies::check_unique;
 use crate::build::frames::{Points, twice};
 use crate::build::symbols::{Shared, Symbols};
-use crate::diagnostic::{Diagnostic, Log};
+use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::exact::{CoordinateIdx, Exact, ParameterIdx, Symbol};
 use crate::formula::{Ast, AstKind};
 use crate::kind_terms::{factors, lacking_units, unit_at};
@@ -16,7 +16,7 @@ use crate::scope::{Sort, Wanted};
 use crate::suggest;
 use crate::unit::Dimension;
 use crate::values::Name;
-use crate::values::PlaceKind;
+use crate::values::{PlaceKind, SignName};
 
 /// Reads the effects; their parameters join those of the file.
 pub(super) fn effects(
@@ -201,6 +201,12 @@ fn effect(
                 idx
             }
         };
+        warn_of_sign(
+            &symbols.parameters[idx.0],
+            parameter.sign,
+            nominal.map_or(span, |number| number.span),
+            log,
+        );
         if let Some(meaning) = symbols.scope.get(&symbols.parameters[idx.0].name) {
             meaning.used.set(true);
         }
@@ -214,6 +220,27 @@ fn effect(
         places,
         terms,
     })
+}
+
+/// Warns of a nominal value whose sign makes no physical sense.
+fn warn_of_sign(parameter: &Parameter, sign: Option<SignName>, span: Span, log: &mut Log) {
+    let value = parameter.nominal;
+    let expected = match sign {
+        Some(SignName::Positive) if value < 0.0 => "positive",
+        Some(SignName::Negative) if value > 0.0 => "negative",
+        _ => return,
+    };
+    log.push(
+        Diagnostic::warning(
+            span,
+            format!(
+                "the nominal value of `{}` is {value} {}",
+                parameter.name, parameter.unit
+            ),
+        )
+        .label(format!("expected a {expected} value"))
+        .help("check its sign, and whether the kind is the one that is meant"),
+    );
 }
 
 fn place(
