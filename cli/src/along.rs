@@ -66,12 +66,15 @@ pub(crate) fn places(
     measured: &[Vec<Vec<f64>>],
     forces: &[Vec<Vec<f64>>],
 ) -> Outcome<Places> {
-    let (rounding, drives): (Vec<(usize, String)>, Vec<(usize, String)>) = model
-        .drives()
-        .into_iter()
-        .enumerate()
-        .partition(|(d, _)| is_rounding(*d, measured, forces));
-    let rounding = rounding.into_iter().map(|(_, drive)| drive).collect();
+    let mut rounding = Vec::new();
+    let mut drives = Vec::new();
+    for (d, drive) in model.drives().into_iter().enumerate() {
+        if is_rounding(d, measured, forces) {
+            rounding.push(drive);
+        } else {
+            drives.push((d, drive));
+        }
+    }
     if drives.is_empty() {
         return Ok(Places {
             regions: Vec::new(),

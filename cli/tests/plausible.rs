@@ -358,7 +358,7 @@ fn columns_of_one_letter_are_not_proposed_for_one_another() {
         ],
     );
     assert!(
-        says.contains("`theta2`") && !says.contains("meant?"),
+        says.contains("there is no column `theta2`. The columns are") && !says.contains("meant?"),
         "{says}"
     );
 }

@@ -84,7 +84,8 @@ fn paths_in_the_help_exist() {
         let paths: Vec<&str> = help
             .split_whitespace()
             .filter(|word| {
-                word.contains('/') && (word.ends_with(".toml") || word.ends_with(".csv"))
+                let end = Path::new(word).extension();
+                word.contains('/') && end.is_some_and(|end| end == "toml" || end == "csv")
             })
             .collect();
         assert!(!paths.is_empty(), "{command} shows no path:\n{help}");

@@ -40,6 +40,10 @@ pub enum Status {
 }
 
 impl Status {
+    #[allow(
+        clippy::trivially_copy_pass_by_ref,
+        reason = "serde asks with a reference"
+    )]
     fn is_identified(&self) -> bool {
         *self == Self::Identified
     }

@@ -231,8 +231,9 @@ impl fmt::Display for Fault {
                 } else {
                     write!(f, "there is no column `{name}`")?;
                 }
-                if let Some(nearest) = nearest {
-                    write!(f, "; is `{nearest}` meant?")?;
+                match nearest {
+                    Some(nearest) => write!(f, "; is `{nearest}` meant?")?,
+                    None => f.write_str(".")?,
                 }
                 write!(f, " The columns are: {}.", list(present))?;
                 if *by_renaming {

@@ -6,15 +6,16 @@ use crate::build::bodies::check_unique;
 use crate::build::frames::{Points, twice};
 use crate::build::symbols::{Shared, Symbols};
 use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::document::Key;
 use crate::exact::{CoordinateIdx, Exact, ParameterIdx, Symbol};
 use crate::formula::{Ast, AstKind};
 use crate::kind_terms::{factors, lacking_units, unit_at};
 use crate::kinds::{Carries, check, library_entries};
 use crate::mechanism::{Drive, DriveIdx, DriveKind, Effect, EffectTerm, Motion, Parameter, Place};
-use crate::schema::{EffectEntry, EffectKindEntry, ModelEntry};
+use crate::schema::{EffectEntry, EffectKindEntry, KindParameterEntry, ModelEntry};
 use crate::scope::{Sort, Wanted};
 use crate::suggest;
-use crate::unit::Dimension;
+use crate::unit::{Dimension, Unit};
 use crate::values::Name;
 use crate::values::{PlaceKind, SignName};
 
@@ -154,7 +155,7 @@ fn effect(
     let before = log.n_errors();
     let constants = constants(entry, kind, kind_name, symbols, carries, log);
     let factors = factors(kind, carries, &constants, log)?;
-    let place_names = at
+    let places_name = at
         .entries
         .iter()
         .map(|name| name.text.as_str())
@@ -163,55 +164,9 @@ fn effect(
     let mut terms = Vec::new();
     let parameters = kind.parameters.iter().flat_map(|table| &table.entries);
     for ((key, parameter), expression) in parameters.zip(factors) {
-        let said = entry
-            .parameters
-            .iter()
-            .flat_map(|table| &table.entries)
-            .find(|(name, _)| name.name == key.name)
-            .map(|(_, said)| said);
-        let named = said.and_then(|said| said.name.as_ref());
-        let name = named.map_or_else(
-            || format!("{}_{place_names}", key.name),
-            |name| name.text.clone(),
-        );
-        let span = named.map_or(kind_name.span, |name| name.span);
-        let nominal = said.and_then(|said| said.nominal);
         let unit = unit_at(parameter.unit.as_ref(), carries)?;
-        let shared = symbols.share_parameter(&name, Some(unit.dimension), span, nominal, log);
-        let idx = match shared {
-            Shared::Known(idx) => idx,
-            Shared::Faulty => return None,
-            Shared::New => {
-                let idx = ParameterIdx(symbols.parameters.len());
-                let fine = symbols.declare_parameter(
-                    Parameter {
-                        name,
-                        nominal: nominal.map_or(0.0, |number| number.value),
-                        unit: unit.text.clone(),
-                        note: parameter.note.as_ref().map(|note| note.text.clone()),
-                    },
-                    Some(unit.dimension),
-                    span,
-                    nominal.map(|number| number.span),
-                    log,
-                );
-                if !fine {
-                    return None;
-                }
-                idx
-            }
-        };
-        warn_of_sign(
-            &symbols.parameters[idx.0],
-            parameter.sign,
-            nominal.map_or(span, |number| number.span),
-            log,
-        );
-        if let Some(meaning) = symbols.scope.get(&symbols.parameters[idx.0].name) {
-            meaning.used.set(true);
-        }
         terms.push(EffectTerm {
-            parameter: idx,
+            parameter: term_parameter(entry, key, parameter, unit, &places_name, symbols, log)?,
             expression,
         });
     }
@@ -220,6 +175,67 @@ fn effect(
         places,
         terms,
     })
+}
+
+/// The parameter of one term of an effect: one that the file knows, or a new one.
+fn term_parameter(
+    entry: &EffectEntry,
+    key: &Key,
+    parameter: &KindParameterEntry,
+    unit: &Unit,
+    places_name: &str,
+    symbols: &mut Symbols,
+    log: &mut Log,
+) -> Option<ParameterIdx> {
+    let said = entry
+        .parameters
+        .iter()
+        .flat_map(|table| &table.entries)
+        .find(|(name, _)| name.name == key.name)
+        .map(|(_, said)| said);
+    let named = said.and_then(|said| said.name.as_ref());
+    let name = named.map_or_else(
+        || format!("{}_{places_name}", key.name),
+        |name| name.text.clone(),
+    );
+    let kind_span = entry.kind.as_ref().map_or(entry.span, |kind| kind.span);
+    let span = named.map_or(kind_span, |name| name.span);
+    let nominal = said.and_then(|said| said.nominal);
+    let shared = symbols.share_parameter(&name, Some(unit.dimension), span, nominal, log);
+    let idx = match shared {
+        Shared::Known(idx) => idx,
+        Shared::Faulty => return None,
+        Shared::New => {
+            let idx = ParameterIdx(symbols.parameters.len());
+            let fine = symbols.declare_parameter(
+                Parameter {
+                    name,
+                    nominal: nominal.map_or(0.0, |number| number.value),
+                    unit: unit.text.clone(),
+                    note: parameter.note.as_ref().map(|note| note.text.clone()),
+                },
+                Some(unit.dimension),
+                span,
+                nominal.map(|number| number.span),
+                log,
+            );
+            if !fine {
+                return None;
+            }
+            idx
+        }
+    };
+    let nominal_span = nominal.map_or(span, |number| number.span);
+    warn_of_sign(
+        &symbols.parameters[idx.0],
+        parameter.sign,
+        nominal_span,
+        log,
+    );
+    if let Some(meaning) = symbols.scope.get(&symbols.parameters[idx.0].name) {
+        meaning.used.set(true);
+    }
+    Some(idx)
 }
 
 /// Warns of a nominal value whose sign makes no physical sense.
