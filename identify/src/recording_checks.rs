@@ -111,12 +111,11 @@ impl Recording {
                 let why = if misfit < MISFIT {
                     explain(ratio, *is_angle)
                 } else {
-                    "check which column is which (--map)".to_owned()
+                    String::new()
                 };
-                match found
-                    .iter_mut()
-                    .find(|(other, .., r)| *other == why && (r / ratio - 1.0).abs() < 0.05)
-                {
+                match found.iter_mut().find(|(other, .., r)| {
+                    *other == why && (why.is_empty() || (r / ratio - 1.0).abs() < 0.05)
+                }) {
                     Some((_, ofs, rates, _)) => {
                         ofs.push(of);
                         rates.push(rate);
@@ -131,13 +130,17 @@ impl Recording {
             } else {
                 ("are", "the derivatives")
             };
+            let how = if why.is_empty() {
+                "nor a multiple of it: check which column is which (--map)".to_owned()
+            } else {
+                format!("but about {} times as large: {why}", short(ratio))
+            };
             Note::warning(format!(
-                "{} in {} {is} not {derivative} of {} with respect to `t`, but about {} times as large: {why}. \
-                 Mend the columns, or take derivatives from positions (--derivatives positions).",
+                "{} in {} {is} not {derivative} of {} with respect to `t`, {how}. Mend the columns, or take derivatives \
+                 from positions (--derivatives positions).",
                 list(&rates),
                 self.file(),
                 list(&ofs),
-                short(ratio),
             ))
         });
         (notes.collect(), settled)
