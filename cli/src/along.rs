@@ -45,16 +45,42 @@ pub(crate) fn interleaved(channels: &[Vec<f64>]) -> Vec<f64> {
         .collect()
 }
 
+/// Errors below this fraction of the measured force are rounding of the numbers in the recording; where they sit says
+/// nothing about the mechanism.
+pub(crate) const ROUNDING: f64 = 1e-6;
+
+/// Where errors live.
+pub(crate) struct Places {
+    /// Regions that hold more than their share.
+    pub(crate) regions: Vec<Region>,
+    /// Drives whose error is so small that it was not looked at.
+    pub(crate) rounding: Vec<String>,
+}
+
 /// Regions of coordinates, rates, loads and time that hold more than their share of the error.
 ///
 /// With several recordings, time is looked at in each of them on its own.
-pub(crate) fn regions(
+pub(crate) fn places(
     model: &Model,
     data: &[Data],
     measured: &[Vec<Vec<f64>>],
     forces: &[Vec<Vec<f64>>],
-) -> Outcome<Vec<Region>> {
-    let drives = model.drives();
+) -> Outcome<Places> {
+    let mut rounding = Vec::new();
+    let mut drives = Vec::new();
+    for (d, drive) in model.drives().into_iter().enumerate() {
+        if is_rounding(d, measured, forces) {
+            rounding.push(drive);
+        } else {
+            drives.push((d, drive));
+        }
+    }
+    if drives.is_empty() {
+        return Ok(Places {
+            regions: Vec::new(),
+            rounding,
+        });
+    }
     let errors_of = |k: usize, d: usize| -> Vec<f64> {
         let pairs = measured[k][d].iter().zip(&forces[k][d]);
         pairs.map(|(y, m)| y - m).collect()
@@ -68,8 +94,8 @@ pub(crate) fn regions(
         if data.len() == 1 {
             variables.push((TIME.to_owned(), time));
         } else {
-            for (d, drive) in drives.iter().enumerate() {
-                let error = errors_of(k, d);
+            for (d, drive) in &drives {
+                let error = errors_of(k, *d);
                 let mut found = locate(
                     &[(drive, &error)],
                     &[(TIME, &time)],
@@ -81,8 +107,8 @@ pub(crate) fn regions(
                 in_time.extend(found);
             }
         }
-        for (slot, d) in errors.iter_mut().zip(0..) {
-            slot.extend(errors_of(k, d));
+        for (slot, (d, _)) in errors.iter_mut().zip(&drives) {
+            slot.extend(errors_of(k, *d));
         }
         if joined.is_empty() {
             joined = variables;
@@ -94,7 +120,7 @@ pub(crate) fn regions(
     }
     let errors: Vec<(&str, &[f64])> = drives
         .iter()
-        .map(String::as_str)
+        .map(|(_, drive)| drive.as_str())
         .zip(errors.iter().map(Vec::as_slice))
         .collect();
     let variables: Vec<(&str, &[f64])> = joined
@@ -105,7 +131,19 @@ pub(crate) fn regions(
         locate(&errors, &variables, &LocateOptions::default())
     });
     regions.extend(in_time);
-    Ok(regions)
+    Ok(Places { regions, rounding })
+}
+
+/// Whether the error of a drive is rounding beside its force.
+fn is_rounding(drive: usize, measured: &[Vec<Vec<f64>>], forces: &[Vec<Vec<f64>>]) -> bool {
+    let (mut error, mut size) = (0.0, 0.0);
+    for (measured, forces) in measured.iter().zip(forces) {
+        for (y, m) in measured[drive].iter().zip(&forces[drive]) {
+            error += (y - m).powi(2);
+            size += y * y;
+        }
+    }
+    error <= ROUNDING * ROUNDING * size
 }
 
 /// Variables on which an error may depend, decimated like the forces: coordinates and their

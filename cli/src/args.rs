@@ -27,40 +27,48 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Validate a model file and print a summary
-    #[command(after_help = "Examples:\n  modelmill check models/spidermill.toml\n  \
-        modelmill check models/spidermill.toml --json")]
+    #[command(
+        after_help = "Examples (from the project's root):\n  modelmill check model-spec/models/spidermill.toml\n  \
+        modelmill check model-spec/models/spidermill.toml --json"
+    )]
     Check(CheckArgs),
     /// Say what a variant changes: entries, p_g, dependencies, p_min, operation counts
-    #[command(
-        after_help = "Examples:\n  modelmill diff models/spidermill.toml models/spidermill-paper.toml"
-    )]
+    #[command(after_help = "Examples (from the project's root):\n  \
+        modelmill diff model-spec/models/spidermill.toml model-spec/models/spidermill-paper.toml")]
     Diff(DiffArgs),
     /// Print the reduced model as equations: p_g, dependencies, p_min, intermediate variables, counts
     #[command(
-        after_help = "Examples:\n  modelmill equations models/spidermill-paper.toml\n  \
-        modelmill equations models/panda.toml --format html --out panda.html\n  \
-        modelmill equations models/panda.toml --format json | jq .rank"
+        after_help = "Examples (from the project's root):\n  modelmill equations model-spec/models/spidermill-paper.toml\n  \
+        modelmill equations model-spec/models/panda.toml --format html --out panda.html\n  \
+        modelmill equations model-spec/models/panda.toml --format json | jq .rank"
     )]
     Equations(EquationsArgs),
     /// Write the model as Rust source, the same that `cargo build` makes
-    #[command(after_help = "Examples:\n  modelmill generate models/scara.toml --out scara.rs")]
+    #[command(after_help = "Examples (from the project's root):\n  \
+        modelmill generate model-spec/models/scara.toml --out scara.rs")]
     Generate(GenerateArgs),
     /// Compute the model's forces along a recording
-    #[command(after_help = "Examples:\n  \
-        modelmill evaluate models/spidermill.toml --data run.csv --out forces.csv\n  \
-        modelmill evaluate models/spidermill.toml --data run.csv --parameters fit.json --out forces.csv")]
+    #[command(after_help = "Examples (from the project's root):\n  \
+        modelmill evaluate model-spec/models/spidermill.toml \\\n      \
+        --data recordings/spidermill-mbs/plain-check.csv --out forces.csv\n  \
+        modelmill evaluate model-spec/models/spidermill.toml \\\n      \
+        --data recordings/spidermill-mbs/plain-check.csv --parameters fit.json --out forces.csv")]
     Evaluate(EvaluateArgs),
     /// Find the base parameters from recordings by least squares
-    #[command(after_help = "Examples:\n  \
-        modelmill identify models/spidermill.toml --data fit.csv --check check.csv --out fit.json\n  \
-        modelmill identify models/emps.toml --data emps_train.csv \\\n      \
+    #[command(after_help = "Examples (from the project's root):\n  \
+        modelmill identify model-spec/models/spidermill.toml \\\n      \
+        --data recordings/spidermill-mbs/with-rods-fit.csv \\\n      \
+        --check recordings/spidermill-mbs/with-rods-check.csv --out fit.json\n  \
+        modelmill identify model-spec/models/emps.toml --data emps_train.csv \\\n      \
         --order 4 --cutoff 100 --trim 49 --decimate 10\n  \
         modelmill identify arm.toml --data a.csv --data b.csv --map t=time_s --map q1=pos_1")]
     Identify(IdentifyArgs),
     /// Hold the model against recordings: error figures, and where the error lives
-    #[command(after_help = "Examples:\n  \
-        modelmill compare models/spidermill.toml --data check.csv\n  \
-        modelmill compare models/spidermill.toml --data check.csv --parameters fit.json --json")]
+    #[command(after_help = "Examples (from the project's root):\n  \
+        modelmill compare model-spec/models/spidermill.toml \\\n      \
+        --data recordings/spidermill-mbs/with-rods-check.csv\n  \
+        modelmill compare model-spec/models/spidermill.toml \\\n      \
+        --data recordings/spidermill-mbs/with-rods-check.csv --parameters fit.json --json")]
     Compare(CompareArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Examples:\n  \

@@ -21,8 +21,6 @@ pub(crate) const BLOCK: usize = 4096;
 pub(crate) struct Data {
     /// The states and forces.
     pub(crate) run: Run,
-    /// Line in the file for each sample of the run.
-    lines: Vec<u64>,
 }
 
 /// Reads and prepares recordings; their warnings go to standard error.
@@ -31,17 +29,21 @@ pub(crate) fn read_all(
     paths: &[PathBuf],
     args: &PreparationArgs,
 ) -> Outcome<Vec<Data>> {
-    paths.iter().map(|path| read(model, path, args)).collect()
+    let mut all = Vec::new();
+    for path in paths {
+        all.extend(read(model, path, args)?);
+    }
+    Ok(all)
 }
 
-/// Reads and prepares one recording.
-pub(crate) fn read(model: &Model, path: &Path, args: &PreparationArgs) -> Outcome<Data> {
+/// Reads and prepares one recording: one or, where it is cut at gaps in time, several stretches.
+pub(crate) fn read(model: &Model, path: &Path, args: &PreparationArgs) -> Outcome<Vec<Data>> {
     let options = options(model, args, &header(path))?;
     let recording = watched(&format!("reading {}", path.display()), 0, |_| {
         Recording::read_with(path, &options)
     })?;
     let data = prepare(model, &recording, args)?;
-    for note in &data.run.notes {
+    for note in data.iter().flat_map(Data::notes) {
         match note.severity {
             Severity::Warning => terminal::warn(&note.says),
             Severity::Info => terminal::note(&note.says),
@@ -53,18 +55,45 @@ pub(crate) fn read(model: &Model, path: &Path, args: &PreparationArgs) -> Outcom
 /// Reads a recording that ships with the program.
 pub(crate) fn read_text(model: &Model, name: &str, text: &str) -> Outcome<Data> {
     let recording = Recording::from_reader(text.as_bytes(), name, &ReadOptions::default())?;
-    prepare(model, &recording, &PreparationArgs::none())
+    let preparation = PreparationArgs::none().preparation();
+    let run = recording.states_with(&model.active(), &model.drives(), &preparation)?;
+    Ok(Data { run })
 }
 
-fn prepare(model: &Model, recording: &Recording, args: &PreparationArgs) -> Outcome<Data> {
-    let run = watched(&format!("preparing {}", recording.file()), 0, |_| {
-        recording.states_with(&model.active(), &model.drives(), &args.preparation())
+fn prepare(model: &Model, recording: &Recording, args: &PreparationArgs) -> Outcome<Vec<Data>> {
+    let preparation = args.preparation();
+    let mut runs = watched(&format!("preparing {}", recording.file()), 0, |_| {
+        recording.runs_with(&model.active(), &model.drives(), &preparation)
     })?;
-    let start = run.prepared.trimmed.0;
-    let lines = (start..start + run.samples())
-        .map(|sample| recording.line(sample).unwrap_or(0))
-        .collect();
-    Ok(Data { run, lines })
+    if let Some(first) = runs.first_mut() {
+        let suspicions = recording.suspicions(&model.motions(), preparation.source);
+        first.notes.splice(0..0, suspicions);
+    }
+    Ok(runs.into_iter().map(|run| Data { run }).collect())
+}
+
+/// Warns of recordings that are given twice, also as copies: they count twice, or make a check that proves nothing.
+pub(crate) fn note_twins(data: &mut [Data], check: &mut [Data]) {
+    for k in 1..data.len() {
+        let (before, rest) = data.split_at_mut(k);
+        if let Some(twin) = before.iter().find(|other| other.is_twin_of(&rest[0])) {
+            let says = format!(
+                "{} and {} are the same recording: it counts twice, and deviations come out too small; give it once.",
+                twin.run.file, rest[0].run.file
+            );
+            rest[0].warn(says);
+        }
+    }
+    for one in check {
+        if let Some(twin) = data.iter().find(|other| other.is_twin_of(one)) {
+            let says = format!(
+                "{} is used for the fit and {} for the check, but they are the same recording: such a check proves \
+                 nothing; check on another motion.",
+                twin.run.file, one.run.file
+            );
+            one.warn(says);
+        }
+    }
 }
 
 /// Names of the columns, roughly: enough to see whether the model's own mapping applies.
@@ -142,6 +171,18 @@ impl Data {
         decimate_time(&self.run.time, self.decimation())
     }
 
+    /// A warning that goes to standard error and into the JSON.
+    fn warn(&mut self, says: String) {
+        terminal::warn(&says);
+        self.run.notes.push(Note::warning(says));
+    }
+
+    /// Whether both hold the same numbers.
+    fn is_twin_of(&self, other: &Self) -> bool {
+        let (a, b) = (&self.run, &other.run);
+        a.time == b.time && a.q == b.q && a.qd == b.qd && a.qdd == b.qdd && a.force == b.force
+    }
+
     /// Remarks, for the JSON.
     pub(crate) fn notes(&self) -> &[Note] {
         &self.run.notes
@@ -188,7 +229,7 @@ impl Data {
     fn fault(&self, model: &Model, fault: PoseFault, start: usize) -> Failure {
         let sample = start + fault.sample;
         let time = self.run.time.get(sample).copied().unwrap_or(f64::NAN);
-        let line = self.lines.get(sample).copied().unwrap_or(0);
+        let line = self.run.lines.get(sample).copied().unwrap_or(0);
         let pose: Vec<String> = model
             .active()
             .iter()

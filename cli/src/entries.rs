@@ -2,7 +2,7 @@
 
 use modelmill_spec::{
     Angle, Axis, Convention, DriveKind, Effect, Exact, Inertial, Length, Mechanism, Motion, Place,
-    Step, Symbol,
+    PlaceQuantity, Step, Symbol,
 };
 
 /// Entries as they are collected.
@@ -241,13 +241,38 @@ fn places(m: &Mechanism, effect: &Effect) -> String {
     names.join(", ")
 }
 
+/// The name of a symbol of an effect. Where there is only one place, its quantities are called as the columns of a
+/// recording are.
+fn at_place(m: &Mechanism, effect: &Effect, symbol: Symbol) -> String {
+    let (Symbol::Place(quantity), [place]) = (symbol, effect.places.as_slice()) else {
+        return m.symbol_name(symbol).to_owned();
+    };
+    let (name, position) = match place {
+        Place::Coordinate(i) => (&m.coordinates[i.0].name, ""),
+        Place::Drive(d) => match m.drives[d.0].kind {
+            DriveKind::Joint(i) => (&m.coordinates[i.0].name, ""),
+            DriveKind::Linear { .. } => (&m.drives[d.0].name, "_length"),
+        },
+        Place::Point(_) => return m.symbol_name(symbol).to_owned(),
+    };
+    match quantity {
+        PlaceQuantity::Coordinate => format!("{name}{position}"),
+        PlaceQuantity::Rate => format!("{name}_d"),
+        PlaceQuantity::Acceleration => format!("{name}_dd"),
+        PlaceQuantity::Load => m.symbol_name(symbol).to_owned(),
+    }
+}
+
 fn terms(m: &Mechanism, effect: &Effect) -> String {
     let terms: Vec<String> = effect
         .terms
         .iter()
         .map(|term| {
             let name = &m.parameters[term.parameter.0].name;
-            match text(m, &term.expression).as_str() {
+            let expression = term
+                .expression
+                .to_text(&|symbol| at_place(m, effect, symbol));
+            match expression.as_str() {
                 "1" => name.clone(),
                 expression if expression.contains([' ', '/']) => format!("{name}*({expression})"),
                 expression => format!("{name}*{expression}"),

@@ -3,9 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use modelmill_codegen::review::base_expression;
-use modelmill_codegen::{BaseParameter, Derivation};
+use modelmill_codegen::{BaseParameter, Derivation, Monomial};
 use modelmill_identify::{FitFile, ParameterInfo};
-use modelmill_spec::{Loaded, PlaceQuantity, Symbol};
+use modelmill_spec::{
+    EffectKind, Exact, Inertial, Loaded, Mechanism, Motion, ParameterIdx, PlaceQuantity, Sign,
+    Symbol,
+};
 
 use crate::args::ParameterSource;
 use crate::failure::{Failure, Outcome};
@@ -26,6 +29,8 @@ pub(crate) struct Model {
     pub(crate) base: Vec<BaseParameter>,
     /// Their values from the file's nominal values.
     pub(crate) nominal: Vec<f64>,
+    /// The sign that each dynamic parameter must have.
+    signs: Vec<Sign>,
 }
 
 /// Reads a model file; warnings go to standard error.
@@ -65,6 +70,9 @@ pub(crate) fn derive_loaded(path: &str, loaded: &Loaded) -> Outcome<Model> {
         modelmill_codegen::derive(mechanism)
     })
     .map_err(|error| Failure::Input(format!("{path}: {error}")))?;
+    for says in retained_in_vain(&derivation) {
+        terminal::warn(&format!("{path}: {says}"));
+    }
     let stem = Path::new(path).file_stem();
     Ok(Model {
         name: stem.map_or_else(
@@ -75,6 +83,7 @@ pub(crate) fn derive_loaded(path: &str, loaded: &Loaded) -> Outcome<Model> {
         files: loaded.sources.paths().map(Path::to_owned).collect(),
         base: base(&derivation),
         nominal: derivation.nominal_base_values(),
+        signs: signs(mechanism, &loaded.kinds),
         derivation,
     })
 }
@@ -88,7 +97,139 @@ fn base(derivation: &Derivation) -> Vec<BaseParameter> {
     base
 }
 
+/// What `retain` asks for that cannot be, in words.
+pub(crate) fn retained_in_vain(derivation: &Derivation) -> Vec<String> {
+    let reduction = &derivation.reduction;
+    let mechanism = &derivation.mechanism;
+    let mut says = Vec::new();
+    for powers in &mechanism.retain {
+        let wanted = Monomial(powers.iter().map(|(p, n)| (p.0, *n)).collect());
+        let name = wanted.text(mechanism);
+        let why = match reduction.products.iter().position(|p| *p == wanted) {
+            Some(k) if reduction.retained.contains(&k) => continue,
+            Some(_) => "its column depends on those of products that are retained before it",
+            None if reduction.without_effect.contains(&wanted) => {
+                "it has no effect on the drives: its column is zero"
+            }
+            None => "there is no such product in the equations",
+        };
+        says.push(format!("`{name}` of `retain` cannot be retained: {why}"));
+    }
+    says
+}
+
+/// The sign that each dynamic parameter must have: masses, moments of inertia, and what kinds of effects say.
+fn signs(mechanism: &Mechanism, kinds: &[EffectKind]) -> Vec<Sign> {
+    let mut signs = vec![Sign::Any; mechanism.parameters.len()];
+    let mut positive = |exact: &Exact| {
+        if let Some(p) = multiple_of(exact) {
+            signs[p.0] = Sign::Positive;
+        }
+    };
+    for part in &mechanism.parts {
+        let (Inertial::AboutCentre { mass, inertia, .. } | Inertial::Linear { mass, inertia, .. }) =
+            &part.inertial;
+        positive(mass);
+        for i in [0, 3, 5] {
+            positive(&inertia[i]);
+        }
+    }
+    for lumped in &mechanism.lumped_masses {
+        positive(&lumped.mass);
+    }
+    for effect in &mechanism.effects {
+        let Some(kind) = kinds.iter().find(|kind| kind.name == effect.kind) else {
+            continue;
+        };
+        for (term, parameter) in effect.terms.iter().zip(&kind.parameters) {
+            if parameter.sign != Sign::Any {
+                signs[term.parameter.0] = parameter.sign;
+            }
+        }
+    }
+    signs
+}
+
+/// The parameter of which an expression is a positive rational multiple.
+fn multiple_of(exact: &Exact) -> Option<ParameterIdx> {
+    let is_positive = |exact: &Exact| {
+        let mut free = true;
+        exact.for_each_symbol(&mut |_| free = false);
+        free && exact.evaluate(&|_| 0.0) > 0.0
+    };
+    match exact {
+        Exact::Symbol(Symbol::Parameter(p)) => Some(*p),
+        Exact::Quotient(above, below) if is_positive(below) => multiple_of(above),
+        Exact::Product(factors) => {
+            let mut others = factors.iter().filter(|factor| !is_positive(factor));
+            let one = others.next()?;
+            others.next().is_none().then(|| multiple_of(one))?
+        }
+        _ => None,
+    }
+}
+
 impl Model {
+    /// Active coordinates with whether they are angles.
+    pub(crate) fn motions(&self) -> Vec<(String, bool)> {
+        let coordinates = self.derivation.mechanism.coordinates.iter();
+        coordinates
+            .filter(|c| !c.passive)
+            .map(|c| (c.name.clone(), c.motion == Motion::Revolute))
+            .collect()
+    }
+
+    /// Products that a base parameter consists of, with what they are multiplied by for the file's constants.
+    fn products_of(&self, k: usize) -> Vec<(&Monomial, f64)> {
+        let reduction = &self.derivation.reduction;
+        let constants = &self.derivation.mechanism.constants;
+        let constants: Vec<f64> = constants.iter().map(|c| c.value).collect();
+        let mut products = vec![(&reduction.products[reduction.retained[k]], 1.0)];
+        for line in &reduction.dependencies {
+            for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
+                let factor = factor.value_f64(&constants);
+                products.push((&reduction.products[line.product], factor));
+            }
+        }
+        products
+    }
+
+    /// Whether a base parameter consists of numbers of the model file only, so that there is nothing to identify.
+    pub(crate) fn is_known(&self, k: usize) -> bool {
+        self.products_of(k).iter().all(|(p, _)| p.0.is_empty())
+    }
+
+    /// The sign that a base parameter must have, where all of its summands must have the same.
+    pub(crate) fn sign(&self, k: usize) -> Sign {
+        let sign_of = |(product, factor): &(&Monomial, f64)| {
+            let mut is_positive = *factor > 0.0;
+            for (p, power) in &product.0 {
+                match self.signs[*p] {
+                    _ if power % 2 == 0 => {}
+                    Sign::Positive => {}
+                    Sign::Negative => is_positive = !is_positive,
+                    Sign::Any => return Sign::Any,
+                }
+            }
+            if is_positive {
+                Sign::Positive
+            } else {
+                Sign::Negative
+            }
+        };
+        let products = self.products_of(k);
+        let mut signs = products
+            .iter()
+            .filter(|(_, factor)| *factor != 0.0)
+            .map(sign_of);
+        let first = signs.next().unwrap_or(Sign::Any);
+        if signs.all(|sign| sign == first) {
+            first
+        } else {
+            Sign::Any
+        }
+    }
+
     /// Names of the active coordinates, in the order of the file.
     pub(crate) fn active(&self) -> Vec<String> {
         self.coordinates(false)
@@ -165,9 +306,21 @@ impl Model {
             .iter()
             .map(|base| (base.name.as_str(), base.expression.as_str()))
             .collect();
-        FitFile::read(path)
-            .and_then(|fit| fit.values_for(&names, &path.display().to_string()))
-            .map_err(Failure::input)
+        let file = path.display().to_string();
+        let fit = FitFile::read(path).map_err(Failure::input)?;
+        let values = fit.values_for(&names, &file).map_err(Failure::input)?;
+        let constants = self.derivation.mechanism.constants.iter();
+        let constants: Vec<(&str, f64)> = constants.map(|c| (c.name.as_str(), c.value)).collect();
+        let others = fit
+            .other_constants(&constants, &file)
+            .map_err(Failure::input)?;
+        for (name, then, now) in others {
+            terminal::warn(&format!(
+                "{file} was made with {name} = {then}, but {} has {name} = {now}; identify again unless this is meant",
+                self.path
+            ));
+        }
+        Ok(values)
     }
 
     /// Effects whose force depends on the load of the drive.

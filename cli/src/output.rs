@@ -52,7 +52,18 @@ pub(crate) fn write(path: &Path, text: &str) -> Outcome {
     })
 }
 
+/// Whether two paths lead to one file, be it through links.
 fn same_file(a: &Path, b: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        // A hard link is the same file under a path of its own.
+        if let (Ok(a), Ok(b)) = (a.metadata(), b.metadata())
+            && (a.dev(), a.ino()) == (b.dev(), b.ino())
+        {
+            return true;
+        }
+    }
     match (a.canonicalize(), b.canonicalize()) {
         (Ok(a), Ok(b)) => a == b,
         _ => false,

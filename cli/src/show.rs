@@ -1,7 +1,8 @@
 //! Results in text, for people: parameters, figures and regions.
 
-use modelmill_identify::{Figures, FitParameter, Region};
+use modelmill_identify::{Figures, FitParameter, Status};
 
+use crate::along::{Places, ROUNDING};
 use crate::model::Model;
 use crate::table::{Align, number, percent, significant, table};
 
@@ -13,13 +14,17 @@ pub(crate) fn parameters(parameters: &[FitParameter]) -> Vec<String> {
             vec![
                 p.name.clone(),
                 p.nominal.map_or_else(|| "-".to_owned(), number),
-                if p.std.is_some() {
+                if p.status == Status::Identified {
                     number(p.value)
                 } else {
                     format!("({})", number(p.value))
                 },
-                p.std
-                    .map_or_else(|| "not determined".to_owned(), |std| significant(std, 2)),
+                match (p.status, p.std) {
+                    (Status::Known, _) => "known".to_owned(),
+                    (Status::Undetermined, _) => "not determined".to_owned(),
+                    (Status::Identified, Some(std)) => significant(std, 2),
+                    (Status::Identified, None) => "—".to_owned(),
+                },
                 p.std.map_or_else(String::new, |std| {
                     if p.value == 0.0 {
                         "-".to_owned()
@@ -92,14 +97,21 @@ pub(crate) fn figures(named: &[(&str, &Figures)]) -> Vec<String> {
 }
 
 /// Where an error lives, one sentence for each region.
-pub(crate) fn regions(regions: &[Region]) -> Vec<String> {
-    if regions.is_empty() {
-        return vec![
-            "  The error is spread evenly over coordinates, rates, loads and time.".to_owned(),
-        ];
-    }
-    regions
-        .iter()
+pub(crate) fn places(places: &Places) -> Vec<String> {
+    let regions = places.regions.iter();
+    let mut lines: Vec<String> = regions
         .map(|region| format!("  {}.", region.says))
-        .collect()
+        .collect();
+    if !places.rounding.is_empty() {
+        lines.push(format!(
+            "  The error of {} is below {ROUNDING:e} of the force, which is rounding: there is nothing to find.",
+            places.rounding.join(", ")
+        ));
+    }
+    if lines.is_empty() {
+        lines.push(
+            "  The error is spread evenly over coordinates, rates, loads and time.".to_owned(),
+        );
+    }
+    lines
 }

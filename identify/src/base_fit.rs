@@ -4,6 +4,7 @@
 use std::fmt;
 use std::path::Path;
 
+use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
 use crate::deviations::Deviations;
@@ -25,6 +26,29 @@ pub struct ParameterInfo {
     pub nominal: Option<f64>,
 }
 
+/// How a value of a fit came about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// The recordings say it.
+    #[default]
+    Identified,
+    /// The recordings do not say it: the value is the nearest to the nominal ones that fits.
+    Undetermined,
+    /// A number of the model file, which was taken off the measured forces before the fit.
+    Known,
+}
+
+impl Status {
+    #[allow(
+        clippy::trivially_copy_pass_by_ref,
+        reason = "serde asks with a reference"
+    )]
+    fn is_identified(&self) -> bool {
+        *self == Self::Identified
+    }
+}
+
 /// A base parameter with its identified value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitParameter {
@@ -34,8 +58,8 @@ pub struct FitParameter {
     pub expression: String,
     /// The identified value; the nominal one (or 0) where the recording does not determine it.
     pub value: f64,
-    /// Standard deviation allowing for autocorrelated residuals; `null` where the recording does
-    /// not determine the parameter.
+    /// Standard deviation allowing for autocorrelated residuals; `null` where the parameter is not identified, and
+    /// where there are no more equations than parameters.
     pub std: Option<f64>,
     /// Standard deviation for independent residuals, for comparison only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -44,6 +68,9 @@ pub struct FitParameter {
     pub unit: String,
     /// The value that the model file's nominal values give.
     pub nominal: Option<f64>,
+    /// Left away for what is identified.
+    #[serde(default, skip_serializing_if = "Status::is_identified")]
+    pub status: Status,
 }
 
 /// An identification: the JSON of `identify`.
@@ -60,6 +87,9 @@ pub struct FitFile {
     pub scaled_condition_number: Option<f64>,
     /// The base parameters, in the order of the regressor's columns.
     pub parameters: Vec<FitParameter>,
+    /// Values of the model's constants, on which the regressor and the expressions depend.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub constants: IndexMap<String, f64>,
     /// What the recording does not determine, one sentence for each direction.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub undetermined: Vec<String>,
@@ -118,6 +148,15 @@ pub enum FitFault {
         /// The parameter.
         name: String,
     },
+    /// A constant that an expression of the base parameters holds has another value.
+    OtherConstant {
+        /// The constant.
+        name: String,
+        /// Its value in the file.
+        file: f64,
+        /// Its value in the model.
+        model: f64,
+    },
     /// A parameter has the same name but stands for another expression.
     OtherExpression {
         /// The parameter.
@@ -174,6 +213,15 @@ impl fmt::Display for FitFileError {
             FitFault::DuplicateParameter { name } => {
                 write!(f, "{file}: the fit holds `{name}` twice; remove one")
             }
+            FitFault::OtherConstant {
+                name,
+                file: theirs,
+                model,
+            } => write!(
+                f,
+                "{file}: the fit was made with {name} = {theirs}, but the model has {name} = {model}, and base parameters \
+                 depend on it: identify again"
+            ),
             FitFault::OtherExpression {
                 name,
                 file: theirs,
@@ -218,6 +266,11 @@ pub fn fit_parameters(
             classical_std: finite(solution.classical_std[i]),
             unit: info.unit.clone(),
             nominal: info.nominal,
+            status: if solution.determined[i] {
+                Status::Identified
+            } else {
+                Status::Undetermined
+            },
         })
         .collect()
 }
@@ -251,6 +304,42 @@ impl FitFile {
                 fault,
             }
         })
+    }
+
+    /// Constants of the model whose values were others when the fit was made: `(name, value then, value now)`.
+    /// `model` holds `(name, value)`; a fit without constants, as earlier versions wrote it, has none that differ.
+    /// Fails when such a constant stands in an expression of the base parameters, which then are others.
+    /// `file` is what messages call the fit.
+    pub fn other_constants(
+        &self,
+        model: &[(&str, f64)],
+        file: &str,
+    ) -> Result<Vec<(String, f64, f64)>, FitFileError> {
+        let mut others = Vec::new();
+        for (name, now) in model {
+            let Some(then) = self.constants.get(*name) else {
+                continue;
+            };
+            if (then - now).abs() <= 1e-12 * then.abs().max(now.abs()) {
+                continue;
+            }
+            if self
+                .parameters
+                .iter()
+                .any(|p| mentions(&p.expression, name))
+            {
+                return Err(FitFileError {
+                    file: file.to_owned(),
+                    fault: FitFault::OtherConstant {
+                        name: (*name).to_owned(),
+                        file: *then,
+                        model: *now,
+                    },
+                });
+            }
+            others.push(((*name).to_owned(), *then, *now));
+        }
+        Ok(others)
     }
 
     /// The values for a model's base parameters, `(name, expression)` in the model's order.
@@ -309,6 +398,13 @@ impl FitFile {
     }
 }
 
+/// Whether a name stands in an expression.
+fn mentions(expression: &str, name: &str) -> bool {
+    expression
+        .split(|c: char| !(c.is_alphanumeric() || c == '_'))
+        .any(|word| word == name)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -331,6 +427,33 @@ mod tests {
             fit.values_for(&[("p2_min", "fv"), ("p1_min", "m")], "fit.json")
                 .unwrap(),
             [203.5, 95.1]
+        );
+    }
+
+    #[test]
+    fn other_constants_are_told_and_refused_where_parameters_hold_them() {
+        let text = TEXT
+            .replace("\"expression\": \"m\"", "\"expression\": \"m + L*m2\"")
+            .replace(
+                "\"parameters\"",
+                "\"constants\": {\"L\": 0.5, \"g\": 9.81}, \"parameters\"",
+            );
+        let fit = FitFile::parse(&text, "fit.json").unwrap();
+        let others = |model: &[(&str, f64)]| fit.other_constants(model, "fit.json");
+        assert_eq!(others(&[("L", 0.5), ("g", 9.81), ("new", 1.0)]), Ok(vec![]));
+        assert_eq!(
+            others(&[("L", 0.5), ("g", 9.80)]),
+            Ok(vec![("g".to_owned(), 9.81, 9.80)])
+        );
+        let says = others(&[("L", 0.6)]).unwrap_err().to_string();
+        assert!(
+            says.contains("L = 0.5") && says.contains("L = 0.6"),
+            "{says}"
+        );
+        let earlier = FitFile::parse(TEXT, "fit.json").unwrap();
+        assert_eq!(
+            earlier.other_constants(&[("m", 1.0)], "fit.json"),
+            Ok(vec![])
         );
     }
 

@@ -30,7 +30,8 @@ use crate::solution::Solution;
 /// Uncertainty of a solution. Lists are in the order of the regressor's columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Deviations {
-    /// Standard deviations; infinite for parameters that are not determined.
+    /// Standard deviations; infinite for parameters that are not determined, NaN where there are no more rows than
+    /// parameters, for then residuals are rounding and say nothing.
     pub std: Vec<f64>,
     /// Covariance of the parameters; where a parameter is not determined, only of the part that is.
     pub covariance: DMatrix<f64>,
@@ -117,7 +118,9 @@ pub fn autocorrelated<E: From<LeastSquaresError>>(
     });
     let std: Vec<f64> = (0..n)
         .map(|j| {
-            if solution.determined[j] {
+            if solution.rows <= solution.rank {
+                f64::NAN
+            } else if solution.determined[j] {
                 covariance[(j, j)].sqrt()
             } else {
                 f64::INFINITY
@@ -369,6 +372,18 @@ mod tests {
     use super::*;
     use crate::LeastSquares;
     use crate::test_noise::Noise;
+
+    /// As many rows as parameters leave residuals of rounding, from which nothing can be said.
+    #[test]
+    fn without_a_row_to_spare_there_is_no_deviation() {
+        let (w, y) = ([1.0, 0.0, 1.0, 1.0], [1.0, 3.0]);
+        let mut regression = LeastSquares::new(2);
+        regression.add_rows(&w, &y).unwrap();
+        let solution = regression.solve().unwrap();
+        let found: Result<Deviations, LeastSquaresError> =
+            autocorrelated(&solution, 1, |visit| visit(&w, &y));
+        assert!(found.unwrap().std.iter().all(|std| std.is_nan()));
+    }
 
     #[test]
     fn windows_are_bartletts_sum_over_lags() {

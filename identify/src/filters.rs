@@ -69,8 +69,12 @@ impl fmt::Display for FilterError {
             ),
             Self::TooShort { have, need } => write!(
                 f,
-                "{have} samples are too few to be filtered, at least {need} are needed; \
-                 use a longer recording or a lower filter order"
+                "{} too few to be filtered, at least {need} are needed; \
+                 use a longer recording or a lower filter order",
+                match have {
+                    1 => "1 sample is".to_owned(),
+                    n => format!("{n} samples are"),
+                }
             ),
             Self::Shape { have, per_sample } => {
                 write!(

@@ -4,8 +4,8 @@
 //! The crate takes numbers and knows nothing of how a regressor is made. The pipeline:
 //!
 //! 1. [`Recording::read`] - CSV into named columns; every fault has its line and its remedy.
-//! 2. [`Recording::states_with`] - coordinates with derivatives ([`derivatives`], [`filters`]) and
-//!    forces, as a [`Run`]; the caller evaluates its regressor along it, rows interleaved per
+//! 2. [`Recording::suspicions`] - what looks wrong with them; [`Recording::runs_with`] - coordinates with derivatives ([`derivatives`], [`filters`]) and
+//!    forces, as a [`Run`] for each stretch between gaps in time; the caller evaluates its regressor along it, rows interleaved per
 //!    sample (`row = sample * n_channels + channel`), and applies [`filters::decimate_table`] to
 //!    regressor and force where the run asks for it.
 //! 3. [`LeastSquares`] - eq. (12) from a stream of rows; [`deviations::autocorrelated`] - what
@@ -25,6 +25,7 @@ pub mod locate;
 mod notes;
 pub mod numeric_rank;
 mod recording;
+mod recording_checks;
 mod recording_error;
 mod run;
 mod solution;
@@ -33,7 +34,7 @@ mod spectrum;
 mod test_noise;
 mod undetermined;
 
-pub use base_fit::{FitFile, FitFileError, FitParameter, ParameterInfo};
+pub use base_fit::{FitFile, FitFileError, FitParameter, ParameterInfo, Status};
 pub use derivatives::Preparation;
 pub use deviations::Deviations;
 pub use figures::{ChannelFigures, Comparison, Figures, FiguresError};

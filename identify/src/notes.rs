@@ -40,6 +40,15 @@ impl Note {
     }
 }
 
+/// `1 gap`, `2 gaps`.
+pub(crate) fn count_of(n: usize, one: &str, many: &str) -> String {
+    if n == 1 {
+        format!("1 {one}")
+    } else {
+        format!("{n} {many}")
+    }
+}
+
 /// The candidate that is spelt most like `wanted`, if any comes close enough to be a likely slip.
 pub(crate) fn nearest<'a>(
     wanted: &str,
@@ -60,7 +69,10 @@ pub(crate) fn nearest<'a>(
             };
             (distance, candidate)
         })
-        .filter(|(distance, _)| *distance <= 1.max(wanted.chars().count() / 3))
+        // Two names of one letter have nothing in common.
+        .filter(|(distance, candidate)| {
+            *distance <= 1.max(wanted.chars().count() / 3) && *distance < candidate.chars().count()
+        })
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, candidate)| candidate)
 }
@@ -92,5 +104,8 @@ mod tests {
         assert_eq!(nearest("spindel_left", names), Some("spindle_left"));
         assert_eq!(nearest("Theta1", names), Some("theta1"));
         assert_eq!(nearest("gearbox", names), None);
+        assert_eq!(nearest("q", ["t", "x"]), None);
+        assert_eq!(nearest("q", ["t", "Q"]), Some("Q"));
+        assert_eq!(nearest("q", ["t", "q1"]), Some("q1"));
     }
 }

@@ -134,7 +134,21 @@ pub fn reduce_numerically(
     })
 }
 
-/// The matrix with columns of norm 1 (zero columns stay), and the norms.
+/// Columns whose norm is below this fraction of the largest one's are rounding noise, and count as zero: scaled to norm 1
+/// they would look like information.
+pub(crate) const NOISE_TOLERANCE: f64 = 1e-12;
+
+/// Sets norms that are rounding noise beside the largest one to zero.
+pub(crate) fn without_noise(norms: &mut [f64]) {
+    let largest = norms.iter().copied().fold(0.0, f64::max);
+    for norm in norms {
+        if *norm < NOISE_TOLERANCE * largest {
+            *norm = 0.0;
+        }
+    }
+}
+
+/// The matrix with columns of norm 1 (zero columns and rounding noise become zero), and the norms.
 fn scale(w: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<f64>), LeastSquaresError> {
     if w.ncols() == 0 {
         return Err(LeastSquaresError::NoParameters);
@@ -148,11 +162,14 @@ fn scale(w: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<f64>), LeastSquaresError
             column: Some(i / w.nrows()),
         });
     }
-    let norms: Vec<f64> = w.column_iter().map(|column| column.norm()).collect();
+    let mut norms: Vec<f64> = w.column_iter().map(|column| column.norm()).collect();
+    without_noise(&mut norms);
     let mut scaled = w.clone();
     for (mut column, norm) in scaled.column_iter_mut().zip(&norms) {
         if *norm > 0.0 {
             column.unscale_mut(*norm);
+        } else {
+            column.fill(0.0);
         }
     }
     Ok((scaled, norms))
@@ -247,6 +264,31 @@ mod tests {
                 assert!((sum - w[(i, dependency.column)]).abs() < 1e-12 * scale.max(1e-12));
             }
         }
+    }
+
+    /// A column of rounding noise was scaled to norm 1 and counted.
+    #[test]
+    fn rounding_noise_is_no_column() {
+        let mut noise = Noise::new(5);
+        let w = DMatrix::from_fn(80, 3, |_, j| noise.normal() * [1e3, 1e-4, 1e-13][j]);
+        let rank = numeric_rank(&w).unwrap();
+        assert_eq!(rank.rank, 2);
+        assert!(rank.gap > 1e10);
+        let reduction = reduce_numerically(&w, 3).unwrap();
+        assert_eq!(reduction.kept, [0, 1]);
+        assert_eq!(reduction.dependencies[0].factors, []);
+        let mut regression = LeastSquares::new(3);
+        for row in w.row_iter() {
+            let row: Vec<f64> = row.iter().copied().collect();
+            regression.add_rows(&row, &[row[0] + 2.0 * row[1]]).unwrap();
+        }
+        let solution = regression.solve_near(&[0.0, 0.0, 7.0]).unwrap();
+        assert_eq!(
+            (solution.rank, solution.values[2].to_bits()),
+            (2, 7.0_f64.to_bits())
+        );
+        assert_eq!(solution.determined, [true, true, false]);
+        assert!((solution.values[1] - 2.0).abs() < 1e-6);
     }
 
     #[test]

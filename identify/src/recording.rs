@@ -12,7 +12,7 @@ use std::path::Path;
 
 use indexmap::IndexMap;
 
-use crate::notes::{Note, nearest};
+use crate::notes::{Note, count_of, nearest};
 use crate::recording_error::{Fault, RecordingError};
 
 /// What becomes of samples with NaN, infinite or empty fields.
@@ -171,6 +171,43 @@ impl Recording {
         Ok(&column.values)
     }
 
+    /// The numbers of a column, as [`Recording::column`]; columns of the names `wanted` are not proposed for it.
+    pub(crate) fn column_beside(
+        &self,
+        name: &str,
+        wanted: &[String],
+    ) -> Result<&[f64], RecordingError> {
+        if self.has(name) {
+            return self.column(name);
+        }
+        let others = self
+            .names()
+            .filter(|name| !wanted.iter().any(|w| w == name));
+        let proposed = nearest(name, others).map(str::to_owned);
+        let mut fault = missing(name, self.names(), false);
+        if let Fault::MissingColumn { nearest, .. } = &mut fault {
+            *nearest = proposed;
+        }
+        Err(self.fault(fault))
+    }
+
+    /// The samples from `start` to before `end` as a recording of its own, without the notes.
+    pub(crate) fn stretch(&self, file: String, start: usize, end: usize) -> Self {
+        let columns = self.columns.iter().map(|(name, column)| {
+            let column = Column {
+                values: column.values[start..end].to_vec(),
+                ..column.clone()
+            };
+            (name.clone(), column)
+        });
+        Self {
+            file,
+            columns: columns.collect(),
+            lines: self.lines[start..end].to_vec(),
+            notes: Vec::new(),
+        }
+    }
+
     pub(crate) fn fault(&self, fault: Fault) -> RecordingError {
         RecordingError {
             file: self.file.clone(),
@@ -257,9 +294,11 @@ fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<Recordin
     }
     if let Some(first) = left_out.first() {
         notes.push(Note::warning(format!(
-            "{} of {} samples of {file} hold NaN, infinite or empty fields and are left out, the first in line {first}.",
+            "{} of {} samples of {file} {} NaN, infinite or empty fields and {} left out, the first in line {first}.",
             left_out.len(),
             left_out.len() + lines.len(),
+            if left_out.len() == 1 { "holds" } else { "hold" },
+            if left_out.len() == 1 { "is" } else { "are" },
         )));
     }
     let columns: IndexMap<String, Column> = names.into_iter().zip(columns).collect();
@@ -270,7 +309,8 @@ fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<Recordin
         ] {
             if let Some(Defect { line, count, .. }) = defect {
                 notes.push(Note::warning(format!(
-                    "Column `{name}` of {file} holds {what} ({count} fields, the first in line {line}) and cannot be used."
+                    "Column `{name}` of {file} holds {what} ({}, the first in line {line}) and cannot be used.",
+                    count_of(*count, "field", "fields")
                 )));
             }
         }

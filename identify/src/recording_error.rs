@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::filters::FilterError;
+use crate::notes::count_of;
 
 /// A fault of a recording. Its `Display` names the file, the line and the column where they are
 /// known, and ends with what to do.
@@ -213,7 +214,8 @@ impl fmt::Display for Fault {
             }
             Self::RaggedLine { have, expected, .. } => write!(
                 f,
-                "{have} fields where the header has {expected}; complete or remove the line"
+                "{} where the header has {expected}; complete or remove the line",
+                count_of(*have, "field", "fields")
             ),
             Self::MissingColumn {
                 name,
@@ -229,8 +231,9 @@ impl fmt::Display for Fault {
                 } else {
                     write!(f, "there is no column `{name}`")?;
                 }
-                if let Some(nearest) = nearest {
-                    write!(f, "; is `{nearest}` meant?")?;
+                match nearest {
+                    Some(nearest) => write!(f, "; is `{nearest}` meant?")?,
+                    None => f.write_str(".")?,
                 }
                 write!(f, " The columns are: {}.", list(present))?;
                 if *by_renaming {
@@ -296,7 +299,11 @@ impl fmt::Display for Fault {
             } => {
                 write!(
                     f,
-                    "{have} samples are too few for {purpose}, which takes at least {need}; use a longer recording"
+                    "{} too few for {purpose}, which takes at least {need}; use a longer recording",
+                    match have {
+                        1 => "1 sample is".to_owned(),
+                        n => format!("{n} samples are"),
+                    }
                 )
             }
             Self::Filter { column, error } => write!(f, "`{column}` cannot be filtered: {error}"),

@@ -3,12 +3,15 @@
 //! Derivatives that the file lacks are prepared by [`crate::derivatives`]; every choice that is
 //! made on the way is written into the notes.
 
+use std::fmt::Write as _;
+
 use serde::{Deserialize, Serialize};
 
 use crate::derivatives::{Preparation, Source, choose_cutoff, differentiate, mean_rate, prepare};
 use crate::filters::LowPass;
-use crate::notes::Note;
+use crate::notes::{Note, Severity, count_of};
 use crate::recording::Recording;
+use crate::recording_checks::{GAP, median};
 use crate::recording_error::{Fault, RecordingError, list};
 
 /// States along a run, ready for the regressor. All columns have the length of `time`.
@@ -29,6 +32,8 @@ pub struct Run {
     pub force: Option<Vec<Vec<f64>>>,
     /// Drives whose force the file lacks.
     pub missing_force: Vec<String>,
+    /// Line in the file for each sample.
+    pub lines: Vec<u64>,
     /// What was done to the recording.
     pub prepared: PreparedAs,
     /// What the user should know, the recording's own notes included.
@@ -58,6 +63,93 @@ impl Recording {
         self.states_with(coordinates, drives, &Preparation::default())
     }
 
+    /// [`Recording::states_with`] for each stretch between gaps in time, so that no filter and no difference reaches
+    /// across a gap. Stretches that are too short to be prepared are left out, which the notes say; where nothing is
+    /// to be filtered the recording stays whole.
+    pub fn runs_with(
+        &self,
+        coordinates: &[String],
+        drives: &[String],
+        preparation: &Preparation,
+    ) -> Result<Vec<Run>, RecordingError> {
+        // What is wrong with the whole is said of the whole, before it is cut.
+        let wanted = wanted_names(coordinates, drives);
+        self.check_time(self.column_beside("t", &wanted)?, &mut Vec::new())?;
+        let columns: Result<Vec<Recorded<'_>>, _> = coordinates
+            .iter()
+            .map(|name| self.recorded(name, preparation.source, &wanted))
+            .collect();
+        let is_filtered = preparation.decimate > 1 || columns?.iter().any(|c| !c.is_complete());
+        let stretches = if is_filtered {
+            self.stretches()
+        } else {
+            Vec::new()
+        };
+        if stretches.len() < 2 {
+            return Ok(vec![self.states_with(coordinates, drives, preparation)?]);
+        }
+        let longest = (0..stretches.len()).max_by_key(|i| stretches[*i].samples());
+        let longest = longest.unwrap_or(0);
+        let first = stretches[longest].states_with(coordinates, drives, preparation)?;
+        // One cut-off for all: that which suits the longest.
+        let preparation = Preparation {
+            cutoff_hz: preparation.cutoff_hz.or(first.prepared.cutoff_hz),
+            ..preparation.clone()
+        };
+        let mut runs = Vec::new();
+        let (mut short, mut left_out) = (0, 0);
+        for (i, stretch) in stretches.iter().enumerate() {
+            let run = if i == longest {
+                Ok(first.clone())
+            } else {
+                stretch.states_with(coordinates, drives, &preparation)
+            };
+            match run {
+                Ok(run) => runs.push(run),
+                Err(error) if matches!(error.fault, Fault::TooFewSamples { .. }) => {
+                    short += 1;
+                    left_out += stretch.samples();
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        let mut notes = self.notes().to_vec();
+        let breaks = stretches[..stretches.len() - 1].iter();
+        let places = breaks.filter_map(|stretch| stretch.line(stretch.samples() - 1));
+        let mut says = format!(
+            "{} has {} in time of more than {GAP} usual steps, the first after line {}: the {} stretches are filtered and \
+             differentiated each on its own.",
+            self.file(),
+            count_of(stretches.len() - 1, "gap", "gaps"),
+            places.min().unwrap_or(0),
+            stretches.len(),
+        );
+        if short > 0 {
+            let _ = write!(
+                says,
+                " {} too short for that and left out, {} of {} samples.",
+                if short == 1 {
+                    "One is".to_owned()
+                } else {
+                    format!("{short} are")
+                },
+                left_out,
+                self.samples()
+            );
+        }
+        notes.push(Note::warning(says));
+        for (i, run) in runs.iter_mut().enumerate() {
+            if i > 0 {
+                run.notes.retain(|note| note.severity == Severity::Warning);
+            }
+        }
+        if let Some(run) = runs.first_mut() {
+            notes.append(&mut run.notes);
+            run.notes = notes;
+        }
+        Ok(runs)
+    }
+
     /// [`Recording::states`] with another preparation.
     ///
     /// Fails when a column is missing or unusable, when time does not increase, or when the
@@ -69,7 +161,8 @@ impl Recording {
         drives: &[String],
         preparation: &Preparation,
     ) -> Result<Run, RecordingError> {
-        let time = self.column("t")?;
+        let wanted = wanted_names(coordinates, drives);
+        let time = self.column_beside("t", &wanted)?;
         let mut notes = self.notes().to_vec();
         self.check_time(time, &mut notes)?;
         let missing_force: Vec<String> = drives
@@ -93,7 +186,7 @@ impl Recording {
         };
         let columns: Result<Vec<Recorded<'_>>, _> = coordinates
             .iter()
-            .map(|name| self.recorded(name, preparation.source))
+            .map(|name| self.recorded(name, preparation.source, &wanted))
             .collect();
         let columns = columns?;
         let mut prepared = PreparedAs {
@@ -110,6 +203,7 @@ impl Recording {
             qdd: Vec::new(),
             force,
             missing_force,
+            lines: (0..time.len()).map(|i| self.line(i).unwrap_or(0)).collect(),
             prepared,
             notes,
         };
@@ -123,7 +217,12 @@ impl Recording {
         Ok(run)
     }
 
-    fn recorded(&self, name: &str, source: Source) -> Result<Recorded<'_>, RecordingError> {
+    fn recorded(
+        &self,
+        name: &str,
+        source: Source,
+        wanted: &[String],
+    ) -> Result<Recorded<'_>, RecordingError> {
         let optional = |suffix: &str| {
             let derivative = format!("{name}{suffix}");
             let wanted = source == Source::RecordedFirst && self.has(&derivative);
@@ -131,7 +230,7 @@ impl Recording {
         };
         Ok(Recorded {
             name: name.to_owned(),
-            q: self.column(name)?,
+            q: self.column_beside(name, wanted)?,
             qd: optional("_d")?,
             qdd: optional("_dd")?,
         })
@@ -147,12 +246,11 @@ impl Recording {
                 here: time[i + 1],
             }));
         }
-        let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
+        let steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
         if steps.is_empty() {
             return Ok(());
         }
-        let middle = steps.len() / 2;
-        let median = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let median = median(steps.clone());
         let shortest = steps.iter().copied().fold(f64::INFINITY, f64::min);
         let longest = steps.iter().copied().fold(0.0, f64::max);
         let gaps = steps.iter().filter(|step| **step > 1.5 * median).count();
@@ -162,9 +260,10 @@ impl Recording {
                 .position(|w| w[1] - w[0] > 1.5 * median)
                 .unwrap_or(0);
             notes.push(Note::warning(format!(
-                "{} has {gaps} gaps: steps up to {longest:.6} s where {median:.6} s is usual, the first after line {}. \
-                 Derivatives and filters bridge them as they are.",
+                "{} has {} in time: steps up to {longest:.6} s where {median:.6} s is usual, the first after line {}. \
+                 Derivatives and filters, where any are made, bridge them as they are.",
                 self.file(),
+                count_of(gaps, "gap", "gaps"),
                 self.line(first).unwrap_or(0)
             )));
         } else if longest - shortest > 0.01 * median {
@@ -282,6 +381,8 @@ impl Recording {
             column.drain(..start);
         };
         cut(&mut run.time);
+        run.lines.truncate(have - end);
+        run.lines.drain(..start);
         let forces = run.force.iter_mut().flatten();
         for column in run
             .q
@@ -340,6 +441,16 @@ impl Run {
             .flat_map(|sample| force.iter().map(move |channel| channel[sample]))
             .collect())
     }
+}
+
+/// All names that a model has for columns.
+fn wanted_names(coordinates: &[String], drives: &[String]) -> Vec<String> {
+    let mut names = vec!["t".to_owned()];
+    for name in coordinates {
+        names.extend([name.clone(), format!("{name}_d"), format!("{name}_dd")]);
+    }
+    names.extend(drives.iter().cloned());
+    names
 }
 
 /// What the file holds of a coordinate.

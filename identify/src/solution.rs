@@ -4,6 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::least_squares::LeastSquaresError;
+use crate::numeric_rank::without_noise;
 use crate::undetermined::{Direction, null_directions};
 
 /// Singular values of the column-scaled regressor below this fraction of the largest one count
@@ -87,16 +88,20 @@ pub(crate) fn solve_triangle(
     let r = DMatrix::from_fn(n, n, |i, j| triangle[i * width + j]);
     let qty = DVector::from_fn(n, |i, _| triangle[i * width + n]);
     let corner = triangle[n * width + n];
-    let norms: Vec<f64> = (0..n)
-        .map(|j| {
-            if r.column(j).norm() > 0.0 {
-                r.column(j).norm()
-            } else {
-                1.0
-            }
-        })
-        .collect();
-    let scaled = DMatrix::from_fn(n, n, |i, j| r[(i, j)] / norms[j]);
+    let mut norms: Vec<f64> = r.column_iter().map(|column| column.norm()).collect();
+    without_noise(&mut norms);
+    let scaled = DMatrix::from_fn(n, n, |i, j| {
+        if norms[j] > 0.0 {
+            r[(i, j)] / norms[j]
+        } else {
+            0.0
+        }
+    });
+    for norm in &mut norms {
+        if *norm == 0.0 {
+            *norm = 1.0;
+        }
+    }
     let svd = nalgebra::SVD::try_new(scaled, true, true, f64::EPSILON, 10_000)
         .ok_or(LeastSquaresError::NoConvergence)?;
     let (Some(u), Some(vt)) = (&svd.u, &svd.v_t) else {

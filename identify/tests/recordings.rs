@@ -104,7 +104,7 @@ fn faults_of_header_and_lines() {
     );
     check_refused(
         "t,q\n0\n",
-        "run.csv, line 2: 1 fields where the header has 2; complete or remove the line",
+        "run.csv, line 2: 1 field where the header has 2; complete or remove the line",
     );
 }
 
@@ -269,7 +269,7 @@ fn time_must_increase_and_gaps_are_said() {
     let run = gap.states(&names(&["q"]), &[]).unwrap();
     assert_eq!(run.notes[0].severity, Severity::Warning);
     assert!(
-        run.notes[0].says.contains("1 gaps") && run.notes[0].says.contains("after line 4"),
+        run.notes[0].says.contains("1 gap ") && run.notes[0].says.contains("after line 4"),
         "{}",
         run.notes[0].says
     );

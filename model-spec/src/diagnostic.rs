@@ -181,8 +181,11 @@ impl Log {
                     Severity::Warning
                 },
                 message: format!(
-                    "{} more findings are not shown; mend the first ones and look again",
-                    self.n_left_off
+                    "{} not shown; mend the first ones and look again",
+                    match self.n_left_off {
+                        1 => "1 more finding is".to_owned(),
+                        n => format!("{n} more findings are"),
+                    }
                 ),
                 span: None,
                 label: String::new(),

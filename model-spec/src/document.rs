@@ -6,6 +6,8 @@ use crate::diagnostic::{Diagnostic, Log, Span};
 
 /// Files larger than this are refused unread.
 pub(crate) const LARGEST_FILE: usize = 4 << 20;
+/// A text with more broken lines than this, and without a schema, is something else than a model file.
+const MOST_BROKEN_LINES: usize = 20;
 /// Names, paths and texts are cut to this length in messages.
 const LONGEST_QUOTE: usize = 60;
 
@@ -93,7 +95,9 @@ pub(crate) fn parse(text: &str, file: usize, log: &mut Log) -> Table {
     }
     let (root, mut errors) = DeTable::parse_recoverable(text);
     errors.sort_by_key(|error| error.span().map_or(0, |range| range.start));
+    let is_model = root.get_ref().contains_key("schema");
     let mut last: Option<usize> = None;
+    let mut found = Vec::new();
     for error in &errors {
         log.syntax_broken = true;
         // What follows on the same line is mostly a consequence.
@@ -109,10 +113,22 @@ pub(crate) fn parse(text: &str, file: usize, log: &mut Log) -> Table {
             start: range.start.min(text.len()),
             end: range.end.min(text.len()).max(range.start.min(text.len())),
         });
-        log.push(syntax_error(span, error.message()));
-        if log.is_full() {
+        found.push(syntax_error(span, error.message()));
+        if !is_model && found.len() > MOST_BROKEN_LINES {
+            let first = found[0].span.unwrap_or(whole);
+            log.push(
+                Diagnostic::error(first, "this is no model file")
+                    .label("expected TOML, such as `schema = 1`")
+                    .help("a recording goes behind `--data`, a model file before it"),
+            );
+            return Table::new();
+        }
+        if found.len() > 200 {
             break;
         }
+    }
+    for error in found {
+        log.push(error);
     }
     table(root.into_inner(), text, file)
 }

@@ -76,7 +76,8 @@ pub fn load_file(path: &Path) -> Result<Loaded, Failure> {
                 label: String::new(),
                 related: None,
                 help: vec![
-                    "give the path of a model file, such as `models/two_link.toml`".to_owned(),
+                    "give the path of a model file, such as `model-spec/models/two_link.toml`"
+                        .to_owned(),
                 ],
             }],
             sources: Sources::default(),

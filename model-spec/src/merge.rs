@@ -13,6 +13,17 @@ const ALTERNATIVES: [&[&[&str]]; 3] = [
     &[&["mass", "centre", "inertia"], &["linear"]],
     &[&["joint"], &["linear"]],
 ];
+/// A field that an entry of a list must have: an entry of a variant without it can only mean to override another one.
+const NEEDED: [(&str, &str); 8] = [
+    ("frame", "on"),
+    ("point", "on"),
+    ("part", "on"),
+    ("lumped_mass", "mass"),
+    ("loop", "joins"),
+    ("effect", "kind"),
+    ("effect_kind", "expression"),
+    ("drive", "name"),
+];
 /// Keys that are a file's own and are not taken over.
 const OWN: [&str; 4] = ["schema", "name", "extends", "remove"];
 
@@ -24,14 +35,14 @@ pub(crate) fn merge(mut base: Table, variant: Table, log: &mut Log) -> Table {
     }
     for (key, node) in variant {
         match base.iter_mut().find(|(old, _)| old.name == key.name) {
-            Some((_, old)) => merge_section(old, node),
+            Some((_, old)) => merge_section(&key.name, old, node, log),
             None => base.push((key, node)),
         }
     }
     base
 }
 
-fn merge_section(old: &mut Node, new: Node) {
+fn merge_section(section: &str, old: &mut Node, new: Node, log: &mut Log) {
     match (&mut old.value, new.value) {
         (Value::Table(old), Value::Table(new)) => {
             for (key, entry) in new {
@@ -58,6 +69,9 @@ fn merge_section(old: &mut Node, new: Node) {
                     .find(|other| name.is_some() && name_of(other) == name.as_deref());
                 match known {
                     Some(known) => merge_entry(known, entry),
+                    None if is_partial(section, &entry) && !log.syntax_broken => {
+                        log.push(overrides_nothing(section, &entry, &old[..n_old]));
+                    }
                     None => old.push(entry),
                 }
             }
@@ -100,6 +114,79 @@ fn merge_entry(old: &mut Node, new: Node) {
             None => old_fields.push((key, value)),
         }
     }
+}
+
+/// Whether an entry lacks what a new one must have, so that it can only mean to override.
+fn is_partial(section: &str, entry: &Node) -> bool {
+    let Value::Table(table) = &entry.value else {
+        return false;
+    };
+    NEEDED
+        .iter()
+        .any(|(list, key)| *list == section && get(table, key).is_none())
+}
+
+/// What is wrong with an entry that means to override, but none that there is.
+fn overrides_nothing(section: &str, entry: &Node, old: &[Node]) -> Diagnostic {
+    let (message, advice) = match name_of(entry) {
+        Some(name) => {
+            let names = old.iter().filter_map(name_of);
+            (
+                format!(
+                    "no `{section}` of the extended file is called `{}`",
+                    quote(name)
+                ),
+                names
+                    .clone()
+                    .next()
+                    .map(|_| suggest::advice(name, "names there", names.clone())),
+            )
+        }
+        None => (
+            format!("it is not said which `{section}` this overrides"),
+            Some("add its `name`".to_owned()),
+        ),
+    };
+    let needed = NEEDED
+        .iter()
+        .find(|(list, _)| *list == section)
+        .map_or("", |(_, key)| key);
+    with_unnamed(
+        Diagnostic::error(entry.span, message)
+            .label(format!(
+                "expected the name of an entry there, or `{needed}` and all else that a new entry needs"
+            ))
+            .help_if(advice),
+        section,
+        old,
+        None,
+    )
+}
+
+/// Adds that entries without a name cannot be overridden or removed, if there are any; `wanted` is what the user may
+/// have taken for a name.
+fn with_unnamed(
+    diagnostic: Diagnostic,
+    section: &str,
+    entries: &[Node],
+    wanted: Option<&str>,
+) -> Diagnostic {
+    let mut unnamed = entries.iter().filter(|entry| name_of(entry).is_none());
+    let says = |entry: &&Node| {
+        let Value::Table(table) = &entry.value else {
+            return false;
+        };
+        let texts = ["kind", "on"].map(|key| get(table, key).map(|(_, node)| &node.value));
+        texts
+            .iter()
+            .any(|value| matches!(value, Some(Value::Text { text, .. }) if Some(text.as_str()) == wanted))
+    };
+    let Some(first) = unnamed.clone().find(says).or_else(|| unnamed.next()) else {
+        return diagnostic;
+    };
+    diagnostic
+        .related(first.span, format!("this `{section}` has no name"))
+        .help("what has no `name` can be neither overridden nor removed: give it a name in the extended file")
 }
 
 /// The name of an entry of a list.
@@ -160,18 +247,23 @@ fn remove(base: &mut Table, list: &Node, log: &mut Log) {
             _ => false,
         };
         if !removed && !log.is_full() {
-            log.push(
+            let entries = match &base[position].1.value {
+                Value::Array(entries) => entries.as_slice(),
+                _ => &[],
+            };
+            let advice = (!names.is_empty() || entries.is_empty())
+                .then(|| suggest::advice(name, "names there", names.iter().map(String::as_str)));
+            log.push(with_unnamed(
                 Diagnostic::error(
                     path.span,
                     format!("there is no `{}` in `{section}` to remove", quote(name)),
                 )
                 .label("the extended file has no entry of this name")
-                .help(suggest::advice(
-                    name,
-                    "names there",
-                    names.iter().map(String::as_str),
-                )),
-            );
+                .help_if(advice),
+                section,
+                entries,
+                Some(name),
+            ));
         }
     }
 }

@@ -325,7 +325,10 @@ impl Read for Vector {
             log.push(
                 Diagnostic::error(
                     node.span,
-                    format!("this vector has {} entries", array.len()),
+                    match array.len() {
+                        1 => "this vector has 1 entry".to_owned(),
+                        n => format!("this vector has {n} entries"),
+                    },
                 )
                 .label("expected x, y and z, or x and y")
                 .help(format!("for example `{}`", Self::EXAMPLE)),

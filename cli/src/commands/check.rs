@@ -28,7 +28,12 @@ pub(crate) fn run(args: &CheckArgs) -> Outcome {
     let model = model::derive_loaded(&args.model.display().to_string(), &loaded)?;
     let summary = Summary::new(&model.derivation);
     if args.json {
-        let warnings = diagnostics(&loaded.warnings, &loaded.sources);
+        let mut warnings = diagnostics(&loaded.warnings, &loaded.sources);
+        warnings.extend(
+            model::retained_in_vain(&model.derivation)
+                .into_iter()
+                .map(|says| json!({ "severity": "warning", "says": says, "file": model.path })),
+        );
         return terminal::print_json(&summary.json(&model.name, &model.derivation, &warnings));
     }
     terminal::print(&summary.text(&model.name, &model.derivation))

@@ -8,13 +8,15 @@ use crate::data::{self, Data};
 use crate::failure::{Failure, Outcome};
 use crate::model;
 use crate::show;
+use crate::table::count;
 use crate::terminal;
 
 /// Prints error figures and the regions where the error lives.
 pub(crate) fn run(args: &CompareArgs) -> Outcome {
     let model = model::derive(&args.model)?;
     let values = model.values(&args.parameters)?;
-    let data = data::read_all(&model, &args.data, &args.preparation)?;
+    let mut data = data::read_all(&model, &args.data, &args.preparation)?;
+    data::note_twins(&mut data, &mut []);
     let measured = data
         .iter()
         .map(along::measured)
@@ -28,7 +30,7 @@ pub(crate) fn run(args: &CompareArgs) -> Outcome {
         .map(Vec::as_slice)
         .zip(forces.iter().map(Vec::as_slice));
     let figures = along::figures(&model.drives(), pairs)?;
-    let regions = along::regions(&model, &data, &measured, &forces)?;
+    let places = along::places(&model, &data, &measured, &forces)?;
     if args.json {
         let notes: Vec<_> = data.iter().flat_map(Data::notes).collect();
         let mut object = json!({
@@ -38,7 +40,7 @@ pub(crate) fn run(args: &CompareArgs) -> Outcome {
         let figures = serde_json::to_value(&figures).map_err(Failure::input)?;
         if let (Some(object), Some(figures)) = (object.as_object_mut(), figures.as_object()) {
             object.extend(figures.clone());
-            object.insert("where".to_owned(), json!(regions));
+            object.insert("where".to_owned(), json!(places.regions));
             object.insert("data".to_owned(), json!(notes));
         }
         return terminal::print_json(&object);
@@ -53,11 +55,11 @@ pub(crate) fn run(args: &CompareArgs) -> Outcome {
             .collect::<Vec<_>>()
             .join(", "),
     ))];
-    lines.push(format!("  {} samples", figures.samples));
+    lines.push(format!("  {}", count(figures.samples, "sample", "samples")));
     lines.push(String::new());
     lines.extend(show::figures(&[("error", &figures)]));
     lines.push(String::new());
     lines.push(style.bold("where the error lives"));
-    lines.extend(show::regions(&regions));
+    lines.extend(show::places(&places));
     terminal::print(&lines.join("\n"))
 }

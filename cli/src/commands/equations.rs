@@ -7,6 +7,7 @@ use crate::failure::Outcome;
 use crate::model::{self, Model};
 use crate::output::Target;
 use crate::sampled_rank::sampled_rank;
+use crate::table::count;
 use crate::terminal;
 
 /// Prints the equations, or writes them to a file.
@@ -76,10 +77,10 @@ fn numeric_rank(model: &Model) -> Option<NumericRank> {
     if found.rank < exact {
         terminal::warn(&format!(
             "{}: with the file's values the numeric rank is {}, below the exact {exact} for general values; \
-             special lengths or angles make columns coincide, so identification will find {} directions undetermined",
+             special values make columns vanish or coincide, so identification will find {} undetermined",
             model.path,
             found.rank,
-            exact - found.rank
+            count(exact - found.rank, "direction", "directions")
         ));
     } else if found.rank > exact {
         terminal::warn(&format!(

@@ -9,6 +9,7 @@ use crate::data;
 use crate::failure::Outcome;
 use crate::model;
 use crate::output::Target;
+use crate::table::count;
 use crate::terminal;
 
 /// Writes `t` and one column per drive.
@@ -24,23 +25,27 @@ pub(crate) fn run(args: &EvaluateArgs) -> Outcome {
         .transpose()?;
     let values = model.values(&args.parameters)?;
     let data = data::read(&model, &args.data, &args.preparation)?;
-    let forces = along::forces(&model, &data, &values)?;
-    let time = data.time();
     let mut text = format!("t,{}\n", model.drives().join(","));
-    for (i, t) in time.iter().enumerate() {
-        let _ = write!(text, "{t}");
-        for force in &forces {
-            let _ = write!(text, ",{}", force[i]);
+    let mut samples = 0;
+    for stretch in &data {
+        let forces = along::forces(&model, stretch, &values)?;
+        let time = stretch.time();
+        samples += time.len();
+        for (i, t) in time.iter().enumerate() {
+            let _ = write!(text, "{t}");
+            for force in &forces {
+                let _ = write!(text, ",{}", force[i]);
+            }
+            text.push('\n');
         }
-        text.push('\n');
     }
     match target {
         Some(target) => {
             target.write(&text)?;
             terminal::note(&format!(
-                "{}: {} samples of {}",
+                "{}: {} of {}",
                 target.path().display(),
-                time.len(),
+                count(samples, "sample", "samples"),
                 model.drives().join(", ")
             ));
             Ok(())

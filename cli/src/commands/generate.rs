@@ -6,6 +6,7 @@ use crate::args::GenerateArgs;
 use crate::failure::Outcome;
 use crate::model;
 use crate::output::Target;
+use crate::table::count;
 use crate::terminal;
 
 /// Writes the source that `cargo build` makes of the model.
@@ -21,9 +22,9 @@ pub(crate) fn run(args: &GenerateArgs) -> Outcome {
         Some(target) => {
             target.write(&source)?;
             terminal::note(&format!(
-                "{}: {} lines",
+                "{}: {}",
                 target.path().display(),
-                source.lines().count()
+                count(source.lines().count(), "line", "lines")
             ));
             Ok(())
         }

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use modelmill_identify::base_fit::fit_parameters;
-use modelmill_identify::{Figures, FitFile, Note};
+use modelmill_identify::{Figures, FitFile, FitParameter, Note, ParameterInfo, Severity, Status};
+use modelmill_spec::Sign;
 use serde_json::json;
 
 use crate::along;
@@ -12,7 +13,7 @@ use crate::data::{self, Data};
 use crate::failure::{Failure, Outcome};
 use crate::model::{self, Model};
 use crate::output::Target;
-use crate::regression;
+use crate::regression::{self, Identified};
 use crate::show;
 use crate::table::{count, number};
 use crate::terminal;
@@ -25,6 +26,8 @@ pub(crate) struct Result {
     pub(crate) nominal_fit: Figures,
     /// The same on the recordings of the check.
     pub(crate) nominal_check: Option<Figures>,
+    /// What the user should know about the result; the fit holds it too.
+    pub(crate) notes: Vec<Note>,
 }
 
 /// Identifies, prints and perhaps writes the fit.
@@ -36,17 +39,15 @@ pub(crate) fn run(args: &IdentifyArgs) -> Outcome {
         .as_ref()
         .map(|path| Target::new(path, inputs.map(AsRef::<Path>::as_ref)))
         .transpose()?;
-    for path in args.check.iter().filter(|path| args.data.contains(path)) {
-        terminal::warn(&format!(
-            "{} is used for the fit and for the check, which proves nothing",
-            path.display()
-        ));
-    }
-    let data = data::read_all(&model, &args.data, &args.preparation)?;
-    let check = data::read_all(&model, &args.check, &args.preparation)?;
+    let mut data = data::read_all(&model, &args.data, &args.preparation)?;
+    let mut check = data::read_all(&model, &args.check, &args.preparation)?;
+    data::note_twins(&mut data, &mut check);
     let result = identify(&model, &data, &check)?;
-    for says in &result.fit.undetermined {
-        terminal::warn(&format!("{says}; nominal values are kept for it"));
+    for note in &result.notes {
+        match note.severity {
+            Severity::Warning => terminal::warn(&note.says),
+            Severity::Info => terminal::note(&note.says),
+        }
     }
     let object = result.json()?;
     if let Some(target) = &target {
@@ -70,31 +71,143 @@ pub(crate) fn identify(model: &Model, data: &[Data], check: &[Data]) -> Outcome<
     let found = regression::identify(model, data)?;
     let solution = &found.solution;
     let infos = model.infos();
-    let names: Vec<String> = infos.iter().map(|info| info.expression.clone()).collect();
-    let (fit, nominal_fit) = both_figures(model, data, &solution.values)?;
+    let unknown: Vec<ParameterInfo> = found.unknown.iter().map(|k| infos[*k].clone()).collect();
+    let mut parameters = fit_parameters(&unknown, solution, &found.deviations);
+    for (k, info) in infos.iter().enumerate() {
+        if model.is_known(k) {
+            parameters.insert(k, known(info, model.nominal[k]));
+        }
+    }
+    let notes = remarks(model, &found, &parameters);
+    let values: Vec<f64> = parameters.iter().map(|p| p.value).collect();
+    let names: Vec<String> = unknown.into_iter().map(|info| info.expression).collect();
+    let (fit, nominal_fit) = both_figures(model, data, &values)?;
+    let recordings = data.iter().chain(check);
     let (check, nominal_check) = if check.is_empty() {
         (None, None)
     } else {
-        let (identified, nominal) = both_figures(model, check, &solution.values)?;
+        let (identified, nominal) = both_figures(model, check, &values)?;
         (Some(identified), Some(nominal))
     };
     let finite = |value: f64| value.is_finite().then_some(value);
-    let notes: Vec<Note> = data.iter().flat_map(Data::notes).cloned().collect();
+    let mut all_notes: Vec<Note> = recordings.flat_map(Data::notes).cloned().collect();
+    all_notes.extend(notes.iter().cloned());
+    let constants = &model.derivation.mechanism.constants;
     Ok(Result {
         fit: FitFile {
             model: model.name.clone(),
             samples: fit.samples,
             condition_number: finite(solution.condition_number),
             scaled_condition_number: finite(solution.scaled_condition_number),
-            parameters: fit_parameters(&infos, solution, &found.deviations),
+            parameters,
+            constants: constants
+                .iter()
+                .map(|c| (c.name.clone(), c.value))
+                .collect(),
             undetermined: solution.says_undetermined(&names),
             fit,
             check,
-            data: notes,
+            data: all_notes,
         },
         nominal_fit,
         nominal_check,
+        notes,
     })
+}
+
+/// A parameter that is a number of the model file.
+fn known(info: &ParameterInfo, value: f64) -> FitParameter {
+    FitParameter {
+        name: info.name.clone(),
+        expression: info.expression.clone(),
+        value,
+        std: None,
+        classical_std: None,
+        unit: info.unit.clone(),
+        nominal: info.nominal,
+        status: Status::Known,
+    }
+}
+
+/// What is not as one would wish: known parameters, undetermined ones, no deviations, impossible values.
+fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Vec<Note> {
+    let solution = &found.solution;
+    let mut notes = Vec::new();
+    for p in parameters.iter().filter(|p| p.status == Status::Known) {
+        notes.push(Note::info(format!(
+            "{} = {} holds numbers of the model file only: it is known, its force is taken off the measured one, and it is \
+             not identified.",
+            p.name, p.expression
+        )));
+    }
+    let unknown: Vec<&FitParameter> = found.unknown.iter().map(|k| &parameters[*k]).collect();
+    let names: Vec<String> = unknown.iter().map(|p| p.expression.clone()).collect();
+    for direction in &solution.undetermined {
+        let kept: Vec<String> = direction
+            .changes
+            .iter()
+            .map(|(i, _)| kept(unknown[*i]))
+            .collect();
+        let how = if kept.len() == 1 {
+            "it stays at"
+        } else {
+            "of all values that fit equally well those nearest to the nominal ones are taken:"
+        };
+        notes.push(Note::warning(format!(
+            "{}; {how} {}.",
+            direction.says(&names),
+            kept.join(", ")
+        )));
+    }
+    if solution.rows <= solution.rank {
+        notes.push(Note::warning(format!(
+            "There {} for as many unknown base parameters: no degree of freedom is left for the residuals, so neither \
+             standard deviations nor the error of the fit say anything; use a longer recording.",
+            match solution.rows {
+                1 => "is 1 equation".to_owned(),
+                n => format!("are {n} equations"),
+            }
+        )));
+    }
+    for (k, p) in parameters.iter().enumerate() {
+        let slack = 2.0 * p.std.unwrap_or(0.0);
+        let (wrong, expected) = match model.sign(k) {
+            Sign::Positive => (p.value < -slack, "positive"),
+            Sign::Negative => (p.value > slack, "negative"),
+            Sign::Any => continue,
+        };
+        if wrong && p.status == Status::Identified {
+            notes.push(Note::warning(format!(
+                "{} = {} comes out as {} {}, but must be {expected} to make physical sense: the model lacks something, or \
+                 the recording excites it too little.",
+                p.name,
+                p.expression,
+                number(p.value),
+                p.unit
+            )));
+        }
+    }
+    notes
+}
+
+/// The value of an undetermined parameter beside its nominal one.
+fn kept(p: &FitParameter) -> String {
+    let value = number(p.value);
+    match p.nominal {
+        Some(nominal) if number(nominal) == value => {
+            format!("{} = {value} {} (its nominal value)", p.name, p.unit)
+        }
+        Some(nominal) => format!(
+            "{} = {value} {} (nominal {})",
+            p.name,
+            p.unit,
+            number(nominal)
+        ),
+        None => format!(
+            "{} = {value} {} (the file gives no nominal value, 0 stands for it)",
+            p.name, p.unit
+        ),
+    }
 }
 
 /// Figures with identified and with nominal values.
@@ -138,11 +251,13 @@ impl Result {
     fn text(&self, model: &Model) -> String {
         let style = terminal::style();
         let fit = &self.fit;
+        let identified = fit.parameters.iter().filter(|p| p.status != Status::Known);
+        let identified = identified.count();
         let mut lines = vec![style.bold(&format!(
-            "{}: {} from {} samples",
+            "{}: {} from {}",
             fit.model,
-            count(fit.parameters.len(), "base parameter", "base parameters"),
-            fit.samples
+            count(identified, "base parameter", "base parameters"),
+            count(fit.samples, "sample", "samples")
         ))];
         lines.extend(show::expressions(2, model));
         lines.push(String::new());

@@ -9,7 +9,7 @@ use crate::build::symbols::{LINEAR, Symbols, explicit, shorthand, vector};
 use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::exact::{Exact, Symbol};
 use crate::formula::Formula;
-use crate::mechanism::{FrameIdx, Inertial, LumpedMass, Part};
+use crate::mechanism::{FrameIdx, Inertial, LumpedMass, Mechanism, Part};
 use crate::schema::{LinearEntry, LumpedMassEntry, ModelEntry, PartEntry};
 use crate::scope::{Sort, Wanted};
 use crate::unit::Dimension;
@@ -285,6 +285,60 @@ fn lumped_mass(
         frame,
         force_at: spot(force_at, frame, symbols, tree, points, log),
         moment_at: spot(moment_at, frame, symbols, tree, points, log),
+    }
+}
+
+/// Warns of masses and moments of inertia whose nominal values are negative.
+pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &mut Log) {
+    let mut look = |exact: &Exact, what: &str, unit: &str, span: Span| {
+        let value = exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
+        if value < 0.0 {
+            log.push(
+                Diagnostic::warning(
+                    span,
+                    format!("with nominal values {what} is {value} {unit}"),
+                )
+                .label("expected a positive value")
+                .help("check the signs here and of the nominal values of what stands here"),
+            );
+        }
+    };
+    let place = |formula: Option<&Formula>, or: Span| formula.map_or(or, |f| f.ast.span);
+    let parts = model.part.iter().flat_map(|list| &list.entries);
+    for (entry, part) in parts.zip(&mechanism.parts) {
+        let (mass, inertia, formulas, or) = match (&part.inertial, &entry.linear) {
+            (Inertial::Linear { mass, inertia, .. }, Some(linear)) => {
+                let nominal = linear.nominal.as_ref().map_or(linear.span, |n| n.span);
+                let formulas = ["M", "XX", "YY", "ZZ"].map(|symbol| explicit(linear, symbol));
+                (mass, inertia, formulas, nominal)
+            }
+            (
+                Inertial::AboutCentre { mass, inertia, .. }
+                | Inertial::Linear { mass, inertia, .. },
+                _,
+            ) => {
+                let axes = entry.inertia.as_ref();
+                let formulas = [
+                    entry.mass.as_ref(),
+                    axes.and_then(|axes| axes.xx.as_ref()),
+                    axes.and_then(|axes| axes.yy.as_ref()),
+                    axes.and_then(|axes| axes.zz.as_ref()),
+                ];
+                (mass, inertia, formulas, entry.span)
+            }
+        };
+        let [m, x, y, z] = formulas.map(|formula| place(formula, or));
+        let part = &part.name;
+        look(mass, &format!("the mass of `{part}`"), "kg", m);
+        for (axis, i, span) in [("x", 0, x), ("y", 3, y), ("z", 5, z)] {
+            let what = format!("the moment of inertia of `{part}` about {axis}");
+            look(&inertia[i], &what, "kg m^2", span);
+        }
+    }
+    let lumped = model.lumped_mass.iter().flat_map(|list| &list.entries);
+    for (entry, lumped) in lumped.zip(&mechanism.lumped_masses) {
+        let span = place(entry.mass.as_ref(), entry.span);
+        look(&lumped.mass, "this lumped mass", "kg", span);
     }
 }
 

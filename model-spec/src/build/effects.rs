@@ -5,18 +5,19 @@ use std::collections::BTreeMap;
 use crate::build::bodies::check_unique;
 use crate::build::frames::{Points, twice};
 use crate::build::symbols::{Shared, Symbols};
-use crate::diagnostic::{Diagnostic, Log};
+use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::document::Key;
 use crate::exact::{CoordinateIdx, Exact, ParameterIdx, Symbol};
 use crate::formula::{Ast, AstKind};
 use crate::kind_terms::{factors, lacking_units, unit_at};
 use crate::kinds::{Carries, check, library_entries};
 use crate::mechanism::{Drive, DriveIdx, DriveKind, Effect, EffectTerm, Motion, Parameter, Place};
-use crate::schema::{EffectEntry, EffectKindEntry, ModelEntry};
+use crate::schema::{EffectEntry, EffectKindEntry, KindParameterEntry, ModelEntry};
 use crate::scope::{Sort, Wanted};
 use crate::suggest;
-use crate::unit::Dimension;
+use crate::unit::{Dimension, Unit};
 use crate::values::Name;
-use crate::values::PlaceKind;
+use crate::values::{PlaceKind, SignName};
 
 /// Reads the effects; their parameters join those of the file.
 pub(super) fn effects(
@@ -34,9 +35,42 @@ pub(super) fn effects(
         entries.clone().filter_map(|entry| entry.name.as_ref()),
         log,
     );
+    warn_of_twins(entries.clone(), log);
     entries
         .filter_map(|entry| effect(entry, &kinds, symbols, drives, points, log))
         .collect()
+}
+
+/// Warns of a kind that acts twice at one place with the same constants: the columns are equal, and a variant that means
+/// to override an effect without a name brings this about.
+fn warn_of_twins<'a>(entries: impl Iterator<Item = &'a EffectEntry>, log: &mut Log) {
+    let mut seen: BTreeMap<(&str, &str), (&EffectEntry, &Name)> = BTreeMap::new();
+    for entry in entries.filter(|entry| entry.constants.is_none()) {
+        let Some(kind) = &entry.kind else { continue };
+        for place in entry.at.iter().flat_map(|at| &at.entries) {
+            let known = *seen
+                .entry((&kind.text, &place.text))
+                .or_insert((entry, place));
+            let (first, first_place) = known;
+            if std::ptr::eq(first, entry) {
+                continue;
+            }
+            let remedy = if first.name.is_none() && first_place.span.file != place.span.file {
+                "to override the effect of the extended file, give it a `name` there and here the same one"
+            } else {
+                "delete one of them"
+            };
+            log.push(
+                Diagnostic::warning(
+                    place.span,
+                    format!("`{}` acts twice at `{}`", kind.text, place.text),
+                )
+                .label("the effects add up")
+                .related(first_place.span, "it acts there already")
+                .help(remedy),
+            );
+        }
+    }
 }
 
 /// A kind and whether it is sound.
@@ -121,7 +155,7 @@ fn effect(
     let before = log.n_errors();
     let constants = constants(entry, kind, kind_name, symbols, carries, log);
     let factors = factors(kind, carries, &constants, log)?;
-    let place_names = at
+    let places_name = at
         .entries
         .iter()
         .map(|name| name.text.as_str())
@@ -130,49 +164,9 @@ fn effect(
     let mut terms = Vec::new();
     let parameters = kind.parameters.iter().flat_map(|table| &table.entries);
     for ((key, parameter), expression) in parameters.zip(factors) {
-        let said = entry
-            .parameters
-            .iter()
-            .flat_map(|table| &table.entries)
-            .find(|(name, _)| name.name == key.name)
-            .map(|(_, said)| said);
-        let named = said.and_then(|said| said.name.as_ref());
-        let name = named.map_or_else(
-            || format!("{}_{place_names}", key.name),
-            |name| name.text.clone(),
-        );
-        let span = named.map_or(kind_name.span, |name| name.span);
-        let nominal = said.and_then(|said| said.nominal);
         let unit = unit_at(parameter.unit.as_ref(), carries)?;
-        let shared = symbols.share_parameter(&name, Some(unit.dimension), span, nominal, log);
-        let idx = match shared {
-            Shared::Known(idx) => idx,
-            Shared::Faulty => return None,
-            Shared::New => {
-                let idx = ParameterIdx(symbols.parameters.len());
-                let fine = symbols.declare_parameter(
-                    Parameter {
-                        name,
-                        nominal: nominal.map_or(0.0, |number| number.value),
-                        unit: unit.text.clone(),
-                        note: parameter.note.as_ref().map(|note| note.text.clone()),
-                    },
-                    Some(unit.dimension),
-                    span,
-                    nominal.map(|number| number.span),
-                    log,
-                );
-                if !fine {
-                    return None;
-                }
-                idx
-            }
-        };
-        if let Some(meaning) = symbols.scope.get(&symbols.parameters[idx.0].name) {
-            meaning.used.set(true);
-        }
         terms.push(EffectTerm {
-            parameter: idx,
+            parameter: term_parameter(entry, key, parameter, unit, &places_name, symbols, log)?,
             expression,
         });
     }
@@ -181,6 +175,88 @@ fn effect(
         places,
         terms,
     })
+}
+
+/// The parameter of one term of an effect: one that the file knows, or a new one.
+fn term_parameter(
+    entry: &EffectEntry,
+    key: &Key,
+    parameter: &KindParameterEntry,
+    unit: &Unit,
+    places_name: &str,
+    symbols: &mut Symbols,
+    log: &mut Log,
+) -> Option<ParameterIdx> {
+    let said = entry
+        .parameters
+        .iter()
+        .flat_map(|table| &table.entries)
+        .find(|(name, _)| name.name == key.name)
+        .map(|(_, said)| said);
+    let named = said.and_then(|said| said.name.as_ref());
+    let name = named.map_or_else(
+        || format!("{}_{places_name}", key.name),
+        |name| name.text.clone(),
+    );
+    let kind_span = entry.kind.as_ref().map_or(entry.span, |kind| kind.span);
+    let span = named.map_or(kind_span, |name| name.span);
+    let nominal = said.and_then(|said| said.nominal);
+    let shared = symbols.share_parameter(&name, Some(unit.dimension), span, nominal, log);
+    let idx = match shared {
+        Shared::Known(idx) => idx,
+        Shared::Faulty => return None,
+        Shared::New => {
+            let idx = ParameterIdx(symbols.parameters.len());
+            let fine = symbols.declare_parameter(
+                Parameter {
+                    name,
+                    nominal: nominal.map_or(0.0, |number| number.value),
+                    unit: unit.text.clone(),
+                    note: parameter.note.as_ref().map(|note| note.text.clone()),
+                },
+                Some(unit.dimension),
+                span,
+                nominal.map(|number| number.span),
+                log,
+            );
+            if !fine {
+                return None;
+            }
+            idx
+        }
+    };
+    let nominal_span = nominal.map_or(span, |number| number.span);
+    warn_of_sign(
+        &symbols.parameters[idx.0],
+        parameter.sign,
+        nominal_span,
+        log,
+    );
+    if let Some(meaning) = symbols.scope.get(&symbols.parameters[idx.0].name) {
+        meaning.used.set(true);
+    }
+    Some(idx)
+}
+
+/// Warns of a nominal value whose sign makes no physical sense.
+fn warn_of_sign(parameter: &Parameter, sign: Option<SignName>, span: Span, log: &mut Log) {
+    let value = parameter.nominal;
+    let expected = match sign {
+        Some(SignName::Positive) if value < 0.0 => "positive",
+        Some(SignName::Negative) if value > 0.0 => "negative",
+        _ => return,
+    };
+    log.push(
+        Diagnostic::warning(
+            span,
+            format!(
+                "the nominal value of `{}` is {value} {}",
+                parameter.name, parameter.unit
+            ),
+        )
+        .label(format!("expected a {expected} value"))
+        .help("check its sign, and whether the kind is the one that is meant"),
+    );
 }
 
 fn place(

@@ -80,6 +80,7 @@ pub(crate) fn build(model: &ModelEntry, log: &mut Log) -> (Option<Mechanism>, Ve
         retain,
         recording: Recording { columns },
     };
+    bodies::warn_of_negative(model, &mechanism, log);
     pose::check(&mut mechanism, &places, log);
     ((log.n_errors() == 0).then_some(mechanism), kinds)
 }

@@ -169,14 +169,14 @@ impl Story {
             &chapter.check,
             &chapter.result.values(),
         )?];
-        let regions = along::regions(
+        let places = along::places(
             chapter.model,
             std::slice::from_ref(&chapter.check),
             &measured,
             &forces,
         )?;
         self.line("Where what is left lives, on the check:");
-        self.lines(&show::regions(&regions));
+        self.lines(&show::places(&places));
         self.line("");
         Ok(())
     }
