@@ -198,6 +198,36 @@ impl Graph {
         atoms
     }
 
+    /// A graph of what some roots need and nothing else, in the same order, with the roots there.
+    pub(crate) fn compacted(&self, roots: &[ExprId]) -> (Self, Vec<ExprId>) {
+        let mut compact = Self::new();
+        let mut new = vec![Self::ZERO; self.nodes.len()];
+        new[Self::ONE.index()] = Self::ONE;
+        for (i, needed) in self.reachable(roots).into_iter().enumerate().skip(2) {
+            if needed {
+                let node = match self.nodes[i].clone() {
+                    Node::Sum(terms) => Node::Sum(
+                        terms
+                            .into_iter()
+                            .map(|(c, k)| (new[c.index()], k))
+                            .collect(),
+                    ),
+                    Node::Product(factors) => Node::Product(
+                        factors
+                            .into_iter()
+                            .map(|(c, n)| (new[c.index()], n))
+                            .collect(),
+                    ),
+                    Node::Unary(function, c) => Node::Unary(function, new[c.index()]),
+                    leaf => leaf,
+                };
+                new[i] = compact.intern(node);
+            }
+        }
+        let roots = roots.iter().map(|root| new[root.index()]).collect();
+        (compact, roots)
+    }
+
     fn intern(&mut self, node: Node) -> ExprId {
         if let Some(id) = self.ids.get(&node) {
             return *id;

@@ -37,24 +37,26 @@ pub(crate) struct Request<'a> {
 }
 
 /// Lowers the expressions of a request to a program.
-pub(crate) fn lower(graph: &mut Graph, request: &Request<'_>) -> Program {
+pub(crate) fn lower(graph: &Graph, request: &Request<'_>) -> Program {
     let mut roots: Vec<ExprId> = request.outputs.to_vec();
     roots.extend(request.reachable);
     roots.extend(request.regular.iter().map(|(id, _)| *id));
     for definition in request.definitions {
         roots.extend(definition.operands());
     }
-    let mut best = roots.clone();
-    let mut best_cost = cost::cost(graph, &best);
+    // The passes go through the whole arena again and again, so that only what is needed should be in it.
+    let (mut best_graph, mut best) = graph.compacted(&roots);
+    let mut best_cost = cost::cost(&best_graph, &best);
     for _ in 0..4 {
-        let mut next = flatten::flatten(graph, &best);
-        next = factor_sums::factor_sums(graph, &next);
-        next = share::share(graph, &next);
-        let cost = cost::cost(graph, &next);
+        let (mut graph, mut next) = best_graph.compacted(&best);
+        next = flatten::flatten(&mut graph, &next);
+        next = factor_sums::factor_sums(&mut graph, &next);
+        (graph, next) = share::share(graph, &next);
+        let cost = cost::cost(&graph, &next);
         if cost >= best_cost {
             break;
         }
-        (best, best_cost) = (next, cost);
+        (best_graph, best, best_cost) = (graph, next, cost);
     }
-    schedule::schedule(graph, &best, request)
+    schedule::schedule(&best_graph, &best, request)
 }

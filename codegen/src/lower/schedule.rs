@@ -1,7 +1,7 @@
 //! The last pass: n-ary sums and products become binary operations, fixed factors and terms are gathered so that they
 //! are computed once, and equal operations are shared.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use super::program::{Guard, Op, Program, Stage, ValueId};
 use super::{Request, is_fixed};
@@ -134,10 +134,8 @@ impl Scheduler<'_> {
         if let Some(value) = self.values.get(&id) {
             return *value;
         }
-        let needed = self.graph.reachable(&[id]);
-        for (i, needed) in needed.into_iter().enumerate() {
-            let node = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
-            if needed && !self.values.contains_key(&node) && !self.is_inner(node) {
+        for node in self.unknown_below(id) {
+            if !self.values.contains_key(&node) && !self.is_inner(node) {
                 let value = self.make(node);
                 self.values.insert(node, value);
             }
@@ -150,6 +148,20 @@ impl Scheduler<'_> {
                 value
             }
         }
+    }
+
+    /// A node and what it needs that has no value yet, operands first.
+    fn unknown_below(&self, id: ExprId) -> BTreeSet<ExprId> {
+        let mut found = BTreeSet::from([id]);
+        let mut open = vec![id];
+        while let Some(node) = open.pop() {
+            self.graph.for_each_child(node, |child| {
+                if !self.values.contains_key(&child) && found.insert(child) {
+                    open.push(child);
+                }
+            });
+        }
+        found
     }
 
     /// Plain numbers become operations only where they are used.

@@ -7,16 +7,21 @@ use super::schedule::fixed_nodes;
 use crate::expr::{ExprId, Graph, Node, Rational};
 
 /// Gives a node of its own to every pair that occurs at least twice, most frequent first.
-pub(crate) fn share(graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
-    let mut roots = roots.to_vec();
+pub(crate) fn share(graph: Graph, roots: &[ExprId]) -> (Graph, Vec<ExprId>) {
+    let (mut graph, mut roots) = graph.compacted(roots);
+    let mut live = graph.len();
     for _ in 0..200 {
-        let pairs = common_pairs(graph, &roots);
+        let pairs = common_pairs(&graph, &roots);
         if pairs.is_empty() {
             break;
         }
-        roots = replace(graph, &roots, &pairs);
+        roots = replace(&mut graph, &roots, &pairs);
+        if graph.len() > 2 * live {
+            (graph, roots) = graph.compacted(&roots);
+            live = graph.len();
+        }
     }
-    roots
+    (graph, roots)
 }
 
 /// Two operands that stand together: factors, or terms with the ratio of their coefficients.

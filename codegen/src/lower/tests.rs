@@ -47,7 +47,7 @@ fn values(graph: &Graph, roots: &[ExprId], seed: u64) -> Vec<Element> {
 #[test]
 fn every_pass_keeps_the_value_of_each_output() {
     for model in ["spidermill-paper.toml", "puma560.toml", "three_rrr.toml"] {
-        let mut derivation = derivation(model);
+        let derivation = derivation(model);
         let roots: Vec<ExprId> = derivation
             .equations
             .columns
@@ -55,21 +55,27 @@ fn every_pass_keeps_the_value_of_each_output() {
             .flatten()
             .copied()
             .collect();
-        let graph = &mut derivation.graph;
-        let expected = values(graph, &roots, 11);
-        let mut now = roots;
+        let expected = values(&derivation.graph, &roots, 11);
+        type Pass = fn(Graph, &[ExprId]) -> (Graph, Vec<ExprId>);
+        let flatten: Pass = |mut graph, roots| {
+            let new = flatten::flatten(&mut graph, roots);
+            (graph, new)
+        };
+        let factor_sums: Pass = |mut graph, roots| {
+            let new = factor_sums::factor_sums(&mut graph, roots);
+            (graph, new)
+        };
+        let (mut graph, mut now) = (derivation.graph, roots);
         for (name, pass) in [
-            (
-                "flatten",
-                flatten::flatten as fn(&mut Graph, &[ExprId]) -> Vec<ExprId>,
-            ),
-            ("factor_sums", factor_sums::factor_sums),
+            ("compacted", (|graph, roots| graph.compacted(roots)) as Pass),
+            ("flatten", flatten),
+            ("factor_sums", factor_sums),
             ("share", share::share),
-            ("flatten again", flatten::flatten),
+            ("flatten again", flatten),
         ] {
-            now = pass(graph, &now);
+            (graph, now) = pass(graph, &now);
             assert!(
-                values(graph, &now, 11) == expected,
+                values(&graph, &now, 11) == expected,
                 "{name} changes a value of {model}"
             );
         }

@@ -3,7 +3,7 @@
 use modelmill_spec::{DriveKind, Mechanism, Motion, Place};
 
 use super::document::{Block, Document, Equation, Inline, Line, Table, cell, code, text};
-use crate::expr::print::{Formula, angle_sum, exact, formula, tree_size};
+use crate::expr::print::{Formula, angle_sum, exact_at, formula, tree_size};
 use crate::expr::{ExprId, Graph, Rational};
 use crate::programs::nominal_value;
 use crate::reduce::{Unknowns, plan};
@@ -257,6 +257,9 @@ pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
     }
 }
 
+/// Stands for the coordinate of each of several places.
+const EACH: &str = "x";
+
 /// Effects with their expressions.
 pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
     if mechanism.effects.is_empty() {
@@ -264,11 +267,11 @@ pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
     }
     page.heading("Effects");
     page.paragraph([
-        text("Each adds to the force of its place; "),
-        Inline::Math(Formula::name("x")),
-        text(" is the coordinate of the place, dots are its time derivatives, "),
+        text("Each adds to the force of its place; a linear drive's name stands for its length, "),
         code("load"),
-        text(" is the force that it carries. At a point the parameter is a mass."),
+        text(" for the force that the place carries. Where an effect acts at several places, "),
+        Inline::Math(Formula::name(EACH)),
+        text(" is the coordinate of each. At a point the parameter is a mass."),
     ]);
     let rows = mechanism
         .effects
@@ -285,11 +288,19 @@ pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
                     Place::Point(p) => &*mechanism.points[p.0].name,
                 }));
             }
+            let x = match effect.places.as_slice() {
+                [Place::Drive(d)] => match mechanism.drives[d.0].kind {
+                    DriveKind::Joint(c) => &*mechanism.coordinates[c.0].name,
+                    DriveKind::Linear { .. } => &*mechanism.drives[d.0].name,
+                },
+                [Place::Coordinate(c)] => &*mechanism.coordinates[c.0].name,
+                _ => EACH,
+            };
             let sum = Formula::sum(effect.terms.iter().map(|term| {
                 let parameter = Formula::name(&*mechanism.parameters[term.parameter.0].name);
                 Formula::product(
                     Rational::ONE,
-                    [parameter, exact(mechanism, &term.expression)],
+                    [parameter, exact_at(mechanism, &term.expression, x)],
                 )
             }));
             vec![

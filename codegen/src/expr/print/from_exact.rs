@@ -6,13 +6,18 @@ use super::formula::{Formula, Function};
 use super::symbol::Symbol;
 use crate::expr::Rational;
 
-/// The formula of an exact expression; quantities of a place are called `x`, `x_d`, `x_dd` and `load`.
+/// The formula of an exact expression.
 pub fn exact(mechanism: &Mechanism, expression: &Exact) -> Formula {
-    let of = |inner: &Exact| exact(mechanism, inner);
+    exact_at(mechanism, expression, "x")
+}
+
+/// The formula of an exact expression that acts at the place `x`: `x`, `x_d`, `x_dd` and `load` are its quantities.
+pub fn exact_at(mechanism: &Mechanism, expression: &Exact, x: &str) -> Formula {
+    let of = |inner: &Exact| exact_at(mechanism, inner, x);
     match expression {
         Exact::Rational(value) => Formula::Number(Rational::from(value.clone())),
         Exact::Pi => Formula::name("pi"),
-        Exact::Symbol(symbol) => Formula::Symbol(name(mechanism, *symbol)),
+        Exact::Symbol(symbol) => Formula::Symbol(name(mechanism, *symbol, x)),
         Exact::Sum(terms) => Formula::sum(terms.iter().map(of)),
         Exact::Product(factors) => Formula::product(Rational::ONE, factors.iter().map(of)),
         Exact::Quotient(above, below) => Formula::quotient(of(above), of(below)),
@@ -37,7 +42,7 @@ pub fn exact(mechanism: &Mechanism, expression: &Exact) -> Formula {
 pub fn angle(mechanism: &Mechanism, angle: &Angle) -> Formula {
     let turns = Formula::product(Rational::from(angle.pi.clone()), [Formula::name("pi")]);
     let terms = angle.terms.iter().map(|(symbol, n)| {
-        let symbol = Formula::Symbol(name(mechanism, *symbol));
+        let symbol = Formula::Symbol(name(mechanism, *symbol, "x"));
         Formula::product(Rational::integer(i64::from(*n)), [symbol])
     });
     Formula::sum(terms.chain([turns]))
@@ -52,15 +57,15 @@ pub fn length(mechanism: &Mechanism, length: &Length) -> Formula {
     Formula::sum([exact(mechanism, &length.offset)].into_iter().chain(slides))
 }
 
-fn name(mechanism: &Mechanism, symbol: modelmill_spec::Symbol) -> Symbol {
+fn name(mechanism: &Mechanism, symbol: modelmill_spec::Symbol, x: &str) -> Symbol {
     use modelmill_spec::Symbol as Named;
     match symbol {
         Named::Constant(i) => Symbol::new(&*mechanism.constants[i.0].name),
         Named::Parameter(i) => Symbol::new(&*mechanism.parameters[i.0].name),
         Named::Coordinate(i) => Symbol::new(&*mechanism.coordinates[i.0].name),
-        Named::Place(PlaceQuantity::Coordinate) => Symbol::new("x"),
-        Named::Place(PlaceQuantity::Rate) => Symbol::derived("x", 1),
-        Named::Place(PlaceQuantity::Acceleration) => Symbol::derived("x", 2),
+        Named::Place(PlaceQuantity::Coordinate) => Symbol::new(x),
+        Named::Place(PlaceQuantity::Rate) => Symbol::derived(x, 1),
+        Named::Place(PlaceQuantity::Acceleration) => Symbol::derived(x, 2),
         Named::Place(PlaceQuantity::Load) => Symbol::new("load"),
     }
 }

@@ -19,7 +19,7 @@ mod text;
 pub(crate) mod tests;
 
 pub use formula::{Formula, Function};
-pub use from_exact::{angle, exact, length};
+pub use from_exact::{angle, exact, exact_at, length};
 pub(crate) use from_graph::angle_sum;
 pub use from_graph::{atom, formula, tree_size};
 pub use mathml::escape;
