@@ -51,7 +51,7 @@ pub(crate) fn lower(graph: &Graph, request: &Request<'_>) -> Program {
         let (mut graph, mut next) = best_graph.compacted(&best);
         next = flatten::flatten(&mut graph, &next);
         next = factor_sums::factor_sums(&mut graph, &next);
-        (graph, next) = share::share(graph, &next);
+        (graph, next) = share::share(&graph, &next);
         let cost = cost::cost(&graph, &next);
         if cost >= best_cost {
             break;

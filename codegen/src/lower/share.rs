@@ -7,7 +7,7 @@ use super::schedule::fixed_nodes;
 use crate::expr::{ExprId, Graph, Node, Rational};
 
 /// Gives a node of its own to every pair that occurs at least twice, most frequent first.
-pub(crate) fn share(graph: Graph, roots: &[ExprId]) -> (Graph, Vec<ExprId>) {
+pub(crate) fn share(graph: &Graph, roots: &[ExprId]) -> (Graph, Vec<ExprId>) {
     let (mut graph, mut roots) = graph.compacted(roots);
     let mut live = graph.len();
     for _ in 0..200 {
