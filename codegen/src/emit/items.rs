@@ -1,11 +1,11 @@
 //! The items of an emitted module: names and units, geometry, parameters, state, and the functions of the model.
 
 use proc_macro2::{Literal, TokenStream};
-use quote::quote;
+use quote::{format_ident, quote};
 
 use super::body::Body;
 use super::functions::{inverse_dynamics, model};
-use super::identifier;
+use super::identifier::of_field;
 use crate::Derivation;
 use crate::expr::Atom;
 use crate::lower::{Op, OperationCount, Program, Stage};
@@ -90,7 +90,7 @@ pub(super) fn items(derivation: &Derivation) -> TokenStream {
     let model = model(derivation);
     let inverse_dynamics = inverse_dynamics(derivation);
     quote! {
-        use modelmill_runtime::{BaseParameter, PoseError, Quantity, Real};
+        use ::modelmill_runtime::{BaseParameter, PoseError, Quantity, Real};
 
         #tables
         #geometry
@@ -175,18 +175,18 @@ pub(super) fn signed(value: f64) -> TokenStream {
 
 /// A struct of named quantities with a default.
 fn record(name: &str, doc: &str, fields: &[(&str, f64, &str)]) -> TokenStream {
-    let name = identifier(name);
+    let name = format_ident!("{name}");
     if fields.is_empty() {
         return quote! {
             #[doc = #doc]
             #[derive(Clone, Copy, Debug, PartialEq)]
-            pub struct #name<T> { nothing: core::marker::PhantomData<T> }
+            pub struct #name<T> { nothing: ::core::marker::PhantomData<T> }
             impl<T: Real> Default for #name<T> {
-                fn default() -> Self { Self { nothing: core::marker::PhantomData } }
+                fn default() -> Self { Self { nothing: ::core::marker::PhantomData } }
             }
         };
     }
-    let idents: Vec<_> = fields.iter().map(|f| identifier(f.0)).collect();
+    let idents: Vec<_> = fields.iter().map(|f| of_field(f.0)).collect();
     let docs = fields.iter().map(|f| format!(" Unit: {}.", f.2));
     let values = fields.iter().map(|f| signed(f.1));
     quote! {
@@ -239,13 +239,13 @@ pub(super) fn input(derivation: &Derivation) -> impl Fn(Atom) -> TokenStream {
         .mechanism
         .constants
         .iter()
-        .map(|c| identifier(&c.name))
+        .map(|c| of_field(&c.name))
         .collect();
     let parameters: Vec<_> = derivation
         .mechanism
         .parameters
         .iter()
-        .map(|p| identifier(&p.name))
+        .map(|p| of_field(&p.name))
         .collect();
     move |atom| {
         let position = |i: usize| active.iter().position(|a| *a == i);
@@ -278,7 +278,7 @@ pub(super) fn input(derivation: &Derivation) -> impl Fn(Atom) -> TokenStream {
                 quote! { state.qdd[#k] }
             }
             Atom::Load(d) => quote! { state.load[#d] },
-            Atom::Pi => quote! { T::from_f64(core::f64::consts::PI) },
+            Atom::Pi => quote! { T::from_f64(::core::f64::consts::PI) },
         }
     }
 }

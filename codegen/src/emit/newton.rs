@@ -94,7 +94,7 @@ pub(super) fn newton(derivation: &Derivation) -> Option<Function> {
             let mut smallest = T::from_f64(1e30);
             for _ in 0..40 {
                 let (residual, jacobian) = self.loops(q, &passive);
-                let step = modelmill_runtime::solve(jacobian, residual)?;
+                let step = ::modelmill_runtime::solve(jacobian, residual)?;
                 let mut size = T::from_f64(0.0);
                 for k in 0..N_PASSIVE {
                     let most = T::from_f64(0.5);
