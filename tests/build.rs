@@ -8,6 +8,8 @@
 mod mechanics;
 #[path = "src/random/mod.rs"]
 mod random;
+#[path = "src/scaled.rs"]
+mod scaled;
 #[path = "src/stream.rs"]
 mod stream;
 
@@ -20,8 +22,18 @@ use random::Matter;
 /// Mechanisms of each kind; loops with effects of the load would need another state.
 const EACH: usize = 8;
 
-/// Fixtures whose modules are tested.
-const FIXTURES: [&str; 1] = ["names"];
+/// Fixtures whose modules are tested, and units of length in which they are emitted besides.
+///
+/// Where a length is the independent coordinate, the numeric reduction needs lengths of a metre or more.
+const FIXTURES: [(&str, &[(&str, f64)]); 3] = [
+    ("names", &[]),
+    ("spatial_slider", &[MM, LARGE, KM, SMALL]),
+    ("spatial_press", &[MM, LARGE]),
+];
+const MM: (&str, f64) = ("mm", 1e3);
+const KM: (&str, f64) = ("km", 1e-3);
+const LARGE: (&str, f64) = ("large", 1024.0);
+const SMALL: (&str, f64) = ("small", 1.0 / 1024.0);
 
 fn main() {
     println!("cargo::rerun-if-changed=src");
@@ -44,12 +56,16 @@ fn fixture_models() -> String {
     let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/emitted");
     println!("cargo::rerun-if-changed={}", fixtures.display());
     let mut modules = String::new();
-    for name in FIXTURES {
+    for (name, units) in FIXTURES {
         let mechanism = match modelmill_spec::load_file(&fixtures.join(format!("{name}.toml"))) {
             Ok(loaded) => loaded.mechanism,
             Err(failure) => panic!("{name}: {}", failure.render(false)),
         };
         modules.push_str(&module(&mechanism));
+        for (unit, factor) in units {
+            let name = format!("{name}_{unit}");
+            modules.push_str(&module(&scaled::scaled(&mechanism, &name, *factor)));
+        }
     }
     modules
 }

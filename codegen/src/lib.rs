@@ -14,6 +14,7 @@ mod inertia;
 mod linear;
 mod linear_loops;
 mod lower;
+mod magnitude;
 mod newton_euler;
 mod numeric_pose;
 mod programs;
@@ -32,7 +33,7 @@ pub use error::DeriveError;
 pub use evaluate::{Evaluator, PoseFault, PoseReason, States};
 pub use exact::Monomial;
 pub use lower::{Guard, Op, OperationCount, Program, Stage, ValueId};
-pub use programs::{PassivePosition, Programs};
+pub use programs::{LoopPrograms, PassivePosition, Programs};
 pub use reduce::{Dependency, Method, Polynomial, Powers, RationalFunction, Reduction, Variable};
 
 use expr::Graph;

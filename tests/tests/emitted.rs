@@ -214,6 +214,20 @@ fn words_of_rust_may_be_names() {
     check(&derivation, &sample, &found, 1e-12);
 }
 
+#[test]
+fn loops_in_space_agree_with_the_evaluator() {
+    let derivation = derived("spatial_slider");
+    let sample = sample_of(&derivation);
+    let found = run!(fixture_models, spatial_slider, f64, &sample, passive);
+    check(&derivation, &sample, &found, 1e-12);
+    let found = run!(fixture_models, spatial_slider, f32, &sample, passive);
+    check(&derivation, &sample, &found, 5e-3);
+    let derivation = derived("spatial_press");
+    let sample = sample_of(&derivation);
+    let found = run!(fixture_models, spatial_press, f64, &sample, passive);
+    check(&derivation, &sample, &found, 1e-12);
+}
+
 /// A test that a random mechanism's module agrees with the evaluator.
 macro_rules! agrees_at_random {
     ($($model:ident: $function:ident $seed:literal $($passive:ident)?;)+) => {

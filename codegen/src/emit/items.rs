@@ -9,6 +9,7 @@ use super::identifier::of_field;
 use crate::Derivation;
 use crate::expr::Atom;
 use crate::lower::{Op, OperationCount, Program, Stage};
+use crate::programs::PassivePosition;
 
 /// What the module says of itself.
 pub(super) fn module_doc(derivation: &Derivation) -> String {
@@ -75,6 +76,7 @@ pub(super) fn items(derivation: &Derivation) -> TokenStream {
         .iter()
         .map(|p| (p.name.as_str(), p.nominal, p.unit.as_str()))
         .collect();
+    let geometry_check = geometry_check(derivation);
     let geometry = record(
         "Geometry",
         "Known quantities; the default is the model file's.",
@@ -89,11 +91,18 @@ pub(super) fn items(derivation: &Derivation) -> TokenStream {
     let base_parameters = base_parameters(derivation);
     let model = model(derivation);
     let inverse_dynamics = inverse_dynamics(derivation);
+    let newton = matches!(
+        derivation.programs.passive_position,
+        PassivePosition::Newton(_)
+    )
+    .then(|| quote! { use ::modelmill_runtime::{Scales, correct, follow, settle}; });
     quote! {
-        use ::modelmill_runtime::{BaseParameter, PoseError, Quantity, Real};
+        use ::modelmill_runtime::{BaseParameter, PoseError, Quantity, Real, check_finite};
+        #newton
 
         #tables
         #geometry
+        #geometry_check
         #parameters
         #state
         #base_parameters
@@ -199,6 +208,24 @@ fn record(name: &str, doc: &str, fields: &[(&str, f64, &str)]) -> TokenStream {
     }
 }
 
+/// That all constants are numbers, as a method.
+fn geometry_check(derivation: &Derivation) -> TokenStream {
+    let names: Vec<&str> = derivation
+        .mechanism
+        .constants
+        .iter()
+        .map(|c| c.name.as_str())
+        .collect();
+    let fields = names.iter().map(|name| of_field(name));
+    quote! {
+        impl<T: Real> Geometry<T> {
+            fn check(&self) -> Result<(), PoseError> {
+                check_finite::<T>(&[#(self.#fields),*], &[#(#names),*])
+            }
+        }
+    }
+}
+
 fn uses_load(derivation: &Derivation) -> bool {
     let programs = &derivation.programs;
     [&programs.regressor, &programs.inverse_dynamics]
@@ -217,6 +244,15 @@ fn state(derivation: &Derivation) -> TokenStream {
             pub load: [T; N_DRIVES],
         }
     });
+    let check_load = uses_load(derivation).then(|| quote! { check_finite(&self.load, &DRIVES)?; });
+    let mechanism = &derivation.mechanism;
+    let (active, _) = derivation.coordinates();
+    let [rates, accelerations] = ["_d", "_dd"].map(|suffix| {
+        let names = active
+            .iter()
+            .map(|i| format!("{}{suffix}", mechanism.coordinates[*i].name));
+        quote! { &[#(#names),*] }
+    });
     quote! {
         /// Motion of the independent coordinates, rad or m, and seconds.
         #[derive(Clone, Copy, Debug, PartialEq)]
@@ -228,6 +264,17 @@ fn state(derivation: &Derivation) -> TokenStream {
             /// Accelerations.
             pub qdd: [T; N_ACTIVE],
             #load
+        }
+
+        impl<T: Real> State<T> {
+            /// Names the first entry that is no finite number.
+            fn check(&self) -> Result<(), PoseError> {
+                check_finite(&self.q, &ACTIVE)?;
+                check_finite(&self.qd, #rates)?;
+                check_finite(&self.qdd, #accelerations)?;
+                #check_load
+                Ok(())
+            }
         }
     }
 }
