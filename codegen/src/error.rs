@@ -53,6 +53,13 @@ pub enum DeriveError {
         /// How many draws were made.
         draws: usize,
     },
+    /// A number that is infinite or none.
+    NotFinite {
+        /// Which number.
+        what: String,
+        /// What to do about it.
+        todo: &'static str,
+    },
     /// A factor of eq. (6) is no rational function of reasonable size.
     FactorNotRecovered {
         /// The eliminated product.
@@ -109,6 +116,9 @@ impl fmt::Display for DeriveError {
                     f,
                     "no pose that closes the loops was found in {draws} draws; the loops may contradict each other"
                 )
+            }
+            Self::NotFinite { what, todo } => {
+                write!(f, "{what} is no finite number; {todo}")
             }
             Self::FactorNotRecovered { product, retained } => write!(
                 f,

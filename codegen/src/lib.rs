@@ -10,6 +10,7 @@ mod evaluate;
 mod exact;
 pub mod expr;
 pub mod field;
+mod finite;
 mod inertia;
 mod linear;
 mod linear_loops;
@@ -54,6 +55,7 @@ pub struct Derivation {
 
 /// Derives the inverse dynamics of a mechanism and reduces it to base parameters, exactly.
 pub fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
+    finite::check_values(mechanism)?;
     let mut graph = Graph::new();
     let equations = regressor::equations(&mut graph, mechanism)?;
     let reduction = reduce::reduce(
@@ -64,11 +66,13 @@ pub fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
         &equations.columns,
     )?;
     let programs = programs::programs(&mut graph, mechanism, &equations, &reduction)?;
-    Ok(Derivation {
+    let derivation = Derivation {
         mechanism: mechanism.clone(),
         graph,
         reduction,
         programs,
         equations,
-    })
+    };
+    finite::check_results(&derivation)?;
+    Ok(derivation)
 }
