@@ -163,11 +163,17 @@ impl<'a> Evaluator<'a> {
         let n_drives = self.mechanism.drives.len();
         let columns = self.run(program, states, &[])?;
         let n_columns = columns.len() / n_drives.max(1);
-        Ok(DMatrix::from_fn(
-            states.len() * n_drives,
-            n_columns,
-            |row, column| columns[(row % n_drives) * n_columns + column][row / n_drives],
-        ))
+        let n_rows = states.len() * n_drives;
+        let mut matrix = DMatrix::zeros(n_rows, n_columns);
+        let entries = matrix.as_mut_slice();
+        for (k, values) in columns.iter().enumerate() {
+            // Columns stand one after the other; drives take turns in each.
+            let first = (k % n_columns) * n_rows + k / n_columns;
+            for (i, value) in values.iter().enumerate() {
+                entries[first + i * n_drives] = *value;
+            }
+        }
+        Ok(matrix)
     }
 
     fn run(
@@ -430,7 +436,9 @@ struct Machine<'a> {
     program: &'a Program,
     /// Values of the fixed stage.
     fixed: Vec<f64>,
-    /// Slot of each operation of the state stage.
+    /// Those among them that the state stage needs, with their slots.
+    kept: Vec<(usize, f64)>,
+    /// Slot of each operation of the state stage, and of fixed values that are needed there.
     slots: Vec<usize>,
     n_slots: usize,
 }
@@ -447,8 +455,13 @@ impl<'a> Machine<'a> {
             }
         }
         let mut last_use: Vec<usize> = (0..program.ops.len()).collect();
+        let mut needed = vec![false; program.ops.len()];
         for (i, op) in program.ops.iter().enumerate() {
-            op.for_each_operand(|v| last_use[v.index()] = i);
+            let is_state = program.stages[i] == Stage::State;
+            op.for_each_operand(|v| {
+                last_use[v.index()] = i;
+                needed[v.index()] |= is_state;
+            });
         }
         for value in program
             .outputs
@@ -457,9 +470,17 @@ impl<'a> Machine<'a> {
             .chain(program.guards.iter().map(|g| g.value()))
         {
             last_use[value.index()] = program.ops.len();
+            needed[value.index()] = true;
         }
         let mut slots = vec![0; program.ops.len()];
         let (mut free, mut n_slots): (Vec<usize>, usize) = (Vec::new(), 0);
+        // Fixed values keep their slots.
+        for i in (0..program.ops.len()).filter(|i| program.stages[*i] == Stage::Fixed) {
+            if needed[i] {
+                slots[i] = n_slots;
+                n_slots += 1;
+            }
+        }
         let mut ends: Vec<Vec<usize>> = vec![Vec::new(); program.ops.len() + 1];
         for i in 0..program.ops.len() {
             if program.stages[i] == Stage::State {
@@ -471,9 +492,14 @@ impl<'a> Machine<'a> {
             }
             free.append(&mut ends[i]);
         }
+        let kept = (0..program.ops.len())
+            .filter(|i| needed[*i] && program.stages[*i] == Stage::Fixed)
+            .map(|i| (slots[i], fixed[i]))
+            .collect();
         Self {
             program,
             fixed,
+            kept,
             slots,
             n_slots,
         }
@@ -496,6 +522,9 @@ impl<'a> Machine<'a> {
             })
             .collect();
         let mut memory = vec![[0.0; BLOCK]; self.n_slots];
+        for (slot, value) in &self.kept {
+            memory[*slot] = [*value; BLOCK];
+        }
         let mut start = 0;
         while start < n {
             let len = BLOCK.min(n - start);
@@ -503,12 +532,12 @@ impl<'a> Machine<'a> {
                 if self.program.stages[i] == Stage::Fixed {
                     continue;
                 }
-                let mut result = [0.0; BLOCK];
-                match (op, inputs[i]) {
-                    (_, Some(values)) => result[..len].copy_from_slice(&values[start..start + len]),
-                    _ => self.block(op, &memory, &mut result),
+                match inputs[i] {
+                    Some(values) => {
+                        memory[self.slots[i]][..len].copy_from_slice(&values[start..start + len]);
+                    }
+                    None => memory[self.slots[i]] = self.block(op, &memory),
                 }
-                memory[self.slots[i]] = result;
             }
             if let Some((k, guard)) = self.first_fault(len, &memory) {
                 let reason = match guard {
@@ -536,36 +565,46 @@ impl<'a> Machine<'a> {
         failing.min_by_key(|(k, guard)| (*k, guard.value()))
     }
 
-    fn values(&self, index: usize, memory: &[[f64; BLOCK]]) -> [f64; BLOCK] {
-        if self.program.stages[index] == Stage::Fixed {
-            [self.fixed[index]; BLOCK]
-        } else {
-            memory[self.slots[index]]
-        }
+    fn values<'m>(&self, index: usize, memory: &'m [[f64; BLOCK]]) -> &'m [f64; BLOCK] {
+        &memory[self.slots[index]]
     }
 
-    fn block(&self, op: &Op, memory: &[[f64; BLOCK]], result: &mut [f64; BLOCK]) {
-        let get = |v: crate::ValueId| self.values(v.index(), memory);
-        let binary = |a, b, result: &mut [f64; BLOCK], f: fn(f64, f64) -> f64| {
-            let (a, b): ([f64; BLOCK], [f64; BLOCK]) = (get(a), get(b));
-            for k in 0..BLOCK {
-                result[k] = f(a[k], b[k]);
-            }
-        };
+    fn block(&self, op: &Op, memory: &[[f64; BLOCK]]) -> [f64; BLOCK] {
+        let get = |v: &crate::ValueId| self.values(v.index(), memory);
         match op {
-            Op::Add(a, b) => binary(*a, *b, result, |x, y| x + y),
-            Op::Sub(a, b) => binary(*a, *b, result, |x, y| x - y),
-            Op::Mul(a, b) => binary(*a, *b, result, |x, y| x * y),
-            Op::Div(a, b) => binary(*a, *b, result, |x, y| x / y),
-            Op::Atan2(a, b) => binary(*a, *b, result, f64::atan2),
-            Op::Neg(a) | Op::Unary(_, a) | Op::Sin(a) | Op::Cos(a) => {
-                let a = get(*a);
-                for k in 0..BLOCK {
-                    result[k] = scalar(op, |_| a[k]);
-                }
-            }
+            Op::Add(a, b) => each(get(a), get(b), |x, y| x + y),
+            Op::Sub(a, b) => each(get(a), get(b), |x, y| x - y),
+            Op::Mul(a, b) => each(get(a), get(b), |x, y| x * y),
+            Op::Div(a, b) => each(get(a), get(b), |x, y| x / y),
+            Op::Atan2(a, b) => each(get(a), get(b), f64::atan2),
+            Op::Neg(a) => get(a).map(|x| -x),
+            Op::Sin(a) => get(a).map(f64::sin),
+            Op::Cos(a) => get(a).map(f64::cos),
+            Op::Unary(function, a) => get(a).map(|x| unary(*function, x)),
             Op::Number(_) | Op::Input(_) => unreachable!("numbers are fixed and inputs are copied"),
         }
+    }
+}
+
+/// Generic, so that each operation is a loop of its own that the compiler can make wide.
+fn each(a: &[f64; BLOCK], b: &[f64; BLOCK], operation: impl Fn(f64, f64) -> f64) -> [f64; BLOCK] {
+    let mut result = [0.0; BLOCK];
+    for k in 0..BLOCK {
+        result[k] = operation(a[k], b[k]);
+    }
+    result
+}
+
+fn unary(function: Unary, x: f64) -> f64 {
+    match function {
+        Unary::Sqrt => x.sqrt(),
+        Unary::Sign if x == 0.0 => 0.0,
+        Unary::Sign => x.signum(),
+        Unary::Abs => x.abs(),
+        Unary::Tanh => x.tanh(),
+        Unary::Exp => x.exp(),
+        Unary::Sin => x.sin(),
+        Unary::Cos => x.cos(),
     }
 }
 
@@ -582,18 +621,6 @@ fn scalar(op: &Op, value: impl Fn(usize) -> f64) -> f64 {
         Op::Sin(a) => get(a).sin(),
         Op::Cos(a) => get(a).cos(),
         Op::Atan2(y, x) => get(y).atan2(get(x)),
-        Op::Unary(function, a) => {
-            let a = get(a);
-            match function {
-                Unary::Sqrt => a.sqrt(),
-                Unary::Sign if a == 0.0 => 0.0,
-                Unary::Sign => a.signum(),
-                Unary::Abs => a.abs(),
-                Unary::Tanh => a.tanh(),
-                Unary::Exp => a.exp(),
-                Unary::Sin => a.sin(),
-                Unary::Cos => a.cos(),
-            }
-        }
+        Op::Unary(function, a) => unary(*function, get(a)),
     }
 }

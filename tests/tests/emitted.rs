@@ -198,16 +198,15 @@ mod fixture_models {
 #[test]
 fn words_of_rust_may_be_names() {
     let geometry = fixture_models::_f64::Geometry::<f64>::default();
-    assert_eq!(
-        [
-            geometry._self,
-            geometry.self_,
-            geometry.r#type,
-            geometry.type_,
-            geometry.r#gen
-        ],
-        [9.81, 0.1, 0.2, 0.4, 12.8]
-    );
+    let fields = [
+        geometry._self,
+        geometry.self_,
+        geometry.r#type,
+        geometry.type_,
+        geometry.r#gen,
+    ];
+    let values = [9.81, 0.1, 0.2, 0.4, 12.8_f64];
+    assert_eq!(fields.map(f64::to_bits), values.map(f64::to_bits));
     let derivation = derived("names");
     let sample = sample_of(&derivation);
     let found = run!(fixture_models, _f64, f64, &sample);

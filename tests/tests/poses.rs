@@ -69,7 +69,7 @@ fn lengths_in_any_unit_make_the_same_poses() {
     let cranks: Vec<f64> = (0..80).map(|k| 1.2 + 0.37 * f64::from(k)).collect();
     let evaluated = |unit: f64| {
         let mechanism = scaled(&model("spatial_slider"), "slider", unit);
-        passive_of(&derive(&mechanism), &[cranks.clone()]).expect("the crank turns")
+        passive_of(&derive(&mechanism), std::slice::from_ref(&cranks)).expect("the crank turns")
     };
     macro_rules! emitted {
         ($model:ident) => {{
@@ -199,7 +199,7 @@ fn a_pose_is_followed_from_the_last_one() {
         for (a, b) in passive.iter().zip(found) {
             assert!((a - b).abs() < 1e-13);
         }
-        assert!(k == 0 || before != passive);
+        assert!(k == 0 || before.map(f64::to_bits) != passive.map(f64::to_bits));
         let mut again = passive;
         let h = model.regressor_near(&state, &mut again).expect("near by");
         let difference = h[0][0] - model.regressor(&state).expect("within reach")[0][0];
@@ -223,7 +223,7 @@ fn a_pose_is_followed_from_the_last_one() {
         model.regressor_near(&state, &mut guess),
         Err(PoseError::OutOfReach)
     );
-    assert_eq!(guess, expected);
+    assert_eq!(guess.map(f64::to_bits), expected.map(f64::to_bits));
     assert_eq!(PASSIVE.len(), guess.len());
 }
 

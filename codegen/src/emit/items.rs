@@ -33,7 +33,7 @@ pub(super) fn module_doc(derivation: &Derivation) -> String {
     line(String::new());
     for base in derivation.base_parameters() {
         line(format!(
-            "- `{} = {}` [{}]",
+            "- `{} = {}` ({})",
             base.name, base.expression, base.unit
         ));
     }
