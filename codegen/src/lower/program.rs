@@ -120,8 +120,6 @@ pub struct Program {
     pub ops: Vec<Op>,
     /// Stage of each operation.
     pub stages: Vec<Stage>,
-    /// Names of intermediate values that mean something, by position in `ops`.
-    pub names: std::collections::BTreeMap<usize, String>,
     /// Outputs.
     pub outputs: Vec<ValueId>,
     /// What must hold at a pose.
@@ -197,9 +195,6 @@ impl Program {
                 continue;
             }
             new[i] = ValueId(u32::try_from(kept.ops.len()).expect("program below 4G operations"));
-            if let Some(name) = self.names.get(&i) {
-                kept.names.insert(kept.ops.len(), name.clone());
-            }
             kept.ops
                 .push(op.map_operands(|operand| new[operand.index()]));
             kept.stages.push(self.stages[i]);
