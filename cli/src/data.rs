@@ -248,6 +248,10 @@ impl Data {
                 "check the units (rad, m) and the signs of the positions, which column is which \
                  coordinate (--map), and the lengths in the model file",
             ),
+            PoseReason::Undefined => (
+                "a term of the model has no finite value at this state",
+                "look at the effects whose expressions hold quotients, roots or exponentials",
+            ),
             PoseReason::Singular => (
                 "the mechanism is singular at this pose, so that forces are not determined",
                 "leave the poses around it out of the recording, and check which column is which coordinate (--map)",

@@ -5,9 +5,12 @@ use std::collections::BTreeMap;
 
 use modelmill_spec::Mechanism;
 
+use crate::DeriveError;
 use crate::dyad::turn;
 use crate::expr::{AngleSum, Atom, ExprId, Graph, Node};
+use crate::finite;
 use crate::lower::{Definition, Program, Request, lower};
+use crate::magnitude;
 use crate::programs::nominal_value;
 use crate::reduce::Plan;
 use crate::regressor::Equations;
@@ -25,6 +28,8 @@ pub(crate) struct Closing {
     angle_of: BTreeMap<usize, AngleParts>,
     /// Determinants, with the magnitudes below which they count as zero.
     regular: Vec<(ExprId, f64)>,
+    /// Whether effects may have no finite value at some states.
+    may_be_undefined: bool,
 }
 
 /// An angle as a sum of known angles, a multiple of pi/12, and solved angles by position.
@@ -44,7 +49,7 @@ fn quarter_turns(angle: f64) -> i32 {
     quarters
 }
 
-/// A determinant this much smaller than at the nominal pose counts as zero.
+/// A determinant this much smaller than the sum of the magnitudes of its terms counts as zero.
 const SINGULAR: f64 = 1e-9;
 
 impl Closing {
@@ -53,7 +58,7 @@ impl Closing {
         mechanism: &Mechanism,
         equations: &Equations,
         plan: Option<Plan>,
-    ) -> Self {
+    ) -> Result<Self, DeriveError> {
         let mut closing = Self {
             plan,
             definitions: Vec::new(),
@@ -62,13 +67,17 @@ impl Closing {
             solved: Vec::new(),
             angle_of: BTreeMap::new(),
             regular: Vec::new(),
+            may_be_undefined: finite::may_be_undefined(mechanism),
         };
         for id in &equations.projection.determinants {
-            let nominal = nominal_value(graph, mechanism, *id).unwrap_or(1.0);
-            closing.regular.push((*id, SINGULAR * nominal.abs()));
+            let limit = SINGULAR * magnitude::at_nominal(graph, mechanism, &[*id]);
+            if nominal_value(graph, mechanism, *id).is_some_and(|value| value.abs() <= limit) {
+                return Err(DeriveError::SingularNominal);
+            }
+            closing.regular.push((*id, limit));
         }
         let Some(plan) = closing.plan.clone() else {
-            return closing;
+            return Ok(closing);
         };
         for step in &plan.steps {
             // Earlier steps' unknowns are known by now; their closed form goes into this step's expressions.
@@ -124,7 +133,7 @@ impl Closing {
                 });
             }
         }
-        closing
+        Ok(closing)
     }
 
     /// Whether every loop has a closed form.
@@ -283,6 +292,7 @@ impl Closing {
         lower(
             graph,
             &Request {
+                may_be_undefined: self.may_be_undefined,
                 outputs,
                 reachable: &self.reachable,
                 regular: &regular,

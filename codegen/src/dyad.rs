@@ -5,7 +5,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::closure::{Closure, Leg};
+use crate::closure::{Closure, Leg, coordinates_of};
 use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational};
 use crate::linear_loops::Relation;
 
@@ -264,12 +264,21 @@ fn circle_and_line(
         let ratio = graph.div(r, q);
         (graph.scale(ratio, &Rational::new(-1, 2)), None)
     } else {
+        // Divided by a length of the arm, so that loops of equal shape and unequal size have the same radicand.
+        let one = a0
+            .into_iter()
+            .find(|x| *x != Graph::ZERO && coordinates_of(graph, &[*x]).is_empty())
+            .unwrap_or(Graph::ONE);
+        let inverse = graph.pow(one, -2);
         let (square, product) = (graph.mul(q, q), graph.mul(p, r));
-        let radicand = graph.sub(square, product);
+        let difference = graph.sub(square, product);
+        let radicand = graph.mul(difference, inverse);
         let root = signed(graph, radicand, positive);
-        let numerator = graph.sub(root, q);
+        let root_of_length = graph.mul(root, one);
+        let numerator = graph.sub(root_of_length, q);
         let linear = graph.mul(p, at);
-        let witness = graph.add(linear, q);
+        let sum = graph.add(linear, q);
+        let witness = graph.div(sum, one);
         (graph.div(numerator, p), Some(Root { radicand, witness }))
     };
     let put = |graph: &mut Graph, v0: [ExprId; 2], v1: [ExprId; 2]| -> [ExprId; 2] {

@@ -41,6 +41,8 @@ pub enum DeriveError {
         /// Passive coordinates.
         passive: usize,
     },
+    /// The loops or the drives are singular at the nominal pose.
+    SingularNominal,
     /// There must be one drive per degree of freedom.
     DriveCount {
         /// Drives.
@@ -50,6 +52,11 @@ pub enum DeriveError {
     },
     /// No order was found in which every loop is a planar dyad, so that it cannot be sampled exactly.
     LoopsNotSampled {
+        /// Names of the loops.
+        loops: Vec<String>,
+    },
+    /// Assembly modes that square roots cannot tell apart, as those of a mechanism that can be flat.
+    BranchesNotSeparated {
         /// Names of the loops.
         loops: Vec<String>,
     },
@@ -109,6 +116,9 @@ impl fmt::Display for DeriveError {
                 f,
                 "the loops give {equations} independent equations for {passive} passive coordinates; mark as many coordinates passive as there are equations"
             ),
+            Self::SingularNominal => f.write_str(
+                "the nominal pose is singular: there the passive coordinates do not follow from the active ones, or a drive moves nothing; give the coordinates other nominal values",
+            ),
             Self::DriveCount { drives, freedoms } => {
                 write!(
                     f,
@@ -117,7 +127,12 @@ impl fmt::Display for DeriveError {
             }
             Self::LoopsNotSampled { loops } => write!(
                 f,
-                "no exact reduction for the loops {}: they are not planar, or no two coordinates of each can be solved for in turn; the numeric reduction still works",
+                "the loops {} cannot be sampled exactly: they are not planar, or no two coordinates of each can be solved for in turn",
+                loops.join(", ")
+            ),
+            Self::BranchesNotSeparated { loops } => write!(
+                f,
+                "the loops {} cannot be sampled exactly: their assembly modes meet, or depend on each other, so that square roots cannot tell them apart",
                 loops.join(", ")
             ),
             Self::NoPointFound { draws } => {
@@ -134,10 +149,10 @@ impl fmt::Display for DeriveError {
                 "the factor between the columns of {product} and {retained} is no rational function of the constants of reasonable size"
             ),
             Self::RankChanged => f.write_str(
-                "the rank differs between random constants; this is a fault of the program",
+                "the rank differs between random constants",
             ),
             Self::NotConfirmed => {
-                f.write_str("the reduction failed its own proof; this is a fault of the program")
+                f.write_str("what was found in exact arithmetic does not hold at other poses")
             }
         }
     }

@@ -57,6 +57,8 @@ pub enum PoseReason {
     OutOfReach,
     /// The passive coordinates or the drives' forces are not determined there.
     Singular,
+    /// A term of the model, such as an effect of its own, has no finite value there.
+    Undefined,
     /// An input is no finite number.
     NotFinite {
         /// Its name in the model file, with `_d` and `_dd` for rates and accelerations; `p1_min`, ... for base parameters.
@@ -69,6 +71,7 @@ impl From<PoseError> for PoseReason {
         match error {
             PoseError::OutOfReach => Self::OutOfReach,
             PoseError::Singular => Self::Singular,
+            PoseError::Undefined => Self::Undefined,
             PoseError::NotFinite(input) => Self::NotFinite {
                 input: input.to_owned(),
             },
@@ -87,6 +90,11 @@ impl fmt::Display for PoseFault {
             PoseReason::Singular => {
                 write!(f, "at sample {} the mechanism is singular", self.sample)
             }
+            PoseReason::Undefined => write!(
+                f,
+                "at sample {} a term of the model has no finite value",
+                self.sample
+            ),
             PoseReason::NotFinite { input } => {
                 write!(f, "at sample {} `{input}` is no finite number", self.sample)
             }
@@ -543,6 +551,7 @@ impl<'a> Machine<'a> {
                 let reason = match guard {
                     Guard::Reachable(_) => PoseReason::OutOfReach,
                     Guard::Regular(..) => PoseReason::Singular,
+                    Guard::Finite(_) => PoseReason::Undefined,
                 };
                 let sample = start + k;
                 return Err(PoseFault { sample, reason });

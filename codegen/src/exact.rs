@@ -326,11 +326,13 @@ struct AngleParts {
 impl AngleParts {
     /// An expression as an exact angle; `None` if it is no sum of integer multiples of angles and of pi/12.
     fn of(exact: &Exact) -> Option<(AngleSum, i32)> {
+        /// Sines of larger multiples are no polynomials that anyone wants to see.
+        const MOST: u32 = 100;
         let mut parts = Self::default();
         parts.collect(exact, &Rational::ONE)?;
         let integer = |value: &Rational| {
             let (n, _) = value.as_small().filter(|(_, d)| *d == 1)?;
-            i32::try_from(n).ok()
+            i32::try_from(n).ok().filter(|n| n.unsigned_abs() <= MOST)
         };
         let twelfths = &parts.pi * &Rational::integer(12);
         let (n, _) = twelfths.as_small().filter(|(_, d)| *d == 1)?;

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use modelmill_spec::{Mechanism, Motion};
 use nalgebra::{DMatrix, DVector};
 
-use crate::closure::Closure;
+use crate::closure::{Closure, coordinates_of};
 use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Node, Tape};
 use crate::field::{Element, MODULUS, Stream};
 use crate::numeric_pose::Loops;
@@ -22,38 +22,62 @@ pub(crate) struct Relation {
     pub(crate) pi12: i32,
 }
 
-/// How far the active coordinates are moved from the nominal pose, rad or m, and how exact a relation must look.
+/// How far known coordinates are moved from the nominal pose, in rad or relative to the size of the loop, and how exact
+/// a relation must look.
 const MOVE: f64 = 0.05;
 const TOLERANCE: f64 = 1e-8;
 
 /// Finds loops that are solved by relations and writes these into them.
+///
+/// Loops are looked at one after the other, as soon as all but as many of their coordinates are known as they have
+/// equations: a loop may be driven by another one.
 pub(crate) fn find(graph: &mut Graph, mechanism: &Mechanism, closures: &mut [Closure]) {
-    let Some(poses) = poses(graph, mechanism, closures) else {
-        return;
+    let mut known: BTreeSet<usize> = (0..mechanism.coordinates.len())
+        .filter(|c| !mechanism.coordinates[*c].passive)
+        .collect();
+    let mut related: Vec<Relation> = Vec::new();
+    let mut todo: Vec<usize> = (0..closures.len()).collect();
+    let unknown_of = |closure: &Closure, known: &BTreeSet<usize>| -> Vec<usize> {
+        let coordinates = closure.coordinates.iter().copied();
+        coordinates.filter(|c| !known.contains(c)).collect()
     };
-    for closure in closures {
-        let passive: Vec<usize> = closure
-            .coordinates
-            .iter()
-            .copied()
-            .filter(|c| mechanism.coordinates[*c].passive)
-            .collect();
-        if passive.len() != closure.residual.len() {
-            continue;
-        }
-        let fixed = fixed_angles(graph, &closure.residual);
-        let candidates: Vec<Vec<Relation>> = passive
-            .iter()
-            .map(|p| relations(mechanism, &poses, &closure.coordinates, &fixed, *p))
-            .collect();
-        let relations =
-            combinations(&candidates).find(|relations| closes(graph, closure, relations));
-        if let Some(relations) = relations {
+    while let Some(position) = todo.iter().position(|i| {
+        let closure = &closures[*i];
+        unknown_of(closure, &known).len() == closure.residual.len()
+    }) {
+        let closure = &mut closures[todo.remove(position)];
+        let unknown = unknown_of(closure, &known);
+        known.extend(&unknown);
+        // What is known of other loops' angles may be what makes this one a parallelogram.
+        let residual = put_in(graph, &related, &closure.residual);
+        if let Some(relations) = relations_of(graph, mechanism, &residual, &unknown) {
             closure.residual = relations.iter().map(|r| r.residual(graph)).collect();
-            closure.relations = relations;
+            closure.coordinates = coordinates_of(graph, &closure.residual);
             closure.chain = None;
+            related.extend(relations.iter().cloned());
+            closure.relations = relations;
         }
     }
+}
+
+/// The relations that solve a loop for `unknown`, if there are such; shown exactly.
+fn relations_of(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    residual: &[ExprId],
+    unknown: &[usize],
+) -> Option<Vec<Relation>> {
+    let given: Vec<usize> = coordinates_of(graph, residual)
+        .into_iter()
+        .filter(|c| !unknown.contains(c))
+        .collect();
+    let poses = poses(graph, mechanism, residual, unknown, &given)?;
+    let fixed = fixed_angles(graph, residual);
+    let candidates: Vec<Vec<Relation>> = unknown
+        .iter()
+        .map(|p| relations(mechanism, &poses, &given, &fixed, *p))
+        .collect();
+    combinations(&candidates).find(|relations| closes(graph, residual, relations))
 }
 
 impl Relation {
@@ -72,22 +96,27 @@ impl Relation {
     }
 }
 
-/// Coordinates at the nominal pose and at some poses around it; `None` if the loops cannot be followed there.
-fn poses(graph: &mut Graph, mechanism: &Mechanism, closures: &[Closure]) -> Option<Vec<Vec<f64>>> {
-    if closures.is_empty() {
-        return None;
-    }
-    let residual: Vec<ExprId> = closures
-        .iter()
-        .flat_map(|c| c.residual.iter().copied())
-        .collect();
-    let loops = Loops::new(graph, mechanism, &residual);
-    let mut stream = Stream::new(1);
-    let mut found = vec![loops.nominal()];
-    for _ in 0..mechanism.coordinates.len() + 4 {
-        found.push(loops.random(MOVE, &mut stream)?);
-    }
-    Some(found)
+/// Coordinates at the nominal pose and at some poses around it; `None` if the loop cannot be followed there.
+fn poses(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    residual: &[ExprId],
+    unknown: &[usize],
+    given: &[usize],
+) -> Option<Vec<Vec<f64>>> {
+    /// How often the reach is halved where loops cannot be followed, as near the end of a slide.
+    const HALVINGS: u32 = 6;
+    let loops = Loops::solved_for(graph, mechanism, residual, unknown.to_vec(), given);
+    let nominal = loops.nominal()?;
+    (0..=HALVINGS).find_map(|k| {
+        let reach = MOVE / f64::from(1_u32 << k);
+        let mut stream = Stream::new(1);
+        let mut found = vec![nominal.clone()];
+        for _ in 0..given.len() + unknown.len() + 4 {
+            found.push(loops.random(reach, &mut stream)?);
+        }
+        Some(found)
+    })
 }
 
 /// Constants in sines and cosines.
@@ -123,16 +152,16 @@ fn combinations(candidates: &[Vec<Relation>]) -> impl Iterator<Item = Vec<Relati
     })
 }
 
-/// Relations that a passive angle keeps to at all poses: with the active angles of its loop, and in its fixed part with
+/// Relations that an unknown angle keeps to at all poses: with the known angles of its loop, and in its fixed part with
 /// multiples of constant angles. The simplest come first.
 fn relations(
     mechanism: &Mechanism,
     poses: &[Vec<f64>],
-    coordinates: &[usize],
+    given: &[usize],
     fixed: &[usize],
     p: usize,
 ) -> Vec<Relation> {
-    let Some((turning, offset)) = turning(mechanism, poses, coordinates, p) else {
+    let Some((turning, offset)) = turning(mechanism, poses, given, p) else {
         return Vec::new();
     };
     multiples(fixed.len())
@@ -180,20 +209,17 @@ fn multiples(n: usize) -> Vec<Vec<i32>> {
     found
 }
 
-/// The active angles with which a passive one turns, and what it is beside them.
+/// The known angles with which an unknown one turns, and what it is beside them.
 fn turning(
     mechanism: &Mechanism,
     poses: &[Vec<f64>],
-    coordinates: &[usize],
+    given: &[usize],
     p: usize,
 ) -> Option<(AngleSum, f64)> {
-    let others: Vec<usize> = coordinates
+    let others: Vec<usize> = given
         .iter()
         .copied()
-        .filter(|c| {
-            !mechanism.coordinates[*c].passive
-                && mechanism.coordinates[*c].motion == Motion::Revolute
-        })
+        .filter(|c| mechanism.coordinates[*c].motion == Motion::Revolute)
         .collect();
     if mechanism.coordinates[p].motion != Motion::Revolute {
         return None;
@@ -228,8 +254,8 @@ fn turning(
 }
 
 /// Whether the relations close the loop at every pose: shown at random points of the field.
-fn closes(graph: &mut Graph, closure: &Closure, relations: &[Relation]) -> bool {
-    let closed = put_in(graph, relations, &closure.residual);
+fn closes(graph: &mut Graph, residual: &[ExprId], relations: &[Relation]) -> bool {
+    let closed = put_in(graph, relations, residual);
     let tape = Tape::new(graph, &closed);
     let atoms = graph.atoms(&closed);
     let mut stream = Stream::new(2);

@@ -7,6 +7,7 @@ use modelmill_spec::{Mechanism, Motion};
 
 use crate::closure::coordinates_of;
 use crate::expr::{Atom, ExprId, Graph, Node, Unary};
+use crate::programs::nominal_value;
 use crate::projection::Projection;
 
 /// Scales of the residuals, of the passive coordinates and of the active ones, one after the other.
@@ -39,6 +40,20 @@ pub(crate) fn scales(
         });
     }
     scales
+}
+
+/// The sum of the magnitudes of all terms of some expressions at the nominal pose: the size of a mechanism's loops in m.
+/// It is 1 where there is none.
+pub(crate) fn at_nominal(graph: &mut Graph, mechanism: &Mechanism, roots: &[ExprId]) -> f64 {
+    let mut known = HashMap::new();
+    let terms: Vec<ExprId> = roots
+        .iter()
+        .map(|root| magnitude(graph, mechanism, &mut known, *root))
+        .collect();
+    let total = graph.add_all(&terms);
+    nominal_value(graph, mechanism, total)
+        .filter(|size| size.is_normal())
+        .unwrap_or(1.0)
 }
 
 /// An expression with every term taken by its magnitude.

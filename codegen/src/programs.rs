@@ -13,7 +13,7 @@ use crate::exact::Monomial;
 use crate::expr::{Atom, ExprId, Graph};
 use crate::lower::{Program, Request, lower};
 use crate::magnitude;
-use crate::reduce::{Reduction, Unknowns, plan};
+use crate::reduce::{Reduction, closed_form};
 use crate::regressor::Equations;
 
 /// How the passive coordinates are found.
@@ -61,16 +61,8 @@ pub(crate) fn programs(
     equations: &Equations,
     reduction: &Reduction,
 ) -> Result<Programs, DeriveError> {
-    let nominal = |graph: &Graph, id: ExprId| -> bool {
-        nominal_value(graph, mechanism, id).is_none_or(|v| v >= 0.0)
-    };
-    let plan = plan(
-        graph,
-        &equations.projection,
-        Unknowns::Passive,
-        &mut |graph, id| nominal(graph, id),
-    );
-    let closing = Closing::new(graph, mechanism, equations, plan);
+    let plan = closed_form(graph, mechanism, &equations.projection);
+    let closing = Closing::new(graph, mechanism, equations, plan)?;
     let n_drives = mechanism.drives.len();
 
     let retained: Vec<&Monomial> = reduction
@@ -152,6 +144,7 @@ pub(crate) fn programs(
 /// A program of expressions as they stand, without guards.
 fn plain(graph: &mut Graph, outputs: &[ExprId]) -> Program {
     let request = Request {
+        may_be_undefined: false,
         outputs,
         reachable: &[],
         regular: &[],

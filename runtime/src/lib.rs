@@ -20,6 +20,8 @@ pub enum PoseError {
     OutOfReach,
     /// The passive coordinates or the drives' forces are not determined there.
     Singular,
+    /// A term of the model, such as an effect of its own, has no finite value there.
+    Undefined,
     /// An input is no finite number; its name in the model file, with `_d` and `_dd` for rates and accelerations.
     NotFinite(&'static str),
 }
@@ -29,6 +31,7 @@ impl fmt::Display for PoseError {
         match self {
             Self::OutOfReach => f.write_str("the loops cannot close: the pose is out of reach"),
             Self::Singular => f.write_str("the pose is singular"),
+            Self::Undefined => f.write_str("a term of the model has no finite value there"),
             Self::NotFinite(input) => write!(f, "`{input}` is no finite number"),
         }
     }

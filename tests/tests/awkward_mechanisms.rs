@@ -2,10 +2,11 @@
 
 use std::fmt::Write;
 
-use modelmill_codegen::Method;
+use modelmill_codegen::{DeriveError, Evaluator, Method, PassivePosition, States};
 use modelmill_spec::{DriveKind, FrameIdx, Mechanism, PointIdx};
-use modelmill_tests::fixtures::{derive, fixtures};
+use modelmill_tests::fixtures::{derive, fixtures, model};
 use modelmill_tests::laws::Case;
+use modelmill_tests::scaled::scaled;
 
 /// All laws that hold for any mechanism. Parameters without a nominal value get one, so that they are felt.
 fn keeps_the_laws(mut mechanism: Mechanism, reach: f64) -> Case {
@@ -92,6 +93,98 @@ fn what_no_rational_function_can_say_is_said_in_numbers() {
             Method::Numeric { .. }
         ));
     }
+}
+
+#[test]
+fn loops_alike_but_for_their_assembly_modes() {
+    // Each rocker has its own inertia and two first moments: mirrored motion is another motion.
+    exact("mirrored_four_bars", 0.3, 6);
+    // The equal cranks make pistons move oppositely: masses at both, and where the rods' centres differ.
+    exact("boxer", 0.3, 3);
+    exact("opposed_sliders", 0.3, 3);
+    // The larger one's columns are those of the smaller one times its scale.
+    exact("sliders_to_scale", 0.3, 3);
+}
+
+#[test]
+fn parallelograms_that_others_drive_or_stand_beside() {
+    for (name, rank, poses) in [
+        ("desk_lamp", 3, vec![vec![0.8, 0.5, 0.1, -0.3, -1.2]]),
+        (
+            "parallelogram_beside_a_slide",
+            6,
+            vec![vec![0.8, 0.5, 0.1, -0.3, -1.2], vec![0.3325; 5]],
+        ),
+    ] {
+        let case = exact(name, 0.2, rank);
+        // Far beyond the pose where the parallelogram is flat and might turn into the crossed linkage.
+        let evaluator = Evaluator::new(&case.derivation);
+        let still = vec![vec![0.0; 5]; poses.len()];
+        let states = States {
+            q: poses.iter().map(Vec::as_slice).collect(),
+            qd: still.iter().map(Vec::as_slice).collect(),
+            qdd: still.iter().map(Vec::as_slice).collect(),
+            load: Vec::new(),
+        };
+        let passive = evaluator.passive(&states).unwrap();
+        for (k, q) in poses[0].iter().enumerate() {
+            let pairs = passive[..if name == "desk_lamp" { 4 } else { 2 }].chunks(2);
+            for pair in pairs {
+                assert!((pair[0][k] + q).abs() < 1e-12, "{name}: the coupler at {q}");
+                assert!((pair[1][k] - q).abs() < 1e-12, "{name}: the rocker at {q}");
+            }
+        }
+    }
+    exact("rocker_cranks_parallelogram", 0.3, 8);
+}
+
+#[test]
+fn assembly_modes_that_meet_are_reduced_in_numbers_and_followed() {
+    for name in ["antiparallelogram", "deltoid"] {
+        let case = keeps_the_laws(awkward(name), 0.3);
+        assert_eq!(case.derivation.reduction.retained.len(), 8, "{name}");
+        let Method::Numeric { because, .. } = &case.derivation.reduction.method else {
+            panic!("{name} cannot be reduced exactly yet");
+        };
+        assert!(matches!(
+            **because,
+            DeriveError::BranchesNotSeparated { .. }
+        ));
+        assert!(matches!(
+            case.derivation.programs.passive_position,
+            PassivePosition::Newton(_)
+        ));
+    }
+}
+
+#[test]
+fn a_singular_nominal_pose_is_refused() {
+    let error = modelmill_codegen::derive(&awkward("drive_through_its_pivot")).err();
+    assert_eq!(error, Some(DeriveError::SingularNominal));
+}
+
+#[test]
+fn any_unit_of_length_gives_the_same_rank() {
+    for name in ["spatial_press", "spatial_slider"] {
+        let rank = derive(&model(name)).reduction.retained.len();
+        for unit in [1e-3, 1e3] {
+            let scaled = derive(&scaled(&model(name), name, unit));
+            assert_eq!(scaled.reduction.retained.len(), rank, "{name} times {unit}");
+        }
+    }
+}
+
+/// These took all time or memory once.
+#[test]
+fn large_multiples_and_many_roots_come_to_an_end() {
+    // ZZ1 and ZZ2, four first moments in two pairs of which one mass is part, and the effect.
+    let many = derive(&awkward("sine_of_a_large_multiple"));
+    assert_eq!(
+        many.reduction.retained.len(),
+        derive(&model("two_link")).reduction.retained.len() + 1
+    );
+    let roots = derive(&awkward("many_roots"));
+    assert!(matches!(roots.reduction.method, Method::Numeric { .. }));
 }
 
 /// Four-bars beside each other, each with a crank of its own, or in a row, each cranked by the rocker of the one before.

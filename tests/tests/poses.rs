@@ -383,3 +383,42 @@ fn an_effect_that_takes_signs_names_what_is_no_number() {
     assert_eq!(fault.sample, 2);
     assert!(matches!(fault.reason, PoseReason::NotFinite { input } if input.ends_with("_d")));
 }
+
+#[test]
+fn terms_without_a_finite_value_are_errors() {
+    use fixtures::undefined_effects::{
+        Geometry, InverseDynamics, Model, Parameters, State, base_parameters,
+    };
+    let derivation = derived("undefined_effects");
+    let geometry = Geometry::<f64>::default();
+    let model = Model::new(&geometry);
+    let base = base_parameters(&geometry, &Parameters::default());
+    let dynamics = InverseDynamics::new(&geometry, &base);
+    // At a quotient's pole, beyond what an exponential reaches, and where a root is imaginary.
+    for (q, is_fine) in [
+        ([0.5, 0.5], true),
+        ([0.0, 0.5], false),
+        ([1000.0, 0.5], false),
+        ([0.5, -0.5], false),
+    ] {
+        let state = State {
+            q,
+            qd: [0.1, 0.2],
+            qdd: [0.3, 0.4],
+        };
+        let expected = if is_fine {
+            None
+        } else {
+            Some(PoseError::Undefined)
+        };
+        assert_eq!(model.regressor(&state).err(), expected, "{q:?}");
+        assert_eq!(dynamics.forces(&state).err(), expected, "{q:?}");
+        let sample = at_rest(&columns(&[q]));
+        let found = Evaluator::new(&derivation).regressor(&sample.states());
+        assert_eq!(
+            found.err().map(|fault| fault.reason),
+            expected.map(PoseReason::from),
+            "{q:?}"
+        );
+    }
+}

@@ -167,6 +167,9 @@ impl<'a> Body<'a> {
                 let limit = Literal::f64_unsuffixed(limit);
                 quote! { if !(#value.abs() > T::from_f64(#limit)) { return Err(PoseError::Singular); } }
             }
+            Guard::Finite(_) => {
+                quote! { if !#value.is_finite() { return Err(PoseError::Undefined); } }
+            }
         }
     }
 

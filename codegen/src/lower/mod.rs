@@ -32,6 +32,8 @@ pub(crate) struct Request<'a> {
     pub(crate) reachable: &'a [ExprId],
     /// What must not vanish, with the magnitude below which it counts as zero.
     pub(crate) regular: &'a [(ExprId, f64)],
+    /// Whether outputs may have no finite value at states where everything else is regular.
+    pub(crate) may_be_undefined: bool,
     /// Atoms that are computed rather than read.
     pub(crate) definitions: &'a [Definition],
 }

@@ -94,13 +94,15 @@ pub enum Guard {
     Reachable(ValueId),
     /// The magnitude of the value must stay above the limit: otherwise the pose is singular.
     Regular(ValueId, f64),
+    /// The value must be a finite number: a term of the model may have none.
+    Finite(ValueId),
 }
 
 impl Guard {
     /// The guarded value.
     pub fn value(self) -> ValueId {
         match self {
-            Self::Reachable(v) | Self::Regular(v, _) => v,
+            Self::Reachable(v) | Self::Regular(v, _) | Self::Finite(v) => v,
         }
     }
 
@@ -109,6 +111,7 @@ impl Guard {
         match self {
             Self::Reachable(_) => value >= 0.0,
             Self::Regular(_, limit) => value.abs() > limit,
+            Self::Finite(_) => value.is_finite(),
         }
     }
 }
@@ -206,6 +209,7 @@ impl Program {
             .map(|guard| match guard {
                 Guard::Reachable(v) => Guard::Reachable(new[v.index()]),
                 Guard::Regular(v, limit) => Guard::Regular(new[v.index()], *limit),
+                Guard::Finite(v) => Guard::Finite(new[v.index()]),
             })
             .collect();
         kept

@@ -51,7 +51,15 @@ pub(crate) fn schedule(graph: &Graph, roots: &[ExprId], request: &Request<'_>) -
         let value = scheduler.value(*id);
         scheduler.program.guards.push(Guard::Regular(value, *limit));
     }
-    let outputs = outputs.iter().map(|id| scheduler.value(*id)).collect();
+    let outputs: Vec<ValueId> = outputs.iter().map(|id| scheduler.value(*id)).collect();
+    if request.may_be_undefined {
+        let distinct: BTreeSet<ValueId> = outputs.iter().copied().collect();
+        let program = &mut scheduler.program;
+        let moving = distinct
+            .into_iter()
+            .filter(|v| program.stages[v.index()] == Stage::State);
+        program.guards.extend(moving.map(Guard::Finite));
+    }
     scheduler.program.outputs = outputs;
     scheduler.program.without_dead_code()
 }

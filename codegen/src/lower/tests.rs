@@ -100,6 +100,7 @@ fn the_estimated_cost_is_what_the_program_counts() {
         &derivation.graph,
         &roots,
         &super::Request {
+            may_be_undefined: false,
             outputs: &roots,
             reachable: &[],
             regular: &[],

@@ -4,9 +4,12 @@
 //! linear dependences found by elimination there, and the constant factors of eq. (6) reconstructed as rational functions
 //! of the model's constants. A wrong answer has a probability below 1e-15 (Schwartz 1980, Zippel 1979).
 
+mod branches;
 mod eliminate;
 mod lift;
 mod numeric;
+mod plan;
+mod poses;
 mod print;
 mod rational_function;
 mod reconstruct;
@@ -17,8 +20,9 @@ use std::collections::BTreeSet;
 
 use modelmill_spec::Mechanism;
 
+pub(crate) use branches::closed_form;
+pub(crate) use plan::Plan;
 pub use rational_function::{Polynomial, Powers, RationalFunction, Variable};
-pub(crate) use sample::{Plan, Unknowns, plan};
 
 use crate::DeriveError;
 use crate::exact::Monomial;
@@ -39,6 +43,10 @@ const IDLE: usize = 2;
 /// the question.
 const IDLE_WITH_SIGNS: usize = 80;
 
+/// With how many sets of constants the result is shown, and at how many points of motion for each.
+const CONFIRMED_WITH: usize = 4;
+const CONFIRMED_AT: usize = 2;
+
 /// The result: which columns are kept and how the others follow from them.
 #[derive(Clone, Debug)]
 pub struct Reduction {
@@ -55,7 +63,7 @@ pub struct Reduction {
 }
 
 /// How a reduction was found.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Method {
     /// In the prime field: it holds for all values of the constants but special ones.
     Exact {
@@ -68,6 +76,8 @@ pub enum Method {
         least_kept: f64,
         /// The same for the dependent column that is furthest from it.
         most_dropped: f64,
+        /// Why there is no exact reduction.
+        because: Box<DeriveError>,
     },
 }
 
@@ -148,16 +158,29 @@ pub(crate) fn reduce(
     let exact = reduce_exactly(
         graph, mechanism, projection, candidates, &effective, &order, &outputs,
     );
+    let exact = exact.and_then(|found| {
+        // Loops are sampled on their algebraic variety; machines live on the branch of the nominal pose.
+        let is_contradicted = !projection.closures.is_empty()
+            && numeric::contradicts(graph, mechanism, projection, candidates, columns, &found);
+        if is_contradicted {
+            Err(DeriveError::NotConfirmed)
+        } else {
+            Ok(found)
+        }
+    });
     match exact {
         Err(
-            DeriveError::LoopsNotSampled { .. }
+            because @ (DeriveError::LoopsNotSampled { .. }
+            | DeriveError::BranchesNotSeparated { .. }
             | DeriveError::FactorNotRecovered { .. }
             | DeriveError::NoPointFound { .. }
             | DeriveError::NotConfirmed
-            | DeriveError::RankChanged,
+            | DeriveError::RankChanged),
         ) => {
             let order: Vec<usize> = order.into_iter().map(|k| effective[k]).collect();
-            numeric::reduce(graph, mechanism, projection, candidates, columns, &order)
+            numeric::reduce(
+                graph, mechanism, projection, candidates, columns, &order, because,
+            )
         }
         exact => exact,
     }
@@ -187,10 +210,8 @@ fn reduce_exactly(
     let variables = occurrences(graph, outputs, projection);
     let factors = pattern.factors(&regressor, &variables, &roots, &mut stream)?;
     let names = |k: usize| candidates[effective[k]].clone();
-    let mut reduction = pattern.reduction(mechanism, candidates, &names, factors)?;
-    reduction.method = Method::Exact {
-        confirmed_at: reduction.confirm(&regressor, &pattern.shown, &mut stream)?,
-    };
+    let reduction = pattern.reduction(mechanism, candidates, &names, factors)?;
+    reduction.confirm(&regressor, &pattern.shown, &mut stream)?;
     Ok(reduction)
 }
 
@@ -371,7 +392,9 @@ impl Pattern {
             retained: self.pivots.iter().map(|p| position(*p)).collect(),
             products,
             dependencies,
-            method: Method::Exact { confirmed_at: 0 },
+            method: Method::Exact {
+                confirmed_at: CONFIRMED_WITH * CONFIRMED_AT,
+            },
         })
     }
 }
@@ -405,18 +428,16 @@ impl reconstruct::Oracle for Factors<'_> {
 }
 
 impl Reduction {
-    /// Shows `H p_g = H_min p_min` for random parameters at fresh points of motion with fresh constants; returns how many.
+    /// Shows `H p_g = H_min p_min` for random parameters at fresh points of motion with fresh constants.
     fn confirm(
         &self,
         regressor: &SampledRegressor,
         shown: &[usize],
         stream: &mut Stream,
-    ) -> Result<usize, DeriveError> {
-        const CONSTANTS: usize = 4;
-        const POINTS: usize = 2;
+    ) -> Result<(), DeriveError> {
         /// A field that had no part in finding it.
         const FRESH: u64 = PRIMES[PRIMES.len() - 1];
-        for _ in 0..CONSTANTS {
+        for _ in 0..CONFIRMED_WITH {
             let constants = regressor.sampler.constants::<FRESH>(stream)?;
             let parameters: Vec<Element<FRESH>> =
                 self.products.iter().map(|_| stream.element()).collect();
@@ -428,7 +449,7 @@ impl Reduction {
                     base[*k] = base[*k] + factor * parameters[line.product];
                 }
             }
-            for _ in 0..POINTS {
+            for _ in 0..CONFIRMED_AT {
                 for row in regressor.point(&constants, stream)? {
                     let sum = |terms: &mut dyn Iterator<Item = (usize, Element<FRESH>)>| {
                         terms.fold(Element::ZERO, |s, (k, p)| s + row[k] * p)
@@ -445,7 +466,7 @@ impl Reduction {
                 }
             }
         }
-        Ok(CONSTANTS * POINTS)
+        Ok(())
     }
 }
 

@@ -17,8 +17,10 @@ use crate::projection::Projection;
 const DEPENDENT: f64 = 1e-9;
 /// A column this much smaller than the largest is rounding.
 const NOTHING: f64 = 1e-13;
-/// How far poses lie from the nominal one, rad or m.
+/// How far poses lie from the nominal one, in rad or relative to the size of the loops, and how often that is halved
+/// where most of such poses cannot be reached.
 const REACH: f64 = 0.4;
+const HALVINGS: u32 = 6;
 
 /// Reduces `columns[k][d]`, trying them in the given order.
 pub(super) fn reduce(
@@ -28,8 +30,9 @@ pub(super) fn reduce(
     candidates: &[Monomial],
     columns: &[Vec<ExprId>],
     order: &[usize],
+    because: DeriveError,
 ) -> Result<Reduction, DeriveError> {
-    let w = sample(graph, mechanism, projection, columns)?;
+    let w = sample(graph, mechanism, projection, columns, 4 * columns.len())?;
     let norms: Vec<f64> = (0..columns.len()).map(|k| w.column(k).norm()).collect();
     let largest = norms.iter().fold(0.0, |a: f64, b| a.max(*b));
     let mut kept: Vec<usize> = Vec::new();
@@ -115,29 +118,67 @@ pub(super) fn reduce(
         method: Method::Numeric {
             least_kept,
             most_dropped,
+            because: Box::new(because),
         },
     })
 }
 
-/// A number with thirteen decimals, as an exact rational, so that everything behind treats it like any other factor.
-fn decimal(value: f64) -> RationalFunction {
-    const SCALE: f64 = 1e13;
-    let scaled = (value * SCALE).round();
-    #[expect(clippy::cast_possible_truncation, reason = "checked against the range")]
-    let rational = if scaled.abs() < 9e18 {
-        Rational::new(scaled as i64, 10_000_000_000_000)
-    } else {
-        num_rational::BigRational::from_float(value).map_or(Rational::ZERO, Rational::from)
+/// Whether dependences that were found elsewhere fail on the model file's values around the nominal pose. Where no pose
+/// is found they do not.
+pub(super) fn contradicts(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    projection: &Projection,
+    candidates: &[Monomial],
+    columns: &[Vec<ExprId>],
+    found: &Reduction,
+) -> bool {
+    /// Far above rounding in poses that are followed, far below what a wrong dependence makes.
+    const WRONG: f64 = 1e-6;
+    let Ok(w) = sample(graph, mechanism, projection, columns, 0) else {
+        return false;
     };
-    RationalFunction::constant(rational)
+    let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
+    let column = |product: usize| {
+        let at = candidates
+            .iter()
+            .position(|c| *c == found.products[product])
+            .expect("a product is a candidate");
+        w.column(at)
+    };
+    let largest = w.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
+    found.dependencies.iter().any(|line| {
+        let mut left = column(line.product).into_owned();
+        let mut size = left.norm();
+        for (k, factor) in &line.equals {
+            let term = column(found.retained[*k]) * factor.value_f64(&constants);
+            size += term.norm();
+            left -= term;
+        }
+        left.norm() > WRONG * size && left.norm() > NOTHING * largest
+    })
 }
 
-/// W of eq. (9) at random states around the nominal pose.
-fn sample(
+/// A number with thirteen significant digits, as an exact rational, so that everything behind treats it like any other
+/// factor.
+fn decimal(value: f64) -> RationalFunction {
+    const DIGITS: i32 = 12;
+    let written = format!("{value:.12e}");
+    let rational = written.split_once('e').and_then(|(mantissa, exponent)| {
+        let mantissa: i64 = mantissa.replace('.', "").parse().ok()?;
+        let exponent: i32 = exponent.parse().ok()?;
+        Some(&Rational::integer(mantissa) * &Rational::integer(10).pow(exponent - DIGITS))
+    });
+    RationalFunction::constant(rational.expect("a finite number has a mantissa and an exponent"))
+}
+
+/// W of eq. (9) at random states around the nominal pose, with some more rows than are wanted.
+pub(super) fn sample(
     graph: &mut Graph,
     mechanism: &Mechanism,
     projection: &Projection,
     columns: &[Vec<ExprId>],
+    wanted: usize,
 ) -> Result<DMatrix<f64>, DeriveError> {
     let n_drives = projection.drives.len();
     let outputs: Vec<ExprId> = (0..n_drives)
@@ -153,19 +194,23 @@ fn sample(
     let mut stream = Stream::new(super::SEED);
     let n_coordinates = mechanism.coordinates.len();
     let mut rows: Vec<f64> = Vec::new();
-    let wanted = (4 * columns.len()).div_ceil(n_drives.max(1)) + 10;
+    let wanted = wanted.div_ceil(n_drives.max(1)) + 10;
     let (mut n_points, mut tries) = (0, 0);
-    while n_points < wanted && tries < 20 * wanted {
+    let mut reach = REACH;
+    while n_points < wanted && tries < (HALVINGS as usize + 20) * wanted {
+        if tries % wanted == 0 && n_points < tries / 4 {
+            reach = (reach / 2.0).max(REACH / f64::from(1_u32 << HALVINGS));
+        }
         tries += 1;
-        let Some(q) = loops.random(REACH, &mut stream) else {
+        let Some(q) = loops.random(reach, &mut stream) else {
             continue;
         };
-        let mut qd: Vec<f64> = (0..n_coordinates)
-            .map(|_| 2.0 * symmetric(&mut stream))
-            .collect();
-        let mut qdd: Vec<f64> = (0..n_coordinates)
-            .map(|_| 5.0 * symmetric(&mut stream))
-            .collect();
+        let mut moving = |most: f64| -> Vec<f64> {
+            (0..n_coordinates)
+                .map(|i| most * loops.unit(i) * symmetric(&mut stream))
+                .collect()
+        };
+        let (mut qd, mut qdd) = (moving(2.0), moving(5.0));
         let load: Vec<f64> = (0..n_drives)
             .map(|_| 100.0 * symmetric(&mut stream))
             .collect();

@@ -1,6 +1,6 @@
 //! Rational functions of the model's constants: the factors a_k of eq. (6).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Rational};
 use crate::field::Element;
@@ -12,7 +12,7 @@ pub enum Variable {
     Constant(usize),
     /// Cosine of a constant angle.
     Cos(usize),
-    /// Sine of a constant angle; its powers above the first are written with the cosine.
+    /// Sine of a constant angle.
     Sin(usize),
     /// Square root of a small integer, from a sine or cosine of a multiple of pi/12.
     Root(i64),
@@ -81,6 +81,7 @@ impl RationalFunction {
         if numerator.is_empty() {
             return Self::constant(Rational::ZERO);
         }
+        (numerator, denominator) = (with_fewest_terms(numerator), with_fewest_terms(denominator));
         let common = denominator
             .keys()
             .chain(numerator.keys())
@@ -193,6 +194,46 @@ impl RationalFunction {
         let (n, d) = (build(&self.numerator), build(&self.denominator));
         graph.div(n, d)
     }
+}
+
+/// The same polynomial with even powers of a cosine as powers of the sine where that has fewer terms:
+/// `L^2 - L^2*cos(beta)^2` is `L^2*sin(beta)^2`.
+fn with_fewest_terms(mut p: Polynomial) -> Polynomial {
+    let angles: BTreeSet<usize> = p
+        .keys()
+        .flatten()
+        .filter_map(|(v, _)| match v {
+            Variable::Cos(i) => Some(*i),
+            _ => None,
+        })
+        .collect();
+    for i in angles {
+        let mut in_sines = Polynomial::new();
+        for (powers, k) in &p {
+            let power_of = |v: Variable| {
+                let found = powers.iter().find(|(w, _)| *w == v);
+                found.map_or(0, |(_, n)| *n)
+            };
+            let (cosines, sines) = (power_of(Variable::Cos(i)), power_of(Variable::Sin(i)));
+            // cos^2n = (1 - sin^2)^n, term by term with alternating binomial coefficients.
+            let n = cosines / 2;
+            let mut coefficient = k.clone();
+            for j in 0..=n {
+                let mut term: BTreeMap<Variable, u32> = powers.iter().copied().collect();
+                term.insert(Variable::Cos(i), cosines % 2);
+                term.insert(Variable::Sin(i), sines + 2 * j);
+                let term: Powers = term.into_iter().filter(|(_, n)| *n > 0).collect();
+                let sum = in_sines.entry(term).or_insert(Rational::ZERO);
+                *sum = &*sum + &coefficient;
+                coefficient = &coefficient * &Rational::new(-i64::from(n - j), i64::from(j) + 1);
+            }
+        }
+        in_sines.retain(|_, k| !k.is_zero());
+        if in_sines.len() < p.len() {
+            p = in_sines;
+        }
+    }
+    p
 }
 
 pub(crate) fn monomial_value<const P: u64>(

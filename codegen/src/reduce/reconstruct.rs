@@ -317,6 +317,9 @@ impl Shape {
             .map(|(_, (n, d))| n.max(d).div_ceil(2))
             .max();
         let angle_degree = angle_degree.unwrap_or(0);
+        if roots.len() >= MOST_UNKNOWNS.ilog2() as usize {
+            return Ok(None);
+        }
         let root_powers = root_products(roots);
         let with_roots = |monomials: Vec<Powers>| -> Vec<Powers> {
             monomials

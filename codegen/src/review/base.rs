@@ -176,14 +176,14 @@ pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
         )]);
         return;
     }
-    page.paragraph([text(match reduction.method {
+    page.paragraph([text(match &reduction.method {
         Method::Exact { confirmed_at } => format!(
             "Columns that are constant combinations of retained ones at every state, eq. (6). \
              They were found in exact arithmetic and confirmed at {confirmed_at} further states with other values of the constants."
         ),
-        Method::Numeric { least_kept, most_dropped } => format!(
+        Method::Numeric { least_kept, most_dropped, because } => format!(
             "Columns that are constant combinations of retained ones, eq. (6), found numerically on the values of this file: \
-             the loops cannot be sampled exactly. The factors are rounded. \
+             {because}. The factors are rounded. \
              Of every retained column the others leave at least {least_kept:.1e}, of every dependent one at most {most_dropped:.1e}."
         ),
     })]);

@@ -6,7 +6,7 @@ use super::document::{Block, Document, Equation, Inline, Line, Table, cell, code
 use crate::expr::print::{Formula, angle_sum, exact_at, formula, tree_size};
 use crate::expr::{ExprId, Graph, Rational};
 use crate::programs::nominal_value;
-use crate::reduce::{Unknowns, plan};
+use crate::reduce::closed_form;
 use crate::{Derivation, PassivePosition};
 
 /// Expressions with more nodes than this are shown in a program rather than in one line.
@@ -124,14 +124,7 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
         ..
     } = derivation;
     let mut graph = graph.clone();
-    let mut positive =
-        |graph: &Graph, id: ExprId| nominal_value(graph, mechanism, id).is_none_or(|v| v >= 0.0);
-    let Some(plan) = plan(
-        &mut graph,
-        &equations.projection,
-        Unknowns::Passive,
-        &mut positive,
-    ) else {
+    let Some(plan) = closed_form(&mut graph, mechanism, &equations.projection) else {
         return;
     };
     let mut related = Vec::new();
@@ -158,7 +151,7 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
             _ => " follow from two linear equations",
         }));
         if let Some(root) = step.solved.root {
-            let sign = if positive(&graph, root.witness) {
+            let sign = if nominal_value(&graph, mechanism, root.witness).is_none_or(|x| x >= 0.0) {
                 "positive"
             } else {
                 "negative"

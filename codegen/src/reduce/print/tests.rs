@@ -152,3 +152,39 @@ fn squares_and_their_differences_are_seen() {
         "d1^2 + d3^2",
     );
 }
+
+/// The same at random points, with fewer terms where even powers of a cosine make up one of the sine.
+#[test]
+fn even_powers_of_cosines_become_sines_where_that_is_shorter() {
+    let (length, cosine, sine) = (Variable::Constant(0), Variable::Cos(1), Variable::Sin(1));
+    let one = Rational::ONE;
+    let numerator = Polynomial::from([
+        (vec![(length, 2)], one.clone()),
+        (vec![(length, 2), (cosine, 2)], -&one),
+    ]);
+    let quartic = Polynomial::from([
+        (vec![], one.clone()),
+        (vec![(cosine, 2)], Rational::integer(-2)),
+        (vec![(cosine, 4)], one.clone()),
+    ]);
+    let kept = Polynomial::from([(vec![(cosine, 2)], one.clone()), (vec![(sine, 1)], one)]);
+    for (p, n_terms, power_of_sine) in [(numerator, 1, 2), (quartic, 1, 4), (kept, 2, 1)] {
+        let written = RationalFunction {
+            numerator: p.clone(),
+            denominator: polynomial(&[(1, &[])]),
+        };
+        let found = RationalFunction::new(p, polynomial(&[(1, &[])]));
+        assert_eq!(found.numerator.len(), n_terms);
+        let sines = found.numerator.keys().flatten().filter(|(v, _)| *v == sine);
+        assert_eq!(sines.map(|(_, n)| *n).max(), Some(power_of_sine));
+        let mut stream = Stream::new(7);
+        for _ in 0..4 {
+            let mut point = FieldPoint::<MODULUS>::default();
+            for i in 0..2 {
+                point.values.insert(Atom::Constant(i), stream.element());
+                point.angles.insert(Atom::Constant(i), stream.circle());
+            }
+            assert_eq!(found.value(&point), written.value(&point));
+        }
+    }
+}

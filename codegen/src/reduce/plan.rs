@@ -1,0 +1,205 @@
+//! The order in which loops are solved, each as a dyad or by relations, and the same made evaluable in the field.
+
+use std::collections::BTreeSet;
+
+use modelmill_spec::Mechanism;
+
+use crate::closure::Closure;
+use crate::dyad::{self, Solved};
+use crate::expr::{AngleSum, Atom, Domain, ExprId, FieldPoint, Graph, Tape};
+use crate::programs::nominal_value;
+use crate::projection::Projection;
+
+/// A way to solve all loops one after the other, each for at most two coordinates.
+#[derive(Clone, Debug)]
+pub(crate) struct Plan {
+    pub(crate) steps: Vec<PlanStep>,
+}
+
+/// One loop of a plan.
+#[derive(Clone, Debug)]
+pub(crate) struct PlanStep {
+    pub(crate) unknown: Vec<usize>,
+    pub(crate) solved: Solved,
+}
+
+/// Which coordinates a plan may solve for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unknowns {
+    /// The passive ones, with the active ones given: what a controller needs.
+    Passive,
+    /// Any, with the others drawn at random: what sampling needs.
+    Any,
+}
+
+/// Looks for a plan. Every loop takes the root that it has at the nominal pose: loops that are alike but for their
+/// assembly mode must differ in the field, too.
+///
+/// Given coordinates only become more from loop to loop, so for [`Unknowns::Passive`] any loop that can be solved may be
+/// solved next. With [`Unknowns::Any`] a loop's unknowns must not be needed by the loops before it, so the plan is made
+/// from its end: any loop with two unknowns of its own among those left may be the last of them.
+pub(crate) fn plan(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    projection: &Projection,
+    unknowns: Unknowns,
+) -> Option<Plan> {
+    let mut steps: Vec<PlanStep> = Vec::new();
+    let mut todo: Vec<usize> = (0..projection.closures.len()).collect();
+    let mut known: BTreeSet<usize> = projection.active.iter().copied().collect();
+    while !todo.is_empty() {
+        let next = todo.iter().enumerate().find_map(|(position, index)| {
+            let closure = &projection.closures[*index];
+            let free: Vec<usize> = closure
+                .coordinates
+                .iter()
+                .copied()
+                .filter(|c| match unknowns {
+                    Unknowns::Passive => !known.contains(c),
+                    Unknowns::Any => !todo.iter().any(|other| {
+                        other != index && projection.closures[*other].coordinates.contains(c)
+                    }),
+                })
+                .collect();
+            choices(closure, &free, projection, unknowns)
+                .into_iter()
+                .find_map(|unknown| solve(graph, mechanism, closure, unknown))
+                .map(|step| (position, step))
+        });
+        let (position, step) = next?;
+        let index = todo.remove(position);
+        known.extend(&projection.closures[index].coordinates);
+        steps.push(step);
+    }
+    if unknowns == Unknowns::Any {
+        steps.reverse();
+    }
+    Some(Plan { steps })
+}
+
+/// Sets of coordinates for which a loop may be solved; passive ones first.
+fn choices(
+    closure: &Closure,
+    free: &[usize],
+    projection: &Projection,
+    unknowns: Unknowns,
+) -> Vec<Vec<usize>> {
+    if !closure.relations.is_empty() {
+        let related: Vec<usize> = closure.relations.iter().map(|r| r.coordinate).collect();
+        let all = match unknowns {
+            Unknowns::Passive => free.iter().all(|c| related.contains(c)),
+            Unknowns::Any => related.iter().all(|c| free.contains(c)),
+        };
+        return if all { vec![related] } else { Vec::new() };
+    }
+    if unknowns == Unknowns::Passive {
+        return if free.len() == 2 {
+            vec![free.to_vec()]
+        } else {
+            Vec::new()
+        };
+    }
+    let mut pairs: Vec<Vec<usize>> = Vec::new();
+    for (i, a) in free.iter().enumerate() {
+        pairs.extend(free[i + 1..].iter().map(|b| vec![*a, *b]));
+    }
+    pairs.sort_by_key(|pair| {
+        pair.iter()
+            .filter(|c| !projection.passive.contains(c))
+            .count()
+    });
+    pairs
+}
+
+fn solve(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    closure: &Closure,
+    unknown: Vec<usize>,
+) -> Option<PlanStep> {
+    let mut solved = dyad::solve(graph, closure, &unknown, true)?;
+    if let Some(root) = solved.root
+        && nominal_value(graph, mechanism, root.witness).is_some_and(|x| x < 0.0)
+    {
+        solved = dyad::solve(graph, closure, &unknown, false)?;
+    }
+    Some(PlanStep { unknown, solved })
+}
+
+/// A step of a plan in the field.
+pub(super) struct SolveStep {
+    unknown: Vec<usize>,
+    angles: Vec<AngleSum>,
+    /// Coordinates whose values follow: lengths, and angles that are combinations of known ones.
+    numbers: Vec<usize>,
+    /// Cosines and sines of the angles in pairs, then the numbers.
+    tape: Tape,
+    /// What the step takes the root of, if it does.
+    pub(super) radicand: Option<Tape>,
+}
+
+impl SolveStep {
+    /// Makes a step evaluable; what it evaluates goes to `roots`.
+    pub(super) fn new(graph: &mut Graph, step: PlanStep, roots: &mut Vec<ExprId>) -> Self {
+        let solved = step.solved;
+        let mut angles: Vec<(AngleSum, [ExprId; 2])> = solved.angles;
+        let mut numbers: Vec<(usize, ExprId)> = solved.lengths;
+        for relation in &solved.relations {
+            let (c, s) = graph.cos_sin(&relation.sum, relation.pi12);
+            let angle = AngleSum::new([(Atom::Coordinate(relation.coordinate), 1)]);
+            angles.push((angle, [c, s]));
+            numbers.push((relation.coordinate, relation.value(graph)));
+        }
+        let mut own: Vec<ExprId> = angles.iter().flat_map(|(_, cs)| *cs).collect();
+        own.extend(numbers.iter().map(|(_, value)| *value));
+        roots.extend(&own);
+        Self {
+            unknown: step.unknown,
+            angles: angles.into_iter().map(|(angle, _)| angle).collect(),
+            numbers: numbers.iter().map(|(i, _)| *i).collect(),
+            tape: Tape::new(graph, &own),
+            radicand: solved.root.map(|root| Tape::new(graph, &[root.radicand])),
+        }
+    }
+
+    /// Sets the unknown coordinates of a point whose other coordinates are set; `None` if the loop does not close there.
+    pub(super) fn solve<const P: u64>(&self, point: &mut FieldPoint<P>) -> Option<()> {
+        let values = self.tape.evaluate(point)?;
+        let numbers = &values[2 * self.angles.len()..];
+        for (i, value) in self.numbers.iter().zip(numbers) {
+            point.values.insert(Atom::Coordinate(*i), *value);
+        }
+        let in_angles = |c: &usize| {
+            self.angles
+                .iter()
+                .any(|a| a.atoms().any(|x| x == Atom::Coordinate(*c)))
+        };
+        let mut unknown: Vec<usize> = self.unknown.iter().copied().filter(in_angles).collect();
+        while !unknown.is_empty() {
+            let before = unknown.len();
+            for (k, angle) in self.angles.iter().enumerate() {
+                let inside: Vec<_> = angle
+                    .terms()
+                    .iter()
+                    .filter(|(atom, _)| matches!(atom, Atom::Coordinate(i) if unknown.contains(i)))
+                    .collect();
+                let &[(atom @ Atom::Coordinate(i), sign)] = inside.as_slice() else {
+                    continue;
+                };
+                let rest = angle.plus(&AngleSum::new([(*atom, *sign)]), -1);
+                let (cr, sr) = point.cos_sin(&rest)?;
+                let (c, s) = (values[2 * k], values[2 * k + 1]);
+                // The unknown angle is sign * (angle - rest).
+                let (c, s) = (c * cr + s * sr, s * cr - c * sr);
+                point
+                    .angles
+                    .insert(*atom, (c, if *sign < 0 { -s } else { s }));
+                unknown.retain(|u| u != i);
+            }
+            if unknown.len() == before {
+                return None;
+            }
+        }
+        Some(())
+    }
+}
