@@ -104,6 +104,8 @@ fn loops_alike_but_for_their_assembly_modes() {
     exact("opposed_sliders", 0.3, 3);
     // The larger one's columns are those of the smaller one times its scale.
     exact("sliders_to_scale", 0.3, 3);
+    let case = keeps_the_laws(awkward("sliders_in_numbers"), 0.3);
+    assert_eq!(case.derivation.reduction.retained.len(), 3);
 }
 
 #[test]

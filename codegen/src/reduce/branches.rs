@@ -56,7 +56,7 @@ pub(super) fn of(
     outputs: &[ExprId],
 ) -> Result<Vec<Branch>, DeriveError> {
     let further = radicands(graph, outputs);
-    let of_steps = poses.steps.iter().filter(|s| s.radicand.is_some()).count();
+    let of_steps: usize = poses.steps.iter().map(|s| s.radicands.len()).sum();
     let mut seen: Vec<Seen> = (0..of_steps + further.len()).map(Seen::new).collect();
     let mut stream = Stream::new(SEED);
     let constants = poses.constants::<MODULUS>(&mut stream)?;
@@ -80,7 +80,7 @@ pub(super) fn of(
         };
         let mut walk = || -> Option<()> {
             for step in &poses.steps {
-                if let Some(radicand) = &step.radicand {
+                for radicand in &step.radicands {
                     note(radicand.evaluate(&point))?;
                 }
                 step.solve(&mut point)?;
@@ -148,7 +148,7 @@ impl Seen {
 }
 
 /// What roots under `outputs` are taken of, if it depends on coordinates and constants alone.
-fn radicands(graph: &Graph, outputs: &[ExprId]) -> Vec<Tape> {
+pub(super) fn radicands(graph: &Graph, outputs: &[ExprId]) -> Vec<Tape> {
     let inner = graph.nodes_of(outputs).filter_map(|node| match node {
         Node::Unary(Unary::Sqrt, inner) => Some(*inner),
         _ => None,

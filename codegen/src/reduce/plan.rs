@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use modelmill_spec::Mechanism;
 
+use super::branches;
 use crate::closure::Closure;
 use crate::dyad::{self, Solved};
 use crate::expr::{AngleSum, Atom, Domain, ExprId, FieldPoint, Graph, Tape};
@@ -134,8 +135,8 @@ pub(super) struct SolveStep {
     numbers: Vec<usize>,
     /// Cosines and sines of the angles in pairs, then the numbers.
     tape: Tape,
-    /// What the step takes the root of, if it does.
-    pub(super) radicand: Option<Tape>,
+    /// What the step takes roots of: one at most, as it stands.
+    pub(super) radicands: Vec<Tape>,
 }
 
 impl SolveStep {
@@ -158,7 +159,7 @@ impl SolveStep {
             angles: angles.into_iter().map(|(angle, _)| angle).collect(),
             numbers: numbers.iter().map(|(i, _)| *i).collect(),
             tape: Tape::new(graph, &own),
-            radicand: solved.root.map(|root| Tape::new(graph, &[root.radicand])),
+            radicands: branches::radicands(graph, &own),
         }
     }
 
