@@ -29,6 +29,7 @@ mod record;
 mod schema;
 mod scope;
 mod suggest;
+mod unclosed;
 mod unit;
 mod values;
 

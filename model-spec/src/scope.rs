@@ -129,10 +129,13 @@ impl Scope {
         let Some(meaning) = self.names.get(name) else {
             if !log.is_full() {
                 let candidates: Vec<&str> = allowed().collect();
+                let removal = log.removal(&["constants", "parameters", "coordinates"], name);
                 log.push(
                     Diagnostic::error(span, format!("unknown name `{}`", quote(name)))
                         .label(format!("expected {list}"))
-                        .help(suggest::advice(name, "names", candidates.iter().copied())),
+                        .removed_or(removal, || {
+                            suggest::advice(name, "names", candidates.iter().copied())
+                        }),
                 );
             }
             return None;

@@ -288,10 +288,13 @@ fn place(
         .chain(points.names())
         .collect();
     if !log.is_full() {
+        let removal = log.removal(&["drive", "coordinates", "point"], &name.text);
         log.push(
             Diagnostic::error(name.span, format!("unknown place `{}`", name.text))
                 .label("expected the name of a drive, a coordinate or a point")
-                .help(suggest::advice(&name.text, "places", known.iter().copied())),
+                .removed_or(removal, || {
+                    suggest::advice(&name.text, "places", known.iter().copied())
+                }),
         );
     }
     None
