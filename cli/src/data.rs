@@ -45,12 +45,16 @@ pub(crate) fn read(model: &Model, path: &Path, args: &PreparationArgs) -> Outcom
         None => std::fs::File::open(path).map_or_else(|_| Vec::new(), header),
     };
     let options = options(model, args, &header)?;
-    let recording = watched(&format!("reading {}", path.display()), 0, |_| match &piped {
-        Some(bytes) => {
-            Recording::from_reader(bytes.as_slice(), &path.display().to_string(), &options)
-        }
-        None => Recording::read_with(path, &options),
-    })?;
+    let recording = watched(
+        &format!("reading {}", path.display()),
+        0,
+        |_| match &piped {
+            Some(bytes) => {
+                Recording::from_reader(bytes.as_slice(), &path.display().to_string(), &options)
+            }
+            None => Recording::read_with(path, &options),
+        },
+    )?;
     let mut data = prepare(model, &recording, args)?;
     note_idle_options(&mut data, args);
     for note in data.iter().flat_map(Data::notes) {

@@ -192,6 +192,10 @@ impl fmt::Display for Fault {
                 "the first line holds numbers, but column names are expected there; \
                  put a line such as `t,theta1,spindle_left` on top",
             ),
+            Self::UnclearSeparator { header } if header.starts_with('#') => write!(
+                f,
+                "the first line must name the columns, but it is `{header}`; comment lines are not read, delete them"
+            ),
             Self::UnclearSeparator { header } => write!(
                 f,
                 "it cannot be told what separates the columns of `{header}`; \

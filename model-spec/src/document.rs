@@ -81,15 +81,12 @@ pub(crate) fn quote(text: &str) -> String {
 /// Parses a file; syntax errors go to the log, and what could be understood comes back.
 pub(crate) fn parse(text: &str, file: usize, log: &mut Log) -> Table {
     // The parser takes all that follows an open bracket for its inside; what stands before is read by itself.
-    let open = unclosed(text).filter(|_| {
-        text.len() <= LARGEST_FILE && !DeTable::parse_recoverable(text).1.is_empty()
-    });
+    let open = unclosed(text)
+        .filter(|_| text.len() <= LARGEST_FILE && !DeTable::parse_recoverable(text).1.is_empty());
     let Some(open) = open else {
         return parse_closed(text, file, log);
     };
-    let line = text[..open.outermost]
-        .rfind('\n')
-        .map_or(0, |end| end + 1);
+    let line = text[..open.outermost].rfind('\n').map_or(0, |end| end + 1);
     let table = parse_closed(&text[..line], file, log);
     log.syntax_broken = true;
     let span = |at: usize, length: usize| Span {

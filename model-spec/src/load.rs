@@ -25,6 +25,8 @@ pub struct Loaded {
     pub sources: Sources,
     /// The kinds of effects that the file may use: the library's, then its own.
     pub kinds: Vec<EffectKind>,
+    /// Where each product of [`Mechanism::retain`] stands.
+    pub retain: Vec<Span>,
 }
 
 impl Loaded {
@@ -183,6 +185,12 @@ pub fn load(
         warnings: diagnostics,
         sources,
         kinds,
+        retain: model
+            .retain
+            .iter()
+            .flat_map(|list| &list.entries)
+            .map(|formula| formula.ast.span)
+            .collect(),
     })
 }
 

@@ -126,9 +126,15 @@ mod tests {
     #[test]
     fn brackets_without_partners_are_found() {
         check("a = { b = 1\n[c]\n", Some("{ b = 1\n[c]\n"));
-        check("a = [1, 2\n\n[[c]] # x\nd = [1]", Some("[1, 2\n\n[[c]] # x\nd = [1]"));
+        check(
+            "a = [1, 2\n\n[[c]] # x\nd = [1]",
+            Some("[1, 2\n\n[[c]] # x\nd = [1]"),
+        );
         check("a = [{ b = [1, }]\n", None);
-        check("a = [\n  [1],\n  [true]\n]\n[b]\nc = { d = \"}{\\\"{\" }", None);
+        check(
+            "a = [\n  [1],\n  [true]\n]\n[b]\nc = { d = \"}{\\\"{\" }",
+            None,
+        );
         check("a = \'{\' # {\nb = \"\"\"{\n[c]\n\"\"\"", None);
         check("a = 1\nb = [", Some("["));
         check("a = \"x\nb = { [", None);

@@ -54,7 +54,9 @@ fn a_file_that_is_no_text_in_utf_8() {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("latin.toml");
     std::fs::write(&path, b"schema = 1\nname = \"arm\" # m\xFCde\n").unwrap();
     let found = modelmill_spec::load_file(&path).unwrap_err();
-    let says = found.render(false).replace(&*path.to_string_lossy(), "latin.toml");
+    let says = found
+        .render(false)
+        .replace(&*path.to_string_lossy(), "latin.toml");
     insta::assert_snapshot!(says, @r#"
     error: this file is no text in UTF-8
      --> latin.toml:2:17

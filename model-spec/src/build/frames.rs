@@ -36,11 +36,7 @@ impl Tree {
                 Diagnostic::error(name.span, format!("unknown frame `{}`", name.text))
                     .label("expected the name of a frame, or `base`")
                     .removed_or(removal, || {
-                        suggest::advice(
-                            &name.text,
-                            "frames",
-                            self.names.keys().map(String::as_str),
-                        )
+                        suggest::advice(&name.text, "frames", self.names.keys().map(String::as_str))
                     }),
             );
         }
