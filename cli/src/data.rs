@@ -10,6 +10,7 @@ use modelmill_identify::{NotFinite, Note, ReadOptions, Recording, Run, Severity}
 
 use crate::failure::{Failure, Outcome};
 use crate::model::Model;
+use crate::piped::piped;
 use crate::preparation::PreparationArgs;
 use crate::progress::watched;
 use crate::terminal;
@@ -38,11 +39,24 @@ pub(crate) fn read_all(
 
 /// Reads and prepares one recording: one or, where it is cut at gaps in time, several stretches.
 pub(crate) fn read(model: &Model, path: &Path, args: &PreparationArgs) -> Outcome<Vec<Data>> {
-    let options = options(model, args, &header(path))?;
-    let recording = watched(&format!("reading {}", path.display()), 0, |_| {
-        Recording::read_with(path, &options)
-    })?;
-    let data = prepare(model, &recording, args)?;
+    let piped = piped(path)?;
+    let header = match &piped {
+        Some(bytes) => header(bytes.as_slice()),
+        None => std::fs::File::open(path).map_or_else(|_| Vec::new(), header),
+    };
+    let options = options(model, args, &header)?;
+    let recording = watched(
+        &format!("reading {}", path.display()),
+        0,
+        |_| match &piped {
+            Some(bytes) => {
+                Recording::from_reader(bytes.as_slice(), &path.display().to_string(), &options)
+            }
+            None => Recording::read_with(path, &options),
+        },
+    )?;
+    let mut data = prepare(model, &recording, args)?;
+    note_idle_options(&mut data, args);
     for note in data.iter().flat_map(Data::notes) {
         match note.severity {
             Severity::Warning => terminal::warn(&note.says),
@@ -69,7 +83,34 @@ fn prepare(model: &Model, recording: &Recording, args: &PreparationArgs) -> Outc
         let suspicions = recording.suspicions(&model.motions(), preparation.source);
         first.notes.splice(0..0, suspicions);
     }
+    for run in &mut runs {
+        let idle = run.suspicious_forces(&model.drives());
+        run.notes.extend(idle);
+    }
     Ok(runs.into_iter().map(|run| Data { run }).collect())
+}
+
+/// Says that options of the filter do nothing where all derivatives are recorded.
+fn note_idle_options(data: &mut [Data], args: &PreparationArgs) {
+    let given: Vec<&str> = [
+        args.cutoff.map(|_| "--cutoff"),
+        args.order.map(|_| "--order"),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    if given.is_empty() || data.iter().any(|one| one.run.prepared.cutoff_hz.is_some()) {
+        return;
+    }
+    if let Some(one) = data.first_mut() {
+        let does = if given.len() == 1 { "does" } else { "do" };
+        one.run.notes.push(Note::warning(format!(
+            "{} {does} nothing to {}: it holds all rates and accelerations, so none are made from positions; ask for \
+             that with `--derivatives positions`.",
+            given.join(" and "),
+            one.run.file
+        )));
+    }
 }
 
 /// Warns of recordings that are given twice, also as copies: they count twice, or make a check that proves nothing.
@@ -97,12 +138,9 @@ pub(crate) fn note_twins(data: &mut [Data], check: &mut [Data]) {
 }
 
 /// Names of the columns, roughly: enough to see whether the model's own mapping applies.
-fn header(path: &Path) -> Vec<String> {
-    let Ok(file) = std::fs::File::open(path) else {
-        return Vec::new();
-    };
+fn header(stream: impl Read) -> Vec<String> {
     let mut line = Vec::new();
-    let mut reader = BufReader::new(file).take(1 << 20);
+    let mut reader = BufReader::new(stream).take(1 << 20);
     if reader.read_until(b'\n', &mut line).is_err() {
         return Vec::new();
     }

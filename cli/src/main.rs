@@ -10,6 +10,7 @@ mod entries;
 mod failure;
 mod model;
 mod output;
+mod piped;
 mod plot;
 mod preparation;
 mod progress;

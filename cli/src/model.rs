@@ -70,8 +70,15 @@ pub(crate) fn derive_loaded(path: &str, loaded: &Loaded) -> Outcome<Model> {
         modelmill_codegen::derive(mechanism)
     })
     .map_err(|error| Failure::Input(format!("{path}: {error}")))?;
-    for says in retained_in_vain(&derivation) {
-        terminal::warn(&format!("{path}: {says}"));
+    for (k, says) in retained_in_vain(&derivation) {
+        let place = loaded.retain.get(k).map(|span| {
+            let (line, column) = loaded.sources.line_and_column(*span);
+            let file = loaded.sources.files.get(span.file);
+            let file = file.map_or_else(|| path.to_owned(), |f| f.path.display().to_string());
+            format!("{file}:{line}:{column}")
+        });
+        let place = place.unwrap_or_else(|| path.to_owned());
+        terminal::warn(&format!("{place}: {says}"));
     }
     let stem = Path::new(path).file_stem();
     Ok(Model {
@@ -97,23 +104,23 @@ fn base(derivation: &Derivation) -> Vec<BaseParameter> {
     base
 }
 
-/// What `retain` asks for that cannot be, in words.
-pub(crate) fn retained_in_vain(derivation: &Derivation) -> Vec<String> {
+/// What `retain` asks for that cannot be, in words, by its place in the list.
+pub(crate) fn retained_in_vain(derivation: &Derivation) -> Vec<(usize, String)> {
     let reduction = &derivation.reduction;
     let mechanism = &derivation.mechanism;
     let mut says = Vec::new();
-    for powers in &mechanism.retain {
+    for (k, powers) in mechanism.retain.iter().enumerate() {
         let wanted = Monomial(powers.iter().map(|(p, n)| (p.0, *n)).collect());
         let name = wanted.text(mechanism);
         let why = match reduction.products.iter().position(|p| *p == wanted) {
-            Some(k) if reduction.retained.contains(&k) => continue,
+            Some(at) if reduction.retained.contains(&at) => continue,
             Some(_) => "its column depends on those of products that are retained before it",
             None if reduction.without_effect.contains(&wanted) => {
                 "it has no effect on the drives: its column is zero"
             }
             None => "there is no such product in the equations",
         };
-        says.push(format!("`{name}` of `retain` cannot be retained: {why}"));
+        says.push((k, format!("`{name}` of `retain` cannot be retained: {why}")));
     }
     says
 }

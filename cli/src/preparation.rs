@@ -3,6 +3,10 @@
 use clap::{Args, ValueEnum};
 use modelmill_identify::Preparation;
 use modelmill_identify::derivatives::Source;
+use modelmill_identify::filters::MAX_ORDER;
+
+/// Order of the low-pass where none is asked for.
+const USUAL_ORDER: usize = 4;
 
 /// How recordings are read and states are prepared.
 #[derive(Debug, Clone, Args)]
@@ -13,17 +17,17 @@ pub(crate) struct PreparationArgs {
     #[arg(long, value_name = "OURS=THEIRS", value_parser = parse_map)]
     pub(crate) map: Vec<(String, String)>,
     /// Cut-off of the low-pass on positions, Hz; chosen from the signal if not given
-    #[arg(long, value_name = "HZ", value_parser = parse_cutoff)]
+    #[arg(long, value_name = "HZ", value_parser = parse_cutoff, allow_negative_numbers = true)]
     pub(crate) cutoff: Option<f64>,
-    /// Order of the Butterworth low-pass, which runs forwards and backwards
-    #[arg(long, value_name = "N", default_value_t = 4)]
-    pub(crate) order: usize,
+    /// Order of the Butterworth low-pass, which runs forwards and backwards [default: 4]
+    #[arg(long, value_name = "N", value_parser = parse_order, allow_negative_numbers = true)]
+    pub(crate) order: Option<usize>,
     /// Samples dropped at the start and at the end, once derivatives are made; a single number
     /// counts for both ends
-    #[arg(long, value_name = "N[,N]", value_parser = parse_trim)]
+    #[arg(long, value_name = "N[,N]", value_parser = parse_trim, allow_hyphen_values = true)]
     pub(crate) trim: Option<(usize, usize)>,
     /// Keep every n-th sample, after a low-pass on forces and regressor alike
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_decimate)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_decimate, allow_negative_numbers = true)]
     pub(crate) decimate: usize,
     /// Which rates and accelerations are taken
     #[arg(long, value_enum, default_value = "recorded")]
@@ -48,7 +52,7 @@ impl PreparationArgs {
         Self {
             map: Vec::new(),
             cutoff: None,
-            order: 4,
+            order: None,
             trim: None,
             decimate: 1,
             derivatives: DerivativesArg::Recorded,
@@ -60,7 +64,7 @@ impl PreparationArgs {
     pub(crate) fn preparation(&self) -> Preparation {
         Preparation {
             cutoff_hz: self.cutoff,
-            order: self.order,
+            order: self.order.unwrap_or(USUAL_ORDER),
             trim: self.trim,
             decimate: self.decimate,
             source: match self.derivatives {
@@ -84,6 +88,15 @@ fn parse_cutoff(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
         _ => Err("expected a frequency above 0 in Hz, such as 25".to_owned()),
+    }
+}
+
+fn parse_order(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(order) if (1..=MAX_ORDER).contains(&order) => Ok(order),
+        _ => Err(format!(
+            "expected an order from 1 to {MAX_ORDER}; 4 is usual"
+        )),
     }
 }
 

@@ -8,6 +8,8 @@ use modelmill_identify::numeric_rank::numeric_rank;
 use modelmill_spec::Motion;
 
 use crate::model::Model;
+use crate::progress::watched;
+use crate::table::count;
 
 /// Fewest random states.
 const SAMPLES: usize = 40;
@@ -18,8 +20,37 @@ const RATE: f64 = 2.0;
 const ACCELERATION: f64 = 5.0;
 const LOAD: f64 = 100.0;
 
+/// The rank of H on the file's values, and in words where it says something else than exact reduction.
+pub(crate) fn judged_rank(model: &Model) -> (Option<NumericRank>, Option<String>) {
+    let message = format!("sampling {}", model.name);
+    let found = match watched(&message, 0, |_| sampled_rank(model)) {
+        Ok(found) => found,
+        Err(reason) => {
+            let says = format!("the numeric rank of eq. (9) was not found: {reason}");
+            return (None, Some(says));
+        }
+    };
+    let exact = model.base.len();
+    let says = if found.rank < exact {
+        Some(format!(
+            "with the file's values the numeric rank is {}, below the exact {exact} for general values; special values \
+             make columns vanish or coincide, so identification will find {} undetermined",
+            found.rank,
+            count(exact - found.rank, "direction", "directions")
+        ))
+    } else if found.rank > exact {
+        Some(format!(
+            "the numeric rank is {}, above the exact {exact}; please report this model, one of them is wrong",
+            found.rank
+        ))
+    } else {
+        None
+    };
+    (Some(found), says)
+}
+
 /// The rank of H on the file's values; the reason in words if there is none.
-pub(crate) fn sampled_rank(model: &Model) -> Result<NumericRank, String> {
+fn sampled_rank(model: &Model) -> Result<NumericRank, String> {
     let mechanism = &model.derivation.mechanism;
     let active: Vec<(f64, Motion)> = mechanism
         .coordinates

@@ -408,7 +408,8 @@ fn a_product_that_cannot_be_retained_is_said() {
             && says
                 .err
                 .contains("`M^2` of `retain` cannot be retained: there is no such product")
-            && !says.err.contains("`M` of"),
+            && !says.err.contains("`M` of")
+            && says.err.contains("retain.toml:"),
         "{}",
         says.err
     );
@@ -423,6 +424,60 @@ fn a_product_that_cannot_be_retained_is_said() {
             .to_string()
             .contains("its column is zero"),
         "{checked:#}"
+    );
+}
+
+/// A crank of no length: the slider stands still, whatever the exact reduction for general lengths says.
+#[test]
+fn special_values_that_lower_the_rank_are_said_by_check() {
+    let text = r#"
+schema = 1
+name = "slider_crank"
+constants = { r = { value = 0.1, unit = "m" }, l = { value = 0.3, unit = "m" } }
+coordinates = { q = { nominal = 0.5 }, b = { nominal = -0.66, passive = true }, x = { nominal = 0.38, passive = true } }
+frame = [
+    { name = "crank", on = "base", modified_dh = { theta = "q" } },
+    { name = "rod", on = "crank", modified_dh = { a = "r", theta = "b" } },
+    { name = "slider", on = "base", joint = { prismatic = "x", axis = "x" } },
+]
+point = [{ name = "end", on = "rod", at = ["l", 0] }, { name = "pin", on = "slider", at = [0, 0] }]
+part = [
+    { on = "crank", linear = { planar = 1 } },
+    { on = "rod", linear = { planar = 2 } },
+    { on = "slider", linear = { planar = 3 } },
+]
+loop = [{ joins = ["end", "pin"] }]
+drive = [{ name = "motor", joint = "q" }]
+"#;
+    let file = scratch("slider.toml");
+    std::fs::write(&file, text).expect("written");
+    let sound = ran(&["check", &file]);
+    assert!(sound.status == 0 && sound.err.is_empty(), "{}", sound.err);
+    assert!(
+        sound.out.contains("slider_crank (the file's `name`)"),
+        "{}",
+        sound.out
+    );
+    let special = text
+        .replace("r = { value = 0.1,", "r = { value = 0,")
+        .replace("nominal = 0.38", "nominal = 0.3")
+        .replace("-0.66", "-0.5");
+    std::fs::write(&file, special).expect("written");
+    let checked = ran(&["check", &file]);
+    assert!(
+        checked.status == 0
+            && checked
+                .err
+                .contains("with the file's values the numeric rank is"),
+        "{}",
+        checked.err
+    );
+    let object = json(&["check", &file, "--json"]);
+    assert_eq!(object["model"], "slider");
+    assert_eq!(object["module"], "slider_crank");
+    assert!(
+        object["diagnostics"].to_string().contains("numeric rank"),
+        "{object:#}"
     );
 }
 

@@ -20,6 +20,9 @@ fn wrong_usage_ends_with_two() {
         &["evaluate", "m.toml", "--data", "r.csv", "--decimate", "0"],
         &["evaluate", "m.toml", "--data", "r.csv", "--cutoff", "-3"],
         &["evaluate", "m.toml", "--data", "r.csv", "--trim", "a"],
+        &["evaluate", "m.toml", "--data", "r.csv", "--trim", "-5"],
+        &["evaluate", "m.toml", "--data", "r.csv", "--order", "0"],
+        &["evaluate", "m.toml", "--data", "r.csv", "--order", "21"],
         &["evaluate", "m.toml", "--data", "r.csv", "--map", "theta1"],
         &["completions", "tcsh9"],
     ] {
@@ -28,6 +31,8 @@ fn wrong_usage_ends_with_two() {
             says.contains("Usage") || says.contains("--help"),
             "{args:?}: {says}"
         );
+        // Dashes would make the number a second model file.
+        assert!(!says.contains("'-- -"), "{args:?}: {says}");
     }
     let says = refused(
         2,

@@ -16,6 +16,10 @@
 //!    weights; never below `n + 1`, and never above a tenth of the samples.
 //! 4. Recolouring by `1/(1 - a)` and the factor `T/(T - n_parameters)`.
 //!
+//! All this is a limit of many samples: residuals of a fit are orthogonal to its columns, so with few of them their
+//! influences cancel and the estimate goes to nothing. [`Deviations::few_samples`] says when; then a deviation is never
+//! below the classical one, which takes the degrees of freedom off exactly.
+//!
 //! Bartlett's sum over lags is computed as the sum over all windows of `L` samples of
 //! `S_t S_t'/L`, `S_t` being the sum of the window: the same number, at a cost and a memory
 //! that do not grow with the lags times the parameters squared.
@@ -44,7 +48,13 @@ pub struct Deviations {
     pub bandwidth: usize,
     /// Samples, each of all channels.
     pub samples: usize,
+    /// True where there are fewer than [`FEWEST_ROWS`] equations for each parameter: the deviations are then no smaller
+    /// than the classical ones, and still too small if neighbouring residuals resemble each other.
+    pub few_samples: bool,
 }
+
+/// Equations for each parameter below which the influences of samples cancel too much to be summed over lags.
+pub const FEWEST_ROWS: usize = 20;
 
 /// One showing of a block of whole samples: regressor and measured values, as in
 /// [`LeastSquares::add_rows`](crate::LeastSquares::add_rows), rows interleaved per sample
@@ -113,9 +123,13 @@ pub fn autocorrelated<E: From<LeastSquaresError>>(
     let freedom = samples.saturating_sub(n.div_ceil(channels)).max(1);
     let correction = samples as f64 / freedom as f64;
     let sum = windows.finish();
-    let covariance = DMatrix::from_fn(n, n, |i, j| {
+    let mut covariance = DMatrix::from_fn(n, n, |i, j| {
         correction * sum[(i, j)] / ((1.0 - whitening[i]) * (1.0 - whitening[j]))
     });
+    let few_samples = solution.rows < FEWEST_ROWS * solution.rank;
+    if few_samples {
+        raise_to_classical(&mut covariance, solution);
+    }
     let std: Vec<f64> = (0..n)
         .map(|j| {
             if solution.rows <= solution.rank {
@@ -147,7 +161,27 @@ pub fn autocorrelated<E: From<LeastSquaresError>>(
             .collect(),
         bandwidth,
         samples,
+        few_samples,
     })
+}
+
+/// Raises variances that lie below the classical ones up to them; correlations stay.
+fn raise_to_classical(covariance: &mut DMatrix<f64>, solution: &Solution) {
+    for i in 0..solution.values.len() {
+        let classical = solution.classical_std[i].powi(2);
+        let variance = covariance[(i, i)];
+        if !solution.determined[i] || !classical.is_finite() || variance >= classical {
+            continue;
+        }
+        let factor = if variance > 0.0 {
+            (classical / variance).sqrt()
+        } else {
+            0.0
+        };
+        covariance.row_mut(i).scale_mut(factor);
+        covariance.column_mut(i).scale_mut(factor);
+        covariance[(i, i)] = classical;
+    }
 }
 
 /// Newey and West's number of lags that the bandwidth is estimated from (Bartlett's kernel).
@@ -383,6 +417,39 @@ mod tests {
         let found: Result<Deviations, LeastSquaresError> =
             autocorrelated(&solution, 1, |visit| visit(&w, &y));
         assert!(found.unwrap().std.iter().all(|std| std.is_nan()));
+    }
+
+    /// The classical deviation is exact for independent residuals, however few: `(y - W p) / std` then follows Student's
+    /// distribution, whose 2-sigma coverage for two degrees of freedom is 81.6 %, for eight 91.9 % (any table of t).
+    #[test]
+    fn few_samples_cover_as_students_distribution_says() {
+        for (samples, expected) in [(4, 0.816), (10, 0.919)] {
+            let mut noise = Noise::new(5);
+            let trials = 4000;
+            let mut hits = 0;
+            for _ in 0..trials {
+                let w: Vec<f64> = (0..samples).flat_map(|i| [1.0, f64::from(i)]).collect();
+                let y: Vec<f64> = (0..samples)
+                    .map(|i| 3.0 + 2.0 * f64::from(i) + noise.normal())
+                    .collect();
+                let mut regression = LeastSquares::new(2);
+                regression.add_rows(&w, &y).unwrap();
+                let solution = regression.solve().unwrap();
+                let found: Result<Deviations, LeastSquaresError> =
+                    autocorrelated(&solution, 1, |visit| visit(&w, &y));
+                let found = found.unwrap();
+                assert!(found.few_samples);
+                for j in 0..2 {
+                    assert!(found.std[j] >= solution.classical_std[j] * (1.0 - 1e-12));
+                    assert!((found.covariance[(j, j)].sqrt() / found.std[j] - 1.0).abs() < 1e-12);
+                }
+                assert!(found.covariance.clone().symmetric_eigenvalues().min() > -1e-12);
+                hits += usize::from((solution.values[1] - 2.0).abs() <= 2.0 * found.std[1]);
+            }
+            let coverage = hits as f64 / f64::from(trials);
+            println!("{samples} samples: {coverage:.3}, expected at least {expected}");
+            assert!(coverage > expected - 0.02, "{samples} samples: {coverage}");
+        }
     }
 
     #[test]

@@ -89,7 +89,7 @@ impl fmt::Display for FilterError {
 impl std::error::Error for FilterError {}
 
 /// Orders beyond this one ring for so long that no recording is long enough.
-const MAX_ORDER: usize = 20;
+pub const MAX_ORDER: usize = 20;
 
 /// A low-pass filter in second-order sections `(b0 + b1/z + b2/z^2) / (1 + a1/z + a2/z^2)`.
 #[derive(Debug, Clone, PartialEq)]

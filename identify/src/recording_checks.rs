@@ -9,6 +9,7 @@ use crate::derivatives::Source;
 use crate::notes::Note;
 use crate::recording::Recording;
 use crate::recording_error::list;
+use crate::run::Run;
 
 /// Steps of time above this many times the usual one are gaps, across which nothing is filtered.
 pub(crate) const GAP: f64 = 5.0;
@@ -26,6 +27,28 @@ pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     }
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+impl Run {
+    /// Warnings about measured forces of the given drives that are 0 throughout, which fit parameters of 0 exactly.
+    pub fn suspicious_forces(&self, drives: &[String]) -> Vec<Note> {
+        let forces = self.force.iter().flatten();
+        let idle: Vec<String> = drives
+            .iter()
+            .zip(forces)
+            .filter(|(_, force)| force.iter().all(|f| *f == 0.0))
+            .map(|(name, _)| name.clone())
+            .collect();
+        if idle.is_empty() {
+            return Vec::new();
+        }
+        vec![Note::warning(format!(
+            "The measured force of {} in {} is 0 throughout: nothing was measured, or the column is another one (--map); \
+             parameters found from it are 0 as well, with deviations of 0.",
+            list(&idle),
+            self.file
+        ))]
+    }
 }
 
 impl Recording {
@@ -178,6 +201,7 @@ impl Recording {
 fn compare(time: &[f64], position: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
     let usual = median(time.windows(2).map(|w| w[1] - w[0]).collect());
     let (mut qq, mut qi, mut ii, mut steps) = (0.0, 0.0, 0.0, 0.0);
+    let largest = position.iter().fold(0.0_f64, |most, q| most.max(q.abs()));
     let mut start = 0;
     for end in 1..=time.len() {
         if end < time.len() && time[end] - time[end - 1] <= GAP * usual {
@@ -200,8 +224,10 @@ fn compare(time: &[f64], position: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
         }
         start = end;
     }
+    // A coordinate that rests away from zero differs from its mean by rounding, which is no motion.
+    let rounding = (1e-12 * largest).powi(2) * time.len() as f64;
     // What changes as much from sample to sample as over the whole is noise, or sampled too coarsely to tell.
-    if time.len() < 16 || qq <= 0.0 || steps > 0.5 * qq {
+    if time.len() < 16 || qq <= rounding || steps > 0.5 * qq {
         return None;
     }
     if ii <= 0.0 {
@@ -338,7 +364,9 @@ mod tests {
         check(&rough, "");
         let coarse = recording(300, |t| t, |t| q(40.0 * t), |t| 40.0 * qd(40.0 * t));
         check(&coarse, "");
-        check(&recording(500, |t| t, |_| 1.0, |_| 0.0), "");
+        for rest in [0.0, 1.0, 0.3, -0.7] {
+            check(&recording(500, |t| t, |_| rest, |_| 0.0), "");
+        }
     }
 
     #[test]

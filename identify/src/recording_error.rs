@@ -124,6 +124,15 @@ pub enum Fault {
         /// What they are needed for.
         purpose: &'static str,
     },
+    /// The cut-off's period is longer than the recording.
+    CutoffTooLow {
+        /// The cut-off, Hz.
+        cutoff_hz: f64,
+        /// The lowest that leaves something, Hz.
+        lowest_hz: f64,
+        /// Length of the recording, s.
+        duration: f64,
+    },
     /// The filter that was asked for does not suit the recording.
     Filter {
         /// The coordinate that was being prepared.
@@ -183,6 +192,10 @@ impl fmt::Display for Fault {
                 "the first line holds numbers, but column names are expected there; \
                  put a line such as `t,theta1,spindle_left` on top",
             ),
+            Self::UnclearSeparator { header } if header.starts_with('#') => write!(
+                f,
+                "the first line must name the columns, but it is `{header}`; comment lines are not read, delete them"
+            ),
             Self::UnclearSeparator { header } => write!(
                 f,
                 "it cannot be told what separates the columns of `{header}`; \
@@ -236,6 +249,11 @@ impl fmt::Display for Fault {
                     None => f.write_str(".")?,
                 }
                 write!(f, " The columns are: {}.", list(present))?;
+                if present.first().is_some_and(|first| first.starts_with('#')) {
+                    f.write_str(
+                        " The first line must name the columns: comment lines are not read, delete them.",
+                    )?;
+                }
                 if *by_renaming {
                     f.write_str(" Renamings read `--map ours=theirs`.")
                 } else {
@@ -278,7 +296,7 @@ impl fmt::Display for Fault {
                     )?;
                 }
                 others(f, *count, "fields of the column are not finite or empty")?;
-                f.write_str("; repair the recording, or ask for such samples to be left out (they are counted)")
+                f.write_str("; repair the recording, or leave such samples out with `--skip-bad-samples` (they are counted)")
             }
             Self::MissingForce { drives } => write!(
                 f,
@@ -306,6 +324,15 @@ impl fmt::Display for Fault {
                     }
                 )
             }
+            Self::CutoffTooLow {
+                cutoff_hz,
+                lowest_hz,
+                duration,
+            } => write!(
+                f,
+                "a cut-off of {cutoff_hz} Hz is too low for a recording of {duration:.4} s, of which no motion would be \
+                 left; choose one above {lowest_hz:.4} Hz, or leave `--cutoff` away and have it chosen from the signal"
+            ),
             Self::Filter { column, error } => write!(f, "`{column}` cannot be filtered: {error}"),
         }
     }

@@ -51,6 +51,9 @@ pub struct PreparedAs {
     pub coordinates: Vec<String>,
     /// Samples dropped at the start and at the end.
     pub trimmed: (usize, usize),
+    /// Whether the caller asked for those, rather than the filter.
+    #[serde(default)]
+    pub trim_asked_for: bool,
     /// The parallel decimation that the regression is to apply to the columns of the regressor
     /// and to the forces ([`crate::filters::decimate_table`]); the columns here are not decimated.
     pub decimate: usize,
@@ -106,7 +109,12 @@ impl Recording {
             };
             match run {
                 Ok(run) => runs.push(run),
-                Err(error) if matches!(error.fault, Fault::TooFewSamples { .. }) => {
+                Err(error)
+                    if matches!(
+                        error.fault,
+                        Fault::TooFewSamples { .. } | Fault::CutoffTooLow { .. }
+                    ) =>
+                {
                     short += 1;
                     left_out += stretch.samples();
                 }
@@ -195,6 +203,7 @@ impl Recording {
         };
         let states = self.prepare_states(time, &columns, preparation, &mut prepared, &mut notes)?;
         prepared.trimmed = preparation.trim.unwrap_or(prepared.trimmed);
+        prepared.trim_asked_for = preparation.trim.is_some();
         let mut run = Run {
             file: self.file().to_owned(),
             time: time.to_vec(),
@@ -318,6 +327,15 @@ impl Recording {
         };
         let cutoff = preparation.cutoff_hz.or_else(chosen).unwrap_or(0.1 * rate);
         design(cutoff)?;
+        // A cut-off whose period is longer than the recording leaves nothing of it but a trend.
+        let lowest = rate / time.len() as f64;
+        if cutoff < lowest {
+            return Err(self.fault(Fault::CutoffTooLow {
+                cutoff_hz: cutoff,
+                lowest_hz: lowest,
+                duration: time.len() as f64 / rate,
+            }));
+        }
         prepared.cutoff_hz = Some(cutoff);
         prepared.cutoff_chosen = preparation.cutoff_hz.is_none();
         prepared.trimmed = self.transients(rate / cutoff, time.len(), preparation, notes);
@@ -370,7 +388,11 @@ impl Recording {
             return Err(self.fault(Fault::TooFewSamples {
                 have,
                 need: start.saturating_add(end).saturating_add(1),
-                purpose: "dropping the filter's transients at both ends",
+                purpose: if run.prepared.trim_asked_for {
+                    "dropping as many at both ends as `--trim` asks for"
+                } else {
+                    "dropping the filter's transients at both ends"
+                },
             }));
         }
         if start + end == 0 {
@@ -394,8 +416,13 @@ impl Recording {
             cut(column);
         }
         run.notes.push(Note::info(format!(
-            "The first {start} and the last {end} of {have} samples of {} are dropped (transients of the filter).",
-            self.file()
+            "The first {start} and the last {end} of {have} samples of {} are dropped ({}).",
+            self.file(),
+            if run.prepared.trim_asked_for {
+                "as asked for by --trim"
+            } else {
+                "transients of the filter"
+            }
         )));
         Ok(())
     }

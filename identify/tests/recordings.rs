@@ -122,7 +122,7 @@ fn a_column_with_other_things_than_numbers_is_refused_when_it_is_used() {
         recording.column("f").unwrap_err().to_string(),
         "run.csv, line 2: column `f` holds `NaN` where a finite number is expected \
          (3 fields of the column are not finite or empty); \
-         repair the recording, or ask for such samples to be left out (they are counted)"
+         repair the recording, or leave such samples out with `--skip-bad-samples` (they are counted)"
     );
     let says: Vec<&str> = recording
         .notes()
@@ -372,7 +372,19 @@ fn a_preparation_of_ones_own_is_kept_to() {
             .states_with(&names(&["q"]), &[], &bad)
             .unwrap_err()
             .to_string()
-            .contains("too few")
+            .contains("--trim")
+    );
+    let bad = Preparation {
+        cutoff_hz: Some(1e-9),
+        ..bad
+    };
+    let error = sine(&["q"])
+        .states_with(&names(&["q"]), &[], &bad)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("0.000000001 Hz is too low") && error.contains("above 0.5000 Hz"),
+        "{error}"
     );
 }
 

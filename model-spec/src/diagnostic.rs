@@ -2,6 +2,8 @@
 //!
 //! Findings go in, text as rustc prints it comes out.
 
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use annotate_snippets::renderer::DecorStyle;
@@ -84,6 +86,17 @@ impl Diagnostic {
         self
     }
 
+    /// Points to where a variant removes what is missing; otherwise gives other advice.
+    #[must_use]
+    pub(crate) fn removed_or(self, removal: Option<Span>, advice: impl FnOnce() -> String) -> Self {
+        match removal {
+            Some(span) => self
+                .related(span, "the variant removes it here")
+                .help("remove what uses it as well, or keep it"),
+            None => self.help(advice()),
+        }
+    }
+
     /// Says what to do.
     #[must_use]
     pub(crate) fn help(mut self, help: impl Into<String>) -> Self {
@@ -141,6 +154,8 @@ pub(crate) struct Log {
     n_left_off: usize,
     /// Set while the text itself is broken: what is missing then is no news.
     pub(crate) syntax_broken: bool,
+    /// Where variants remove entries, by section and name: what still uses one is told so.
+    pub(crate) removed: BTreeMap<(String, String), Span>,
 }
 
 impl Log {
@@ -162,6 +177,14 @@ impl Log {
     /// True once there are so many findings that it is not worth working out good advice for more.
     pub(crate) fn is_full(&self) -> bool {
         self.diagnostics.len() >= MOST_DIAGNOSTICS
+    }
+
+    /// Where a variant removes an entry from one of these sections.
+    pub(crate) fn removal(&self, sections: &[&str], name: &str) -> Option<Span> {
+        sections.iter().find_map(|section| {
+            let key = ((*section).to_owned(), name.to_owned());
+            self.removed.get(&key).copied()
+        })
     }
 
     /// Number of errors so far.
@@ -237,6 +260,14 @@ fn render_one(diagnostic: &Diagnostic, sources: &Sources, renderer: &Renderer) -
             }
             None => group = place(group, sources, &[(span, label, true)]),
         }
+    }
+    if diagnostic.span.is_none() {
+        // Without a snippet the renderer would begin the help by an empty margin.
+        let mut text = renderer.render(&[group]);
+        for help in &diagnostic.help {
+            let _ = write!(text, "\n  = help: {help}");
+        }
+        return text;
     }
     for help in &diagnostic.help {
         group = group.element(Level::HELP.message(help.as_str()));

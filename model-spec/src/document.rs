@@ -3,6 +3,7 @@
 use toml::de::{DeTable, DeValue};
 
 use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::unclosed::unclosed;
 
 /// Files larger than this are refused unread.
 pub(crate) const LARGEST_FILE: usize = 4 << 20;
@@ -79,6 +80,34 @@ pub(crate) fn quote(text: &str) -> String {
 
 /// Parses a file; syntax errors go to the log, and what could be understood comes back.
 pub(crate) fn parse(text: &str, file: usize, log: &mut Log) -> Table {
+    // The parser takes all that follows an open bracket for its inside; what stands before is read by itself.
+    let open = unclosed(text)
+        .filter(|_| text.len() <= LARGEST_FILE && !DeTable::parse_recoverable(text).1.is_empty());
+    let Some(open) = open else {
+        return parse_closed(text, file, log);
+    };
+    let line = text[..open.outermost].rfind('\n').map_or(0, |end| end + 1);
+    let table = parse_closed(&text[..line], file, log);
+    log.syntax_broken = true;
+    let span = |at: usize, length: usize| Span {
+        file,
+        start: at,
+        end: (at + length).min(text.len()),
+    };
+    let close = if open.bracket == '{' { '}' } else { ']' };
+    let found = Diagnostic::error(
+        span(open.at, 1),
+        format!("this is not TOML: this `{}` is not closed", open.bracket),
+    )
+    .label(format!("expected a `{close}` behind its entries"));
+    log.push(match open.next {
+        Some((at, length)) => found.related(span(at, length), "the next table begins here"),
+        None => found.help("the file ends before it is closed"),
+    });
+    table
+}
+
+fn parse_closed(text: &str, file: usize, log: &mut Log) -> Table {
     let whole = Span {
         file,
         start: 0,

@@ -145,6 +145,7 @@ fn scope(
                 exact,
                 dimension: unit.map(|unit| unit.dimension),
                 unit: String::new(),
+                value: None,
                 declared: Some(key.span),
                 used: Cell::new(false),
             },

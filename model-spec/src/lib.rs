@@ -11,6 +11,7 @@ mod editor;
 mod exact;
 #[cfg(test)]
 mod exact_tests;
+mod finite;
 mod formula;
 mod kind_terms;
 mod kinds;
@@ -28,6 +29,7 @@ mod record;
 mod schema;
 mod scope;
 mod suggest;
+mod unclosed;
 mod unit;
 mod values;
 

@@ -25,6 +25,8 @@ pub struct Loaded {
     pub sources: Sources,
     /// The kinds of effects that the file may use: the library's, then its own.
     pub kinds: Vec<EffectKind>,
+    /// Where each product of [`Mechanism::retain`] stands.
+    pub retain: Vec<Span>,
 }
 
 impl Loaded {
@@ -68,6 +70,7 @@ pub fn load_file(path: &Path) -> Result<Loaded, Failure> {
     let mut read = read_limited;
     match read(path) {
         Ok(text) => load(&path.to_string_lossy(), &text, &mut read),
+        Err(error) if error.kind() == std::io::ErrorKind::InvalidData => Err(no_text(path)),
         Err(error) => Err(Failure {
             diagnostics: vec![Diagnostic {
                 severity: Severity::Error,
@@ -82,6 +85,39 @@ pub fn load_file(path: &Path) -> Result<Loaded, Failure> {
             }],
             sources: Sources::default(),
         }),
+    }
+}
+
+/// What is wrong with a file whose bytes are no text, with the place of the first of them.
+fn no_text(path: &Path) -> Failure {
+    let mut bytes = Vec::new();
+    // What could be read a moment ago can be read again; if not, the place is the start.
+    if let Ok(file) = std::fs::File::open(path) {
+        let _ = file.take(LARGEST_FILE as u64 + 1).read_to_end(&mut bytes);
+    }
+    let start = match std::str::from_utf8(&bytes) {
+        Ok(text) => text.len(),
+        Err(error) => error.valid_up_to(),
+    };
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    let end = (start + char::REPLACEMENT_CHARACTER.len_utf8()).min(text.len());
+    let span = Span {
+        file: 0,
+        start,
+        end,
+    };
+    Failure {
+        diagnostics: vec![
+            Diagnostic::error(span, "this file is no text in UTF-8")
+                .label("the first byte that is not")
+                .help("save it as UTF-8; `modelmill` reads model files as text (TOML)"),
+        ],
+        sources: Sources {
+            files: vec![SourceFile {
+                path: path.to_owned(),
+                text,
+            }],
+        },
     }
 }
 
@@ -149,6 +185,12 @@ pub fn load(
         warnings: diagnostics,
         sources,
         kinds,
+        retain: model
+            .retain
+            .iter()
+            .flat_map(|list| &list.entries)
+            .map(|formula| formula.ast.span)
+            .collect(),
     })
 }
 

@@ -246,6 +246,10 @@ fn remove(base: &mut Table, list: &Node, log: &mut Log) {
             }
             _ => false,
         };
+        if removed {
+            log.removed
+                .insert((section.to_owned(), name.to_owned()), path.span);
+        }
         if !removed && !log.is_full() {
             let entries = match &base[position].1.value {
                 Value::Array(entries) => entries.as_slice(),

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::document::quote;
 use crate::exact::{Exact, Function, Symbol};
+use crate::finite;
 use crate::formula::{Ast, AstKind, Formula};
 use crate::suggest;
 use crate::unit::Dimension;
@@ -43,6 +44,8 @@ pub(crate) struct Meaning {
     pub(crate) dimension: Option<Dimension>,
     /// The unit as printed.
     pub(crate) unit: String,
+    /// The number that the file gives it; only constants have one.
+    pub(crate) value: Option<f64>,
     pub(crate) declared: Option<Span>,
     pub(crate) used: Cell<bool>,
 }
@@ -126,10 +129,13 @@ impl Scope {
         let Some(meaning) = self.names.get(name) else {
             if !log.is_full() {
                 let candidates: Vec<&str> = allowed().collect();
+                let removal = log.removal(&["constants", "parameters", "coordinates"], name);
                 log.push(
                     Diagnostic::error(span, format!("unknown name `{}`", quote(name)))
                         .label(format!("expected {list}"))
-                        .help(suggest::advice(name, "names", candidates.iter().copied())),
+                        .removed_or(removal, || {
+                            suggest::advice(name, "names", candidates.iter().copied())
+                        }),
                 );
             }
             return None;
@@ -162,6 +168,7 @@ impl Scope {
     ) -> Option<Exact> {
         let before = log.n_errors();
         let (exact, dimension) = self.walk(&formula.ast, wanted.sorts, log)?;
+        self.check_value(&formula.ast, log);
         if let Some(found) = dimension
             && found != wanted.dimension
         {
@@ -179,6 +186,22 @@ impl Scope {
             );
         }
         (log.n_errors() == before).then_some(exact)
+    }
+
+    /// The number that the file gives a name; only constants have one.
+    pub(crate) fn value(&self, name: &str) -> Option<f64> {
+        self.get(name)?.value
+    }
+
+    /// Reports an expression without a finite value at the constants of the file.
+    fn check_value(&self, ast: &Ast, log: &mut Log) {
+        if let Err(fault) = finite::value(ast, &|name| self.value(name)) {
+            let declared = match &fault.piece.kind {
+                AstKind::Name(name) => self.get(name).and_then(|meaning| meaning.declared),
+                _ => None,
+            };
+            log.push(fault.report(declared));
+        }
     }
 
     /// The meaning and dimension of a subexpression; `None` as a dimension fits any, as bare numbers do.
@@ -334,6 +357,7 @@ pub(crate) fn meaning(
         exact: Exact::Symbol(symbol),
         dimension,
         unit: unit.to_owned(),
+        value: None,
         declared,
         used: Cell::new(false),
     }

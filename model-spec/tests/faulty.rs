@@ -48,6 +48,32 @@ fn messages() {
     });
 }
 
+/// Bytes that are no text are named by line and column; nothing is printed of what cannot be read at all.
+#[test]
+fn a_file_that_is_no_text_in_utf_8() {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("latin.toml");
+    std::fs::write(&path, b"schema = 1\nname = \"arm\" # m\xFCde\n").unwrap();
+    let found = modelmill_spec::load_file(&path).unwrap_err();
+    let says = found
+        .render(false)
+        .replace(&*path.to_string_lossy(), "latin.toml");
+    insta::assert_snapshot!(says, @r#"
+    error: this file is no text in UTF-8
+     --> latin.toml:2:17
+      |
+    2 | name = "arm" # m�de
+      |                 ^ the first byte that is not
+      |
+      = help: save it as UTF-8; `modelmill` reads model files as text (TOML)
+    "#);
+    let none = modelmill_spec::load_file(Path::new("no/such.toml")).unwrap_err();
+    assert_eq!(
+        none.render(false),
+        "error: cannot read `no/such.toml`: No such file or directory (os error 2)\n  \
+         = help: give the path of a model file, such as `model-spec/models/two_link.toml`\n"
+    );
+}
+
 #[test]
 fn color_marks_the_same_text() {
     let failure = failure("schema = 2");

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use crate::args::CheckArgs;
 use crate::failure::{Failure, Outcome};
 use crate::model;
+use crate::sampled_rank::judged_rank;
 use crate::table::count;
 use crate::terminal;
 
@@ -27,12 +28,36 @@ pub(crate) fn run(args: &CheckArgs) -> Outcome {
     let loaded = model::load(&args.model)?;
     let model = model::derive_loaded(&args.model.display().to_string(), &loaded)?;
     let summary = Summary::new(&model.derivation);
+    // Without any product there is nothing whose rank could be looked at.
+    let rank = if model.derivation.reduction.products.is_empty() {
+        None
+    } else {
+        judged_rank(&model).1
+    };
+    if let Some(says) = &rank {
+        terminal::warn(&format!("{}: {says}", model.path));
+    }
     if args.json {
         let mut warnings = diagnostics(&loaded.warnings, &loaded.sources);
         warnings.extend(
             model::retained_in_vain(&model.derivation)
                 .into_iter()
-                .map(|says| json!({ "severity": "warning", "says": says, "file": model.path })),
+                .map(|(k, says)| {
+                    let place = loaded
+                        .retain
+                        .get(k)
+                        .map(|span| loaded.sources.line_and_column(*span));
+                    json!({
+                        "severity": "warning",
+                        "says": says,
+                        "file": model.path,
+                        "line": place.map(|p| p.0),
+                        "column": place.map(|p| p.1),
+                    })
+                }),
+        );
+        warnings.extend(
+            rank.map(|says| json!({ "severity": "warning", "says": says, "file": model.path })),
         );
         return terminal::print_json(&summary.json(&model.name, &model.derivation, &warnings));
     }
@@ -98,6 +123,7 @@ impl Summary {
     fn json(&self, name: &str, derivation: &Derivation, warnings: &[Value]) -> Value {
         json!({
             "model": name,
+            "module": derivation.mechanism.name,
             "valid": true,
             "title": derivation.mechanism.title,
             "bodies": self.bodies,
@@ -126,6 +152,7 @@ impl Summary {
             [] => String::new(),
             names => format!(": {}", names.join(", ")),
         };
+        line("module", format!("{} (the file's `name`)", m.name));
         line("bodies", self.bodies.to_string());
         if self.lumped_masses > 0 {
             line("lumped masses", self.lumped_masses.to_string());

@@ -6,8 +6,7 @@ use crate::args::{EquationsArgs, EquationsFormat};
 use crate::failure::Outcome;
 use crate::model::{self, Model};
 use crate::output::Target;
-use crate::sampled_rank::sampled_rank;
-use crate::table::count;
+use crate::sampled_rank::judged_rank;
 use crate::terminal;
 
 /// Prints the equations, or writes them to a file.
@@ -63,30 +62,9 @@ pub(crate) fn pages(model: &Model) -> Pages {
 
 /// Eq. (9) on the file's values, with a warning where it says something else than exact reduction.
 fn numeric_rank(model: &Model) -> Option<NumericRank> {
-    let found = match sampled_rank(model) {
-        Ok(found) => found,
-        Err(reason) => {
-            terminal::warn(&format!(
-                "{}: the numeric rank of eq. (9) was not found: {reason}",
-                model.path
-            ));
-            return None;
-        }
-    };
-    let exact = model.base.len();
-    if found.rank < exact {
-        terminal::warn(&format!(
-            "{}: with the file's values the numeric rank is {}, below the exact {exact} for general values; \
-             special values make columns vanish or coincide, so identification will find {} undetermined",
-            model.path,
-            found.rank,
-            count(exact - found.rank, "direction", "directions")
-        ));
-    } else if found.rank > exact {
-        terminal::warn(&format!(
-            "{}: the numeric rank is {}, above the exact {exact}; please report this model, one of them is wrong",
-            model.path, found.rank
-        ));
+    let (found, says) = judged_rank(model);
+    if let Some(says) = says {
+        terminal::warn(&format!("{}: {says}", model.path));
     }
-    Some(found)
+    found
 }

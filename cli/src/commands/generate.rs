@@ -22,9 +22,10 @@ pub(crate) fn run(args: &GenerateArgs) -> Outcome {
         Some(target) => {
             target.write(&source)?;
             terminal::note(&format!(
-                "{}: {}",
+                "{}: {}, the module `{}`",
                 target.path().display(),
-                count(source.lines().count(), "line", "lines")
+                count(source.lines().count(), "line", "lines"),
+                model.derivation.mechanism.name
             ));
             Ok(())
         }

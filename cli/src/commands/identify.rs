@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use modelmill_identify::base_fit::fit_parameters;
+use modelmill_identify::deviations::FEWEST_ROWS;
 use modelmill_identify::{Figures, FitFile, FitParameter, Note, ParameterInfo, Severity, Status};
 use modelmill_spec::Sign;
 use serde_json::json;
@@ -167,6 +168,18 @@ fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Ve
                 1 => "is 1 equation".to_owned(),
                 n => format!("are {n} equations"),
             }
+        )));
+    } else if found.deviations.few_samples {
+        notes.push(Note::warning(format!(
+            "There are only {} equations for {}: standard deviations take the residuals for independent and are too small \
+             if they are not, and the error of the fit says little; use a longer recording (at least {FEWEST_ROWS} \
+             equations for each parameter).",
+            solution.rows,
+            count(
+                solution.values.len(),
+                "unknown base parameter",
+                "unknown base parameters"
+            ),
         )));
     }
     for (k, p) in parameters.iter().enumerate() {

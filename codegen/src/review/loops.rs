@@ -251,20 +251,26 @@ pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
 }
 
 /// Stands for the coordinate of each of several places.
-const EACH: &str = "x";
+const EACH: [&str; 4] = ["x", "xi", "chi", "place"];
 
 /// Effects with their expressions.
 pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
     if mechanism.effects.is_empty() {
         return;
     }
+    // A coordinate or constant of the model may have that name.
+    let taken = super::names::reserved(mechanism);
+    let each = EACH
+        .iter()
+        .find(|name| !taken.contains(**name))
+        .map_or_else(|| "x_of_the_place".to_owned(), |name| (*name).to_owned());
     page.heading("Effects");
     page.paragraph([
         text("Each adds to the force of its place; a linear drive's name stands for its length, "),
         code("load"),
         text(" for the force that the place carries. Where an effect acts at several places, "),
-        Inline::Math(Formula::name(EACH)),
-        text(" is the coordinate of each. At a point the parameter is a mass."),
+        Inline::Math(Formula::name(&*each)),
+        text(" stands for the coordinate of each of them. At a point the parameter is a mass."),
     ]);
     let rows = mechanism
         .effects
@@ -287,7 +293,7 @@ pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
                     DriveKind::Linear { .. } => &*mechanism.drives[d.0].name,
                 },
                 [Place::Coordinate(c)] => &*mechanism.coordinates[c.0].name,
-                _ => EACH,
+                _ => &*each,
             };
             let sum = Formula::sum(effect.terms.iter().map(|term| {
                 let parameter = Formula::name(&*mechanism.parameters[term.parameter.0].name);

@@ -109,6 +109,14 @@ pub(super) fn drives(
             }
         };
         let Some(name) = &entry.name else { continue };
+        if name.text == "t" {
+            // Its force would be read from the column that holds the time.
+            log.push(
+                Diagnostic::error(name.span, "a drive cannot be called `t`")
+                    .label("recordings hold the time in the column `t`")
+                    .help("choose another name, such as `motor`"),
+            );
+        }
         if let Some(first) = drives.iter().position(|drive| drive.name == name.text) {
             log.push(twice("drive", name, places.drives[first]));
             continue;

@@ -8,6 +8,7 @@ use crate::build::symbols::{Shared, Symbols};
 use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::document::Key;
 use crate::exact::{CoordinateIdx, Exact, ParameterIdx, Symbol};
+use crate::finite::{self, Why};
 use crate::formula::{Ast, AstKind};
 use crate::kind_terms::{factors, lacking_units, unit_at};
 use crate::kinds::{Carries, check, library_entries};
@@ -154,6 +155,7 @@ fn effect(
     let carries = common_load(kind, &at.entries, &places, symbols, drives, log)?;
     let before = log.n_errors();
     let constants = constants(entry, kind, kind_name, symbols, carries, log);
+    check_values(entry, kind, kind_name, symbols, log);
     let factors = factors(kind, carries, &constants, log)?;
     let places_name = at
         .entries
@@ -286,10 +288,13 @@ fn place(
         .chain(points.names())
         .collect();
     if !log.is_full() {
+        let removal = log.removal(&["drive", "coordinates", "point"], &name.text);
         log.push(
             Diagnostic::error(name.span, format!("unknown place `{}`", name.text))
                 .label("expected the name of a drive, a coordinate or a point")
-                .help(suggest::advice(&name.text, "places", known.iter().copied())),
+                .removed_or(removal, || {
+                    suggest::advice(&name.text, "places", known.iter().copied())
+                }),
         );
     }
     None
@@ -435,6 +440,77 @@ fn constants(
         }
     }
     values
+}
+
+/// Reports values of the constants at which the kind's expression has no finite value, such as a Stribeck speed of 0.
+fn check_values(
+    entry: &EffectEntry,
+    kind: &EffectKindEntry,
+    kind_name: &Name,
+    symbols: &Symbols,
+    log: &mut Log,
+) {
+    let given = |name: &str| {
+        let own = entry
+            .constants
+            .iter()
+            .flat_map(|table| &table.entries)
+            .find(|(key, _)| key.name == name)
+            .map(|(_, formula)| formula);
+        own.or_else(|| {
+            kind.constants
+                .iter()
+                .flat_map(|table| &table.entries)
+                .find(|(key, _)| key.name == name)
+                .and_then(|(_, constant)| constant.value.as_ref())
+        })
+    };
+    // Values that are no numbers themselves are reported where they stand.
+    let value = |name: &str| {
+        finite::value(&given(name)?.ast, &|inner| symbols.scope.value(inner))
+            .ok()
+            .flatten()
+    };
+    let Some(expression) = kind.expression.as_ref() else {
+        return;
+    };
+    let Err(fault) = finite::value(&expression.ast, &value) else {
+        return;
+    };
+    let named = kind
+        .constants
+        .iter()
+        .flat_map(|table| &table.entries)
+        .map(|(key, _)| key.name.as_str())
+        .find(|name| finite::mentions(fault.piece, name));
+    let span = named
+        .and_then(given)
+        .map(|formula| formula.ast.span)
+        .filter(|span| span.file != usize::MAX)
+        .unwrap_or(kind_name.span);
+    let what = named.map_or_else(
+        || format!("`{}`", kind_name.text),
+        |name| format!("`{name}`"),
+    );
+    let is_name = matches!(&fault.piece.kind, AstKind::Name(_));
+    let message = match fault.why {
+        Why::Divides if is_name => format!("{what} must not be zero"),
+        Why::Root if is_name => format!("{what} must not be negative"),
+        _ => format!(
+            "with this value of {what} the effect `{}` has no finite value",
+            kind_name.text
+        ),
+    };
+    let label = match fault.why {
+        Why::Divides => format!("`{}` divides by it", kind_name.text),
+        Why::Root => format!("`{}` takes its root", kind_name.text),
+        Why::TooLarge => "too large".to_owned(),
+    };
+    log.push(
+        Diagnostic::error(span, message)
+            .label(label)
+            .help(format!("the kind adds `{}`", expression.text)),
+    );
 }
 
 fn check_parameter_names(entry: &EffectEntry, kind: &EffectKindEntry, log: &mut Log) {

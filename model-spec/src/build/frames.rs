@@ -22,21 +22,22 @@ use crate::values::Name;
 pub(super) struct Tree {
     pub(super) frames: Vec<Frame>,
     names: BTreeMap<String, FrameIdx>,
+    /// True if two frames have one name: the name that is missed may be meant for one of them.
+    any_twice: bool,
 }
 
 impl Tree {
     /// Looks a frame up; an unknown name is reported.
     pub(super) fn find(&self, name: &Name, log: &mut Log) -> Option<FrameIdx> {
         let found = self.names.get(&name.text).copied();
-        if found.is_none() && !log.is_full() {
+        if found.is_none() && !self.any_twice && !log.is_full() {
+            let removal = log.removal(&["frame"], &name.text);
             log.push(
                 Diagnostic::error(name.span, format!("unknown frame `{}`", name.text))
                     .label("expected the name of a frame, or `base`")
-                    .help(suggest::advice(
-                        &name.text,
-                        "frames",
-                        self.names.keys().map(String::as_str),
-                    )),
+                    .removed_or(removal, || {
+                        suggest::advice(&name.text, "frames", self.names.keys().map(String::as_str))
+                    }),
             );
         }
         found
@@ -52,6 +53,7 @@ pub(super) fn frames(
 ) -> Tree {
     let entries: Vec<&FrameEntry> = model.frame.iter().flat_map(|list| &list.entries).collect();
     let mut by_name: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut any_twice = false;
     for (i, entry) in entries.iter().enumerate() {
         let Some(name) = &entry.name else { continue };
         if name.text == "base" {
@@ -65,6 +67,7 @@ pub(super) fn frames(
                 .as_ref()
                 .map_or(name.span, |name| name.span);
             log.push(twice("frame", name, first_span));
+            any_twice = true;
         } else {
             by_name.insert(&name.text, i);
         }
@@ -77,9 +80,10 @@ pub(super) fn frames(
             convention: Convention::Base,
         }],
         names: BTreeMap::from([("base".to_owned(), FrameIdx(0))]),
+        any_twice,
     };
     places.frames.push(None);
-    let order = parents_first(&entries, &by_name, log);
+    let order = parents_first(&entries, &by_name, any_twice, log);
     for i in order {
         let entry = entries[i];
         let Some(name) = &entry.name else { continue };
@@ -117,6 +121,7 @@ pub(super) fn twice(what: &str, name: &Name, first: Span) -> Diagnostic {
 fn parents_first(
     entries: &[&FrameEntry],
     by_name: &BTreeMap<&str, usize>,
+    any_twice: bool,
     log: &mut Log,
 ) -> Vec<usize> {
     #[derive(Clone, Copy, PartialEq)]
@@ -145,12 +150,13 @@ fn parents_first(
                 break;
             }
             let Some(&parent) = by_name.get(on.text.as_str()) else {
-                if !log.is_full() {
+                if !any_twice && !log.is_full() {
                     let known = by_name.keys().copied().chain(["base"]);
+                    let removal = log.removal(&["frame"], &on.text);
                     log.push(
                         Diagnostic::error(on.span, format!("unknown frame `{}`", on.text))
                             .label("expected the name of a frame, or `base`")
-                            .help(suggest::advice(&on.text, "frames", known)),
+                            .removed_or(removal, || suggest::advice(&on.text, "frames", known)),
                     );
                 }
                 break;
@@ -424,10 +430,13 @@ impl Points {
     pub(super) fn find(&self, name: &Name, log: &mut Log) -> Option<PointIdx> {
         let found = self.get(&name.text);
         if found.is_none() && !log.is_full() {
+            let removal = log.removal(&["point"], &name.text);
             log.push(
                 Diagnostic::error(name.span, format!("unknown point `{}`", name.text))
                     .label("expected the name of a point")
-                    .help(suggest::advice(&name.text, "points", self.names())),
+                    .removed_or(removal, || {
+                        suggest::advice(&name.text, "points", self.names())
+                    }),
             );
         }
         found

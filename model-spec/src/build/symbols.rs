@@ -68,7 +68,10 @@ pub(super) fn declare(model: &ModelEntry, places: &mut Places, log: &mut Log) ->
         let unit = entry.unit.as_ref();
         let unit_text = unit.map_or("?", |unit| unit.text.as_str());
         let dimension = unit.map(|unit| unit.dimension);
-        let meaning = meaning(Sort::Constant, symbol, dimension, unit_text, Some(key.span));
+        let meaning = Meaning {
+            value: entry.value.map(|number| number.value),
+            ..meaning(Sort::Constant, symbol, dimension, unit_text, Some(key.span))
+        };
         if symbols.scope.declare(&key.name, meaning, log) {
             symbols.constants.push(Constant {
                 name: key.name.clone(),
@@ -116,6 +119,7 @@ fn declare_faulty(model: &ModelEntry, symbols: &mut Symbols, log: &mut Log) {
             exact: Exact::zero(),
             dimension: None,
             unit: "?".to_owned(),
+            value: None,
             declared: Some(key.span),
             used: Cell::new(false),
         };

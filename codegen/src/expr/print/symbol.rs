@@ -93,7 +93,8 @@ fn greek(word: &str) -> Option<Glyphs> {
         .map(|(name, letter)| Glyphs::Greek(name, *letter))
 }
 
-/// Letters in a row up to this number are a letter with an index; more are a word.
+/// Letters in a row up to this number are a letter with an index; more are a word, and so are as many small ones, such
+/// as `rod`, `len` or `off`, which hold no capital that could be the symbol.
 const LONGEST_SYMBOL: usize = 3;
 
 /// Splits an identifier into its letter and its index.
@@ -107,7 +108,7 @@ pub(crate) fn typeset(name: &str) -> Typeset {
     let upper = letters.len() > 1 && letters.chars().all(char::is_uppercase);
     let (base, rest) = if let Some(letter) = greek(letters) {
         (letter, "")
-    } else if upper || letters.chars().count() > LONGEST_SYMBOL {
+    } else if upper || is_word(letters) {
         (Glyphs::Word(letters.to_owned()), "")
     } else {
         let first = letters.chars().next().map_or(0, char::len_utf8);
@@ -124,6 +125,13 @@ pub(crate) fn typeset(name: &str) -> Typeset {
             .map(index_part),
     );
     Typeset { base, index }
+}
+
+fn is_word(letters: &str) -> bool {
+    match letters.chars().count() {
+        LONGEST_SYMBOL => letters.chars().all(char::is_lowercase),
+        n => n > LONGEST_SYMBOL,
+    }
 }
 
 fn index_part(part: &str) -> Vec<Glyphs> {

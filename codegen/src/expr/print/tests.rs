@@ -198,6 +198,10 @@ fn names_are_typeset_as_engineers_write_them() {
         ("omega_S3_z", "\\omega_{S3,z}"),
         ("s_theta1", "s_{\\theta 1}"),
         ("offset", "\\mathrm{offset}"),
+        ("off", "\\mathrm{off}"),
+        ("rod2", "\\mathrm{rod}_{2}"),
+        ("len_a", "\\mathrm{len}_{a}"),
+        ("Fvp", "F_{vp}"),
     ] {
         assert_eq!(Symbol::new(plain).latex(), latex, "{plain}");
     }

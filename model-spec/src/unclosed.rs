@@ -1,0 +1,143 @@
+//! Brackets that are opened in a value and never closed: a text of TOML goes in, the bracket comes out.
+//!
+//! The parser cannot see such a bracket, for it takes the rest of the file for its inside and reports every line of it.
+//! A line that holds nothing but the head of a table, `[name]` or `[[name]]`, cannot stand inside a value, for values
+//! are no bare words.
+
+/// A bracket without its partner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Unclosed {
+    /// `{` or `[`.
+    pub(crate) bracket: char,
+    /// Its byte.
+    pub(crate) at: usize,
+    /// The byte of the first bracket that is open there; the same one, or one around it.
+    pub(crate) outermost: usize,
+    /// The head of the table before which it should have been closed: first byte and length; `None` at the end of the
+    /// file.
+    pub(crate) next: Option<(usize, usize)>,
+}
+
+/// The first bracket that is open where the next table, or the end of the file, comes.
+pub(crate) fn unclosed(text: &str) -> Option<Unclosed> {
+    let mut open: Vec<(char, usize)> = Vec::new();
+    let mut at = 0;
+    let mut starts_line = true;
+    while at < text.len() {
+        let rest = &text[at..];
+        if starts_line && let Some(length) = head_of_table(rest) {
+            if let Some((bracket, place)) = open.last() {
+                return Some(Unclosed {
+                    bracket: *bracket,
+                    at: *place,
+                    outermost: open[0].1,
+                    next: Some((at, length)),
+                });
+            }
+            at += length;
+            continue;
+        }
+        let first = rest.chars().next()?;
+        starts_line = first == '\n' || (starts_line && first.is_whitespace());
+        at += match first {
+            '#' => rest.find('\n').unwrap_or(rest.len()),
+            '"' | '\'' => string(rest, first)?,
+            '{' | '[' => {
+                open.push((first, at));
+                1
+            }
+            '}' | ']' => {
+                // A wrong partner is an error of its own.
+                let (bracket, _) = open.pop()?;
+                if (bracket == '{') != (first == '}') {
+                    return None;
+                }
+                1
+            }
+            other => other.len_utf8(),
+        };
+    }
+    open.last().map(|(bracket, at)| Unclosed {
+        bracket: *bracket,
+        at: *at,
+        outermost: open[0].1,
+        next: None,
+    })
+}
+
+/// The length of `[name]` or `[[name]]`, if the line holds nothing else.
+fn head_of_table(rest: &str) -> Option<usize> {
+    if !rest.starts_with('[') {
+        return None;
+    }
+    let line = rest.lines().next()?;
+    let line = line.split('#').next()?.trim_end();
+    let name = line
+        .strip_prefix("[[")
+        .and_then(|inner| inner.strip_suffix("]]"))
+        .or_else(|| line.strip_prefix('[')?.strip_suffix(']'))?
+        .trim();
+    let is_name = name.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')
+        && name
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || "_-.".contains(c));
+    let is_value = ["true", "false", "inf", "nan"].contains(&name);
+    (is_name && !is_value).then_some(line.len())
+}
+
+/// The length of a string with its quotes; `None` where it is not closed, which is an error of its own.
+fn string(rest: &str, quote: char) -> Option<usize> {
+    let long: String = std::iter::repeat_n(quote, 3).collect();
+    let (fence, several_lines) = if rest.starts_with(&long) {
+        (long.as_str(), true)
+    } else {
+        (&long[..1], false)
+    };
+    let mut at = fence.len();
+    while at < rest.len() {
+        let inner = &rest[at..];
+        if inner.starts_with(fence) {
+            return Some(at + fence.len());
+        }
+        let first = inner.chars().next()?;
+        if first == '\n' && !several_lines {
+            return None;
+        }
+        let escaped = if first == '\\' && quote == '"' {
+            inner[1..].chars().next().map_or(0, char::len_utf8)
+        } else {
+            0
+        };
+        at += first.len_utf8() + escaped;
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn check(text: &str, expected: Option<&str>) {
+        let found = unclosed(text);
+        assert_eq!(found.map(|open| &text[open.at..]), expected, "{text}");
+    }
+
+    #[test]
+    fn brackets_without_partners_are_found() {
+        check("a = { b = 1\n[c]\n", Some("{ b = 1\n[c]\n"));
+        check(
+            "a = [1, 2\n\n[[c]] # x\nd = [1]",
+            Some("[1, 2\n\n[[c]] # x\nd = [1]"),
+        );
+        check("a = [{ b = [1, }]\n", None);
+        check(
+            "a = [\n  [1],\n  [true]\n]\n[b]\nc = { d = \"}{\\\"{\" }",
+            None,
+        );
+        check("a = \'{\' # {\nb = \"\"\"{\n[c]\n\"\"\"", None);
+        check("a = 1\nb = [", Some("["));
+        check("a = \"x\nb = { [", None);
+        check("é = { ü = \"ö\"", Some("{ ü = \"ö\""));
+    }
+}
