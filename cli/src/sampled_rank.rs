@@ -2,6 +2,8 @@
 //! numeric rank of the stacked regressor comes out. A statement about these values and samples,
 //! beside the exact one about all values.
 
+use std::cmp::Ordering;
+
 use modelmill_codegen::review::NumericRank;
 use modelmill_codegen::{Evaluator, PoseFault, States};
 use modelmill_identify::numeric_rank::numeric_rank;
@@ -31,20 +33,18 @@ pub(crate) fn judged_rank(model: &Model) -> (Option<NumericRank>, Option<String>
         }
     };
     let exact = model.base.len();
-    let says = if found.rank < exact {
-        Some(format!(
+    let says = match found.rank.cmp(&exact) {
+        Ordering::Less => Some(format!(
             "with the file's values the numeric rank is {}, below the exact {exact} for general values; special values \
              make columns vanish or coincide, so identification will find {} undetermined",
             found.rank,
             count(exact - found.rank, "direction", "directions")
-        ))
-    } else if found.rank > exact {
-        Some(format!(
+        )),
+        Ordering::Greater => Some(format!(
             "the numeric rank is {}, above the exact {exact}; please report this model, one of them is wrong",
             found.rank
-        ))
-    } else {
-        None
+        )),
+        Ordering::Equal => None,
     };
     (Some(found), says)
 }
