@@ -237,6 +237,12 @@ impl Data {
             .map(|(name, q)| format!("{name} = {:.6}", q.get(sample).copied().unwrap_or(f64::NAN)))
             .collect();
         let (what, todo) = match fault.reason {
+            PoseReason::NotFinite { input } => {
+                return Failure::Input(format!(
+                    "{}, line {line} (t = {time} s): `{input}` is no finite number",
+                    self.run.file
+                ));
+            }
             PoseReason::OutOfReach => (
                 "the loops cannot close at this pose",
                 "check the units (rad, m) and the signs of the positions, which column is which \

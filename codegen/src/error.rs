@@ -58,6 +58,13 @@ pub enum DeriveError {
         /// How many draws were made.
         draws: usize,
     },
+    /// A number that is infinite or none.
+    NotFinite {
+        /// Which number.
+        what: String,
+        /// What to do about it.
+        todo: &'static str,
+    },
     /// A factor of eq. (6) is no rational function of reasonable size.
     FactorNotRecovered {
         /// The eliminated product.
@@ -118,6 +125,9 @@ impl fmt::Display for DeriveError {
                     f,
                     "no pose was found in {draws} draws at which all loops close and every passive joint and drive can move; check that the loops do not contradict each other, that each passive joint moves when the active ones do, and that every drive moves with them"
                 )
+            }
+            Self::NotFinite { what, todo } => {
+                write!(f, "{what} is no finite number; {todo}")
             }
             Self::FactorNotRecovered { product, retained } => write!(
                 f,

@@ -1,22 +1,20 @@
 //! The block evaluator: runs a program over many states inside the process, so that a changed model file can be tried
 //! on a recording at once, without a compiler.
 
+use std::cell::RefCell;
 use std::fmt;
 
+use modelmill_runtime::{Loops, PoseError, Scales, follow, settle};
 use modelmill_spec::Mechanism;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use crate::expr::{Atom, Unary};
 use crate::lower::{Guard, Op, Program, Stage};
-use crate::programs::PassivePosition;
+use crate::programs::{LoopPrograms, PassivePosition};
 use crate::{Derivation, Programs};
 
 /// States per block: small enough for the cache, large enough to hide the interpretation.
 const BLOCK: usize = 64;
-
-/// Newton steps allowed for a pose, and the accuracy asked for (m or rad).
-const NEWTON_STEPS: usize = 40;
-const NEWTON_ACCURACY: f64 = 1e-13;
 
 /// Motion of the active coordinates, one slice of equal length per coordinate, in the order of the model file.
 #[derive(Clone, Debug, Default)]
@@ -44,7 +42,7 @@ impl States<'_> {
 }
 
 /// A state at which the model has no answer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PoseFault {
     /// Which state.
     pub sample: usize,
@@ -53,17 +51,34 @@ pub struct PoseFault {
 }
 
 /// Why a pose has no answer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PoseReason {
     /// The loops cannot close there.
     OutOfReach,
     /// The passive coordinates or the drives' forces are not determined there.
     Singular,
+    /// An input is no finite number.
+    NotFinite {
+        /// Its name in the model file, with `_d` and `_dd` for rates and accelerations; `p1_min`, ... for base parameters.
+        input: String,
+    },
+}
+
+impl From<PoseError> for PoseReason {
+    fn from(error: PoseError) -> Self {
+        match error {
+            PoseError::OutOfReach => Self::OutOfReach,
+            PoseError::Singular => Self::Singular,
+            PoseError::NotFinite(input) => Self::NotFinite {
+                input: input.to_owned(),
+            },
+        }
+    }
 }
 
 impl fmt::Display for PoseFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.reason {
+        match &self.reason {
             PoseReason::OutOfReach => write!(
                 f,
                 "at sample {} the loops cannot close: the pose is out of reach",
@@ -71,6 +86,9 @@ impl fmt::Display for PoseFault {
             ),
             PoseReason::Singular => {
                 write!(f, "at sample {} the mechanism is singular", self.sample)
+            }
+            PoseReason::NotFinite { input } => {
+                write!(f, "at sample {} `{input}` is no finite number", self.sample)
             }
         }
     }
@@ -145,11 +163,17 @@ impl<'a> Evaluator<'a> {
         let n_drives = self.mechanism.drives.len();
         let columns = self.run(program, states, &[])?;
         let n_columns = columns.len() / n_drives.max(1);
-        Ok(DMatrix::from_fn(
-            states.len() * n_drives,
-            n_columns,
-            |row, column| columns[(row % n_drives) * n_columns + column][row / n_drives],
-        ))
+        let n_rows = states.len() * n_drives;
+        let mut matrix = DMatrix::zeros(n_rows, n_columns);
+        let entries = matrix.as_mut_slice();
+        for (k, values) in columns.iter().enumerate() {
+            // Columns stand one after the other; drives take turns in each.
+            let first = (k % n_columns) * n_rows + k / n_columns;
+            for (i, value) in values.iter().enumerate() {
+                entries[first + i * n_drives] = *value;
+            }
+        }
+        Ok(matrix)
     }
 
     fn run(
@@ -158,21 +182,25 @@ impl<'a> Evaluator<'a> {
         states: &States<'_>,
         base: &[f64],
     ) -> Result<Vec<Vec<f64>>, PoseFault> {
-        let passive = match &self.programs.passive_position {
-            PassivePosition::Newton { residual } => self.newton(residual, states)?,
-            PassivePosition::None | PassivePosition::Closed => Vec::new(),
-        };
+        let (mut n, mut fault) = (states.len(), self.not_finite(program, states, base));
+        if let Some(fault) = &fault {
+            n = fault.sample;
+        }
+        let mut passive = Vec::new();
+        if let PassivePosition::Newton(loops) = &self.programs.passive_position {
+            let found = self.newton(loops, states, n);
+            passive = found.passive;
+            if let Some(earlier) = found.fault {
+                n = earlier.sample;
+                fault = Some(earlier);
+            }
+        }
         let machine = Machine::new(program, |atom| self.fixed(atom, base));
-        machine.run(states.len(), |atom| match atom {
-            Atom::Coordinate(i) => match self.active.iter().position(|a| *a == i) {
-                Some(k) => states.q[k],
-                None => {
-                    &passive[self
-                        .passive
-                        .iter()
-                        .position(|p| *p == i)
-                        .expect("a coordinate is active or passive")]
-                }
+        // States before the first fault known so far may still have an earlier one.
+        let outputs = machine.run(n, |atom| match atom {
+            Atom::Coordinate(i) => match self.place(i) {
+                Place::Active(k) => states.q[k],
+                Place::Passive(k) => &passive[k],
             },
             Atom::Rate(i) => states.qd[self.position(i)],
             Atom::Acceleration(i) => states.qdd[self.position(i)],
@@ -180,7 +208,62 @@ impl<'a> Evaluator<'a> {
             Atom::Pi | Atom::Constant(_) | Atom::Parameter(_) | Atom::Base(_) => {
                 unreachable!("fixed atoms are no inputs of a state")
             }
-        })
+        })?;
+        fault.map_or(Ok(outputs), Err)
+    }
+
+    /// The first state with an input that is no finite number; constants and base parameters belong to the first one.
+    fn not_finite(
+        &self,
+        program: &Program,
+        states: &States<'_>,
+        base: &[f64],
+    ) -> Option<PoseFault> {
+        let fault = |sample, input| {
+            let reason = PoseReason::NotFinite { input };
+            Some(PoseFault { sample, reason })
+        };
+        if states.is_empty() {
+            return None;
+        }
+        let of_constants = self.constants.iter().position(|x| !x.is_finite());
+        if let Some(i) = of_constants {
+            return fault(0, self.mechanism.constants[i].name.clone());
+        }
+        if let Some(k) = base.iter().position(|x| !x.is_finite()) {
+            return fault(0, format!("p{}_min", k + 1));
+        }
+        let name = |k: usize| &self.mechanism.coordinates[self.active[k]].name;
+        let motion = [(&states.q, ""), (&states.qd, "_d"), (&states.qdd, "_dd")];
+        let mut columns: Vec<(&[f64], String)> = Vec::new();
+        for (values, suffix) in motion {
+            let named = values.iter().enumerate();
+            columns.extend(named.map(|(k, column)| (*column, format!("{}{suffix}", name(k)))));
+        }
+        // A load that nothing depends on is not looked at.
+        let uses_load = |op: &Op| matches!(op, Op::Input(Atom::Load(_)));
+        if program.ops.iter().any(uses_load) {
+            let drives = states.load.iter().zip(&self.mechanism.drives);
+            columns.extend(drives.map(|(column, drive)| (*column, drive.name.clone())));
+        }
+        let first = columns.into_iter().filter_map(|(column, name)| {
+            let sample = column.iter().position(|x| !x.is_finite())?;
+            Some((sample, name))
+        });
+        let (sample, name) = first.min_by_key(|(sample, _)| *sample)?;
+        fault(sample, name)
+    }
+
+    /// Where a coordinate's values are.
+    fn place(&self, coordinate: usize) -> Place {
+        let position = |list: &[usize]| list.iter().position(|i| *i == coordinate);
+        position(&self.active).map_or_else(
+            || {
+                let k = position(&self.passive);
+                Place::Passive(k.expect("a coordinate is active or passive"))
+            },
+            Place::Active,
+        )
     }
 
     fn position(&self, coordinate: usize) -> usize {
@@ -200,94 +283,151 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// Passive coordinates of every state by Newton's method, each started from the state before.
-    fn newton(&self, residual: &Program, states: &States<'_>) -> Result<Vec<Vec<f64>>, PoseFault> {
-        let n = self.passive.len();
-        let machine = Machine::new(residual, |atom| self.fixed(atom, &[]));
-        let nominal: Vec<f64> = self
-            .passive
-            .iter()
-            .map(|p| self.mechanism.coordinates[*p].nominal)
-            .collect();
-        let nominal_active: Vec<f64> = self
-            .active
-            .iter()
-            .map(|a| self.mechanism.coordinates[*a].nominal)
-            .collect();
-        let mut found: Vec<Vec<f64>> = vec![Vec::with_capacity(states.len()); n];
-        let (mut at, mut guess) = (nominal_active, nominal);
-        for sample in 0..states.len() {
-            let target: Vec<f64> = states.q.iter().map(|q| q[sample]).collect();
-            // From the pose before in steps that keep to the assembly mode.
-            let distance = at
-                .iter()
-                .zip(&target)
-                .map(|(a, b)| (a - b).abs())
-                .fold(0.0, f64::max);
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "a small positive count"
-            )]
-            let steps = (distance / 0.1).ceil().clamp(1.0, 1000.0) as usize;
-            let from = at.clone();
-            for step in 1..=steps {
-                let share = step as f64 / steps as f64;
-                let active: Vec<f64> = from
-                    .iter()
-                    .zip(&target)
-                    .map(|(a, b)| a + share * (b - a))
-                    .collect();
-                guess = self
-                    .newton_pose(&machine, &active, guess)
-                    .map_err(|reason| PoseFault { sample, reason })?;
-            }
-            at = target;
-            for (column, value) in found.iter_mut().zip(&guess) {
-                column.push(*value);
+    /// Passive coordinates of the first `n` states by Newton's method, each started from the state before; where that
+    /// fails, from the nominal pose.
+    fn newton(&self, programs: &LoopPrograms, states: &States<'_>, n: usize) -> Followed {
+        let machine = |program| Machine::new(program, |atom| self.fixed(atom, &[]));
+        let loops = Poses {
+            evaluator: self,
+            residual: Scalar::new(machine(&programs.residual)),
+            scales: Scalar::new(machine(&programs.scales)),
+        };
+        let nominal = |list: &[usize]| -> Vec<f64> {
+            let coordinates = list.iter().map(|i| &self.mechanism.coordinates[*i]);
+            coordinates.map(|c| c.nominal).collect()
+        };
+        let first_active = nominal(&self.active);
+        let first = settle(&loops, &first_active, &nominal(&self.passive));
+        let mut followed = Followed {
+            passive: vec![Vec::with_capacity(n); self.passive.len()],
+            fault: None,
+        };
+        let mut last: Option<(Vec<f64>, Vec<f64>)> = None;
+        for sample in 0..n {
+            let active: Vec<f64> = states.q.iter().map(|q| q[sample]).collect();
+            let near = last.and_then(|(at, passive)| follow(&loops, &at, &passive, &active).ok());
+            let found = near.map_or_else(
+                || {
+                    follow(
+                        &loops,
+                        &first_active,
+                        first.as_ref().map_err(|e| *e)?,
+                        &active,
+                    )
+                },
+                Ok,
+            );
+            match found {
+                Ok(passive) => {
+                    for (column, value) in followed.passive.iter_mut().zip(&passive) {
+                        column.push(*value);
+                    }
+                    last = Some((active, passive));
+                }
+                Err(error) => {
+                    let reason = error.into();
+                    followed.fault = Some(PoseFault { sample, reason });
+                    break;
+                }
             }
         }
-        Ok(found)
+        followed
+    }
+}
+
+/// Where a coordinate's values are: among the active or the passive ones.
+enum Place {
+    Active(usize),
+    Passive(usize),
+}
+
+/// Passive coordinates of the states before the first fault.
+struct Followed {
+    passive: Vec<Vec<f64>>,
+    fault: Option<PoseFault>,
+}
+
+/// The loops of one geometry, one pose at a time.
+struct Poses<'a> {
+    evaluator: &'a Evaluator<'a>,
+    residual: Scalar<'a>,
+    scales: Scalar<'a>,
+}
+
+impl Poses<'_> {
+    fn value(&self, atom: Atom, active: &[f64], passive: &[f64]) -> f64 {
+        let Atom::Coordinate(i) = atom else {
+            unreachable!("a loop's residual depends on coordinates alone")
+        };
+        match self.evaluator.place(i) {
+            Place::Active(k) => active[k],
+            Place::Passive(k) => passive[k],
+        }
+    }
+}
+
+impl Loops for Poses<'_> {
+    type Number = f64;
+    type Active = Vec<f64>;
+    type Passive = Vec<f64>;
+    type Matrix = Vec<Vec<f64>>;
+
+    fn linearise(&self, active: &Vec<f64>, passive: &Vec<f64>) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let n = passive.len();
+        self.residual.run(
+            |atom| self.value(atom, active, passive),
+            |output| {
+                let row = |i: usize| (0..n).map(|j| output(n + i * n + j)).collect();
+                ((0..n).map(output).collect(), (0..n).map(row).collect())
+            },
+        )
     }
 
-    fn newton_pose(
+    fn scales(&self, active: &Vec<f64>, passive: &Vec<f64>) -> Scales<Vec<f64>, Vec<f64>> {
+        let (n, n_active) = (passive.len(), active.len());
+        self.scales.run(
+            |atom| self.value(atom, active, passive),
+            |output| Scales {
+                residual: (0..n).map(output).collect(),
+                passive: (n..2 * n).map(output).collect(),
+                active: (2 * n..2 * n + n_active).map(output).collect(),
+            },
+        )
+    }
+}
+
+/// A program for one state at a time, as Newton's method needs it.
+struct Scalar<'a> {
+    program: &'a Program,
+    /// Values of all operations; those of the fixed stage stay.
+    values: RefCell<Vec<f64>>,
+}
+
+impl<'a> Scalar<'a> {
+    fn new(machine: Machine<'a>) -> Self {
+        Self {
+            program: machine.program,
+            values: RefCell::new(machine.fixed),
+        }
+    }
+
+    /// Runs the program and reads what is wanted of its outputs.
+    fn run<R>(
         &self,
-        machine: &Machine<'_>,
-        active: &[f64],
-        mut passive: Vec<f64>,
-    ) -> Result<Vec<f64>, PoseReason> {
-        let n = passive.len();
-        for _ in 0..NEWTON_STEPS {
-            let values = machine
-                .run(1, |atom| match atom {
-                    Atom::Coordinate(i) => match self.active.iter().position(|a| *a == i) {
-                        Some(k) => &active[k..=k],
-                        None => {
-                            let k = self
-                                .passive
-                                .iter()
-                                .position(|p| *p == i)
-                                .expect("a coordinate is active or passive");
-                            &passive[k..=k]
-                        }
-                    },
-                    _ => unreachable!("a loop's residual depends on coordinates alone"),
-                })
-                .map_err(|fault| fault.reason)?;
-            let residual = DVector::from_fn(n, |i, _| values[i][0]);
-            let jacobian = DMatrix::from_fn(n, n, |i, j| values[n + i * n + j][0]);
-            let step = jacobian.lu().solve(&residual).ok_or(PoseReason::Singular)?;
-            for (x, dx) in passive.iter_mut().zip(step.iter()) {
-                *x -= dx.clamp(-0.5, 0.5);
-            }
-            if !passive.iter().all(|x| x.is_finite()) {
-                return Err(PoseReason::Singular);
-            }
-            if step.amax() < NEWTON_ACCURACY {
-                return Ok(passive);
+        input: impl Fn(Atom) -> f64,
+        read: impl FnOnce(&dyn Fn(usize) -> f64) -> R,
+    ) -> R {
+        let mut values = self.values.borrow_mut();
+        let ops = self.program.ops.iter().zip(&self.program.stages);
+        for (i, (op, stage)) in ops.enumerate() {
+            if *stage == Stage::State {
+                values[i] = match op {
+                    Op::Input(atom) => input(*atom),
+                    _ => scalar(op, |v| values[v]),
+                };
             }
         }
-        Err(PoseReason::OutOfReach)
+        read(&|k| values[self.program.outputs[k].index()])
     }
 }
 
@@ -296,7 +436,9 @@ struct Machine<'a> {
     program: &'a Program,
     /// Values of the fixed stage.
     fixed: Vec<f64>,
-    /// Slot of each operation of the state stage.
+    /// Those among them that the state stage needs, with their slots.
+    kept: Vec<(usize, f64)>,
+    /// Slot of each operation of the state stage, and of fixed values that are needed there.
     slots: Vec<usize>,
     n_slots: usize,
 }
@@ -313,8 +455,13 @@ impl<'a> Machine<'a> {
             }
         }
         let mut last_use: Vec<usize> = (0..program.ops.len()).collect();
+        let mut needed = vec![false; program.ops.len()];
         for (i, op) in program.ops.iter().enumerate() {
-            op.for_each_operand(|v| last_use[v.index()] = i);
+            let is_state = program.stages[i] == Stage::State;
+            op.for_each_operand(|v| {
+                last_use[v.index()] = i;
+                needed[v.index()] |= is_state;
+            });
         }
         for value in program
             .outputs
@@ -323,9 +470,17 @@ impl<'a> Machine<'a> {
             .chain(program.guards.iter().map(|g| g.value()))
         {
             last_use[value.index()] = program.ops.len();
+            needed[value.index()] = true;
         }
         let mut slots = vec![0; program.ops.len()];
         let (mut free, mut n_slots): (Vec<usize>, usize) = (Vec::new(), 0);
+        // Fixed values keep their slots.
+        for i in (0..program.ops.len()).filter(|i| program.stages[*i] == Stage::Fixed) {
+            if needed[i] {
+                slots[i] = n_slots;
+                n_slots += 1;
+            }
+        }
         let mut ends: Vec<Vec<usize>> = vec![Vec::new(); program.ops.len() + 1];
         for i in 0..program.ops.len() {
             if program.stages[i] == Stage::State {
@@ -337,9 +492,14 @@ impl<'a> Machine<'a> {
             }
             free.append(&mut ends[i]);
         }
+        let kept = (0..program.ops.len())
+            .filter(|i| needed[*i] && program.stages[*i] == Stage::Fixed)
+            .map(|i| (slots[i], fixed[i]))
+            .collect();
         Self {
             program,
             fixed,
+            kept,
             slots,
             n_slots,
         }
@@ -362,6 +522,9 @@ impl<'a> Machine<'a> {
             })
             .collect();
         let mut memory = vec![[0.0; BLOCK]; self.n_slots];
+        for (slot, value) in &self.kept {
+            memory[*slot] = [*value; BLOCK];
+        }
         let mut start = 0;
         while start < n {
             let len = BLOCK.min(n - start);
@@ -369,25 +532,20 @@ impl<'a> Machine<'a> {
                 if self.program.stages[i] == Stage::Fixed {
                     continue;
                 }
-                let mut result = [0.0; BLOCK];
-                match (op, inputs[i]) {
-                    (_, Some(values)) => result[..len].copy_from_slice(&values[start..start + len]),
-                    _ => self.block(op, &memory, &mut result),
+                match inputs[i] {
+                    Some(values) => {
+                        memory[self.slots[i]][..len].copy_from_slice(&values[start..start + len]);
+                    }
+                    None => memory[self.slots[i]] = self.block(op, &memory),
                 }
-                memory[self.slots[i]] = result;
             }
-            for guard in &self.program.guards {
-                let values = self.values(guard.value().index(), &memory);
-                if let Some(k) = values[..len].iter().position(|v| !guard.passes(*v)) {
-                    let reason = match guard {
-                        Guard::Reachable(_) => PoseReason::OutOfReach,
-                        Guard::Regular(..) => PoseReason::Singular,
-                    };
-                    return Err(PoseFault {
-                        sample: start + k,
-                        reason,
-                    });
-                }
+            if let Some((k, guard)) = self.first_fault(len, &memory) {
+                let reason = match guard {
+                    Guard::Reachable(_) => PoseReason::OutOfReach,
+                    Guard::Regular(..) => PoseReason::Singular,
+                };
+                let sample = start + k;
+                return Err(PoseFault { sample, reason });
             }
             for (output, value) in outputs.iter_mut().zip(&self.program.outputs) {
                 output.extend_from_slice(&self.values(value.index(), &memory)[..len]);
@@ -397,36 +555,56 @@ impl<'a> Machine<'a> {
         Ok(outputs)
     }
 
-    fn values(&self, index: usize, memory: &[[f64; BLOCK]]) -> [f64; BLOCK] {
-        if self.program.stages[index] == Stage::Fixed {
-            [self.fixed[index]; BLOCK]
-        } else {
-            memory[self.slots[index]]
-        }
+    /// The first state of a block at which a guard fails, and the guard: of several, the one that emitted code sees first.
+    fn first_fault(&self, len: usize, memory: &[[f64; BLOCK]]) -> Option<(usize, Guard)> {
+        let failing = self.program.guards.iter().filter_map(|guard| {
+            let values = self.values(guard.value().index(), memory);
+            let k = values[..len].iter().position(|v| !guard.passes(*v))?;
+            Some((k, *guard))
+        });
+        failing.min_by_key(|(k, guard)| (*k, guard.value()))
     }
 
-    fn block(&self, op: &Op, memory: &[[f64; BLOCK]], result: &mut [f64; BLOCK]) {
-        let get = |v: crate::ValueId| self.values(v.index(), memory);
-        let binary = |a, b, result: &mut [f64; BLOCK], f: fn(f64, f64) -> f64| {
-            let (a, b): ([f64; BLOCK], [f64; BLOCK]) = (get(a), get(b));
-            for k in 0..BLOCK {
-                result[k] = f(a[k], b[k]);
-            }
-        };
+    fn values<'m>(&self, index: usize, memory: &'m [[f64; BLOCK]]) -> &'m [f64; BLOCK] {
+        &memory[self.slots[index]]
+    }
+
+    fn block(&self, op: &Op, memory: &[[f64; BLOCK]]) -> [f64; BLOCK] {
+        let get = |v: &crate::ValueId| self.values(v.index(), memory);
         match op {
-            Op::Add(a, b) => binary(*a, *b, result, |x, y| x + y),
-            Op::Sub(a, b) => binary(*a, *b, result, |x, y| x - y),
-            Op::Mul(a, b) => binary(*a, *b, result, |x, y| x * y),
-            Op::Div(a, b) => binary(*a, *b, result, |x, y| x / y),
-            Op::Atan2(a, b) => binary(*a, *b, result, f64::atan2),
-            Op::Neg(a) | Op::Unary(_, a) | Op::Sin(a) | Op::Cos(a) => {
-                let a = get(*a);
-                for k in 0..BLOCK {
-                    result[k] = scalar(op, |_| a[k]);
-                }
-            }
+            Op::Add(a, b) => each(get(a), get(b), |x, y| x + y),
+            Op::Sub(a, b) => each(get(a), get(b), |x, y| x - y),
+            Op::Mul(a, b) => each(get(a), get(b), |x, y| x * y),
+            Op::Div(a, b) => each(get(a), get(b), |x, y| x / y),
+            Op::Atan2(a, b) => each(get(a), get(b), f64::atan2),
+            Op::Neg(a) => get(a).map(|x| -x),
+            Op::Sin(a) => get(a).map(f64::sin),
+            Op::Cos(a) => get(a).map(f64::cos),
+            Op::Unary(function, a) => get(a).map(|x| unary(*function, x)),
             Op::Number(_) | Op::Input(_) => unreachable!("numbers are fixed and inputs are copied"),
         }
+    }
+}
+
+/// Generic, so that each operation is a loop of its own that the compiler can make wide.
+fn each(a: &[f64; BLOCK], b: &[f64; BLOCK], operation: impl Fn(f64, f64) -> f64) -> [f64; BLOCK] {
+    let mut result = [0.0; BLOCK];
+    for k in 0..BLOCK {
+        result[k] = operation(a[k], b[k]);
+    }
+    result
+}
+
+fn unary(function: Unary, x: f64) -> f64 {
+    match function {
+        Unary::Sqrt => x.sqrt(),
+        Unary::Sign if x == 0.0 => 0.0,
+        Unary::Sign => x.signum(),
+        Unary::Abs => x.abs(),
+        Unary::Tanh => x.tanh(),
+        Unary::Exp => x.exp(),
+        Unary::Sin => x.sin(),
+        Unary::Cos => x.cos(),
     }
 }
 
@@ -443,18 +621,6 @@ fn scalar(op: &Op, value: impl Fn(usize) -> f64) -> f64 {
         Op::Sin(a) => get(a).sin(),
         Op::Cos(a) => get(a).cos(),
         Op::Atan2(y, x) => get(y).atan2(get(x)),
-        Op::Unary(function, a) => {
-            let a = get(a);
-            match function {
-                Unary::Sqrt => a.sqrt(),
-                Unary::Sign if a == 0.0 => 0.0,
-                Unary::Sign => a.signum(),
-                Unary::Abs => a.abs(),
-                Unary::Tanh => a.tanh(),
-                Unary::Exp => a.exp(),
-                Unary::Sin => a.sin(),
-                Unary::Cos => a.cos(),
-            }
-        }
+        Op::Unary(function, a) => unary(*function, get(a)),
     }
 }

@@ -10,10 +10,12 @@ mod evaluate;
 mod exact;
 pub mod expr;
 pub mod field;
+mod finite;
 mod inertia;
 mod linear;
 mod linear_loops;
 mod lower;
+mod magnitude;
 mod newton_euler;
 mod numeric_pose;
 mod programs;
@@ -32,7 +34,7 @@ pub use error::DeriveError;
 pub use evaluate::{Evaluator, PoseFault, PoseReason, States};
 pub use exact::Monomial;
 pub use lower::{Guard, Op, OperationCount, Program, Stage, ValueId};
-pub use programs::{PassivePosition, Programs};
+pub use programs::{LoopPrograms, PassivePosition, Programs};
 pub use reduce::{Dependency, Method, Polynomial, Powers, RationalFunction, Reduction, Variable};
 
 use expr::Graph;
@@ -53,6 +55,7 @@ pub struct Derivation {
 
 /// Derives the inverse dynamics of a mechanism and reduces it to base parameters, exactly.
 pub fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
+    finite::check_values(mechanism)?;
     let mut graph = Graph::new();
     let equations = regressor::equations(&mut graph, mechanism)?;
     let reduction = reduce::reduce(
@@ -63,11 +66,13 @@ pub fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
         &equations.columns,
     )?;
     let programs = programs::programs(&mut graph, mechanism, &equations, &reduction)?;
-    Ok(Derivation {
+    let derivation = Derivation {
         mechanism: mechanism.clone(),
         graph,
         reduction,
         programs,
         equations,
-    })
+    };
+    finite::check_results(&derivation)?;
+    Ok(derivation)
 }

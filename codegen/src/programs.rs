@@ -12,6 +12,7 @@ use crate::closing::Closing;
 use crate::exact::Monomial;
 use crate::expr::{Atom, ExprId, Graph};
 use crate::lower::{Program, Request, lower};
+use crate::magnitude;
 use crate::reduce::{Reduction, Unknowns, plan};
 use crate::regressor::Equations;
 
@@ -23,10 +24,16 @@ pub enum PassivePosition {
     /// In closed form, inside the programs.
     Closed,
     /// By Newton's method on the loops.
-    Newton {
-        /// Residuals, then their Jacobian by the passive coordinates row by row.
-        residual: Program,
-    },
+    Newton(Box<LoopPrograms>),
+}
+
+/// What Newton's method on the loops evaluates.
+#[derive(Clone, Debug)]
+pub struct LoopPrograms {
+    /// Residuals, then their Jacobian by the passive coordinates row by row.
+    pub residual: Program,
+    /// What residuals, passive and active coordinates are held against, one after the other.
+    pub scales: Program,
 }
 
 /// Straight-line programs; outputs in the order given.
@@ -120,24 +127,14 @@ pub(crate) fn programs(
     } else {
         let mut outputs = projection.residual.clone();
         outputs.extend(projection.residual_jacobian.iter().flatten());
-        let request = Request {
-            outputs: &outputs,
-            reachable: &[],
-            regular: &[],
-            definitions: &[],
-        };
-        PassivePosition::Newton {
-            residual: lower(graph, &request),
-        }
+        let scales = magnitude::scales(graph, mechanism, projection);
+        PassivePosition::Newton(Box::new(LoopPrograms {
+            residual: plain(graph, &outputs),
+            scales: plain(graph, &scales),
+        }))
     };
     let base = crate::base::expressions(graph, reduction);
-    let request = Request {
-        outputs: &base,
-        reachable: &[],
-        regular: &[],
-        definitions: &[],
-    };
-    let base_parameters = lower(graph, &request);
+    let base_parameters = plain(graph, &base);
     let mut program = |outputs: &[ExprId]| closing.program(graph, equations, outputs);
     let regressor = cheapest(regressors.iter().map(|outputs| program(outputs)));
     let inverse_dynamics = cheapest(inverse_dynamics.iter().map(|outputs| program(outputs)));
@@ -150,6 +147,17 @@ pub(crate) fn programs(
         base_parameters,
         drives: program(&drives),
     })
+}
+
+/// A program of expressions as they stand, without guards.
+fn plain(graph: &mut Graph, outputs: &[ExprId]) -> Program {
+    let request = Request {
+        outputs,
+        reachable: &[],
+        regular: &[],
+        definitions: &[],
+    };
+    lower(graph, &request)
 }
 
 /// The program that costs least per state; the first of equals.

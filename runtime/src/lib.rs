@@ -1,13 +1,15 @@
-//! What emitted models need at run time: a trait for `f32` and `f64`, the errors of a pose, and a small linear solver.
+//! What emitted models need at run time: a trait for `f32` and `f64`, the errors of a pose, and Newton's method on loops.
 //!
 //! There is no allocation and no unsafe code here, and without the feature `std` no standard library either.
 #![cfg_attr(not(feature = "std"), no_std)]
 
+mod loops;
 mod real;
 mod solve;
 
 use core::fmt;
 
+pub use loops::{Loops, Scales, correct, follow, settle};
 pub use real::Real;
 pub use solve::solve;
 
@@ -18,18 +20,42 @@ pub enum PoseError {
     OutOfReach,
     /// The passive coordinates or the drives' forces are not determined there.
     Singular,
+    /// An input is no finite number; its name in the model file, with `_d` and `_dd` for rates and accelerations.
+    NotFinite(&'static str),
 }
 
 impl fmt::Display for PoseError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::OutOfReach => "the loops cannot close: the pose is out of reach",
-            Self::Singular => "the pose is singular",
-        })
+        match self {
+            Self::OutOfReach => f.write_str("the loops cannot close: the pose is out of reach"),
+            Self::Singular => f.write_str("the pose is singular"),
+            Self::NotFinite(input) => write!(f, "`{input}` is no finite number"),
+        }
     }
 }
 
 impl core::error::Error for PoseError {}
+
+/// Names the first of some inputs that is no finite number.
+///
+/// # Errors
+/// [`PoseError::NotFinite`] with its name.
+#[inline]
+pub fn check_finite<T: Real>(values: &[T], names: &[&'static str]) -> Result<(), PoseError> {
+    // The sum is finite unless one of them is not, or all are huge: a branch in place of many.
+    let mut sum = T::from_f64(0.0);
+    for value in values {
+        sum = sum + *value;
+    }
+    if sum.is_finite() {
+        return Ok(());
+    }
+    let found = values
+        .iter()
+        .zip(names)
+        .find(|(value, _)| !value.is_finite());
+    found.map_or(Ok(()), |(_, name)| Err(PoseError::NotFinite(name)))
+}
 
 /// Name, unit and the model file's value of a quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]

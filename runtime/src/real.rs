@@ -18,6 +18,10 @@ pub trait Real:
     fn from_f64(value: f64) -> Self;
     /// The same number as `f64`.
     fn to_f64(self) -> f64;
+    /// Distance from 1 to the next larger number.
+    fn epsilon() -> Self;
+    /// Whether it is a number and finite.
+    fn is_finite(self) -> bool;
     /// Sine and cosine of an angle in rad.
     fn sin_cos(self) -> (Self, Self);
     /// Square root.
@@ -36,7 +40,7 @@ pub trait Real:
     #[must_use]
     fn exp(self) -> Self;
 
-    /// -1, 0 or 1.
+    /// -1, 0 or 1; what is no number stays what it is.
     #[must_use]
     fn sign(self) -> Self {
         let zero = Self::from_f64(0.0);
@@ -45,7 +49,7 @@ pub trait Real:
         } else if self < zero {
             Self::from_f64(-1.0)
         } else {
-            zero
+            self
         }
     }
 }
@@ -62,6 +66,14 @@ macro_rules! real {
             #[inline]
             fn to_f64(self) -> f64 {
                 f64::from(self)
+            }
+            #[inline]
+            fn epsilon() -> Self {
+                <$float>::EPSILON
+            }
+            #[inline]
+            fn is_finite(self) -> bool {
+                self.is_finite()
             }
             #[inline]
             fn sin_cos(self) -> (Self, Self) {
@@ -99,6 +111,14 @@ macro_rules! real {
             #[inline]
             fn to_f64(self) -> f64 {
                 f64::from(self)
+            }
+            #[inline]
+            fn epsilon() -> Self {
+                <$float>::EPSILON
+            }
+            #[inline]
+            fn is_finite(self) -> bool {
+                self.is_finite()
             }
             #[inline]
             fn sin_cos(self) -> (Self, Self) {
@@ -144,3 +164,15 @@ real!(
     libm::tanhf,
     libm::expf
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sign_of_what_is_no_number_is_no_number() {
+        let exact = [2.0, -3.0, 0.0_f64].map(|x| Real::sign(x).to_bits());
+        assert_eq!(exact, [1.0, -1.0, 0.0_f64].map(f64::to_bits));
+        assert!(Real::sign(f64::NAN).is_nan());
+    }
+}

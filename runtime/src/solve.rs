@@ -2,46 +2,51 @@
 
 use crate::{PoseError, Real};
 
-/// Solves `matrix * x = rhs` by Gaussian elimination with partial pivoting.
+/// Solves `matrix * x = rhs` by Gaussian elimination with partial pivoting; `rhs` becomes `x`, the matrix is used up.
 ///
 /// # Errors
 /// [`PoseError::Singular`] if a pivot is zero or no number.
-pub fn solve<T: Real, const N: usize>(
-    mut matrix: [[T; N]; N],
-    mut rhs: [T; N],
-) -> Result<[T; N], PoseError> {
+pub fn solve<T: Real, Row: AsRef<[T]> + AsMut<[T]>>(
+    matrix: &mut [Row],
+    rhs: &mut [T],
+) -> Result<(), PoseError> {
+    let n = rhs.len();
     let zero = T::from_f64(0.0);
-    for column in 0..N {
+    for column in 0..n {
         let mut pivot = column;
-        for row in column + 1..N {
-            if matrix[row][column].abs() > matrix[pivot][column].abs() {
+        for row in column + 1..n {
+            if matrix[row].as_ref()[column].abs() > matrix[pivot].as_ref()[column].abs() {
                 pivot = row;
             }
         }
         matrix.swap(column, pivot);
         rhs.swap(column, pivot);
-        let lead = matrix[column][column];
+        let (above, below) = matrix.split_at_mut(column + 1);
+        let lead_row = above[column].as_ref();
+        let lead = lead_row[column];
         let regular = lead.abs() > zero;
         // A pivot that is no number fails this comparison too.
         if !regular {
             return Err(PoseError::Singular);
         }
-        for row in column + 1..N {
-            let factor = matrix[row][column] / lead;
-            for k in column..N {
-                matrix[row][k] = matrix[row][k] - factor * matrix[column][k];
+        for (k, row) in below.iter_mut().enumerate() {
+            let row = row.as_mut();
+            let factor = row[column] / lead;
+            for (x, above) in row.iter_mut().zip(lead_row).skip(column + 1) {
+                *x = *x - factor * *above;
             }
-            rhs[row] = rhs[row] - factor * rhs[column];
+            rhs[column + 1 + k] = rhs[column + 1 + k] - factor * rhs[column];
         }
     }
-    for row in (0..N).rev() {
+    for row in (0..n).rev() {
+        let coefficients = matrix[row].as_ref();
         let mut value = rhs[row];
-        for k in row + 1..N {
-            value = value - matrix[row][k] * rhs[k];
+        for k in row + 1..n {
+            value = value - coefficients[k] * rhs[k];
         }
-        rhs[row] = value / matrix[row][row];
+        rhs[row] = value / coefficients[row];
     }
-    Ok(rhs)
+    Ok(())
 }
 
 #[cfg(test)]
@@ -50,9 +55,10 @@ mod tests {
 
     #[test]
     fn a_system_that_needs_pivoting_is_solved() {
-        let x = solve(
-            [[0.0, 2.0, 1.0], [1.0, 1.0, 0.0], [3.0, 0.0, -1.0]],
-            [7.0, 3.0, 0.0],
+        let mut x = [7.0, 3.0, 0.0];
+        solve(
+            &mut [[0.0, 2.0, 1.0], [1.0, 1.0, 0.0], [3.0, 0.0, -1.0]],
+            &mut x,
         )
         .unwrap();
         for (found, expected) in x.iter().zip([1.0, 2.0, 3.0]) {
@@ -62,10 +68,11 @@ mod tests {
 
     #[test]
     fn a_singular_system_is_an_error() {
+        let dependent = solve(&mut [[1.0, 2.0], [2.0, 4.0]], &mut [1.0, 1.0_f64]);
+        assert_eq!(dependent, Err(PoseError::Singular));
         assert_eq!(
-            solve([[1.0, 2.0], [2.0, 4.0]], [1.0, 1.0_f64]),
+            solve(&mut [[f64::NAN]], &mut [1.0]),
             Err(PoseError::Singular)
         );
-        assert_eq!(solve([[f64::NAN]], [1.0]), Err(PoseError::Singular));
     }
 }

@@ -11,16 +11,19 @@ pub fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures")
 }
 
-/// The model file `name` of the models that ship with the program, or else of the variants that tests add.
+/// The model file `name` of the models that ship with the program, or else of those that tests add.
 pub fn model_file(name: &str) -> PathBuf {
-    let shipped = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../model-spec/models")
-        .join(format!("{name}.toml"));
-    if shipped.exists() {
-        shipped
-    } else {
-        fixtures().join("variants").join(format!("{name}.toml"))
-    }
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/models");
+    let file = format!("{name}.toml");
+    [
+        shipped,
+        fixtures().join("emitted"),
+        fixtures().join("variants"),
+    ]
+    .map(|folder| folder.join(&file))
+    .into_iter()
+    .find(|path| path.exists())
+    .unwrap_or_else(|| panic!("there is no model file {file}"))
 }
 
 /// Loads a model or a variant by the name of its file.

@@ -12,4 +12,5 @@ pub mod published;
 pub mod random;
 pub mod rank;
 pub mod sample;
+pub mod scaled;
 pub mod stream;

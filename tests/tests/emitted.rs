@@ -189,6 +189,44 @@ mod random_models {
     include!(concat!(env!("OUT_DIR"), "/random_models.rs"));
 }
 
+/// Modules of fixtures, see `build.rs`.
+#[expect(unreachable_pub, dead_code, reason = "emitted for a crate of its own")]
+mod fixture_models {
+    include!(concat!(env!("OUT_DIR"), "/fixture_models.rs"));
+}
+
+#[test]
+fn words_of_rust_may_be_names() {
+    let geometry = fixture_models::_f64::Geometry::<f64>::default();
+    let fields = [
+        geometry._self,
+        geometry.self_,
+        geometry.r#type,
+        geometry.type_,
+        geometry.r#gen,
+    ];
+    let values = [9.81, 0.1, 0.2, 0.4, 12.8_f64];
+    assert_eq!(fields.map(f64::to_bits), values.map(f64::to_bits));
+    let derivation = derived("names");
+    let sample = sample_of(&derivation);
+    let found = run!(fixture_models, _f64, f64, &sample);
+    check(&derivation, &sample, &found, 1e-12);
+}
+
+#[test]
+fn loops_in_space_agree_with_the_evaluator() {
+    let derivation = derived("spatial_slider");
+    let sample = sample_of(&derivation);
+    let found = run!(fixture_models, spatial_slider, f64, &sample, passive);
+    check(&derivation, &sample, &found, 1e-12);
+    let found = run!(fixture_models, spatial_slider, f32, &sample, passive);
+    check(&derivation, &sample, &found, 5e-3);
+    let derivation = derived("spatial_press");
+    let sample = sample_of(&derivation);
+    let found = run!(fixture_models, spatial_press, f64, &sample, passive);
+    check(&derivation, &sample, &found, 1e-12);
+}
+
 /// A test that a random mechanism's module agrees with the evaluator.
 macro_rules! agrees_at_random {
     ($($model:ident: $function:ident $seed:literal $($passive:ident)?;)+) => {

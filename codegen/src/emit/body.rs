@@ -19,10 +19,7 @@ pub(super) struct Body<'a> {
 impl<'a> Body<'a> {
     pub(super) fn new(program: &'a Program, input: &'a dyn Fn(Atom) -> TokenStream) -> Self {
         let names = (0..program.ops.len())
-            .map(|i| match program.names.get(&i) {
-                Some(name) => format_ident!("{}", name),
-                None => format_ident!("v{}", i),
-            })
+            .map(|i| format_ident!("v{}", i))
             .collect();
         let mut needed = vec![false; program.ops.len()];
         for (i, op) in program.ops.iter().enumerate() {

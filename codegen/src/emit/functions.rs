@@ -1,7 +1,7 @@
 //! The functions of an emitted model: regressor, motion of drives and passive coordinates, inverse dynamics.
 
 use proc_macro2::TokenStream;
-use quote::quote;
+use quote::{format_ident, quote};
 
 use super::body::Body;
 use super::items::{count, input};
@@ -19,6 +19,8 @@ pub(super) struct Function {
     pub(super) field: TokenStream,
     /// That field's initialiser, with `geometry` in scope.
     pub(super) init: TokenStream,
+    /// What is left to do to a prepared `model`.
+    pub(super) finish: TokenStream,
     /// The method itself.
     pub(super) method: TokenStream,
 }
@@ -31,13 +33,24 @@ pub(super) fn model(derivation: &Derivation) -> TokenStream {
     let items = functions.iter().map(|f| &f.items);
     let fields = functions.iter().map(|f| &f.field);
     let inits = functions.iter().map(|f| &f.init);
+    let finishes = functions.iter().map(|f| &f.finish);
     let methods = functions.iter().map(|f| &f.method);
+    let prepared = quote! { Self { input: geometry.check(), #(#inits)* } };
+    let new = if functions.iter().all(|f| f.finish.is_empty()) {
+        prepared
+    } else {
+        quote! { let mut model = #prepared; #(#finishes)* model }
+    };
     quote! {
         #(#items)*
 
         /// The model for one geometry; what depends on the geometry alone is computed once.
         #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct Model<T> { #(#fields)* }
+        pub struct Model<T> {
+            /// What is wrong with the geometry.
+            input: Result<(), PoseError>,
+            #(#fields)*
+        }
 
         impl<T: Real> Default for Model<T> {
             fn default() -> Self {
@@ -48,11 +61,106 @@ pub(super) fn model(derivation: &Derivation) -> TokenStream {
         impl<T: Real> Model<T> {
             /// Prepares the model of a geometry.
             pub fn new(geometry: &Geometry<T>) -> Self {
-                let _ = geometry;
-                Self { #(#inits)* }
+                #new
             }
 
             #(#methods)*
+        }
+    }
+}
+
+/// A function of the state, as methods.
+struct Method<'a> {
+    name: &'a str,
+    doc: &'a str,
+    program: &'a Program,
+    /// Statements of the program and the expression of the result, with `fixed`, `state` and `passive` in scope.
+    statements: TokenStream,
+    result: TokenStream,
+    /// Where the fixed values and the model are.
+    fixed: TokenStream,
+    model: TokenStream,
+    /// What the result is.
+    output: TokenStream,
+}
+
+impl Method<'_> {
+    /// One method; where the passive coordinates are found by Newton's method, a second one that takes a guess.
+    fn tokens(&self, derivation: &Derivation) -> TokenStream {
+        let Self {
+            name,
+            doc,
+            statements,
+            result,
+            fixed,
+            model,
+            output,
+            ..
+        } = self;
+        let method = format_ident!("{name}");
+        let doc = format!(" {doc}");
+        if !reads_passive(derivation, self.program) {
+            return quote! {
+                #[doc = #doc]
+                ///
+                /// # Errors
+                /// A pose out of reach or singular, or an input that is no finite number.
+                pub fn #method(&self, state: &State<T>) -> Result<#output, PoseError> {
+                    self.input?;
+                    state.check()?;
+                    let fixed = &#fixed;
+                    #statements
+                    Ok(#result)
+                }
+            };
+        }
+        let (near, at) = (format_ident!("{name}_near"), format_ident!("{name}_at"));
+        let cost = format!(
+            " Cost: that of [`{}passive_position`] besides.",
+            if name == &"forces" {
+                "Model::"
+            } else {
+                "Self::"
+            }
+        );
+        let cost_near = cost.replace("passive_position", "passive_position_near");
+        let same = format!(
+            " The same as [`Self::{name}`], with the passive coordinates of a pose near by, such as those of the last \
+             cycle; they become those of this state."
+        );
+        quote! {
+            #[doc = #doc]
+            ///
+            #[doc = #cost]
+            ///
+            /// # Errors
+            /// A pose out of reach or singular, or an input that is no finite number.
+            pub fn #method(&self, state: &State<T>) -> Result<#output, PoseError> {
+                self.input?;
+                state.check()?;
+                self.#at(state, &#model.passive_position(&state.q)?)
+            }
+
+            #[doc = #same]
+            ///
+            #[doc = #cost_near]
+            ///
+            /// # Errors
+            /// A pose out of reach or singular, or an input that is no finite number.
+            pub fn #near(&self, state: &State<T>, passive: &mut [T; N_PASSIVE]) -> Result<#output, PoseError> {
+                self.input?;
+                state.check()?;
+                let found = #model.passive_position_near(&state.q, passive)?;
+                let result = self.#at(state, &found)?;
+                *passive = found;
+                Ok(result)
+            }
+
+            fn #at(&self, state: &State<T>, passive: &[T; N_PASSIVE]) -> Result<#output, PoseError> {
+                let fixed = &#fixed;
+                #statements
+                Ok(#result)
+            }
         }
     }
 }
@@ -61,30 +169,27 @@ fn regressor(derivation: &Derivation) -> Function {
     let program = &derivation.programs.regressor;
     let input = input(derivation);
     let body = Body::new(program, &input);
-    let (n, fixed, state) = (body.n_fixed(), body.fixed(), body.state());
-    let needs = passive_needed(derivation, program, &quote! { self });
+    let (n, fixed) = (body.n_fixed(), body.fixed());
     let n_drives = derivation.mechanism.drives.len();
-    let h = rows(&body, 0, n_drives, derivation.reduction.retained.len());
-    let doc = format!(
-        " H_min: one row per drive, one column per base parameter. {}.",
-        count(program)
-    );
+    let method = Method {
+        name: "regressor",
+        doc: &format!(
+            "H_min: one row per drive, one column per base parameter. {}.",
+            count(program)
+        ),
+        program,
+        statements: body.state(),
+        result: rows(&body, 0, n_drives, derivation.reduction.retained.len()),
+        fixed: quote! { self.regressor },
+        model: quote! { self },
+        output: quote! { [[T; N_BASE]; N_DRIVES] },
+    };
     Function {
         items: TokenStream::new(),
         field: quote! { regressor: [T; #n], },
         init: quote! { regressor: { #fixed }, },
-        method: quote! {
-            #[doc = #doc]
-            ///
-            /// # Errors
-            /// A pose out of reach or singular.
-            pub fn regressor(&self, state: &State<T>) -> Result<[[T; N_BASE]; N_DRIVES], PoseError> {
-                let fixed = &self.regressor;
-                #needs
-                #state
-                Ok(#h)
-            }
-        },
+        finish: TokenStream::new(),
+        method: method.tokens(derivation),
     }
 }
 
@@ -92,12 +197,21 @@ fn drives(derivation: &Derivation) -> Function {
     let program = &derivation.programs.drives;
     let input = input(derivation);
     let body = Body::new(program, &input);
-    let (n, fixed, state) = (body.n_fixed(), body.fixed(), body.state());
-    let needs = passive_needed(derivation, program, &quote! { self });
+    let (n, fixed) = (body.n_fixed(), body.fixed());
     let n_drives = derivation.mechanism.drives.len();
     let n_active = derivation.coordinates().0.len();
     let (lengths, speeds) = (list(&body, 0, n_drives), list(&body, n_drives, n_drives));
     let jacobian = rows(&body, 2 * n_drives, n_drives, n_active);
+    let method = Method {
+        name: "drives",
+        doc: "Lengths or angles of the drives, their rates, and their Jacobian.",
+        program,
+        statements: body.state(),
+        result: quote! { Drives { coordinate: #lengths, rate: #speeds, jacobian: #jacobian } },
+        fixed: quote! { self.drives },
+        model: quote! { self },
+        output: quote! { Drives<T> },
+    };
     Function {
         items: quote! {
             /// Motion of the drives.
@@ -113,18 +227,8 @@ fn drives(derivation: &Derivation) -> Function {
         },
         field: quote! { drives: [T; #n], },
         init: quote! { drives: { #fixed }, },
-        method: quote! {
-            /// Lengths or angles of the drives, their rates, and their Jacobian.
-            ///
-            /// # Errors
-            /// A pose out of reach or singular.
-            pub fn drives(&self, state: &State<T>) -> Result<Drives<T>, PoseError> {
-                let fixed = &self.drives;
-                #needs
-                #state
-                Ok(Drives { coordinate: #lengths, rate: #speeds, jacobian: #jacobian })
-            }
-        },
+        finish: TokenStream::new(),
+        method: method.tokens(derivation),
     }
 }
 
@@ -136,9 +240,18 @@ fn passive(derivation: &Derivation) -> Option<Function> {
     let program = &derivation.programs.passive;
     let input = input(derivation);
     let body = Body::new(program, &input);
-    let (n, fixed, state) = (body.n_fixed(), body.fixed(), body.state());
-    let needs = passive_needed(derivation, program, &quote! { self });
+    let (n, fixed) = (body.n_fixed(), body.fixed());
     let [q, qd, qdd] = [0, 1, 2].map(|k| list(&body, k * n_passive, n_passive));
+    let method = Method {
+        name: "passive",
+        doc: "Passive coordinates with their rates and accelerations.",
+        program,
+        statements: body.state(),
+        result: quote! { Passive { q: #q, qd: #qd, qdd: #qdd } },
+        fixed: quote! { self.motion },
+        model: quote! { self },
+        output: quote! { Passive<T> },
+    };
     Some(Function {
         items: quote! {
             /// Motion of the passive coordinates.
@@ -154,18 +267,8 @@ fn passive(derivation: &Derivation) -> Option<Function> {
         },
         field: quote! { motion: [T; #n], },
         init: quote! { motion: { #fixed }, },
-        method: quote! {
-            /// Passive coordinates with their rates and accelerations.
-            ///
-            /// # Errors
-            /// A pose out of reach or singular.
-            pub fn passive(&self, state: &State<T>) -> Result<Passive<T>, PoseError> {
-                let fixed = &self.motion;
-                #needs
-                #state
-                Ok(Passive { q: #q, qd: #qd, qdd: #qdd })
-            }
-        },
+        finish: TokenStream::new(),
+        method: method.tokens(derivation),
     })
 }
 
@@ -174,20 +277,27 @@ pub(super) fn inverse_dynamics(derivation: &Derivation) -> TokenStream {
     let input = input(derivation);
     let program = &derivation.programs.inverse_dynamics;
     let body = Body::new(program, &input);
-    let (n, fixed, state) = (body.n_fixed(), body.fixed(), body.state());
-    let forces = list(&body, 0, derivation.mechanism.drives.len());
-    let needs = passive_needed(derivation, program, &quote! { self.model });
-    let doc = format!(" Forces of the drives, N or N m. {}.", count(program));
-    let is_newton = matches!(
-        derivation.programs.passive_position,
-        PassivePosition::Newton { .. }
-    );
-    let model_field = is_newton.then(|| quote! { model: Model<T>, });
-    let model_init = is_newton.then(|| quote! { model: Model::new(geometry), });
+    let (n, fixed) = (body.n_fixed(), body.fixed());
+    let method = Method {
+        name: "forces",
+        doc: &format!("Forces of the drives, N or N m. {}.", count(program)),
+        program,
+        statements: body.state(),
+        result: list(&body, 0, derivation.mechanism.drives.len()),
+        fixed: quote! { self.fixed },
+        model: quote! { self.model },
+        output: quote! { [T; N_DRIVES] },
+    };
+    let method = method.tokens(derivation);
+    let needs_model = reads_passive(derivation, program);
+    let model_field = needs_model.then(|| quote! { model: Model<T>, });
+    let model_init = needs_model.then(|| quote! { model: Model::new(geometry), });
     quote! {
         /// Inverse dynamics for one geometry and one set of base parameters.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct InverseDynamics<T> {
+            /// What is wrong with the geometry or the base parameters.
+            input: Result<(), PoseError>,
             fixed: [T; #n],
             #model_field
         }
@@ -195,20 +305,12 @@ pub(super) fn inverse_dynamics(derivation: &Derivation) -> TokenStream {
         impl<T: Real> InverseDynamics<T> {
             /// Prepares the recursion: what does not depend on the state is computed once.
             pub fn new(geometry: &Geometry<T>, base: &[T; N_BASE]) -> Self {
-                let _ = (geometry, base);
-                Self { fixed: { #fixed }, #model_init }
+                let names = BASE_PARAMETERS.map(|parameter| parameter.name);
+                let input = geometry.check().and(check_finite(base, &names));
+                Self { input, fixed: { #fixed }, #model_init }
             }
 
-            #[doc = #doc]
-            ///
-            /// # Errors
-            /// A pose out of reach or singular.
-            pub fn forces(&self, state: &State<T>) -> Result<[T; N_DRIVES], PoseError> {
-                let fixed = &self.fixed;
-                #needs
-                #state
-                Ok(#forces)
-            }
+            #method
         }
     }
 }
@@ -226,16 +328,14 @@ pub(super) fn list(body: &Body<'_>, first: usize, n: usize) -> TokenStream {
     quote! { [#(#entries),*] }
 }
 
-/// Statements that provide `passive` where a program reads it.
-fn passive_needed(derivation: &Derivation, program: &Program, model: &TokenStream) -> TokenStream {
+/// Whether a program needs passive coordinates that Newton's method finds.
+fn reads_passive(derivation: &Derivation, program: &Program) -> bool {
     let (_, passive) = derivation.coordinates();
-    let reads = program
+    matches!(
+        derivation.programs.passive_position,
+        PassivePosition::Newton(_)
+    ) && program
         .ops
         .iter()
-        .any(|op| matches!(op, Op::Input(Atom::Coordinate(i)) if passive.contains(i)));
-    if reads {
-        quote! { let passive = #model.passive_position(&state.q)?; }
-    } else {
-        TokenStream::new()
-    }
+        .any(|op| matches!(op, Op::Input(Atom::Coordinate(i)) if passive.contains(i)))
 }

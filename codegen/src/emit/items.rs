@@ -1,14 +1,15 @@
 //! The items of an emitted module: names and units, geometry, parameters, state, and the functions of the model.
 
 use proc_macro2::{Literal, TokenStream};
-use quote::quote;
+use quote::{format_ident, quote};
 
 use super::body::Body;
 use super::functions::{inverse_dynamics, model};
-use super::identifier;
+use super::identifier::of_field;
 use crate::Derivation;
 use crate::expr::Atom;
 use crate::lower::{Op, OperationCount, Program, Stage};
+use crate::programs::PassivePosition;
 
 /// What the module says of itself.
 pub(super) fn module_doc(derivation: &Derivation) -> String {
@@ -32,7 +33,7 @@ pub(super) fn module_doc(derivation: &Derivation) -> String {
     line(String::new());
     for base in derivation.base_parameters() {
         line(format!(
-            "- `{} = {}` [{}]",
+            "- `{} = {}` ({})",
             base.name, base.expression, base.unit
         ));
     }
@@ -75,6 +76,7 @@ pub(super) fn items(derivation: &Derivation) -> TokenStream {
         .iter()
         .map(|p| (p.name.as_str(), p.nominal, p.unit.as_str()))
         .collect();
+    let geometry_check = geometry_check(derivation);
     let geometry = record(
         "Geometry",
         "Known quantities; the default is the model file's.",
@@ -89,11 +91,18 @@ pub(super) fn items(derivation: &Derivation) -> TokenStream {
     let base_parameters = base_parameters(derivation);
     let model = model(derivation);
     let inverse_dynamics = inverse_dynamics(derivation);
+    let newton = matches!(
+        derivation.programs.passive_position,
+        PassivePosition::Newton(_)
+    )
+    .then(|| quote! { use ::modelmill_runtime::{Scales, correct, follow, settle}; });
     quote! {
-        use modelmill_runtime::{BaseParameter, PoseError, Quantity, Real};
+        use ::modelmill_runtime::{BaseParameter, PoseError, Quantity, Real, check_finite};
+        #newton
 
         #tables
         #geometry
+        #geometry_check
         #parameters
         #state
         #base_parameters
@@ -175,18 +184,18 @@ pub(super) fn signed(value: f64) -> TokenStream {
 
 /// A struct of named quantities with a default.
 fn record(name: &str, doc: &str, fields: &[(&str, f64, &str)]) -> TokenStream {
-    let name = identifier(name);
+    let name = format_ident!("{name}");
     if fields.is_empty() {
         return quote! {
             #[doc = #doc]
             #[derive(Clone, Copy, Debug, PartialEq)]
-            pub struct #name<T> { nothing: core::marker::PhantomData<T> }
+            pub struct #name<T> { nothing: ::core::marker::PhantomData<T> }
             impl<T: Real> Default for #name<T> {
-                fn default() -> Self { Self { nothing: core::marker::PhantomData } }
+                fn default() -> Self { Self { nothing: ::core::marker::PhantomData } }
             }
         };
     }
-    let idents: Vec<_> = fields.iter().map(|f| identifier(f.0)).collect();
+    let idents: Vec<_> = fields.iter().map(|f| of_field(f.0)).collect();
     let docs = fields.iter().map(|f| format!(" Unit: {}.", f.2));
     let values = fields.iter().map(|f| signed(f.1));
     quote! {
@@ -195,6 +204,24 @@ fn record(name: &str, doc: &str, fields: &[(&str, f64, &str)]) -> TokenStream {
         pub struct #name<T> { #(#[doc = #docs] pub #idents: T),* }
         impl<T: Real> Default for #name<T> {
             fn default() -> Self { Self { #(#idents: T::from_f64(#values)),* } }
+        }
+    }
+}
+
+/// That all constants are numbers, as a method.
+fn geometry_check(derivation: &Derivation) -> TokenStream {
+    let names: Vec<&str> = derivation
+        .mechanism
+        .constants
+        .iter()
+        .map(|c| c.name.as_str())
+        .collect();
+    let fields = names.iter().map(|name| of_field(name));
+    quote! {
+        impl<T: Real> Geometry<T> {
+            fn check(&self) -> Result<(), PoseError> {
+                check_finite::<T>(&[#(self.#fields),*], &[#(#names),*])
+            }
         }
     }
 }
@@ -217,6 +244,15 @@ fn state(derivation: &Derivation) -> TokenStream {
             pub load: [T; N_DRIVES],
         }
     });
+    let check_load = uses_load(derivation).then(|| quote! { check_finite(&self.load, &DRIVES)?; });
+    let mechanism = &derivation.mechanism;
+    let (active, _) = derivation.coordinates();
+    let [rates, accelerations] = ["_d", "_dd"].map(|suffix| {
+        let names = active
+            .iter()
+            .map(|i| format!("{}{suffix}", mechanism.coordinates[*i].name));
+        quote! { &[#(#names),*] }
+    });
     quote! {
         /// Motion of the independent coordinates, rad or m, and seconds.
         #[derive(Clone, Copy, Debug, PartialEq)]
@@ -229,6 +265,17 @@ fn state(derivation: &Derivation) -> TokenStream {
             pub qdd: [T; N_ACTIVE],
             #load
         }
+
+        impl<T: Real> State<T> {
+            /// Names the first entry that is no finite number.
+            fn check(&self) -> Result<(), PoseError> {
+                check_finite(&self.q, &ACTIVE)?;
+                check_finite(&self.qd, #rates)?;
+                check_finite(&self.qdd, #accelerations)?;
+                #check_load
+                Ok(())
+            }
+        }
     }
 }
 
@@ -239,13 +286,13 @@ pub(super) fn input(derivation: &Derivation) -> impl Fn(Atom) -> TokenStream {
         .mechanism
         .constants
         .iter()
-        .map(|c| identifier(&c.name))
+        .map(|c| of_field(&c.name))
         .collect();
     let parameters: Vec<_> = derivation
         .mechanism
         .parameters
         .iter()
-        .map(|p| identifier(&p.name))
+        .map(|p| of_field(&p.name))
         .collect();
     move |atom| {
         let position = |i: usize| active.iter().position(|a| *a == i);
@@ -278,7 +325,7 @@ pub(super) fn input(derivation: &Derivation) -> impl Fn(Atom) -> TokenStream {
                 quote! { state.qdd[#k] }
             }
             Atom::Load(d) => quote! { state.load[#d] },
-            Atom::Pi => quote! { T::from_f64(core::f64::consts::PI) },
+            Atom::Pi => quote! { T::from_f64(::core::f64::consts::PI) },
         }
     }
 }

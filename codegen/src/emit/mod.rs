@@ -5,11 +5,12 @@
 
 mod body;
 mod functions;
+mod identifier;
 mod items;
 mod newton;
 
 use proc_macro2::TokenStream;
-use quote::{format_ident, quote};
+use quote::quote;
 
 use crate::Derivation;
 
@@ -42,7 +43,7 @@ impl Emitted {
     /// The source as a `pub mod` that can be included anywhere.
     pub fn module(&self) -> String {
         let (doc, items) = (doc_lines(&self.doc, false), &self.items);
-        let name = identifier(&self.name);
+        let name = identifier::of_module(&self.name);
         print(&quote! { #doc #[allow(#LINTS)] pub mod #name { #items } })
     }
 }
@@ -75,12 +76,4 @@ fn print(tokens: &TokenStream) -> String {
     let file = syn::parse2(tokens.clone())
         .unwrap_or_else(|error| panic!("emitted tokens do not parse: {error}\n{tokens}"));
     prettyplease::unparse(&file)
-}
-
-/// A Rust identifier for a name of the model file.
-fn identifier(name: &str) -> proc_macro2::Ident {
-    match syn::parse_str::<syn::Ident>(name) {
-        Ok(ident) => ident,
-        Err(_) => format_ident!("{}_", name),
-    }
 }

@@ -1,130 +1,133 @@
-//! Newton's method on loops that have no closed form.
+//! Newton's method on loops that have no closed form: what the runtime asks of a model, and who calls it.
 
 use proc_macro2::TokenStream;
 use quote::quote;
 
 use super::body::Body;
 use super::functions::{Function, list, rows};
-use super::items::{input, signed};
+use super::items::{count, input, signed};
 use crate::Derivation;
 use crate::expr::Atom;
 use crate::programs::PassivePosition;
 
-/// Newton's method on the loops, where there is no closed form.
-#[expect(clippy::too_many_lines, reason = "one template of emitted code")]
+/// The model's loops and its passive coordinates, where there is no closed form.
 pub(super) fn newton(derivation: &Derivation) -> Option<Function> {
-    let PassivePosition::Newton { residual } = &derivation.programs.passive_position else {
+    let PassivePosition::Newton(loops) = &derivation.programs.passive_position else {
         return None;
     };
     let (active, passive) = derivation.coordinates();
-    let n = passive.len();
-    let input = {
-        let (active, passive) = (active.clone(), passive.clone());
-        let other = input(derivation);
-        move |atom: Atom| match atom {
-            Atom::Coordinate(i) => match active.iter().position(|a| *a == i) {
-                Some(k) => quote! { q[#k] },
-                None => {
-                    let k = passive
-                        .iter()
-                        .position(|p| *p == i)
-                        .expect("a coordinate is active or passive");
-                    quote! { passive[#k] }
-                }
-            },
-            _ => other(atom),
-        }
-    };
-    let body = Body::new(residual, &input);
-    let statements = body.state();
+    let (n, n_active) = (passive.len(), active.len());
+    let input = of_pose(derivation);
+    let (body, scales) = (
+        Body::new(&loops.residual, &input),
+        Body::new(&loops.scales, &input),
+    );
+    let (statements, scale_statements) = (body.state(), scales.state());
     let (values, jacobian) = (list(&body, 0, n), rows(&body, n, n, n));
-    let nominal = |indices: &[usize]| -> Vec<TokenStream> {
-        indices
+    let [of_residual, of_passive] = [0, n].map(|first| list(&scales, first, n));
+    let of_active = list(&scales, 2 * n, n_active);
+    let (n_fixed, fixed) = (body.n_fixed(), body.fixed());
+    let (n_scales, fixed_scales) = (scales.n_fixed(), scales.fixed());
+    let nominal = |indices: &[usize]| {
+        let values = indices
             .iter()
-            .map(|i| signed(derivation.mechanism.coordinates[*i].nominal))
-            .collect()
+            .map(|i| signed(derivation.mechanism.coordinates[*i].nominal));
+        quote! { [#(T::from_f64(#values)),*] }
     };
     let (nominal_active, nominal_passive) = (nominal(&active), nominal(&passive));
-    let (n_fixed, fixed) = (body.n_fixed(), body.fixed());
+    let cost = format!(
+        " Cost: one evaluation of the loops ({}) with a linear system of {n} unknowns per Newton step,",
+        count(&loops.residual)
+    );
+    let items = quote! {
+        impl<T: Real> ::modelmill_runtime::Loops for Model<T> {
+            type Number = T;
+            type Active = [T; N_ACTIVE];
+            type Passive = [T; N_PASSIVE];
+            type Matrix = [[T; N_PASSIVE]; N_PASSIVE];
+
+            fn linearise(
+                &self,
+                q: &[T; N_ACTIVE],
+                passive: &[T; N_PASSIVE],
+            ) -> ([T; N_PASSIVE], [[T; N_PASSIVE]; N_PASSIVE]) {
+                let fixed = &self.residual;
+                #statements
+                (#values, #jacobian)
+            }
+
+            fn scales(&self, q: &[T; N_ACTIVE], passive: &[T; N_PASSIVE]) -> Scales<[T; N_ACTIVE], [T; N_PASSIVE]> {
+                let fixed = &self.scales;
+                #scale_statements
+                Scales { residual: #of_residual, passive: #of_passive, active: #of_active }
+            }
+        }
+    };
     let method = quote! {
-        /// Passive coordinates of a pose, in the assembly mode of the nominal pose, followed from there in small steps.
+        /// Passive coordinates of a pose, in the assembly mode of the nominal pose, followed from there in a straight
+        /// line of the independent coordinates.
+        ///
+        #[doc = #cost]
+        /// three to five steps for every half radian from the nominal pose; [`Self::passive_position_near`] saves these.
         ///
         /// # Errors
-        /// A pose out of reach or singular.
+        /// A pose that is out of reach, or cannot be followed from the nominal one, or is singular, or is no number.
         pub fn passive_position(&self, q: &[T; N_ACTIVE]) -> Result<[T; N_PASSIVE], PoseError> {
-            let nominal: [T; N_ACTIVE] = [#(T::from_f64(#nominal_active)),*];
-            self.passive_position_from(&nominal, [#(T::from_f64(#nominal_passive)),*], q)
+            self.input?;
+            check_finite(q, &ACTIVE)?;
+            follow(self, &Self::nominal_active(), &self.nominal?, q)
         }
 
-        /// Passive coordinates of a pose, followed from a known pose near by: for control, the one of the last cycle.
+        /// Passive coordinates of a pose, from those of a pose near by: for control, of the last cycle.
+        ///
+        #[doc = #cost]
+        /// two or three steps for a motion of some hundredths of a radian. If the guess is too far away to be sure of the
+        /// assembly mode, the pose is followed from the nominal one, at that cost besides.
         ///
         /// # Errors
-        /// A pose out of reach or singular.
-        pub fn passive_position_from(
+        /// As [`Self::passive_position`].
+        pub fn passive_position_near(
             &self,
-            from: &[T; N_ACTIVE],
-            mut passive: [T; N_PASSIVE],
-            to: &[T; N_ACTIVE],
+            q: &[T; N_ACTIVE],
+            guess: &[T; N_PASSIVE],
         ) -> Result<[T; N_PASSIVE], PoseError> {
-            let mut steps = 1_u32;
-            let mut reach = T::from_f64(0.1);
-            let mut far = T::from_f64(0.0);
-            for (a, b) in from.iter().zip(to) {
-                let distance = (*b - *a).abs();
-                if distance > far {
-                    far = distance;
-                }
-            }
-            while far > reach && steps < 1000 {
-                steps += 1;
-                reach = reach + T::from_f64(0.1);
-            }
-            for step in 1..=steps {
-                let share = T::from_f64(f64::from(step) / f64::from(steps));
-                let mut q = *to;
-                for k in 0..N_ACTIVE {
-                    q[k] = from[k] + share * (to[k] - from[k]);
-                }
-                passive = self.close(&q, passive)?;
-            }
-            Ok(passive)
+            self.input?;
+            check_finite(q, &ACTIVE)?;
+            correct(self, q, guess).or_else(|_| self.passive_position(q))
         }
 
-        fn close(&self, q: &[T; N_ACTIVE], mut passive: [T; N_PASSIVE]) -> Result<[T; N_PASSIVE], PoseError> {
-            let mut smallest = T::from_f64(1e30);
-            for _ in 0..40 {
-                let (residual, jacobian) = self.loops(q, &passive);
-                let step = modelmill_runtime::solve(jacobian, residual)?;
-                let mut size = T::from_f64(0.0);
-                for k in 0..N_PASSIVE {
-                    let most = T::from_f64(0.5);
-                    let bounded = if step[k] > most { most } else if step[k] < -most { -most } else { step[k] };
-                    passive[k] = passive[k] - bounded;
-                    size = size + step[k].abs();
-                }
-                if !(size < T::from_f64(1e30)) {
-                    return Err(PoseError::Singular);
-                }
-                // Rounding ends the convergence: the steps stop shrinking once they are tiny.
-                if size < T::from_f64(1e-3) && !(size < smallest * T::from_f64(0.5)) || !(size > T::from_f64(1e-14)) {
-                    return Ok(passive);
-                }
-                smallest = size;
-            }
-            Err(PoseError::OutOfReach)
-        }
-
-        /// Residuals of the loops and their Jacobian by the passive coordinates.
-        fn loops(&self, q: &[T; N_ACTIVE], passive: &[T; N_PASSIVE]) -> ([T; N_PASSIVE], [[T; N_PASSIVE]; N_PASSIVE]) {
-            let fixed = &self.residual;
-            #statements
-            (#values, #jacobian)
+        /// Independent coordinates of the nominal pose.
+        fn nominal_active() -> [T; N_ACTIVE] {
+            #nominal_active
         }
     };
     Some(Function {
-        items: TokenStream::new(),
-        field: quote! { residual: [T; #n_fixed], },
-        init: quote! { residual: { #fixed }, },
+        items,
+        field: quote! {
+            residual: [T; #n_fixed],
+            scales: [T; #n_scales],
+            /// Passive coordinates of the nominal pose.
+            nominal: Result<[T; N_PASSIVE], PoseError>,
+        },
+        init: quote! {
+            residual: { #fixed },
+            scales: { #fixed_scales },
+            nominal: Err(PoseError::OutOfReach),
+        },
+        finish: quote! { model.nominal = settle(&model, &Self::nominal_active(), &#nominal_passive); },
         method,
     })
+}
+
+/// How the inputs of a program of the pose alone are written.
+fn of_pose(derivation: &Derivation) -> impl Fn(Atom) -> TokenStream {
+    let (active, _) = derivation.coordinates();
+    let other = input(derivation);
+    move |atom| match atom {
+        Atom::Coordinate(i) if active.contains(&i) => {
+            let k = active.iter().position(|a| *a == i);
+            quote! { q[#k] }
+        }
+        _ => other(atom),
+    }
 }

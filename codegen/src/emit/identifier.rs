@@ -1,0 +1,92 @@
+//! Rust identifiers for names of the model file: different names give different identifiers.
+
+use std::fmt::Write as _;
+
+use proc_macro2::{Ident, Span};
+
+/// Keywords that `r#` does not make identifiers.
+const NEVER: [&str; 4] = ["self", "Self", "super", "crate"];
+
+/// Keywords that the parser takes for identifiers, because an older edition does.
+const NEWER: [&str; 1] = ["gen"];
+
+/// Names in scope everywhere that a module of the same name would hide from its neighbours.
+const IN_SCOPE: [&str; 20] = [
+    "alloc", "bool", "char", "core", "f32", "f64", "i8", "i16", "i32", "i64", "i128", "isize",
+    "std", "str", "u8", "u16", "u32", "u64", "u128", "usize",
+];
+
+/// The name of a field: the name itself, as `r#type` if it is a keyword.
+///
+/// What cannot be written so starts with `_`, which no name of a model file does; characters that an identifier cannot
+/// hold are spelled by their code, so that no two names meet.
+pub(super) fn of_field(name: &str) -> Ident {
+    let plain = name.starts_with(|c: char| c.is_ascii_alphabetic())
+        && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+        && !NEVER.contains(&name);
+    if !plain {
+        return Ident::new(&spelled(name), Span::call_site());
+    }
+    if NEWER.contains(&name) || syn::parse_str::<syn::Ident>(name).is_err() {
+        Ident::new_raw(name, Span::call_site())
+    } else {
+        Ident::new(name, Span::call_site())
+    }
+}
+
+/// The name of a module, which also keeps clear of what is in scope around it.
+pub(super) fn of_module(name: &str) -> Ident {
+    if IN_SCOPE.contains(&name) {
+        Ident::new(&spelled(name), Span::call_site())
+    } else {
+        of_field(name)
+    }
+}
+
+fn spelled(name: &str) -> String {
+    let mut spelled = "_".to_owned();
+    for c in name.chars() {
+        if c.is_ascii_alphanumeric() {
+            spelled.push(c);
+        } else {
+            _ = write!(spelled, "_{:x}_", u32::from(c));
+        }
+    }
+    spelled
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+
+    #[test]
+    fn different_names_give_different_identifiers() {
+        let names = [
+            "type", "type_", "_type", "r", "r_type", "self", "self_", "_self", "Self", "super",
+            "crate", "gen", "async", "try", "union", "x", "_", "__", "_x", "_x_", "a-b", "a_b",
+            "a_2d_b", "_a_2d_b", "\u{e4}", "_e4_", "1", "_1", "f64", "_f64", "T", "Model",
+        ];
+        for of in [of_field, of_module] {
+            let mut seen = BTreeMap::new();
+            for name in names {
+                let identifier = of(name).to_string();
+                assert!(syn::parse_str::<Ident>(&identifier).is_ok(), "{identifier}");
+                if let Some(other) = seen.insert(identifier.clone(), name) {
+                    panic!("`{name}` and `{other}` are both `{identifier}`");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn names_stay_readable() {
+        let field = |name: &str| of_field(name).to_string();
+        assert_eq!(field("dc1"), "dc1");
+        assert_eq!(field("type"), "r#type");
+        assert_eq!(field("self"), "_self");
+        assert_eq!(of_module("f64").to_string(), "_f64");
+        assert_eq!(of_module("arm").to_string(), "arm");
+    }
+}

@@ -1,0 +1,385 @@
+//! Newton's method on loops that have no closed form: passive coordinates of a pose, followed from a known one.
+//!
+//! Every step must shrink to a quarter of the one before; where that fails, the motion from the known pose is divided
+//! into shorter strides, which keeps to the assembly mode (Deuflhard 2004, "Newton Methods for Nonlinear Problems",
+//! sections 2.1 and 5.1). Residuals and steps are held against scales that the loops give, so that a mechanism in
+//! millimetres is treated like one in kilometres. Emitted models and the block evaluator share this code.
+
+use crate::{PoseError, Real, solve};
+
+/// Residuals count as zero below this many units of rounding of their scale.
+const ROUNDING: f64 = 64.0;
+/// Longest stride of an active coordinate and longest step of a passive one, as a share of its scale (1 for an angle).
+const LONGEST: f64 = 0.5;
+/// After a first contraction better than this, strides grow.
+const EASY: f64 = 0.0625;
+/// Strides for a motion: some ten thousand turns of a crank.
+const STRIDES: u32 = 200_000;
+
+/// The loops of a mechanism, which have as many equations as there are passive coordinates.
+pub trait Loops {
+    /// The numbers.
+    type Number: Real;
+    /// One number per active coordinate: an array or a vector.
+    type Active: Clone + AsRef<[Self::Number]> + AsMut<[Self::Number]>;
+    /// One number per passive coordinate.
+    type Passive: Clone + AsRef<[Self::Number]> + AsMut<[Self::Number]>;
+    /// As many of these as there are passive coordinates.
+    type Matrix: AsRef<[Self::Passive]> + AsMut<[Self::Passive]>;
+
+    /// Residuals of the loops, and their derivatives by the passive coordinates: one row per residual.
+    fn linearise(
+        &self,
+        active: &Self::Active,
+        passive: &Self::Passive,
+    ) -> (Self::Passive, Self::Matrix);
+
+    /// What residuals and coordinates are held against at a pose.
+    fn scales(
+        &self,
+        active: &Self::Active,
+        passive: &Self::Passive,
+    ) -> Scales<Self::Active, Self::Passive>;
+}
+
+/// Magnitudes at a pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scales<A, P> {
+    /// Sum of the magnitudes of what each residual adds up.
+    pub residual: P,
+    /// 1 for an angle, a length of its loops for a slider.
+    pub passive: P,
+    /// The same of the active coordinates; 0 for one on which no loop depends.
+    pub active: A,
+}
+
+/// Passive coordinates that close the loops, from a guess that need not be near: for the first pose of a mechanism.
+///
+/// # Errors
+/// [`PoseError::OutOfReach`] if the loops do not close to rounding, [`PoseError::Singular`] if the passive coordinates
+/// are not determined.
+pub fn settle<L: Loops>(
+    loops: &L,
+    active: &L::Active,
+    guess: &L::Passive,
+) -> Result<L::Passive, PoseError> {
+    newton(loops, active, guess, &FIRST).map(|found| found.passive)
+}
+
+/// Passive coordinates that close the loops, from those of a pose near by.
+///
+/// # Errors
+/// As [`settle`]; also [`PoseError::OutOfReach`] if the guess is so far away that another assembly might be found.
+pub fn correct<L: Loops>(
+    loops: &L,
+    active: &L::Active,
+    guess: &L::Passive,
+) -> Result<L::Passive, PoseError> {
+    newton(loops, active, guess, &FOLLOWED).map(|found| found.passive)
+}
+
+/// Passive coordinates that close the loops at `to`, followed in a straight line from those at `from`.
+///
+/// # Errors
+/// As [`settle`], if the loops cannot close at some pose on the way.
+pub fn follow<L: Loops>(
+    loops: &L,
+    from: &L::Active,
+    passive: &L::Passive,
+    to: &L::Active,
+) -> Result<L::Passive, PoseError> {
+    let number = L::Number::from_f64;
+    let (zero, one) = (number(0.0), number(1.0));
+    let distance = distance::<L>(from, to, &loops.scales(from, passive).active);
+    if distance > number(LONGEST * f64::from(STRIDES)) {
+        return Err(PoseError::OutOfReach);
+    }
+    let longest = if distance > number(LONGEST) {
+        number(LONGEST) / distance
+    } else {
+        one
+    };
+    let (mut done, mut stride, mut passive) = (zero, longest, passive.clone());
+    let mut before = None;
+    for _ in 0..STRIDES {
+        // What remains is not left to a stride of rounding's length.
+        let remains = one - done;
+        let last = stride * number(1.001) >= remains;
+        let (next, way) = if last {
+            (one, remains)
+        } else {
+            (done + stride, stride)
+        };
+        let mut active = to.clone();
+        if !last {
+            // What is `to` so far becomes the point on the way there.
+            for (x, a) in active.as_mut().iter_mut().zip(from.as_ref()) {
+                *x = *a + next * (*x - *a);
+            }
+        }
+        let mut guess = passive.clone();
+        if let Some((at, earlier)) = &before {
+            extrapolate::<L>(&mut guess, earlier, way / (done - *at));
+        }
+        let rule = if last { FOLLOWED } else { ON_THE_WAY };
+        match newton(loops, &active, &guess, &rule) {
+            Ok(found) if last => return Ok(found.passive),
+            Ok(found) => {
+                before = Some((done, passive));
+                (passive, done) = (found.passive, next);
+                let twice = stride + stride;
+                if found.contraction < number(EASY) {
+                    stride = if twice < longest { twice } else { longest };
+                }
+            }
+            Err(error) => {
+                stride = way * number(0.5);
+                if stride <= L::Number::epsilon().sqrt() * longest {
+                    return Err(error);
+                }
+            }
+        }
+    }
+    Err(PoseError::OutOfReach)
+}
+
+/// Continues the line from `earlier` to `passive` by `share` of itself.
+fn extrapolate<L: Loops>(passive: &mut L::Passive, earlier: &L::Passive, share: L::Number) {
+    for (x, earlier) in passive.as_mut().iter_mut().zip(earlier.as_ref()) {
+        *x = *x + share * (*x - *earlier);
+    }
+}
+
+/// Largest way of an active coordinate, as a share of its scale.
+fn distance<L: Loops>(from: &L::Active, to: &L::Active, scales: &L::Active) -> L::Number {
+    let zero = L::Number::from_f64(0.0);
+    let ways = from.as_ref().iter().zip(to.as_ref());
+    let mut distance = zero;
+    for ((a, b), scale) in ways.zip(scales.as_ref()) {
+        let way = (*b - *a).abs();
+        if way > distance * *scale && *scale > zero {
+            distance = way / *scale;
+        }
+    }
+    distance
+}
+
+/// How Newton's method is to proceed.
+struct Rule {
+    /// Most steps.
+    steps: u32,
+    /// By what each step must shrink; otherwise steps are only cut to the longest.
+    contraction: Option<f64>,
+    /// Steps of this size end it before the residuals are zero, on the way to another pose.
+    enough: f64,
+}
+
+/// Towards the first pose.
+const FIRST: Rule = Rule {
+    steps: 50,
+    contraction: None,
+    enough: 0.0,
+};
+/// From a pose near by; at contraction, half of the steps suffice.
+const FOLLOWED: Rule = Rule {
+    steps: 12,
+    contraction: Some(0.25),
+    enough: 0.0,
+};
+/// Between two poses, where only the assembly mode matters.
+const ON_THE_WAY: Rule = Rule {
+    enough: 1e-3,
+    ..FOLLOWED
+};
+
+/// What Newton's method found.
+struct Found<P, T> {
+    passive: P,
+    /// The second step as a share of the first; 0 if there was none.
+    contraction: T,
+}
+
+fn newton<L: Loops>(
+    loops: &L,
+    active: &L::Active,
+    guess: &L::Passive,
+    rule: &Rule,
+) -> Result<Found<L::Passive, L::Number>, PoseError> {
+    let number = L::Number::from_f64;
+    let (zero, one) = (number(0.0), number(1.0));
+    let tiny = L::Number::epsilon().sqrt();
+    let (mut passive, mut longest) = (guess.clone(), number(LONGEST));
+    let (mut first, mut contraction) = (zero, zero);
+    for k in 0..rule.steps {
+        let scales = loops.scales(active, &passive);
+        let (mut step, mut jacobian) = loops.linearise(active, &passive);
+        let closed = is_closed::<L>(active, &passive, &step, &scales);
+        solve(jacobian.as_mut(), step.as_mut())?;
+        let mut size = zero;
+        for (dx, scale) in step.as_ref().iter().zip(scales.passive.as_ref()) {
+            if !dx.is_finite() {
+                return Err(PoseError::Singular);
+            }
+            if dx.abs() > size * *scale {
+                size = dx.abs() / *scale;
+            }
+        }
+        match k {
+            0 => first = size,
+            1 => contraction = size / first,
+            _ => {}
+        }
+        let cut = if rule.contraction.is_none() && size > longest {
+            longest / size
+        } else {
+            one
+        };
+        if cut * size > longest {
+            // Closed loops whose passive coordinates still run away do not determine them.
+            return Err(if closed {
+                PoseError::Singular
+            } else {
+                PoseError::OutOfReach
+            });
+        }
+        for (x, dx) in passive.as_mut().iter_mut().zip(step.as_ref()) {
+            *x = *x - cut * *dx;
+        }
+        if closed && size <= tiny || size < number(rule.enough) {
+            return Ok(Found {
+                passive,
+                contraction,
+            });
+        }
+        if let Some(contraction) = rule.contraction {
+            longest = size * number(contraction);
+        }
+    }
+    Err(PoseError::OutOfReach)
+}
+
+/// Whether all residuals are zero to rounding.
+fn is_closed<L: Loops>(
+    active: &L::Active,
+    passive: &L::Passive,
+    residuals: &L::Passive,
+    scales: &Scales<L::Active, L::Passive>,
+) -> bool {
+    // Angles of many turns bring their own rounding.
+    let mut turns = L::Number::from_f64(1.0);
+    for (xs, scales) in [
+        (active.as_ref(), scales.active.as_ref()),
+        (passive.as_ref(), scales.passive.as_ref()),
+    ] {
+        for (x, scale) in xs.iter().zip(scales) {
+            if x.abs() > turns * *scale && *scale > L::Number::from_f64(0.0) {
+                turns = x.abs() / *scale;
+            }
+        }
+    }
+    let rounding = L::Number::epsilon() * L::Number::from_f64(ROUNDING) * turns;
+    let mut residuals = residuals.as_ref().iter().zip(scales.residual.as_ref());
+    residuals.all(|(residual, scale)| residual.abs() <= rounding * *scale)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A crank and a slider: the passive coordinates are the rod's angle and the slider's position.
+    struct Slider {
+        crank: f64,
+        rod: f64,
+    }
+
+    impl Loops for Slider {
+        type Number = f64;
+        type Active = [f64; 1];
+        type Passive = [f64; 2];
+        type Matrix = [[f64; 2]; 2];
+
+        fn linearise(&self, [q]: &[f64; 1], [phi, x]: &[f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
+            let ((s, c), (sp, cp)) = (q.sin_cos(), phi.sin_cos());
+            let residual = [
+                self.crank * c + self.rod * cp - x,
+                self.crank * s + self.rod * sp,
+            ];
+            (residual, [[-self.rod * sp, -1.0], [self.rod * cp, 0.0]])
+        }
+
+        fn scales(&self, _: &[f64; 1], [_, x]: &[f64; 2]) -> Scales<[f64; 1], [f64; 2]> {
+            let lengths = self.crank + self.rod;
+            Scales {
+                residual: [lengths + x.abs(), lengths],
+                passive: [1.0, lengths + x.abs()],
+                active: [1.0],
+            }
+        }
+    }
+
+    fn first(slider: &Slider) -> [f64; 2] {
+        let guess = [0.2, slider.rod];
+        settle(slider, &[0.0], &guess).unwrap()
+    }
+
+    #[test]
+    fn lengths_in_any_unit_make_the_same_angles() {
+        let angle = |unit: f64| {
+            let slider = Slider {
+                crank: 0.4 * unit,
+                rod: 0.9 * unit,
+            };
+            let [phi, x] = follow(&slider, &[0.0], &first(&slider), &[40.0]).unwrap();
+            let expected = (-0.4 / 0.9 * 40.0_f64.sin()).asin();
+            assert!((phi - expected).abs() < 1e-14);
+            let expected = unit * (0.4 * 40.0_f64.cos() + 0.9 * phi.cos());
+            assert!((x - expected).abs() < 1e-14 * unit);
+            phi.to_bits()
+        };
+        // Powers of two round alike, so that nothing but the unit differs.
+        let one = angle(1.0);
+        assert_eq!([angle(1.0 / 1024.0), angle(1024.0)], [one, one]);
+    }
+
+    #[test]
+    fn a_pose_out_of_reach_is_an_error() {
+        let slider = Slider {
+            crank: 0.9,
+            rod: 0.4,
+        };
+        let farthest = (0.4_f64 / 0.9).asin();
+        let start = first(&slider);
+        let to = |q: f64| follow(&slider, &[0.0], &start, &[q]);
+        assert!(to(farthest - 1e-6).is_ok());
+        for q in [farthest + 1e-9, farthest + 1e-3, 1.5, 3.0] {
+            assert!(to(q).is_err(), "{q}");
+        }
+        assert!(settle(&slider, &[1.5], &start).is_err());
+        assert!(correct(&slider, &[1.5], &start).is_err());
+    }
+
+    #[test]
+    fn a_guess_leads_to_its_own_assembly_or_nowhere() {
+        let slider = Slider {
+            crank: 0.4,
+            rod: 0.9,
+        };
+        let (mut found, mut refused) = (0, 0);
+        for q in (0..60).map(|k| 0.1 * f64::from(k)) {
+            // The rod stands upright at pi/2, where the assemblies meet.
+            for guess in (-15..=15).map(|k| 0.1 * f64::from(k)) {
+                let x = 0.4 * q.cos() + 0.9 * guess.cos();
+                match correct(&slider, &[q], &[guess, x]) {
+                    Ok([phi, _]) => {
+                        assert!(phi.cos() > 0.0, "from {guess} to {phi} at {q}");
+                        found += 1;
+                    }
+                    Err(_) => refused += 1,
+                }
+            }
+        }
+        assert!(found > 500 && refused > 100, "{found} and {refused}");
+        assert!(correct(&slider, &[1.0], &[f64::NAN, 1.0]).is_err());
+        assert!(correct(&slider, &[f64::NAN], &first(&slider)).is_err());
+    }
+}
