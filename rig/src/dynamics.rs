@@ -10,6 +10,7 @@ use nalgebra::linalg::FullPivLU;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::kinematics::{Motion, PoseError};
+use crate::massive;
 use crate::pair::Pair;
 use crate::pose::{BodyMotion, Pose};
 use crate::rig::Rig;
@@ -58,10 +59,15 @@ pub(crate) fn drive_forces(
     let decomposed = FullPivLU::new(leverage);
     let pivots: DVector<f64> = decomposed.u().diagonal();
     let largest = pivots.amax();
-    if pivots.iter().any(|p| p.abs() <= LEVERAGE_TOLERANCE * largest) {
+    if pivots
+        .iter()
+        .any(|p| p.abs() <= LEVERAGE_TOLERANCE * largest)
+    {
         return Err(PoseError::DrivesDeadlocked);
     }
-    let forces = decomposed.solve(&needed).ok_or(PoseError::DrivesDeadlocked)?;
+    let forces = decomposed
+        .solve(&needed)
+        .ok_or(PoseError::DrivesDeadlocked)?;
     Ok(forces.iter().copied().collect())
 }
 
@@ -85,28 +91,31 @@ pub(crate) fn measure(pair: &Pair, motion: &Motion) -> Measured {
     }
 }
 
-/// Kinetic plus potential energy, J; the potential is zero at the base frame's origin.
+/// Kinetic plus potential energy of all masses, those of effects included, J; the potential is zero at the base
+/// frame's origin.
 pub fn energy(rig: &Rig, motion: &Motion) -> f64 {
-    let mut sum = 0.0;
+    let gravity = massive::gravity(rig);
+    let mut sum = massive::energy(rig, motion, &gravity);
     for (body, moves) in rig.bodies.iter().zip(&motion.bodies) {
         let w = moves.R_WB.transpose() * moves.w_WB_W;
         sum += 0.5 * body.mass * moves.velocity(&body.centre).norm_squared()
             + 0.5 * w.dot(&(body.inertia * w))
-            - body.mass * rig.gravity.dot(&moves.place(&body.centre));
+            - body.mass * gravity.dot(&moves.place(&body.centre));
     }
     let base = base();
     for lumped in &rig.lumped_masses {
         let moves = lumped.at.body.map_or(&base, |b| &motion.bodies[b]);
         sum += lumped.mass
             * (0.5 * moves.velocity(&lumped.at.at).norm_squared()
-                - rig.gravity.dot(&moves.place(&lumped.at.at)));
+                - gravity.dot(&moves.place(&lumped.at.at)));
     }
     sum
 }
 
 /// Forces and moments that each body needs for its motion beside gravity, six per body: the force, and the
-/// moment about the origin of its frame.
+/// moment about the origin of its frame; those for the masses of effects included.
 fn body_forces(rig: &Rig, motion: &Motion) -> DVector<f64> {
+    let gravity = massive::gravity(rig);
     let mut all = DVector::zeros(6 * rig.bodies.len());
     let mut add = |body: usize, force: Vector3<f64>, moment: Vector3<f64>| {
         for i in 0..3 {
@@ -116,7 +125,7 @@ fn body_forces(rig: &Rig, motion: &Motion) -> DVector<f64> {
     };
     for (b, (body, moves)) in rig.bodies.iter().zip(&motion.bodies).enumerate() {
         let arm = moves.R_WB * body.centre;
-        let force = body.mass * (moves.acceleration(&body.centre) - rig.gravity);
+        let force = body.mass * (moves.acceleration(&body.centre) - gravity);
         let inertia = moves.R_WB * body.inertia * moves.R_WB.transpose();
         let w = &moves.w_WB_W;
         let euler = inertia * moves.alpha_WB_W + w.cross(&(inertia * w));
@@ -125,14 +134,22 @@ fn body_forces(rig: &Rig, motion: &Motion) -> DVector<f64> {
     for lumped in &rig.lumped_masses {
         if let Some(b) = lumped.at.body {
             let moves = &motion.bodies[b];
-            let inertial = |at: &Vector3<f64>| lumped.mass * (moves.acceleration(at) - rig.gravity);
+            let inertial = |at: &Vector3<f64>| lumped.mass * (moves.acceleration(at) - gravity);
             let arm = moves.R_WB * lumped.moment_at;
-            add(b, inertial(&lumped.at.at), arm.cross(&inertial(&lumped.moment_at)));
+            add(
+                b,
+                inertial(&lumped.at.at),
+                arm.cross(&inertial(&lumped.moment_at)),
+            );
         }
+    }
+    for effect in &rig.effects {
+        massive::supply(rig, effect, motion, &gravity, &mut add);
     }
     all
 }
 
-fn base() -> BodyMotion {
+/// The base as a body that never moves.
+pub(crate) fn base() -> BodyMotion {
     BodyMotion::at_rest(Pose::identity())
 }

@@ -1,7 +1,9 @@
-//! Effects: what friction, rotors, springs and the like add to the force of a drive or in a joint.
+//! Effects: what friction, rotors, springs, rods, tools and the like add to the force of a drive, in a joint, at a
+//! point, to gravity or to the reading of the forces.
 //!
 //! A place's value, rate, acceleration and load go in, the force or torque that must be supplied there besides
-//! comes out. The kinds bear the names that model files use, and their laws are those of the library of effects.
+//! comes out; effects with mass are in `massive`. The kinds bear the names that model files use, and their laws are
+//! those of the library of effects.
 //! Sources: the laws are textbook ones, e.g. B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, "A survey of
 //! models, analysis tools and compensation methods for the control of machines with friction" (1994);
 //! the coupled drive is the wrist of the Staubli TX40 (M. Gautier, A. Jubien).
@@ -11,12 +13,12 @@ use std::f64::consts::PI;
 use crate::dynamics::Measured;
 use crate::rig::Rig;
 
-/// An effect in a rig.
+/// An effect in a rig. [`Rig::effect`] makes one from names; a program may also write it down itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effect {
     /// What it does.
     pub law: Law,
-    /// Where.
+    /// Where; indices of the rig that it belongs to.
     pub places: Vec<Place>,
 }
 
@@ -27,6 +29,12 @@ pub enum Place {
     Drive(usize),
     /// A joint with one coordinate, by index.
     Joint(usize),
+    /// A point, by index.
+    Point(usize),
+    /// The base as a whole.
+    Base,
+    /// The measured forces as a whole.
+    Force,
 }
 
 /// A law with its values, in SI units of the place: N and m, or N m and rad.
@@ -69,7 +77,7 @@ pub enum Law {
         /// Size while shrinking.
         Fcn: f64,
     },
-    /// `mu*abs(load)*sign(rate)`; the load is the drive's force before any effect
+    /// `mu*abs(load)*sign(rate)`; the load is the drive's force for all masses, before friction and the like
     LoadFriction {
         /// Coefficient.
         mu: f64,
@@ -109,11 +117,98 @@ pub enum Law {
         /// Dry friction, by the sum of both rates.
         Fs: f64,
     },
+    /// A slender rod along a linear drive: it turns about the drive's first point and slides through the second.
+    RodInertia {
+        /// Mass, kg.
+        m: f64,
+        /// Distance of its centre of mass from the first point, m.
+        c: f64,
+        /// Inertia about its centre across the rod, kg m^2.
+        I: f64,
+    },
+    /// A mass at a point.
+    PointMass {
+        /// Mass, kg.
+        m: f64,
+    },
+    /// Of two points of one body: the moments of a mass that sits at the first are taken as if it were at the second.
+    LumpedMassPlacement {
+        /// Mass, kg.
+        m: f64,
+    },
+    /// The base stands turned against the vertical by this rotation vector, rad: gravity turns back by it.
+    GravityTilt {
+        /// About x.
+        tx: f64,
+        /// About y.
+        ty: f64,
+        /// About z.
+        tz: f64,
+    },
+    /// All forces are read this much later than they act, s.
+    TimeDelay {
+        /// Delay, s.
+        T: f64,
+    },
+}
+
+/// A value that a kind takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ValueOfKind {
+    /// Its symbol, as in model files.
+    pub symbol: &'static str,
+    /// What it is where none is given; without one it must be given.
+    pub default: Option<f64>,
+    /// Whether it must be above zero (lengths), or at least not below (masses, delays).
+    pub sign: ValueSign,
+}
+
+/// Which values make sense.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ValueSign {
+    /// Any finite number.
+    Any,
+    /// Zero or above.
+    NotNegative,
+    /// Above zero.
+    Positive,
+}
+
+const fn any(symbol: &'static str) -> ValueOfKind {
+    ValueOfKind {
+        symbol,
+        default: None,
+        sign: ValueSign::Any,
+    }
+}
+
+const fn or_zero(symbol: &'static str) -> ValueOfKind {
+    ValueOfKind {
+        symbol,
+        default: Some(0.0),
+        sign: ValueSign::Any,
+    }
+}
+
+const fn not_negative(symbol: &'static str) -> ValueOfKind {
+    ValueOfKind {
+        symbol,
+        default: None,
+        sign: ValueSign::NotNegative,
+    }
+}
+
+const fn positive(symbol: &'static str, default: Option<f64>) -> ValueOfKind {
+    ValueOfKind {
+        symbol,
+        default,
+        sign: ValueSign::Positive,
+    }
 }
 
 impl Law {
     /// Names of all kinds.
-    pub const KINDS: [&'static str; 12] = [
+    pub const KINDS: [&'static str; 17] = [
         "viscous_friction",
         "coulomb_friction",
         "stribeck_friction",
@@ -126,32 +221,32 @@ impl Law {
         "spring",
         "force_ripple",
         "coupled_drive",
+        "rod_inertia",
+        "point_mass",
+        "lumped_mass_placement",
+        "gravity_tilt",
+        "time_delay",
     ];
 
-    /// The values that a kind takes: symbol, the value where none is given (none: it must be given), and whether
-    /// it must be above zero. `None` for an unknown kind.
-    pub(crate) fn values(kind: &str) -> Option<&'static [(&'static str, Option<f64>, bool)]> {
+    /// The values that a kind takes; `None` for an unknown kind.
+    pub fn values(kind: &str) -> Option<&'static [ValueOfKind]> {
         Some(match kind {
-            "viscous_friction" => &[("Fv", None, false)],
-            "coulomb_friction" => &[("Fc", None, false)],
-            "stribeck_friction" => &[("Fs", None, false), ("vs", Some(0.02), true)],
-            "quadratic_friction" => &[("Fq", None, false)],
-            "directional_viscous_friction" => &[("Fvp", None, false), ("Fvn", None, false)],
-            "directional_coulomb_friction" => &[("Fcp", None, false), ("Fcn", None, false)],
-            "load_friction" => &[("mu", None, false)],
-            "drive_inertia" => &[("Ia", None, false)],
-            "force_offset" => &[("F0", None, false)],
-            "spring" => &[("k", None, false), ("rest", Some(0.0), false)],
-            "force_ripple" => &[
-                ("As", Some(0.0), false),
-                ("Ac", Some(0.0), false),
-                ("pitch", None, true),
-            ],
-            "coupled_drive" => &[
-                ("Ia", Some(0.0), false),
-                ("Fv", Some(0.0), false),
-                ("Fs", Some(0.0), false),
-            ],
+            "viscous_friction" => const { &[any("Fv")] },
+            "coulomb_friction" => const { &[any("Fc")] },
+            "stribeck_friction" => const { &[any("Fs"), positive("vs", Some(0.02))] },
+            "quadratic_friction" => const { &[any("Fq")] },
+            "directional_viscous_friction" => const { &[any("Fvp"), any("Fvn")] },
+            "directional_coulomb_friction" => const { &[any("Fcp"), any("Fcn")] },
+            "load_friction" => const { &[any("mu")] },
+            "drive_inertia" => const { &[any("Ia")] },
+            "force_offset" => const { &[any("F0")] },
+            "spring" => const { &[any("k"), or_zero("rest")] },
+            "force_ripple" => const { &[or_zero("As"), or_zero("Ac"), positive("pitch", None)] },
+            "coupled_drive" => const { &[or_zero("Ia"), or_zero("Fv"), or_zero("Fs")] },
+            "rod_inertia" => const { &[not_negative("m"), any("c"), not_negative("I")] },
+            "point_mass" | "lumped_mass_placement" => const { &[any("m")] },
+            "gravity_tilt" => const { &[or_zero("tx"), or_zero("ty"), or_zero("tz")] },
+            "time_delay" => const { &[not_negative("T")] },
             _ => return None,
         })
     }
@@ -176,16 +271,17 @@ impl Law {
             ("spring", &[k, rest]) => Self::Spring { k, rest },
             ("force_ripple", &[As, Ac, pitch]) => Self::ForceRipple { As, Ac, pitch },
             ("coupled_drive", &[Ia, Fv, Fs]) => Self::CoupledDrive { Ia, Fv, Fs },
+            ("rod_inertia", &[m, c, I]) => Self::RodInertia { m, c, I },
+            ("point_mass", &[m]) => Self::PointMass { m },
+            ("lumped_mass_placement", &[m]) => Self::LumpedMassPlacement { m },
+            ("gravity_tilt", &[tx, ty, tz]) => Self::GravityTilt { tx, ty, tz },
+            ("time_delay", &[T]) => Self::TimeDelay { T },
             _ => return None,
         })
     }
 
-    /// Whether the law depends on the load, which only a drive has.
-    pub(crate) fn needs_load(&self) -> bool {
-        matches!(self, Self::LoadFriction { .. })
-    }
-
-    /// What must be supplied at a place beside its load; `other` is the other place of a coupled drive.
+    /// What must be supplied at a drive or in a joint beside the load; `other` is the other place of a coupled drive.
+    /// Effects that act elsewhere supply nothing here.
     pub(crate) fn force(&self, at: Measured, load: f64, other: Measured) -> f64 {
         let way = sign(at.rate);
         match *self {
@@ -214,27 +310,36 @@ impl Law {
             Self::CoupledDrive { Ia, Fv, Fs } => {
                 Ia * other.acceleration + Fv * other.rate + Fs * sign(at.rate + other.rate)
             }
+            Self::RodInertia { .. }
+            | Self::PointMass { .. }
+            | Self::LumpedMassPlacement { .. }
+            | Self::GravityTilt { .. }
+            | Self::TimeDelay { .. } => 0.0,
         }
     }
 }
 
 impl Effect {
-    /// Forces that the effect adds, each with its place; `measured` gives the motion of a place and `load` the
-    /// force of a drive before any effect.
+    /// Forces that the effect adds at drives and in joints, each with its place; `measured` gives the motion of a
+    /// place and `load` the force of a drive before friction and the like.
     pub(crate) fn forces(
         &self,
         measured: impl Fn(Place) -> Measured,
         load: impl Fn(usize) -> f64,
     ) -> Vec<(Place, f64)> {
         let n = self.places.len();
-        self.places
+        let acts = |place: &Place| matches!(place, Place::Drive(_) | Place::Joint(_));
+        let places = self
+            .places
             .iter()
             .enumerate()
+            .filter(|(_, place)| acts(place));
+        places
             .map(|(i, place)| {
                 let other = measured(self.places[(i + 1) % n]);
                 let load = match place {
                     Place::Drive(drive) => load(*drive),
-                    Place::Joint(_) => 0.0,
+                    _ => 0.0,
                 };
                 (*place, self.law.force(measured(*place), load, other))
             })
@@ -243,11 +348,12 @@ impl Effect {
 }
 
 impl Place {
-    /// What is measured at the place.
+    /// What is measured at the place, if it is a drive or a joint with one coordinate.
     pub(crate) fn pair(self, rig: &Rig) -> Option<&crate::pair::Pair> {
         match self {
-            Self::Drive(drive) => Some(&rig.drives[drive].measures),
-            Self::Joint(joint) => rig.joints[joint].motion.as_ref(),
+            Self::Drive(drive) => Some(&rig.drives.get(drive)?.measures),
+            Self::Joint(joint) => rig.joints.get(joint)?.motion.as_ref(),
+            Self::Point(_) | Self::Base | Self::Force => None,
         }
     }
 }

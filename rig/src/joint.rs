@@ -62,14 +62,12 @@ pub(crate) fn equations(
     let (u, v) = across(axis);
     let on = |side: usize, direction: &Vector3<f64>| poses[side].q_WB.inverse() * direction;
     let pair = |shape| Pair { from, to, shape };
-    let coincident = || {
-        [Vector3::x(), Vector3::y(), Vector3::z()].map(|n| pair(Shape::Component(n)))
-    };
+    let coincident =
+        || [Vector3::x(), Vector3::y(), Vector3::z()].map(|n| pair(Shape::Component(n)));
     let on_line = || [&u, &v].map(|n| pair(Shape::Along(on(0, n))));
     let parallel = || [&u, &v].map(|n| pair(Shape::Cosine(on(0, n), on(1, axis))));
-    let locked = || {
-        [(&u, &v), (&v, axis), (axis, &u)].map(|(a, b)| pair(Shape::Cosine(on(0, a), on(1, b))))
-    };
+    let locked =
+        || [(&u, &v), (&v, axis), (axis, &u)].map(|(a, b)| pair(Shape::Cosine(on(0, a), on(1, b))));
     let mut held: Vec<Pair> = Vec::new();
     let mut motion = None;
     match kind {
@@ -108,7 +106,10 @@ pub(crate) fn equations(
 
 /// Makes a joint's coordinate have a value while the bodies are at `poses`.
 pub(crate) fn set_nominal(motion: &mut Pair, nominal: f64, poses: &[Pose]) {
-    let bodies: Vec<BodyMotion> = poses.iter().map(|pose| BodyMotion::at_rest(*pose)).collect();
+    let bodies: Vec<BodyMotion> = poses
+        .iter()
+        .map(|pose| BodyMotion::at_rest(*pose))
+        .collect();
     let base = BodyMotion::at_rest(Pose::identity());
     let value = motion.derive(&bodies, &base).value;
     match &mut motion.shape {

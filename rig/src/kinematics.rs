@@ -3,6 +3,7 @@
 //!
 //! The equations may be redundant, as those of parallel cranks are: each is kept, the least-squares solution
 //! of all is taken, and a residual says that they contradict each other.
+//! Along a trajectory an inverse is kept from pose to pose and solutions are refined (chord method).
 //! The QR decomposition with column pivoting reveals whether they determine the motion at all.
 //! Source: E. Haug, "Computer Aided Kinematics and Dynamics of Mechanical Systems" (1989), sections 3.6 and 9.6.
 
@@ -19,6 +20,10 @@ use crate::rig::Rig;
 const MOST_STEPS: usize = 40;
 /// A step below this, m or rad, ends the search: convergence is quadratic, and this is rounding.
 const SMALLEST_STEP: f64 = 1e-11;
+/// A step, or a refinement, that is not shorter than this share of the one before asks for a fresh inverse.
+const SLOWEST: f64 = 0.2;
+/// Rates are refined until their change is below this share.
+const REFINED: f64 = 1e-13;
 /// Joints may gape by this much, m or rad.
 const LARGEST_GAP: f64 = 1e-9;
 /// A pivot below this share of the largest says that a body can move by itself.
@@ -100,6 +105,10 @@ pub struct Tracker<'r> {
     /// Where the bodies were last, and the coordinates there.
     poses: Vec<Pose>,
     last: Vec<f64>,
+    /// Rates per unit rate of each coordinate where bodies were last, from which the next pose is guessed.
+    slopes: Option<DMatrix<f64>>,
+    /// Inverse of the gradient at some pose nearby.
+    inverse: Option<Inverse>,
 }
 
 impl<'r> Tracker<'r> {
@@ -130,6 +139,8 @@ impl<'r> Tracker<'r> {
             names,
             poses,
             last,
+            slopes: None,
+            inverse: None,
         };
         let q = tracker.last.clone();
         tracker.close(&q)?;
@@ -170,80 +181,118 @@ impl<'r> Tracker<'r> {
             self.close(&q)?;
             step += 1.0;
         }
-        let qr = self.close(&state.q)?;
-        Ok(self.differentiate(state, &qr))
+        self.close(&state.q)?;
+        let motion = self.differentiate(state)?;
+        self.slopes = Some(motion.rates_per_coordinate.clone());
+        Ok(motion)
     }
 
     /// Gauss-Newton from the last poses to those where joints are closed and coordinates have values `q`.
-    fn close(&mut self, q: &[f64]) -> Result<Factored, PoseError> {
+    ///
+    /// One inverse of the gradient serves as long as steps shrink fast with it: along a trajectory that saves
+    /// nearly all decompositions, and the residual, not the inverse, says when the pose is met.
+    fn close(&mut self, q: &[f64]) -> Result<(), PoseError> {
         let n_joint = self.equations.len() - q.len();
         for (equation, value) in self.equations[n_joint..].iter_mut().zip(q) {
             equation.1 = *value;
         }
-        let mut poses = self.poses.clone();
-        let mut outcome = None;
+        let mut poses = self.guess(q);
+        let mut outcome = ("", f64::INFINITY);
+        let mut last_length = f64::INFINITY;
+        let mut is_fresh = false;
         for _ in 0..MOST_STEPS {
             let bodies: Vec<BodyMotion> = poses.iter().map(|p| BodyMotion::at_rest(*p)).collect();
             let derived = self.derive(&bodies);
-            let factored = self.factor(&derived)?;
-            let mut residual = DVector::zeros(self.equations.len());
+            let mut residual = DMatrix::zeros(self.equations.len(), 1);
             for (i, ((pair, target), derived)) in self.equations.iter().zip(&derived).enumerate() {
                 residual[i] = pair.difference(derived.value, *target);
             }
-            let gap = residual.iamax();
-            outcome = Some((self.names[gap], residual[gap].abs()));
-            let mut step = factored.solve(DMatrix::from_column_slice(
-                residual.len(),
-                1,
-                residual.as_slice(),
-            ));
+            let gap = residual.iamax_full().0;
+            outcome = (self.names[gap], residual[gap].abs());
+            let known = self
+                .inverse
+                .as_ref()
+                .map(|inverse| inverse.solve(&residual));
+            let shrinks =
+                |step: &DMatrix<f64>| step.amax() < SMALLEST_STEP.max(SLOWEST * last_length);
+            let mut step = if let Some(step) = known.filter(shrinks) {
+                step
+            } else {
+                let fresh = self.invert(&derived)?;
+                let step = fresh.solve(&residual);
+                self.inverse = Some(fresh);
+                is_fresh = true;
+                step
+            };
             let length = step.amax();
             if !length.is_finite() {
                 break;
             }
             if length < SMALLEST_STEP {
-                if residual[gap].abs() > LARGEST_GAP {
-                    break;
+                if outcome.1 > LARGEST_GAP {
+                    // An old inverse may be blind to this gap.
+                    if is_fresh {
+                        break;
+                    }
+                    self.inverse = None;
+                    continue;
                 }
                 self.poses = poses;
                 q.clone_into(&mut self.last);
-                return Ok(factored);
+                return Ok(());
             }
             // A step over more than half a radian leaves the region where the gradient means anything.
             if length > 0.5 {
                 step *= 0.5 / length;
+                last_length = f64::INFINITY;
+            } else {
+                last_length = length;
             }
-            for (b, pose) in poses.iter_mut().enumerate() {
-                let part = |at: usize| -Vector3::new(step[at], step[at + 1], step[at + 2]);
-                *pose = pose.displaced(&part(6 * b), &part(6 * b + 3));
-            }
+            is_fresh = false;
+            displace(&mut poses, &step);
         }
-        let (at, gap) = outcome.unwrap_or(("", f64::INFINITY));
+        // Whatever comes next starts afresh.
+        self.inverse = None;
         Err(PoseError::OutOfReach {
-            at: at.to_owned(),
-            gap,
+            at: outcome.0.to_owned(),
+            gap: outcome.1,
         })
     }
 
+    /// Where the bodies will be about when the coordinates are `q`.
+    fn guess(&self, q: &[f64]) -> Vec<Pose> {
+        let mut poses = self.poses.clone();
+        if let Some(slopes) = &self.slopes {
+            let measures = self.rig.coordinates.iter().map(|c| &c.measures);
+            let steps = measures.zip(q).zip(&self.last);
+            // The sign: a correction is taken away.
+            let back = DMatrix::from_iterator(
+                q.len(),
+                1,
+                steps.map(|((m, to), from)| -m.difference(*to, *from)),
+            );
+            displace(&mut poses, &(slopes * back));
+        }
+        poses
+    }
+
     /// Rates and accelerations at the closed pose.
-    fn differentiate(&self, state: &State, factored: &Factored) -> Motion {
+    fn differentiate(&mut self, state: &State) -> Result<Motion, PoseError> {
         let n_equations = self.equations.len();
         let n_dof = state.q.len();
         let n_joint = n_equations - n_dof;
-        let mut unit = DMatrix::zeros(n_equations, n_dof);
-        for k in 0..n_dof {
-            unit[(n_joint + k, k)] = 1.0;
-        }
-        let rates_per_coordinate = factored.solve(unit);
-        let mut rates = DVector::zeros(rates_per_coordinate.nrows());
-        for (k, qd) in state.qd.iter().enumerate() {
-            rates.axpy(*qd, &rates_per_coordinate.column(k), 1.0);
-        }
         let mut bodies: Vec<BodyMotion> = self
             .poses
             .iter()
             .map(|pose| BodyMotion::at_rest(*pose))
             .collect();
+        let derived = self.derive(&bodies);
+        let mut unit = DMatrix::zeros(n_equations, n_dof);
+        for k in 0..n_dof {
+            unit[(n_joint + k, k)] = 1.0;
+        }
+        let rates_per_coordinate = self.solve(&derived, &unit)?;
+        let rates = &rates_per_coordinate * DVector::from_column_slice(&state.qd);
         let part = |of: &[f64], at: usize| Vector3::new(of[at], of[at + 1], of[at + 2]);
         for (b, body) in bodies.iter_mut().enumerate() {
             body.v_WB_W = part(rates.as_slice(), 6 * b);
@@ -251,18 +300,65 @@ impl<'r> Tracker<'r> {
         }
         let mut right = DMatrix::zeros(n_equations, 1);
         for (i, derived) in self.derive(&bodies).iter().enumerate() {
-            let prescribed = if i < n_joint { 0.0 } else { state.qdd[i - n_joint] };
+            let prescribed = if i < n_joint {
+                0.0
+            } else {
+                state.qdd[i - n_joint]
+            };
             right[i] = prescribed - derived.bias;
         }
-        let accelerations = factored.solve(right);
+        let accelerations = self.solve(&derived, &right)?;
         for (b, body) in bodies.iter_mut().enumerate() {
             body.a_WB_W = part(accelerations.as_slice(), 6 * b);
             body.alpha_WB_W = part(accelerations.as_slice(), 6 * b + 3);
         }
-        Motion {
+        Ok(Motion {
             bodies,
             rates_per_coordinate,
+        })
+    }
+
+    /// Solves `gradient x = right` by iterative refinement with the inverse at hand; a fresh one if that is slow.
+    fn solve(
+        &mut self,
+        derived: &[Derived],
+        right: &DMatrix<f64>,
+    ) -> Result<DMatrix<f64>, PoseError> {
+        let scale = right.amax().max(f64::MIN_POSITIVE);
+        if let Some(inverse) = &self.inverse {
+            let mut x = inverse.solve(right);
+            let mut last_length = f64::INFINITY;
+            loop {
+                let step = inverse.solve(&(right - self.product(derived, &x)));
+                let length = step.amax();
+                if length <= REFINED * x.amax().max(scale) {
+                    return Ok(x + step);
+                }
+                if length > SLOWEST * last_length || !length.is_finite() {
+                    break;
+                }
+                x += step;
+                last_length = length;
+            }
         }
+        let fresh = self.invert(derived)?;
+        let mut x = fresh.solve(right);
+        x += fresh.solve(&(right - self.product(derived, &x)));
+        self.inverse = Some(fresh);
+        Ok(x)
+    }
+
+    /// Gradient of all equations times columns of rates.
+    fn product(&self, derived: &[Derived], x: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut product = DMatrix::zeros(self.equations.len(), x.ncols());
+        for (i, ((pair, _), derived)) in self.equations.iter().zip(derived).enumerate() {
+            for k in 0..x.ncols() {
+                let mut sum = 0.0;
+                derived.scatter(pair, |column, value| sum += value * x[(column, k)]);
+                product[(i, k)] = sum;
+            }
+        }
+        product
     }
 
     fn derive(&self, bodies: &[BodyMotion]) -> Vec<Derived> {
@@ -272,52 +368,64 @@ impl<'r> Tracker<'r> {
             .collect()
     }
 
-    fn factor(&self, derived: &[Derived]) -> Result<Factored, PoseError> {
+    fn invert(&self, derived: &[Derived]) -> Result<Inverse, PoseError> {
         let n = 6 * self.rig.bodies.len();
         // Rows of zeros complete a matrix with too few equations; its rank then tells.
-        let mut jacobian = DMatrix::zeros(self.equations.len().max(n), n);
+        let mut jacobian: DMatrix<f64> = DMatrix::zeros(self.equations.len().max(n), n);
         for (i, ((pair, _), derived)) in self.equations.iter().zip(derived).enumerate() {
             derived.scatter(pair, |column, value| jacobian[(i, column)] += value);
         }
-        let qr: ColPivQR<f64, Dyn, Dyn> = ColPivQR::new(jacobian.clone());
-        let r: DMatrix<f64> = qr.r();
-        let largest = r[(0, 0)].abs();
-        let smallest = (0..n).fold(f64::INFINITY, |least: f64, i| least.min(r[(i, i)].abs()));
-        if smallest > RANK_TOLERANCE * largest {
-            return Ok(Factored { qr, r, n_equations: self.equations.len() });
+        if jacobian.iter().all(|x| x.is_finite()) {
+            let qr: ColPivQR<f64, Dyn, Dyn> = ColPivQR::new(jacobian.clone());
+            let r: DMatrix<f64> = qr.r();
+            let largest = r[(0, 0)].abs();
+            let smallest = (0..n).fold(f64::INFINITY, |least: f64, i| least.min(r[(i, i)].abs()));
+            if smallest > RANK_TOLERANCE * largest {
+                let q: DMatrix<f64> = qr.q();
+                let mut inverse = q.rows(0, self.equations.len()).transpose();
+                let solvable = r.solve_upper_triangular_mut(&mut inverse);
+                debug_assert!(solvable, "the rank was checked");
+                qr.p().inv_permute_rows(&mut inverse);
+                return Ok(Inverse(inverse));
+            }
         }
-        // The direction that costs no equation anything: which body moves most in it?
-        let svd = jacobian.svd(false, true);
-        let body = svd.v_t.map_or(0, |v_t| {
-            let least = svd.singular_values.imin();
-            (0..n)
-                .max_by(|i, j| v_t[(least, *i)].abs().total_cmp(&v_t[(least, *j)].abs()))
-                .unwrap_or(0)
-                / 6
-        });
         Err(PoseError::Undetermined {
-            body: self.rig.bodies[body].name.clone(),
+            body: self.rig.bodies[freest_body(jacobian)].name.clone(),
         })
     }
 }
 
-/// The gradient of all equations, decomposed.
-struct Factored {
-    qr: ColPivQR<f64, Dyn, Dyn>,
-    r: DMatrix<f64>,
-    n_equations: usize,
+/// The body that moves most in the direction that costs no equation anything.
+fn freest_body(jacobian: DMatrix<f64>) -> usize {
+    let n = jacobian.ncols();
+    if jacobian.iter().any(|x| !x.is_finite()) {
+        return 0;
+    }
+    let svd = jacobian.svd(false, true);
+    svd.v_t.map_or(0, |v_t| {
+        let least = svd.singular_values.imin();
+        (0..n)
+            .max_by(|i, j| v_t[(least, *i)].abs().total_cmp(&v_t[(least, *j)].abs()))
+            .unwrap_or(0)
+            / 6
+    })
 }
 
-impl Factored {
+/// Moves all bodies by minus a step, six rows per body.
+fn displace(poses: &mut [Pose], step: &DMatrix<f64>) {
+    for (b, pose) in poses.iter_mut().enumerate() {
+        let part = |at: usize| -Vector3::new(step[at], step[at + 1], step[at + 2]);
+        *pose = pose.displaced(&part(6 * b), &part(6 * b + 3));
+    }
+}
+
+/// The least-squares inverse of the gradient of all equations at one pose.
+#[derive(Clone, Debug)]
+struct Inverse(DMatrix<f64>);
+
+impl Inverse {
     /// Least-squares solutions, one per column of the right-hand side.
-    fn solve(&self, right: DMatrix<f64>) -> DMatrix<f64> {
-        let n = self.r.ncols();
-        let mut right = right.resize_vertically(self.n_equations.max(n), 0.0);
-        self.qr.q_tr_mul(&mut right);
-        let mut x = right.rows(0, n).into_owned();
-        let solvable = self.r.solve_upper_triangular_mut(&mut x);
-        debug_assert!(solvable, "the rank was checked");
-        self.qr.p().inv_permute_rows(&mut x);
-        x
+    fn solve(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
+        &self.0 * right
     }
 }

@@ -9,15 +9,23 @@
 //! 3. [`Tracker`] - poses, rates and accelerations of all bodies, redundant loops included;
 //! 4. [`forces`] - what the drives must supply, with all effects;
 //! 5. [`simulate`] - the readings of the sensors.
-#![allow(non_snake_case, reason = "physical quantities carry their frames, as in p_WB_W")]
+#![allow(
+    non_snake_case,
+    reason = "physical quantities carry their frames, as in p_WB_W"
+)]
 
 mod assemble;
+mod assemble_sensors;
 mod dynamics;
 mod effect;
+mod effect_by_name;
 mod file;
 mod joint;
 mod kinematics;
 mod load;
+mod log;
+mod massive;
+mod merge;
 mod noise;
 mod pair;
 mod pose;
@@ -27,7 +35,8 @@ mod simulate;
 mod trajectory;
 
 pub use dynamics::{Measured, energy};
-pub use effect::{Effect, Law, Place};
+pub use effect::{Effect, Law, Place, ValueOfKind, ValueSign};
+pub use effect_by_name::{EffectFault, EffectPart};
 pub use kinematics::{Motion, PoseError, State, Tracker};
 pub use load::{Loaded, load, load_file};
 pub use modelmill_spec::Failure;

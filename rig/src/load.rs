@@ -89,18 +89,33 @@ pub fn load(
         };
         if let Some(extends) = &entry.extends {
             let span = Some(span(file, &extends.span()));
-            let other = path.parent().unwrap_or(Path::new("")).join(extends.get_ref());
+            let other = path
+                .parent()
+                .unwrap_or(Path::new(""))
+                .join(extends.get_ref());
             if file + 1 == LONGEST_CHAIN {
                 let help = "check whether two files extend each other".to_owned();
                 let found = fault(span, "this chain of variants is too long");
-                return Err(failure(sources, Diagnostic { help: vec![help], ..found }));
+                return Err(failure(
+                    sources,
+                    Diagnostic {
+                        help: vec![help],
+                        ..found
+                    },
+                ));
             }
             match read(&other) {
                 Ok(text) => next = Some((other, text)),
                 Err(error) => {
                     let found = fault(span, format!("cannot read `{}`: {error}", other.display()));
                     let help = "the path is relative to the folder of this file".to_owned();
-                    return Err(failure(sources, Diagnostic { help: vec![help], ..found }));
+                    return Err(failure(
+                        sources,
+                        Diagnostic {
+                            help: vec![help],
+                            ..found
+                        },
+                    ));
                 }
             }
         }
@@ -117,7 +132,10 @@ pub fn load(
 
 fn parse(text: &str, file: usize) -> Result<RigEntry, Box<Diagnostic>> {
     if text.len() > LARGEST_FILE {
-        return Err(Box::new(fault(None, "this file is too large for a rig file")));
+        return Err(Box::new(fault(
+            None,
+            "this file is too large for a rig file",
+        )));
     }
     toml::from_str(text).map_err(|error| {
         let place = error.span().map(|range| span(file, &range));

@@ -108,10 +108,7 @@ impl Pair {
                 Derived {
                     value: offset + libm::atan2(y.dot(&x_to), x.dot(&x_to)),
                     gradient: [Vector3::zeros(), -axis, Vector3::zeros(), axis],
-                    bias: one
-                        .w_WB_W
-                        .cross(&axis)
-                        .dot(&(two.w_WB_W - one.w_WB_W)),
+                    bias: one.w_WB_W.cross(&axis).dot(&(two.w_WB_W - one.w_WB_W)),
                 }
             }
             Shape::Distance => {
@@ -131,6 +128,11 @@ impl Pair {
                 }
             }
         }
+    }
+
+    /// Whether this is the distance of two points.
+    pub(crate) fn is_distance(&self) -> bool {
+        matches!(self.shape, Shape::Distance)
     }
 
     /// Wraps a difference of values: angles into half a turn to either side.

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::dynamics::{Measured, drive_forces, measure};
-use crate::effect::Place;
+use crate::effect::{Law, Place};
 use crate::kinematics::{Motion, PoseError, State, Tracker};
 use crate::noise::Noise;
 use crate::pair::Pair;
@@ -116,7 +116,8 @@ pub fn forces_along(
 
 /// Forces of the drives for a motion, N or N m, with all effects; in the rig's order.
 ///
-/// Effects at drives add to their forces; effects in joints are loads that the drives balance.
+/// Effects at drives add to their forces; effects in joints are loads that the drives balance, and effects with
+/// mass are loads like those of bodies. A `time_delay` belongs to the sensors and does nothing here.
 /// Fails where the drives cannot balance a load.
 pub fn forces(rig: &Rig, motion: &Motion) -> Result<Vec<f64>, PoseError> {
     let mechanical = drive_forces(rig, motion, &[])?;
@@ -134,7 +135,7 @@ pub fn forces(rig: &Rig, motion: &Motion) -> Result<Vec<f64>, PoseError> {
         for (place, force) in effect.forces(measured, |drive| mechanical[drive]) {
             match place {
                 Place::Drive(drive) => at_drives[drive] += force,
-                Place::Joint(_) => in_joints.extend(place.pair(rig).map(|pair| (pair, force))),
+                place => in_joints.extend(place.pair(rig).map(|pair| (pair, force))),
             }
         }
     }
@@ -169,7 +170,10 @@ pub fn simulate(
     let mut past: Vec<(f64, Vec<Instant>)> = Vec::new();
     for delay in delays(rig) {
         let earlier: Vec<f64> = times.iter().map(|t| t - delay).collect();
-        past.push((delay, forces_along(rig, trajectory, &earlier, &mut progress)?));
+        past.push((
+            delay,
+            forces_along(rig, trajectory, &earlier, &mut progress)?,
+        ));
     }
     let at = |delay: f64| {
         past.iter()
@@ -196,16 +200,23 @@ pub fn simulate(
             ("_dd", |s: &State| &s.qdd),
         ] {
             for (k, (name, encoder)) in names.clone().zip(&rig.sensors.encoders).enumerate() {
-                let values = at(encoder.delay).iter().map(|instant| of(&instant.state)[k]);
+                let values = at(encoder.delay)
+                    .iter()
+                    .map(|instant| of(&instant.state)[k]);
                 columns.push((format!("{name}{suffix}"), values.collect()));
             }
         }
     } else {
         notes.push("positions only, as encoders give them; `derivatives = true` in `[sampling]` adds exact derivatives".to_owned());
     }
-    for (d, (drive, sensor)) in rig.drives.iter().zip(&rig.sensors.force_sensors).enumerate() {
+    for (d, (drive, sensor)) in rig
+        .drives
+        .iter()
+        .zip(&rig.sensors.force_sensors)
+        .enumerate()
+    {
         let mut noise = noise();
-        let values = at(sensor.delay).iter();
+        let values = at(sensor.delay + force_delay(rig)).iter();
         let read = values.map(|instant| sensor.read(instant.forces[d], &mut noise));
         columns.push((drive.name.clone(), read.collect()));
     }
@@ -214,7 +225,10 @@ pub fn simulate(
 
 /// Times of the samples: those of the trajectory, or evenly spaced; from where every delayed reading lies
 /// inside the trajectory.
-fn sample_times(rig: &Rig, trajectory: &Trajectory) -> Result<(Vec<f64>, Vec<String>), SimulationError> {
+fn sample_times(
+    rig: &Rig,
+    trajectory: &Trajectory,
+) -> Result<(Vec<f64>, Vec<String>), SimulationError> {
     let given = trajectory.time();
     let (start, end) = (given[0], given[given.len() - 1]);
     let all = match rig.sensors.rate {
@@ -250,9 +264,24 @@ fn sample_times(rig: &Rig, trajectory: &Trajectory) -> Result<(Vec<f64>, Vec<Str
 
 /// The different delays of all sensors, zero left out.
 fn delays(rig: &Rig) -> Vec<f64> {
-    let sensors = rig.sensors.encoders.iter().chain(&rig.sensors.force_sensors);
-    let mut delays: Vec<f64> = sensors.map(|channel| channel.delay).filter(|d| *d > 0.0).collect();
+    let encoders = rig.sensors.encoders.iter().map(|channel| channel.delay);
+    let lag = force_delay(rig);
+    let forces = rig
+        .sensors
+        .force_sensors
+        .iter()
+        .map(|channel| channel.delay + lag);
+    let mut delays: Vec<f64> = encoders.chain(forces).filter(|d| *d > 0.0).collect();
     delays.sort_by(f64::total_cmp);
     delays.dedup();
     delays
+}
+
+/// How much later all forces are read, by effects, s.
+fn force_delay(rig: &Rig) -> f64 {
+    let lag = |law: &Law| match law {
+        Law::TimeDelay { T } => *T,
+        _ => 0.0,
+    };
+    rig.effects.iter().map(|effect| lag(&effect.law)).sum()
 }

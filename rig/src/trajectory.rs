@@ -86,7 +86,8 @@ impl Trajectory {
         if let Some(at) = time.windows(2).position(|pair| !grows(pair)) {
             return Err(TrajectoryError::TimeGoesBack { sample: at + 1 });
         }
-        let sound = |column: &[f64]| column.len() == time.len() && column.iter().all(|x| x.is_finite());
+        let sound =
+            |column: &[f64]| column.len() == time.len() && column.iter().all(|x| x.is_finite());
         let mut complete = Vec::new();
         for (k, given) in coordinates.into_iter().enumerate() {
             let columns = [Some(&given.q), given.qd.as_ref(), given.qdd.as_ref()];
@@ -234,7 +235,11 @@ mod tests {
     #[test]
     fn polynomials_of_degree_four_are_differentiated_exactly() {
         let q = along(|t| 1.0 - t + 2.0 * t * t - t.powi(4));
-        let only = Samples { q, qd: None, qdd: None };
+        let only = Samples {
+            q,
+            qd: None,
+            qdd: None,
+        };
         let trajectory = Trajectory::new(TIME.to_vec(), vec![only]).expect("enough samples");
         for t in TIME {
             let state = trajectory.at(t);
@@ -261,14 +266,23 @@ mod tests {
 
     #[test]
     fn faults_are_named() {
-        let one = |q: &[f64]| vec![Samples { q: q.to_vec(), qd: None, qdd: None }];
+        let one = |q: &[f64]| {
+            vec![Samples {
+                q: q.to_vec(),
+                qd: None,
+                qdd: None,
+            }]
+        };
         let new = |time: &[f64], q: &[f64]| Trajectory::new(time.to_vec(), one(q)).unwrap_err();
         assert_eq!(new(&[], &[]), TrajectoryError::Empty);
         assert_eq!(
             new(&[0.0, 0.1, 0.1], &[0.0; 3]),
             TrajectoryError::TimeGoesBack { sample: 2 }
         );
-        assert_eq!(new(&[0.0, 0.1], &[0.0; 3]), TrajectoryError::Faulty { coordinate: 0 });
+        assert_eq!(
+            new(&[0.0, 0.1], &[0.0; 3]),
+            TrajectoryError::Faulty { coordinate: 0 }
+        );
         assert_eq!(new(&[0.0, 0.1], &[0.0; 2]), TrajectoryError::TooShort);
     }
 }

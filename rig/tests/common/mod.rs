@@ -12,7 +12,9 @@ fn workspace(path: &str) -> PathBuf {
 /// A rig that ships with the program.
 pub(crate) fn load(name: &str) -> Rig {
     let path = workspace("model-spec/rigs").join(format!("{name}.toml"));
-    modelmill_rig::load_file(&path).unwrap_or_else(|failure| panic!("{failure}")).rig
+    modelmill_rig::load_file(&path)
+        .unwrap_or_else(|failure| panic!("{failure}"))
+        .rig
 }
 
 /// A rig from its text; `schema` and `name` are added.
@@ -31,7 +33,10 @@ pub(crate) fn bundled(name: &str) -> Table {
     let path = workspace("recordings/spidermill-mbs").join(format!("{name}.csv"));
     let mut reader = csv::Reader::from_path(path).expect("a recording");
     let names = reader.headers().expect("a header").clone();
-    let mut table: Table = names.iter().map(|name| (name.to_owned(), Vec::new())).collect();
+    let mut table: Table = names
+        .iter()
+        .map(|name| (name.to_owned(), Vec::new()))
+        .collect();
     for record in reader.records() {
         for ((_, values), field) in table.iter_mut().zip(&record.expect("a record")) {
             values.push(field.parse().expect("a number"));
@@ -42,7 +47,10 @@ pub(crate) fn bundled(name: &str) -> Table {
 
 /// The first samples only.
 pub(crate) fn shortened(table: &Table, n: usize) -> Table {
-    table.iter().map(|(name, values)| (name.clone(), values[..n].to_vec())).collect()
+    table
+        .iter()
+        .map(|(name, values)| (name.clone(), values[..n].to_vec()))
+        .collect()
 }
 
 /// A column by its name.
@@ -65,6 +73,10 @@ pub(crate) fn trajectory(table: &Table, coordinates: &[&str]) -> Trajectory {
 /// Root mean square of the difference over that of the expected values.
 pub(crate) fn relative_rms(found: &[f64], expected: &[f64]) -> f64 {
     assert_eq!(found.len(), expected.len());
-    let error: f64 = found.iter().zip(expected).map(|(x, y)| (x - y).powi(2)).sum();
+    let error: f64 = found
+        .iter()
+        .zip(expected)
+        .map(|(x, y)| (x - y).powi(2))
+        .sum();
     (error / expected.iter().map(|y| y * y).sum::<f64>()).sqrt()
 }
