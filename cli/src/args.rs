@@ -70,6 +70,17 @@ pub(crate) enum Command {
         modelmill compare model-spec/models/spidermill.toml \\\n      \
         --data recordings/spidermill-mbs/with-rods-check.csv --parameters fit.json --json")]
     Compare(CompareArgs),
+    /// Drive a full-body rig along a trajectory and record what its sensors read
+    #[command(
+        after_help = "The trajectory (CSV) has a column t and one per coordinate of the rig; its rates and \
+        accelerations are taken from columns with _d and _dd, or else found by differences over five samples. \
+        Effects, noise, resolution, delay and sampling rate are those of the rig file.\n\n\
+        Examples (from the project's root):\n  \
+        modelmill simulate model-spec/rigs/spidermill-full.toml \\\n      \
+        --trajectory recordings/spidermill-mbs/plain-fit.csv --out run.csv\n  \
+        modelmill simulate rig.toml --trajectory traj.csv --out run.csv --seed 7"
+    )]
+    Simulate(SimulateArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Examples:\n  \
         modelmill completions bash > ~/.local/share/bash-completion/completions/modelmill\n  \
@@ -238,6 +249,28 @@ pub(crate) struct CompareArgs {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) preparation: PreparationArgs,
+}
+
+/// `simulate`.
+#[derive(Debug, Args)]
+pub(crate) struct SimulateArgs {
+    /// Rig file (TOML)
+    pub(crate) rig: PathBuf,
+    /// Trajectory (CSV): t and the coordinates, with or without derivatives
+    #[arg(long, value_name = "TRAJ.csv")]
+    pub(crate) trajectory: PathBuf,
+    /// Write the recording to this file
+    #[arg(long, value_name = "RUN.csv")]
+    pub(crate) out: PathBuf,
+    /// Seed of the noise; the rig's own if not given
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// The trajectory calls our column by another name, e.g. `--map theta1=pos_left`; may be repeated
+    #[arg(long, value_name = "OURS=THEIRS", value_parser = crate::preparation::parse_map)]
+    pub(crate) map: Vec<(String, String)>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// `completions`.

@@ -56,6 +56,7 @@ fn every_command_helps_with_an_example() {
         "evaluate",
         "identify",
         "compare",
+        "simulate",
         "completions",
         "tour",
     ] {

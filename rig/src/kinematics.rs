@@ -237,6 +237,7 @@ impl<'r> Tracker<'r> {
                     self.inverse = None;
                     continue;
                 }
+                displace(&mut poses, &step);
                 self.poses = poses;
                 q.clone_into(&mut self.last);
                 return Ok(());

@@ -44,5 +44,7 @@ pub use pair::{Anchor, Pair};
 pub use pose::{BodyMotion, Pose};
 pub use rig::{Body, Coordinate, Drive, Joint, LumpedMass, Point, Rig};
 pub use sensor::{Channel, Sensors};
-pub use simulate::{Instant, Run, SimulationError, forces, forces_along, n_instants, simulate};
+pub use simulate::{
+    Instant, Run, SimulationError, forces, forces_along, measured, n_instants, simulate,
+};
 pub use trajectory::{Samples, Trajectory, TrajectoryError};

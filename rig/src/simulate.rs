@@ -150,6 +150,11 @@ pub fn forces(rig: &Rig, motion: &Motion) -> Result<Vec<f64>, PoseError> {
     Ok(forces)
 }
 
+/// Value, rate and acceleration of a drive or of a joint with one coordinate; `None` elsewhere.
+pub fn measured(rig: &Rig, place: Place, motion: &Motion) -> Option<Measured> {
+    Some(measure(place.pair(rig)?, motion))
+}
+
 /// How many times the mechanics is solved in a run, for progress.
 pub fn n_instants(rig: &Rig, trajectory: &Trajectory) -> usize {
     let (times, _) = sample_times(rig, trajectory).unwrap_or_default();

@@ -114,6 +114,30 @@ impl Trajectory {
         })
     }
 
+    /// From times, s, and a function that gives the state at each; a Fourier series, say.
+    ///
+    /// Fails when times do not grow or a state is not finite.
+    pub fn from_function(
+        time: Vec<f64>,
+        state: impl Fn(f64) -> State,
+    ) -> Result<Self, TrajectoryError> {
+        let states: Vec<State> = time.iter().map(|t| state(*t)).collect();
+        let n = states.first().map_or(0, |state| state.q.len());
+        let column = |of: fn(&State) -> &Vec<f64>, k: usize| -> Vec<f64> {
+            states
+                .iter()
+                .filter_map(|state| of(state).get(k).copied())
+                .collect()
+        };
+        let samples = (0..n).map(|k| Samples {
+            q: column(|state| &state.q, k),
+            qd: Some(column(|state| &state.qd, k)),
+            qdd: Some(column(|state| &state.qdd, k)),
+        });
+        let samples = samples.collect();
+        Self::new(time, samples)
+    }
+
     /// Times of the samples, s; at least one, growing.
     pub fn time(&self) -> &[f64] {
         &self.time

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill_rig::{Rig, Samples, Trajectory};
+use modelmill_rig::{Rig, Samples, State, Tracker, Trajectory, forces};
 
 fn workspace(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
@@ -79,4 +79,42 @@ pub(crate) fn relative_rms(found: &[f64], expected: &[f64]) -> f64 {
         .map(|(x, y)| (x - y).powi(2))
         .sum();
     (error / expected.iter().map(|y| y * y).sum::<f64>()).sqrt()
+}
+
+/// Forces of the drives in a state.
+pub(crate) fn force(rig: &Rig, tracker: &mut Tracker<'_>, state: &State) -> Vec<f64> {
+    let motion = tracker
+        .follow(state)
+        .unwrap_or_else(|error| panic!("{error}"));
+    forces(rig, &motion).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// States with coordinates between -0.5 and 0.5, rates and accelerations between -2 and 2, always the same.
+pub(crate) fn states(n_coordinates: usize, n: usize) -> Vec<State> {
+    let mut bits = 1_u32;
+    let mut draw = |scale: f64| -> Vec<f64> {
+        let mut values = Vec::new();
+        for _ in 0..n_coordinates {
+            bits = bits.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            values.push(scale * (f64::from(bits) / f64::from(u32::MAX) - 0.5));
+        }
+        values
+    };
+    (0..n)
+        .map(|_| State {
+            q: draw(1.0),
+            qd: draw(4.0),
+            qdd: draw(4.0),
+        })
+        .collect()
+}
+
+/// Two numbers that must agree, to a share of the larger one or of 1.
+#[track_caller]
+pub(crate) fn close(found: f64, expected: f64, tolerance: f64) {
+    let scale = expected.abs().max(1.0);
+    assert!(
+        (found - expected).abs() <= tolerance * scale,
+        "{found} instead of {expected}"
+    );
 }
