@@ -280,6 +280,35 @@ impl Law {
         })
     }
 
+    /// The name of its kind and its values by symbol.
+    pub fn described(&self) -> (&'static str, Vec<(&'static str, f64)>) {
+        let (kind, values): (&str, Vec<f64>) = match *self {
+            Self::ViscousFriction { Fv } => ("viscous_friction", vec![Fv]),
+            Self::CoulombFriction { Fc } => ("coulomb_friction", vec![Fc]),
+            Self::StribeckFriction { Fs, vs } => ("stribeck_friction", vec![Fs, vs]),
+            Self::QuadraticFriction { Fq } => ("quadratic_friction", vec![Fq]),
+            Self::DirectionalViscousFriction { Fvp, Fvn } => {
+                ("directional_viscous_friction", vec![Fvp, Fvn])
+            }
+            Self::DirectionalCoulombFriction { Fcp, Fcn } => {
+                ("directional_coulomb_friction", vec![Fcp, Fcn])
+            }
+            Self::LoadFriction { mu } => ("load_friction", vec![mu]),
+            Self::DriveInertia { Ia } => ("drive_inertia", vec![Ia]),
+            Self::ForceOffset { F0 } => ("force_offset", vec![F0]),
+            Self::Spring { k, rest } => ("spring", vec![k, rest]),
+            Self::ForceRipple { As, Ac, pitch } => ("force_ripple", vec![As, Ac, pitch]),
+            Self::CoupledDrive { Ia, Fv, Fs } => ("coupled_drive", vec![Ia, Fv, Fs]),
+            Self::RodInertia { m, c, I } => ("rod_inertia", vec![m, c, I]),
+            Self::PointMass { m } => ("point_mass", vec![m]),
+            Self::LumpedMassPlacement { m } => ("lumped_mass_placement", vec![m]),
+            Self::GravityTilt { tx, ty, tz } => ("gravity_tilt", vec![tx, ty, tz]),
+            Self::TimeDelay { T } => ("time_delay", vec![T]),
+        };
+        let symbols = Self::values(kind).unwrap_or(&[]).iter().map(|value| value.symbol);
+        (kind, symbols.zip(values).collect())
+    }
+
     /// What must be supplied at a drive or in a joint beside the load; `other` is the other place of a coupled drive.
     /// Effects that act elsewhere supply nothing here.
     pub(crate) fn force(&self, at: Measured, load: f64, other: Measured) -> f64 {

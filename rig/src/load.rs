@@ -42,7 +42,8 @@ pub fn load_file(path: &Path) -> Result<Loaded, Failure> {
     }
 }
 
-fn read_limited(path: &Path) -> std::io::Result<String> {
+/// Reads a file, but not much more than a rig file can be long.
+pub fn read_limited(path: &Path) -> std::io::Result<String> {
     let mut text = String::new();
     std::fs::File::open(path)?
         .take(LARGEST_FILE as u64 + 1)
@@ -83,7 +84,7 @@ pub fn load(
             path: path.clone(),
             text: text.clone(),
         });
-        let entry = match parse(&text, file) {
+        let entry: RigEntry = match parse(&text, file) {
             Ok(entry) => entry,
             Err(found) => return Err(failure(sources, *found)),
         };
@@ -130,11 +131,17 @@ pub fn load(
     }
 }
 
-fn parse(text: &str, file: usize) -> Result<RigEntry, Box<Diagnostic>> {
+/// Reads the tables of a TOML file; `file` is its index among the sources.
+///
+/// Fails with the place of what does not fit.
+pub fn parse<T: serde::de::DeserializeOwned>(
+    text: &str,
+    file: usize,
+) -> Result<T, Box<Diagnostic>> {
     if text.len() > LARGEST_FILE {
         return Err(Box::new(fault(
             None,
-            "this file is too large for a rig file",
+            "this file is too large to be meant",
         )));
     }
     toml::from_str(text).map_err(|error| {
@@ -165,7 +172,7 @@ fn failure(sources: Sources, found: Diagnostic) -> Failure {
 }
 
 /// A place in a file.
-pub(crate) fn span(file: usize, range: &std::ops::Range<usize>) -> Span {
+pub fn span(file: usize, range: &std::ops::Range<usize>) -> Span {
     Span {
         file,
         start: range.start,
@@ -174,7 +181,7 @@ pub(crate) fn span(file: usize, range: &std::ops::Range<usize>) -> Span {
 }
 
 /// An error without further words.
-pub(crate) fn fault(span: Option<Span>, message: impl Into<String>) -> Diagnostic {
+pub fn fault(span: Option<Span>, message: impl Into<String>) -> Diagnostic {
     Diagnostic {
         severity: Severity::Error,
         message: message.into(),

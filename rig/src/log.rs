@@ -14,12 +14,13 @@ pub(crate) struct Item<T> {
     pub(crate) entry: T,
 }
 
-/// Collects findings.
-#[derive(Default)]
-pub(crate) struct Log(pub(crate) Vec<Diagnostic>);
+/// Collects findings about a file.
+#[derive(Debug, Default)]
+pub struct Log(pub Vec<Diagnostic>);
 
 impl Log {
-    pub(crate) fn error(&mut self, span: Span, message: String, label: &str, help: &str) {
+    /// Takes an error at a place: what is wrong, what was expected there, what to do; the last two may be empty.
+    pub fn error(&mut self, span: Span, message: String, label: &str, help: &str) {
         let texts = |text: &str| Some(text.to_owned()).filter(|text| !text.is_empty());
         self.0.push(Diagnostic {
             label: label.to_owned(),
@@ -28,7 +29,8 @@ impl Log {
         });
     }
 
-    pub(crate) fn unknown(&mut self, file: usize, name: &Name, what: &str, known: &[&str]) {
+    /// Takes a name that leads nowhere; `what` says what it should name, `known` what there is.
+    pub fn unknown(&mut self, file: usize, name: &Name, what: &str, known: &[&str]) {
         self.error(
             span(file, &name.span()),
             format!("there is no {what} `{}`", name.get_ref()),

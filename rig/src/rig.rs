@@ -36,6 +36,20 @@ pub struct Rig {
     pub seed: u64,
 }
 
+impl Rig {
+    /// The two points that a linear drive pushes apart; `None` for a drive in a joint.
+    pub fn ends_of_drive(&self, drive: usize) -> Option<[Anchor; 2]> {
+        let pair = &self.drives.get(drive)?.measures;
+        pair.is_distance().then_some([pair.from, pair.to])
+    }
+
+    /// The coordinate that a drive moves directly, because both measure the same.
+    pub fn coordinate_of_drive(&self, drive: usize) -> Option<usize> {
+        let pair = &self.drives.get(drive)?.measures;
+        self.coordinates.iter().position(|c| &c.measures == pair)
+    }
+}
+
 /// A rigid body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
