@@ -22,7 +22,9 @@ impl Symbol {
     /// The largest distance from that value.
     fn deviation(&self) -> f64 {
         let value = self.value();
-        self.stands_for.iter().fold(0.0, |most: f64, (_, x)| most.max((x - value).abs()))
+        self.stands_for
+            .iter()
+            .fold(0.0, |most: f64, (_, x)| most.max((x - value).abs()))
     }
 }
 
@@ -37,7 +39,14 @@ pub(crate) struct Symbols(pub(crate) Vec<Symbol>);
 
 impl Symbols {
     /// Lets `name` stand for one more value.
-    pub(crate) fn stand_for(&mut self, name: &str, unit: &'static str, note: &str, what: &str, value: f64) {
+    pub(crate) fn stand_for(
+        &mut self,
+        name: &str,
+        unit: &'static str,
+        note: &str,
+        what: &str,
+        value: f64,
+    ) {
         let known = self.0.iter().position(|symbol| symbol.name == name);
         let at = known.unwrap_or_else(|| {
             self.0.push(Symbol {
@@ -53,13 +62,20 @@ impl Symbols {
 
     /// The value of a name.
     pub(crate) fn value(&self, name: &str) -> f64 {
-        self.0.iter().find(|symbol| symbol.name == name).map_or(0.0, Symbol::value)
+        self.0
+            .iter()
+            .find(|symbol| symbol.name == name)
+            .map_or(0.0, Symbol::value)
     }
 
     /// Step 3: what shares a name, and by how much it differs.
     pub(crate) fn report_ties(&self, report: &mut Report) {
         for symbol in self.0.iter().filter(|symbol| symbol.stands_for.len() > 1) {
-            let who: Vec<&str> = symbol.stands_for.iter().map(|(what, _)| what.as_str()).collect();
+            let who: Vec<&str> = symbol
+                .stands_for
+                .iter()
+                .map(|(what, _)| what.as_str())
+                .collect();
             report.add(
                 3,
                 &symbol.name,

@@ -15,14 +15,26 @@ pub(crate) struct Contact {
 }
 
 impl Contact {
-    pub(crate) fn place(&self, parts: &[Part], moment: &Moment, plane: &Plane, samples: &Samples) -> Vector2<f64> {
-        self.part.map_or(self.at, |part| parts[part].placed(&self.at, moment, plane, samples))
+    pub(crate) fn place(
+        &self,
+        parts: &[Part],
+        moment: &Moment,
+        plane: &Plane,
+        samples: &Samples,
+    ) -> Vector2<f64> {
+        self.part.map_or(self.at, |part| {
+            parts[part].placed(&self.at, moment, plane, samples)
+        })
     }
 
     /// The nearest place on the longitudinal axis at the same distance from the joint.
     pub(crate) fn on_axis(self) -> Self {
         let at = Vector2::new(self.at.norm().copysign(self.at.x), 0.0);
-        if self.part.is_some() { Self { at, ..self } } else { self }
+        if self.part.is_some() {
+            Self { at, ..self }
+        } else {
+            self
+        }
     }
 }
 
@@ -50,7 +62,11 @@ pub(crate) fn check_linear(
         let (truth, model) = vectors(moment);
         truth.perp(&model).atan2(truth.dot(&model))
     });
-    let out = samples.largest(|moment| plane.normal.dot(&(moment.place(&ends[1]) - moment.place(&ends[0]))));
+    let out = samples.largest(|moment| {
+        plane
+            .normal
+            .dot(&(moment.place(&ends[1]) - moment.place(&ends[0])))
+    });
     report.add(
         4,
         &rig.drives[drive].name,

@@ -20,8 +20,11 @@ mod planar;
 mod reduce;
 mod report;
 mod samples;
+mod urdf;
 mod write;
 
 pub use plan::{Plan, plan, plan_file};
 pub use reduce::{Reduction, reduce};
 pub use report::{Finding, Report, Size};
+pub use samples::sampled_forces;
+pub use urdf::{Imported, UrdfError, import_urdf};

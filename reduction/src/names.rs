@@ -41,11 +41,20 @@ impl<'a> Names<'a> {
     }
 
     /// Bodies of groups; each group may be used once.
-    pub(crate) fn bodies(&self, names: &[Name], used: &mut Vec<String>, log: &mut Log) -> Vec<usize> {
+    pub(crate) fn bodies(
+        &self,
+        names: &[Name],
+        used: &mut Vec<String>,
+        log: &mut Log,
+    ) -> Vec<usize> {
         let known: Vec<&str> = self.groups.iter().map(|(name, _)| name.as_str()).collect();
         let mut bodies = Vec::new();
         for name in names {
-            match self.groups.iter().find(|(group, _)| group == name.get_ref()) {
+            match self
+                .groups
+                .iter()
+                .find(|(group, _)| group == name.get_ref())
+            {
                 None => log.unknown(0, name, "group", &known),
                 Some(_) if used.contains(name.get_ref()) => twice(name, "part or lumped mass", log),
                 Some((group, members)) => {
@@ -59,11 +68,24 @@ impl<'a> Names<'a> {
 
     /// A point by its name in the model or, where `[points]` does not have it, in the rig.
     pub(crate) fn point(&self, name: &Name, log: &mut Log) -> Option<Anchor> {
-        let renamed = self.plan.points.iter().find(|(model, _)| model.get_ref() == name.get_ref());
+        let renamed = self
+            .plan
+            .points
+            .iter()
+            .find(|(model, _)| model.get_ref() == name.get_ref());
         let wanted = renamed.map_or(name, |(_, rig)| rig);
-        let found = self.rig.points.iter().find(|point| &point.name == wanted.get_ref());
+        let found = self
+            .rig
+            .points
+            .iter()
+            .find(|point| &point.name == wanted.get_ref());
         if found.is_none() {
-            let known: Vec<&str> = self.rig.points.iter().map(|point| point.name.as_str()).collect();
+            let known: Vec<&str> = self
+                .rig
+                .points
+                .iter()
+                .map(|point| point.name.as_str())
+                .collect();
             log.unknown(0, wanted, "point of the rig", &known);
         }
         found.map(|point| point.anchor)
@@ -71,30 +93,57 @@ impl<'a> Names<'a> {
 
     /// What the model calls a point of the rig.
     pub(crate) fn point_name(&self, anchor: &Anchor) -> Option<String> {
-        let here = |name: &str| self.rig.points.iter().any(|point| point.name == name && &point.anchor == anchor);
+        let here = |name: &str| {
+            self.rig
+                .points
+                .iter()
+                .any(|point| point.name == name && &point.anchor == anchor)
+        };
         let renamed = self.plan.points.iter().find(|(_, rig)| here(rig.get_ref()));
         // A rig's own name may be taken by another point of the model.
         let free = |name: &str| self.plan.points.keys().all(|model| model.get_ref() != name);
-        renamed.map(|(model, _)| model.get_ref().clone()).or_else(|| {
-            let own = self.rig.points.iter().find(|point| &point.anchor == anchor && free(&point.name));
-            own.map(|point| point.name.clone())
-        })
+        renamed
+            .map(|(model, _)| model.get_ref().clone())
+            .or_else(|| {
+                let own = self
+                    .rig
+                    .points
+                    .iter()
+                    .find(|point| &point.anchor == anchor && free(&point.name));
+                own.map(|point| point.name.clone())
+            })
     }
 
     /// The part that a point is on, `Some(None)` for the base; only leading bodies have a place in the model.
-    pub(crate) fn owner(&self, parts: &[Part], anchor: &Anchor, name: &Name, log: &mut Log) -> Option<Option<usize>> {
+    pub(crate) fn owner(
+        &self,
+        parts: &[Part],
+        anchor: &Anchor,
+        name: &Name,
+        log: &mut Log,
+    ) -> Option<Option<usize>> {
         let Some(body) = anchor.body else {
             return Some(None);
         };
-        let part = parts.iter().position(|part| part.bodies.first() == Some(&body));
+        let part = parts
+            .iter()
+            .position(|part| part.bodies.first() == Some(&body));
         if part.is_none() {
             let leads: Vec<&str> = parts
                 .iter()
-                .filter_map(|part| part.bodies.first().map(|lead| self.rig.bodies[*lead].name.as_str()))
+                .filter_map(|part| {
+                    part.bodies
+                        .first()
+                        .map(|lead| self.rig.bodies[*lead].name.as_str())
+                })
                 .collect();
             log.error(
                 span(0, &name.span()),
-                format!("`{}` is on `{}`, which leads no part", name.get_ref(), self.rig.bodies[body].name),
+                format!(
+                    "`{}` is on `{}`, which leads no part",
+                    name.get_ref(),
+                    self.rig.bodies[body].name
+                ),
                 "expected a point of the base or of a body that leads a part",
                 &format!("bodies that lead a part are {}", leads.join(", ")),
             );

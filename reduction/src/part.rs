@@ -31,7 +31,8 @@ impl Part {
     /// Direction of its longitudinal axis in the nominal configuration, rad.
     pub(crate) fn nominal_angle(&self, plane: &Plane, samples: &Samples) -> f64 {
         let nominal = &samples.nominal;
-        let axis = plane.place(&nominal.place(&self.to)) - plane.place(&nominal.place(&self.joint[1]));
+        let axis =
+            plane.place(&nominal.place(&self.to)) - plane.place(&nominal.place(&self.joint[1]));
         axis.y.atan2(axis.x)
     }
 
@@ -48,7 +49,13 @@ impl Part {
     }
 
     /// Where the model has a place of its frame.
-    pub(crate) fn placed(&self, local: &Vector2<f64>, moment: &Moment, plane: &Plane, samples: &Samples) -> Vector2<f64> {
+    pub(crate) fn placed(
+        &self,
+        local: &Vector2<f64>,
+        moment: &Moment,
+        plane: &Plane,
+        samples: &Samples,
+    ) -> Vector2<f64> {
         let angle = self.nominal_angle(plane, samples) + self.turned(moment, plane, samples);
         plane.place(&moment.place(&self.joint[1])) + self.shift + rotation(angle) * local
     }
@@ -74,7 +81,13 @@ fn wrapped(angle: f64) -> f64 {
 }
 
 /// Mass, centre in the part's frame and inertia of all its bodies, eq. (1); how well they move alike is reported.
-pub(crate) fn substitute(rig: &Rig, part: &Part, plane: &Plane, samples: &Samples, report: &mut Report) -> Flat {
+pub(crate) fn substitute(
+    rig: &Rig,
+    part: &Part,
+    plane: &Plane,
+    samples: &Samples,
+    report: &mut Report,
+) -> Flat {
     let lead = part.bodies[0];
     let angle = part.nominal_angle(plane, samples);
     let mut flats = Vec::new();
@@ -84,7 +97,10 @@ pub(crate) fn substitute(rig: &Rig, part: &Part, plane: &Plane, samples: &Sample
             wrapped(turned(body, moment, plane, samples) - turned(lead, moment, plane, samples))
         });
         let solid = crate::planar::solid(rig, body);
-        let at = Anchor { body: Some(body), at: solid.centre };
+        let at = Anchor {
+            body: Some(body),
+            at: solid.centre,
+        };
         let (arm, shift, strays) = ride(part, &at, plane, samples);
         if body != lead {
             report.add(
@@ -103,14 +119,22 @@ pub(crate) fn substitute(rig: &Rig, part: &Part, plane: &Plane, samples: &Sample
                 ],
             );
         }
-        flats.push(Flat { centre: rotation(-angle) * arm, ..seen });
+        flats.push(Flat {
+            centre: rotation(-angle) * arm,
+            ..seen
+        });
     }
     merge(&flats)
 }
 
 /// A place rides on a part if it is `joint + turn * arm + shift` at all times: arm and shift by least squares, and
 /// the largest distance from that.
-fn ride(part: &Part, at: &Anchor, plane: &Plane, samples: &Samples) -> (Vector2<f64>, Vector2<f64>, f64) {
+fn ride(
+    part: &Part,
+    at: &Anchor,
+    plane: &Plane,
+    samples: &Samples,
+) -> (Vector2<f64>, Vector2<f64>, f64) {
     let n = samples.moments.len() + 1;
     let mut matrix = DMatrix::zeros(2 * n, 4);
     let mut right = DVector::zeros(2 * n);
@@ -131,7 +155,8 @@ fn ride(part: &Part, at: &Anchor, plane: &Plane, samples: &Samples) -> (Vector2<
     } else {
         matrix.clone().svd(true, true).solve(&right, 1e-9).ok()
     };
-    let x = solved.unwrap_or_else(|| DVector::from_vec(vec![right[2 * n - 2], right[2 * n - 1], 0.0, 0.0]));
+    let x = solved
+        .unwrap_or_else(|| DVector::from_vec(vec![right[2 * n - 2], right[2 * n - 1], 0.0, 0.0]));
     let strays = (matrix * &x - right).amax();
     (Vector2::new(x[0], x[1]), Vector2::new(x[2], x[3]), strays)
 }
@@ -140,9 +165,20 @@ fn ride(part: &Part, at: &Anchor, plane: &Plane, samples: &Samples) -> (Vector2<
 pub(crate) fn merge(flats: &[Flat]) -> Flat {
     let mass: f64 = flats.iter().map(|flat| flat.mass).sum();
     let moment: Vector2<f64> = flats.iter().map(|flat| flat.mass * flat.centre).sum();
-    let centre = if mass > 0.0 { moment / mass } else { Vector2::zeros() };
-    let inertia = flats.iter().map(|flat| flat.inertia + flat.mass * (flat.centre - centre).norm_squared()).sum();
-    Flat { mass, centre, inertia }
+    let centre = if mass > 0.0 {
+        moment / mass
+    } else {
+        Vector2::zeros()
+    };
+    let inertia = flats
+        .iter()
+        .map(|flat| flat.inertia + flat.mass * (flat.centre - centre).norm_squared())
+        .sum();
+    Flat {
+        mass,
+        centre,
+        inertia,
+    }
 }
 
 /// The three residuals of eq. (1) between what a part is and what the model says.
@@ -166,7 +202,10 @@ pub(crate) fn lump(
     samples: &Samples,
     report: &mut Report,
 ) -> f64 {
-    let flats: Vec<Flat> = bodies.iter().map(|body| flat(rig, *body, plane, samples)).collect();
+    let flats: Vec<Flat> = bodies
+        .iter()
+        .map(|body| flat(rig, *body, plane, samples))
+        .collect();
     let whole = merge(&flats);
     let masses: Vec<Flat> = points
         .iter()
@@ -177,12 +216,17 @@ pub(crate) fn lump(
         })
         .collect();
     let turns = samples.largest(|moment| {
-        bodies.iter().fold(0.0, |most: f64, b| most.max(moment.motion.bodies[*b].w_WB_W.dot(&plane.normal).abs()))
+        bodies.iter().fold(0.0, |most: f64, b| {
+            most.max(moment.motion.bodies[*b].w_WB_W.dot(&plane.normal).abs())
+        })
     });
     let strays = samples.largest(|moment| {
         let mut most: f64 = 0.0;
         for body in bodies {
-            let centre = Anchor { body: Some(*body), at: crate::planar::solid(rig, *body).centre };
+            let centre = Anchor {
+                body: Some(*body),
+                at: crate::planar::solid(rig, *body).centre,
+            };
             for point in points {
                 let difference = moment.acceleration(&centre) - moment.acceleration(point);
                 most = most.max(plane.flat(&difference).norm());

@@ -64,7 +64,11 @@ pub(crate) struct PlaneEntry {
 
 impl Default for PlaneEntry {
     fn default() -> Self {
-        Self { at: [0.0; 3], normal: [0.0, 0.0, 1.0], x: [1.0, 0.0, 0.0] }
+        Self {
+            at: [0.0; 3],
+            normal: [0.0, 0.0, 1.0],
+            x: [1.0, 0.0, 0.0],
+        }
     }
 }
 
@@ -79,7 +83,10 @@ pub(crate) struct SamplesEntry {
 
 impl Default for SamplesEntry {
     fn default() -> Self {
-        Self { number: 200, range: 0.25 }
+        Self {
+            number: 200,
+            range: 0.25,
+        }
     }
 }
 
@@ -169,19 +176,40 @@ pub(crate) struct DriveEntry {
 ///
 /// Fails with the place of what is wrong.
 pub fn plan(path: &str, text: &str) -> Result<Plan, Failure> {
-    let sources = Sources { files: vec![SourceFile { path: path.into(), text: text.to_owned() }] };
-    let fail = |diagnostics| Failure { diagnostics, sources: sources.clone() };
+    let sources = Sources {
+        files: vec![SourceFile {
+            path: path.into(),
+            text: text.to_owned(),
+        }],
+    };
+    let fail = |diagnostics| Failure {
+        diagnostics,
+        sources: sources.clone(),
+    };
     let entry: PlanEntry = parse(text, 0).map_err(|found| fail(vec![*found]))?;
     let mut log = Log::default();
-    let one = |log: &mut Log, is_bad: bool, range: std::ops::Range<usize>, says: &str, label: &str| {
-        if is_bad {
-            log.error(span(0, &range), says.to_owned(), label, "");
-        }
-    };
-    one(&mut log, *entry.schema.get_ref() != 1, entry.schema.span(), "this schema of plans is not known", "expected 1");
+    let one =
+        |log: &mut Log, is_bad: bool, range: std::ops::Range<usize>, says: &str, label: &str| {
+            if is_bad {
+                log.error(span(0, &range), says.to_owned(), label, "");
+            }
+        };
+    one(
+        &mut log,
+        *entry.schema.get_ref() != 1,
+        entry.schema.span(),
+        "this schema of plans is not known",
+        "expected 1",
+    );
     let name = entry.name.get_ref();
     let is_word = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') && !name.is_empty();
-    one(&mut log, !is_word, entry.name.span(), "this cannot be a model's name", "expected letters, digits and `_`");
+    one(
+        &mut log,
+        !is_word,
+        entry.name.span(),
+        "this cannot be a model's name",
+        "expected letters, digits and `_`",
+    );
     let directions = [entry.plane.normal, entry.plane.x].map(nalgebra::Vector3::from);
     let across = directions[0].cross(&directions[1]).norm();
     let samples = &entry.samples;
@@ -193,9 +221,20 @@ pub fn plan(path: &str, text: &str) -> Result<Plan, Failure> {
         "normal and x of the plane do not span a frame",
         "expected two directions in `[plane]`",
     );
-    let is_sound = (4..=100_000).contains(&samples.number) && samples.range > 0.0 && samples.range <= 10.0;
-    one(&mut log, !is_sound, top, "these samples check nothing", "expected 4 to 100000 in a range above zero and up to 10");
-    if log.0.is_empty() { Ok(Plan { entry, sources }) } else { Err(fail(log.0)) }
+    let is_sound =
+        (4..=100_000).contains(&samples.number) && samples.range > 0.0 && samples.range <= 10.0;
+    one(
+        &mut log,
+        !is_sound,
+        top,
+        "these samples check nothing",
+        "expected 4 to 100000 in a range above zero and up to 10",
+    );
+    if log.0.is_empty() {
+        Ok(Plan { entry, sources })
+    } else {
+        Err(fail(log.0))
+    }
 }
 
 /// Reads a plan from disk.
@@ -204,7 +243,10 @@ pub fn plan_file(path: &Path) -> Result<Plan, Failure> {
         Ok(text) => plan(&path.to_string_lossy(), &text),
         Err(error) => Err(Failure {
             diagnostics: vec![Diagnostic {
-                help: vec!["give the path of a plan, such as `model-spec/rigs/spidermill-plan.toml`".to_owned()],
+                help: vec![
+                    "give the path of a plan, such as `model-spec/rigs/spidermill-plan.toml`"
+                        .to_owned(),
+                ],
                 ..fault(None, format!("cannot read `{}`: {error}", path.display()))
             }],
             sources: Sources::default(),

@@ -22,9 +22,21 @@ pub(crate) struct Solid {
 /// A body of the rig together with its lumped masses, by the theorem of Steiner.
 pub(crate) fn solid(rig: &Rig, body: usize) -> Solid {
     let own = &rig.bodies[body];
-    let mut parts = vec![Solid { mass: own.mass, centre: own.centre, inertia: own.inertia }];
-    for lumped in rig.lumped_masses.iter().filter(|lumped| lumped.at.body == Some(body)) {
-        parts.push(Solid { mass: lumped.mass, centre: lumped.at.at, inertia: Matrix3::zeros() });
+    let mut parts = vec![Solid {
+        mass: own.mass,
+        centre: own.centre,
+        inertia: own.inertia,
+    }];
+    for lumped in rig
+        .lumped_masses
+        .iter()
+        .filter(|lumped| lumped.at.body == Some(body))
+    {
+        parts.push(Solid {
+            mass: lumped.mass,
+            centre: lumped.at.at,
+            inertia: Matrix3::zeros(),
+        });
     }
     merge(&parts)
 }
@@ -32,12 +44,20 @@ pub(crate) fn solid(rig: &Rig, body: usize) -> Solid {
 fn merge(parts: &[Solid]) -> Solid {
     let mass: f64 = parts.iter().map(|part| part.mass).sum();
     let moment: Vector3<f64> = parts.iter().map(|part| part.mass * part.centre).sum();
-    let centre = if mass > 0.0 { moment / mass } else { parts[0].centre };
+    let centre = if mass > 0.0 {
+        moment / mass
+    } else {
+        parts[0].centre
+    };
     let about = |part: &Solid| {
         let d = part.centre - centre;
         part.inertia + part.mass * (Matrix3::identity() * d.norm_squared() - d * d.transpose())
     };
-    Solid { mass, centre, inertia: parts.iter().map(about).sum() }
+    Solid {
+        mass,
+        centre,
+        inertia: parts.iter().map(about).sum(),
+    }
 }
 
 /// A body in the plane, nominal configuration.
@@ -75,7 +95,14 @@ pub(crate) fn out_of_plane(plane: &Plane, samples: &Samples) -> f64 {
 }
 
 /// How far a group is from one that the plane halves.
-pub(crate) fn check_group(rig: &Rig, name: &str, bodies: &[usize], plane: &Plane, samples: &Samples, report: &mut Report) {
+pub(crate) fn check_group(
+    rig: &Rig,
+    name: &str,
+    bodies: &[usize],
+    plane: &Plane,
+    samples: &Samples,
+    report: &mut Report,
+) {
     let in_base: Vec<Solid> = bodies
         .iter()
         .map(|body| {
@@ -95,7 +122,9 @@ pub(crate) fn check_group(rig: &Rig, name: &str, bodies: &[usize], plane: &Plane
     let product = (turned - moment * plane.normal).norm();
     let tilt = if product > 1e-12 * moment.abs().max(whole.inertia.amax()) {
         let eigen = whole.inertia.symmetric_eigen();
-        let nearest = (0..3).map(|k| eigen.eigenvectors.column(k).dot(&plane.normal).abs()).fold(0.0, f64::max);
+        let nearest = (0..3)
+            .map(|k| eigen.eigenvectors.column(k).dot(&plane.normal).abs())
+            .fold(0.0, f64::max);
         nearest.min(1.0).acos()
     } else {
         0.0

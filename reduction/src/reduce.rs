@@ -3,9 +3,7 @@
 use modelmill_rig::{Anchor, Failure, Log, Rig, fault, span};
 use nalgebra::Vector2;
 
-use crate::draft::{
-    Draft, DraftCoordinate, DraftEffect, DraftPart, DraftPoint, Frame, rounded,
-};
+use crate::draft::{Draft, DraftCoordinate, DraftEffect, DraftPart, DraftPoint, Frame, rounded};
 use crate::drive::{Contact, check_linear};
 use crate::names::Names;
 use crate::part::{Part, lump, residuals, substitute};
@@ -47,7 +45,10 @@ pub fn reduce(rig: &Rig, plan: &Plan) -> Result<Reduction, Failure> {
         }
         _ => {
             log.0.sort_by_key(|found| found.span.map(|span| span.start));
-            Err(Failure { diagnostics: log.0, sources: plan.sources.clone() })
+            Err(Failure {
+                diagnostics: log.0,
+                sources: plan.sources.clone(),
+            })
         }
     }
 }
@@ -67,7 +68,8 @@ fn run(rig: &Rig, plan: &Plan, log: &mut Log) -> Option<(Draft, Report)> {
             return None;
         }
         Err(error) => {
-            log.0.push(fault(None, format!("the rig does not stand: {error}")));
+            log.0
+                .push(fault(None, format!("the rig does not stand: {error}")));
             return None;
         }
     };
@@ -98,7 +100,12 @@ fn run(rig: &Rig, plan: &Plan, log: &mut Log) -> Option<(Draft, Report)> {
     work.check_constants(log);
     let draft = work.draft;
     let mut report = work.report;
-    for symbols in [&draft.masses, &draft.centres, &draft.inertias, &draft.constants] {
+    for symbols in [
+        &draft.masses,
+        &draft.centres,
+        &draft.inertias,
+        &draft.constants,
+    ] {
         symbols.report_ties(&mut report);
     }
     Some((draft, report))
@@ -144,22 +151,41 @@ impl Work<'_> {
         );
         let across = self.plane.normal.dot(&rig.gravity);
         let flat = self.plane.flat(&rig.gravity);
-        self.report.add(1, "gravity", "acts in the plane", vec![Size::new("across it", across, "m/s^2")]);
+        self.report.add(
+            1,
+            "gravity",
+            "acts in the plane",
+            vec![Size::new("across it", across, "m/s^2")],
+        );
         self.draft.gravity = match (flat.x.abs() > ZERO, flat.y.abs() > ZERO) {
             (false, false) => ["0", "0"].map(str::to_owned),
-            (true, true) => {
-                [("gx", flat.x), ("gy", flat.y)].map(|(name, value)| self.gravity_constant(name, value))
-            }
-            (true, false) => [signed(self.gravity_constant("g", flat.x.abs()), flat.x), "0".to_owned()],
-            (false, true) => ["0".to_owned(), signed(self.gravity_constant("g", flat.y.abs()), flat.y)],
+            (true, true) => [("gx", flat.x), ("gy", flat.y)]
+                .map(|(name, value)| self.gravity_constant(name, value)),
+            (true, false) => [
+                signed(self.gravity_constant("g", flat.x.abs()), flat.x),
+                "0".to_owned(),
+            ],
+            (false, true) => [
+                "0".to_owned(),
+                signed(self.gravity_constant("g", flat.y.abs()), flat.y),
+            ],
         };
         for (name, bodies) in &self.names.groups {
-            check_group(rig, name, bodies, &self.plane, &self.samples, &mut self.report);
+            check_group(
+                rig,
+                name,
+                bodies,
+                &self.plane,
+                &self.samples,
+                &mut self.report,
+            );
         }
     }
 
     fn gravity_constant(&mut self, name: &str, value: f64) -> String {
-        self.draft.constants.stand_for(name, "m/s^2", "acceleration of gravity", "gravity", value);
+        self.draft
+            .constants
+            .stand_for(name, "m/s^2", "acceleration of gravity", "gravity", value);
         name.to_owned()
     }
 
@@ -167,8 +193,17 @@ impl Work<'_> {
     fn parts(&mut self, log: &mut Log) {
         let plan = self.names.plan;
         for entry in &plan.part {
-            if self.parts.iter().any(|part| &part.name == entry.name.get_ref()) {
-                log.error(span(0, &entry.name.span()), "there are two parts of this name".to_owned(), "", "rename one");
+            if self
+                .parts
+                .iter()
+                .any(|part| &part.name == entry.name.get_ref())
+            {
+                log.error(
+                    span(0, &entry.name.span()),
+                    "there are two parts of this name".to_owned(),
+                    "",
+                    "rename one",
+                );
             }
             if let Some(part) = self.part(entry, log) {
                 self.parts.push(part);
@@ -194,8 +229,12 @@ impl Work<'_> {
         let parent = match entry.on.get_ref().as_str() {
             "base" => None,
             on => {
-                let known: Vec<&str> =
-                    self.parts.iter().map(|part| part.name.as_str()).chain(["base"]).collect();
+                let known: Vec<&str> = self
+                    .parts
+                    .iter()
+                    .map(|part| part.name.as_str())
+                    .chain(["base"])
+                    .collect();
                 let found = self.parts.iter().position(|part| part.name == on);
                 if found.is_none() {
                     log.unknown(0, &entry.on, "part above this one", &known);
@@ -208,7 +247,11 @@ impl Work<'_> {
         let (at, from, to) = (at?, from?, to?);
         let lead = *bodies.first()?;
         let carrier = parent.map(|parent| self.parts[parent].bodies[0]);
-        for (name, anchor, body) in [(&entry.at, at, carrier), (&entry.from, from, Some(lead)), (&entry.to, to, Some(lead))] {
+        for (name, anchor, body) in [
+            (&entry.at, at, carrier),
+            (&entry.from, from, Some(lead)),
+            (&entry.to, to, Some(lead)),
+        ] {
             if anchor.body != body {
                 let wanted = body.map_or("the base", |b| names.rig.bodies[b].name.as_str());
                 log.error(
@@ -230,18 +273,32 @@ impl Work<'_> {
         };
         let length = (from.at - to.at).norm();
         if length < 1e-9 {
-            log.error(span(0, &entry.to.span()), "this part has no length".to_owned(), "expected another point than `from`", "");
+            log.error(
+                span(0, &entry.to.span()),
+                "this part has no length".to_owned(),
+                "expected another point than `from`",
+                "",
+            );
             return None;
         }
         // What the model moves in the plane: the carrier's own shift, and the gap at the joint.
         let carried = parent.map_or_else(Vector2::zeros, |parent| self.parts[parent].shift);
-        let gap = |moment: &Moment| self.plane.place(&moment.place(&at)) - self.plane.place(&moment.place(&from)) + carried;
+        let gap = |moment: &Moment| {
+            self.plane.place(&moment.place(&at)) - self.plane.place(&moment.place(&from)) + carried
+        };
         part.shift = gap(&self.samples.nominal);
-        let strays = self.samples.largest(|moment| (gap(moment) - part.shift).norm());
+        let strays = self
+            .samples
+            .largest(|moment| (gap(moment) - part.shift).norm());
         if strays > TOLERANCE || strays.is_nan() {
             log.error(
                 span(0, &entry.from.span()),
-                format!("`{}` does not hang at `{}`: their distance changes by {} m", part.name, entry.at.get_ref(), digits(strays, 3)),
+                format!(
+                    "`{}` does not hang at `{}`: their distance changes by {} m",
+                    part.name,
+                    entry.at.get_ref(),
+                    digits(strays, 3)
+                ),
                 "expected a place that keeps its distance to `at`",
                 "",
             );
@@ -252,28 +309,44 @@ impl Work<'_> {
 
     /// Frame and coordinate of the part that was added last.
     fn frame(&mut self, entry: &PartEntry, log: &mut Log) {
-        let Some(part) = self.parts.last().cloned() else { return };
+        let Some(part) = self.parts.last().cloned() else {
+            return;
+        };
         let carrier = part.parent.map(|parent| self.parts[parent].clone());
         let (plane, samples) = (self.plane, &self.samples);
         let angle = |moment: &Moment| {
-            let of = |part: &Part| part.nominal_angle(&plane, samples) + part.turned(moment, &plane, samples);
+            let of = |part: &Part| {
+                part.nominal_angle(&plane, samples) + part.turned(moment, &plane, samples)
+            };
             of(&part) - carrier.as_ref().map_or(0.0, of)
         };
         let coordinate = entry.coordinate.get_ref();
         let nominal = wrapped(angle(&samples.nominal));
-        let active = self.names.rig.coordinates.iter().position(|c| &c.name == coordinate);
+        let active = self
+            .names
+            .rig
+            .coordinates
+            .iter()
+            .position(|c| &c.name == coordinate);
         let mut expression = coordinate.clone();
         if let Some(k) = active {
             let strays = |sign: f64| {
                 samples.largest(|moment| {
-                    wrapped(angle(moment) - nominal - sign * (moment.state.q[k] - samples.nominal.state.q[k]))
+                    wrapped(
+                        angle(moment)
+                            - nominal
+                            - sign * (moment.state.q[k] - samples.nominal.state.q[k]),
+                    )
                 })
             };
             let [ahead, back] = [1.0, -1.0].map(strays);
             if ahead.min(back) > TOLERANCE {
                 log.error(
                     span(0, &entry.coordinate.span()),
-                    format!("`{coordinate}` of the rig is not the angle of `{}`", part.name),
+                    format!(
+                        "`{coordinate}` of the rig is not the angle of `{}`",
+                        part.name
+                    ),
                     "expected the coordinate of its joint",
                     "another name makes a passive coordinate",
                 );
@@ -281,15 +354,33 @@ impl Work<'_> {
             let sign = if ahead <= back { 1.0 } else { -1.0 };
             let value = samples.nominal.state.q[k];
             let offset = wrapped(nominal - sign * value);
-            expression = format!("{}{coordinate}{}", if sign < 0.0 { "-" } else { "" }, self.angle_offset(coordinate, offset));
-            self.draft.coordinates.push(DraftCoordinate { name: coordinate.clone(), nominal: rounded(value), passive: false });
+            expression = format!(
+                "{}{coordinate}{}",
+                if sign < 0.0 { "-" } else { "" },
+                self.angle_offset(coordinate, offset)
+            );
+            self.draft.coordinates.push(DraftCoordinate {
+                name: coordinate.clone(),
+                nominal: rounded(value),
+                passive: false,
+            });
         } else {
             let nominal = (nominal * 1e6).round() / 1e6;
-            self.draft.coordinates.push(DraftCoordinate { name: coordinate.clone(), nominal, passive: true });
+            self.draft.coordinates.push(DraftCoordinate {
+                name: coordinate.clone(),
+                nominal,
+                passive: true,
+            });
         }
         let (on, local) = match &carrier {
-            None => ("base".to_owned(), plane.place(&self.samples.nominal.place(&part.joint[0]))),
-            Some(carrier) => (carrier.name.clone(), carrier.local(&part.joint[0], &plane, &self.samples)),
+            None => (
+                "base".to_owned(),
+                plane.place(&self.samples.nominal.place(&part.joint[0])),
+            ),
+            Some(carrier) => (
+                carrier.name.clone(),
+                carrier.local(&part.joint[0], &plane, &self.samples),
+            ),
         };
         let at = self.components(entry.at.get_ref(), &local);
         if part.shift.norm() > ZERO {
@@ -321,7 +412,13 @@ impl Work<'_> {
             return format!(" {sign} {}*pi/12", twelfths.round().abs());
         }
         let name = format!("{coordinate}_offset");
-        self.draft.constants.stand_for(&name, "rad", "from the rig's zero to the part's axis", &name, offset);
+        self.draft.constants.stand_for(
+            &name,
+            "rad",
+            "from the rig's zero to the part's axis",
+            &name,
+            offset,
+        );
         format!(" + {name}")
     }
 
@@ -334,15 +431,31 @@ impl Work<'_> {
                 "0".clone_into(axis);
                 continue;
             }
-            let named = self.names.plan.constants.iter().find(|(_, c)| c.is.iter().any(|is| is.get_ref() == &what));
+            let named = self
+                .names
+                .plan
+                .constants
+                .iter()
+                .find(|(_, c)| c.is.iter().any(|is| is.get_ref() == &what));
             let own = format!("{point}_{axis}");
             let (name, note) = match named {
-                Some((name, constant)) => (name.get_ref().clone(), constant.note.clone().unwrap_or_default()),
+                Some((name, constant)) => (
+                    name.get_ref().clone(),
+                    constant.note.clone().unwrap_or_default(),
+                ),
                 None => (own, String::new()),
             };
-            let symbol = self.draft.constants.0.iter().find(|symbol| symbol.name == name);
-            if symbol.is_none_or(|symbol| symbol.stands_for.iter().all(|(known, _)| known != &what)) {
-                self.draft.constants.stand_for(&name, "m", &note, &what, value);
+            let symbol = self
+                .draft
+                .constants
+                .0
+                .iter()
+                .find(|symbol| symbol.name == name);
+            if symbol.is_none_or(|symbol| symbol.stands_for.iter().all(|(known, _)| known != &what))
+            {
+                self.draft
+                    .constants
+                    .stand_for(&name, "m", &note, &what, value);
             }
             *axis = name;
         }
@@ -351,21 +464,42 @@ impl Work<'_> {
 
     /// Mass properties of the part that was added last.
     fn body(&mut self, entry: &PartEntry, log: &mut Log) {
-        let Some(part) = self.parts.last() else { return };
-        self.used.extend(entry.groups.get_ref().iter().map(|name| name.get_ref().clone()));
+        let Some(part) = self.parts.last() else {
+            return;
+        };
+        self.used.extend(
+            entry
+                .groups
+                .get_ref()
+                .iter()
+                .map(|name| name.get_ref().clone()),
+        );
         let name = part.name.clone();
-        let whole = substitute(self.names.rig, part, &self.plane, &self.samples, &mut self.report);
+        let whole = substitute(
+            self.names.rig,
+            part,
+            &self.plane,
+            &self.samples,
+            &mut self.report,
+        );
         let drops = match entry.off_axis.as_ref().map(|s| s.get_ref().as_str()) {
             None | Some("keep") => false,
             Some("drop") => true,
             Some(_) => {
                 let range = entry.off_axis.as_ref().map_or(0..0, toml::Spanned::span);
-                log.error(span(0, &range), "this is no way to treat an offset".to_owned(), "expected `keep` or `drop`", "");
+                log.error(
+                    span(0, &range),
+                    "this is no way to treat an offset".to_owned(),
+                    "expected `keep` or `drop`",
+                    "",
+                );
                 false
             }
         };
         let symbols = &entry.symbols;
-        let symbol = |given: &Option<String>, prefix: &str| given.clone().unwrap_or_else(|| format!("{prefix}_{name}"));
+        let symbol = |given: &Option<String>, prefix: &str| {
+            given.clone().unwrap_or_else(|| format!("{prefix}_{name}"))
+        };
         let about = |what: &str| format!("{what} of {}", entry.note.as_deref().unwrap_or(&name));
         let (mass, centre, across, inertia) = (
             symbol(&symbols.mass, "m"),
@@ -374,30 +508,68 @@ impl Work<'_> {
             symbol(&symbols.inertia, "I"),
         );
         let draft = &mut self.draft;
-        draft.masses.stand_for(&mass, "kg", &about("mass"), &name, whole.mass);
-        draft.inertias.stand_for(&inertia, "kg m^2", &about("inertia about the centre of mass"), &name, whole.inertia);
+        draft
+            .masses
+            .stand_for(&mass, "kg", &about("mass"), &name, whole.mass);
+        draft.inertias.stand_for(
+            &inertia,
+            "kg m^2",
+            &about("inertia about the centre of mass"),
+            &name,
+            whole.inertia,
+        );
         let mut components = ["0", "0"].map(str::to_owned);
         if whole.centre.x.abs() > ZERO {
-            draft.centres.stand_for(&centre, "m", &about("centre of mass along the axis"), &name, whole.centre.x);
+            draft.centres.stand_for(
+                &centre,
+                "m",
+                &about("centre of mass along the axis"),
+                &name,
+                whole.centre.x,
+            );
             components[0] = centre;
         }
         if whole.centre.y.abs() > ZERO && !drops {
-            draft.centres.stand_for(&across, "m", &about("centre of mass beside the axis"), &name, whole.centre.y);
+            draft.centres.stand_for(
+                &across,
+                "m",
+                &about("centre of mass beside the axis"),
+                &name,
+                whole.centre.y,
+            );
             components[1] = across;
         }
-        let value = |expression: &String| if expression == "0" { 0.0 } else { draft.centres.value(expression) };
+        let value = |expression: &String| {
+            if expression == "0" {
+                0.0
+            } else {
+                draft.centres.value(expression)
+            }
+        };
         let said = Flat {
             mass: draft.masses.value(&mass),
             centre: Vector2::new(value(&components[0]), value(&components[1])),
             inertia: draft.inertias.value(&inertia),
         };
-        let groups: Vec<&str> = entry.groups.get_ref().iter().map(|group| group.get_ref().as_str()).collect();
+        let groups: Vec<&str> = entry
+            .groups
+            .get_ref()
+            .iter()
+            .map(|group| group.get_ref().as_str())
+            .collect();
         let says = format!(
             "= {}: mass {} kg, centre ({}, {}) m, inertia {} kg m^2",
             groups.join(" + "),
             digits(whole.mass, 8),
             digits(whole.centre.x, 8),
-            digits(if whole.centre.y.abs() > ZERO { whole.centre.y } else { 0.0 }, 8),
+            digits(
+                if whole.centre.y.abs() > ZERO {
+                    whole.centre.y
+                } else {
+                    0.0
+                },
+                8
+            ),
             digits(whole.inertia, 8)
         );
         self.report.add(2, &name, says, residuals(&whole, &said));
@@ -414,26 +586,56 @@ impl Work<'_> {
     fn lumped_masses(&mut self, log: &mut Log) {
         let plan = self.names.plan;
         for entry in &plan.lumped_mass {
-            let bodies = self.names.bodies(entry.groups.get_ref(), &mut self.used, log);
-            let points: Vec<(String, Anchor)> =
-                entry.at.get_ref().iter().filter_map(|name| self.model_point(name, log)).collect();
+            let bodies = self
+                .names
+                .bodies(entry.groups.get_ref(), &mut self.used, log);
+            let points: Vec<(String, Anchor)> = entry
+                .at
+                .get_ref()
+                .iter()
+                .filter_map(|name| self.model_point(name, log))
+                .collect();
             if bodies.is_empty() || points.len() < entry.at.get_ref().len() {
                 continue;
             }
             if points.is_empty() {
-                log.error(span(0, &entry.at.span()), "this mass is nowhere".to_owned(), "expected at least one point", "");
+                log.error(
+                    span(0, &entry.at.span()),
+                    "this mass is nowhere".to_owned(),
+                    "expected at least one point",
+                    "",
+                );
                 continue;
             }
             let name = entry.name.get_ref();
             let anchors: Vec<Anchor> = points.iter().map(|(_, anchor)| *anchor).collect();
             let (plane, samples) = (&self.plane, &self.samples);
-            let mass = lump(self.names.rig, name, &bodies, &anchors, plane, samples, &mut self.report);
+            let mass = lump(
+                self.names.rig,
+                name,
+                &bodies,
+                &anchors,
+                plane,
+                samples,
+                &mut self.report,
+            );
             let symbol = entry.symbol.clone().unwrap_or_else(|| format!("m_{name}"));
-            let note = entry.note.clone().unwrap_or_else(|| format!("mass of {name}"));
-            self.draft.masses.stand_for(&symbol, "kg", &note, name, mass);
+            let note = entry
+                .note
+                .clone()
+                .unwrap_or_else(|| format!("mass of {name}"));
+            self.draft
+                .masses
+                .stand_for(&symbol, "kg", &note, name, mass);
             for (point, _) in &points {
-                let one = if points.len() == 1 { name.clone() } else { format!("{name}_{point}") };
-                self.draft.lumped_masses.push((one, symbol.clone(), points.len(), point.clone()));
+                let one = if points.len() == 1 {
+                    name.clone()
+                } else {
+                    format!("{name}_{point}")
+                };
+                self.draft
+                    .lumped_masses
+                    .push((one, symbol.clone(), points.len(), point.clone()));
             }
         }
     }
@@ -459,9 +661,15 @@ impl Work<'_> {
         if self.draft.points.iter().any(|point| point.name == name) {
             return;
         }
-        let on = contact.part.map_or("base".to_owned(), |part| self.parts[part].name.clone());
+        let on = contact
+            .part
+            .map_or("base".to_owned(), |part| self.parts[part].name.clone());
         let at = self.components(name, &contact.at);
-        self.draft.points.push(DraftPoint { name: name.to_owned(), on, at });
+        self.draft.points.push(DraftPoint {
+            name: name.to_owned(),
+            on,
+            at,
+        });
     }
 
     fn loops(&mut self, log: &mut Log) {
@@ -469,25 +677,42 @@ impl Work<'_> {
         for entry in &plan.loops {
             let [one, two] = &entry.joins;
             let ends = (self.model_point(one, log), self.model_point(two, log));
-            let (Some((first, a)), Some((second, b))) = ends else { continue };
+            let (Some((first, a)), Some((second, b))) = ends else {
+                continue;
+            };
             let places = [a, b].map(|anchor| {
-                let part = self.parts.iter().position(|part| part.bodies.first() == anchor.body.as_ref());
+                let part = self
+                    .parts
+                    .iter()
+                    .position(|part| part.bodies.first() == anchor.body.as_ref());
                 self.contact(&anchor, part)
             });
             let gap = self.samples.largest(|moment| {
-                let [p, r] = places.map(|place| place.place(&self.parts, moment, &self.plane, &self.samples));
+                let [p, r] = places
+                    .map(|place| place.place(&self.parts, moment, &self.plane, &self.samples));
                 (p - r).norm()
             });
             if gap > TOLERANCE || gap.is_nan() {
                 log.error(
                     span(0, &two.span()),
-                    format!("the loop `{}` does not close: its points are up to {} m apart", entry.name.get_ref(), digits(gap, 3)),
+                    format!(
+                        "the loop `{}` does not close: its points are up to {} m apart",
+                        entry.name.get_ref(),
+                        digits(gap, 3)
+                    ),
                     "expected a place that stays at the first point, once parts are shifted",
                     "",
                 );
             }
-            self.report.add(2, entry.name.get_ref(), format!("closes where {first} meets {second}"), vec![Size::new("gap", gap, "m")]);
-            self.draft.loops.push((entry.name.get_ref().clone(), [first, second]));
+            self.report.add(
+                2,
+                entry.name.get_ref(),
+                format!("closes where {first} meets {second}"),
+                vec![Size::new("gap", gap, "m")],
+            );
+            self.draft
+                .loops
+                .push((entry.name.get_ref().clone(), [first, second]));
         }
     }
 
@@ -495,23 +720,41 @@ impl Work<'_> {
     fn drives(&mut self, log: &mut Log) {
         let (rig, plan) = (self.names.rig, self.names.plan);
         let known: Vec<&str> = rig.drives.iter().map(|drive| drive.name.as_str()).collect();
-        for entry in plan.drive.iter().filter(|entry| !known.contains(&entry.name.get_ref().as_str())) {
+        for entry in plan
+            .drive
+            .iter()
+            .filter(|entry| !known.contains(&entry.name.get_ref().as_str()))
+        {
             log.unknown(0, &entry.name, "drive of the rig", &known);
         }
         for (d, drive) in rig.drives.iter().enumerate() {
-            let entry = plan.drive.iter().find(|entry| entry.name.get_ref() == &drive.name);
+            let entry = plan
+                .drive
+                .iter()
+                .find(|entry| entry.name.get_ref() == &drive.name);
             let here = entry.map_or_else(|| &plan.name, |entry| &entry.name);
             let Some(ends) = rig.ends_of_drive(d) else {
-                let coordinate = rig.coordinate_of_drive(d).map(|c| rig.coordinates[c].name.clone());
-                let active = coordinate.filter(|name| self.draft.coordinates.iter().any(|c| &c.name == name && !c.passive));
+                let coordinate = rig
+                    .coordinate_of_drive(d)
+                    .map(|c| rig.coordinates[c].name.clone());
+                let active = coordinate.filter(|name| {
+                    self.draft
+                        .coordinates
+                        .iter()
+                        .any(|c| &c.name == name && !c.passive)
+                });
                 match active {
                     Some(coordinate) => {
-                        self.report.add(4, &drive.name, format!("turns {coordinate}"), Vec::new());
+                        self.report
+                            .add(4, &drive.name, format!("turns {coordinate}"), Vec::new());
                         self.draft.drives.push((drive.name.clone(), Ok(coordinate)));
                     }
                     None => log.error(
                         span(0, &here.span()),
-                        format!("the joint of the drive `{}` is the joint of no part", drive.name),
+                        format!(
+                            "the joint of the drive `{}` is the joint of no part",
+                            drive.name
+                        ),
                         "",
                         "give the part that hangs in this joint the joint's coordinate",
                     ),
@@ -522,9 +765,13 @@ impl Work<'_> {
             let mut contacts = Vec::new();
             let mut names = Vec::new();
             for end in ends {
-                let Some(name) = self.names.point_name(&end) else { continue };
+                let Some(name) = self.names.point_name(&end) else {
+                    continue;
+                };
                 let named = Name::new(here.span(), name.clone());
-                let Some(part) = self.names.owner(&self.parts, &end, &named, log) else { continue };
+                let Some(part) = self.names.owner(&self.parts, &end, &named, log) else {
+                    continue;
+                };
                 let mut contact = self.contact(&end, part);
                 if on_axis {
                     contact = contact.on_axis();
@@ -535,8 +782,19 @@ impl Work<'_> {
             }
             if let (&[from, to], [one, two]) = (contacts.as_slice(), names.as_slice()) {
                 let (plane, samples) = (&self.plane, &self.samples);
-                check_linear(rig, d, ends, [from, to], &self.parts, plane, samples, &mut self.report);
-                self.draft.drives.push((drive.name.clone(), Err([one.clone(), two.clone()])));
+                check_linear(
+                    rig,
+                    d,
+                    ends,
+                    [from, to],
+                    &self.parts,
+                    plane,
+                    samples,
+                    &mut self.report,
+                );
+                self.draft
+                    .drives
+                    .push((drive.name.clone(), Err([one.clone(), two.clone()])));
             }
         }
     }
@@ -547,14 +805,21 @@ impl Work<'_> {
         for effect in &rig.effects {
             let (kind, values) = effect.law.described();
             let drive = |place: &modelmill_rig::Place| match place {
-                modelmill_rig::Place::Drive(d) => rig.drives.get(*d).map(|drive| drive.name.clone()),
+                modelmill_rig::Place::Drive(d) => {
+                    rig.drives.get(*d).map(|drive| drive.name.clone())
+                }
                 _ => None,
             };
             let at: Vec<String> = effect.places.iter().filter_map(drive).collect();
             let library = modelmill_spec::library();
             let known = library.iter().find(|known| known.name == kind);
             let Some(known) = known.filter(|_| at.len() == effect.places.len()) else {
-                self.report.add(4, kind, "acts in the rig and is left out of the model", Vec::new());
+                self.report.add(
+                    4,
+                    kind,
+                    "acts in the rig and is left out of the model",
+                    Vec::new(),
+                );
                 continue;
             };
             let is_parameter = |symbol: &str| known.parameters.iter().any(|p| p.symbol == symbol);
@@ -562,8 +827,18 @@ impl Work<'_> {
                 .into_iter()
                 .map(|(symbol, value)| (symbol.to_owned(), value))
                 .partition(|(symbol, _)| is_parameter(symbol));
-            self.report.add(4, kind, format!("at {} as in the rig", at.join(", ")), Vec::new());
-            self.draft.effects.push(DraftEffect { kind: kind.to_owned(), at, parameters, constants });
+            self.report.add(
+                4,
+                kind,
+                format!("at {} as in the rig", at.join(", ")),
+                Vec::new(),
+            );
+            self.draft.effects.push(DraftEffect {
+                kind: kind.to_owned(),
+                at,
+                parameters,
+                constants,
+            });
         }
     }
 
@@ -577,7 +852,10 @@ impl Work<'_> {
                 2,
                 &rig.bodies[body].name,
                 "is left out",
-                vec![Size::new("mass", solid.mass, "kg"), Size::new("inertia", solid.inertia.amax(), "kg m^2")],
+                vec![
+                    Size::new("mass", solid.mass, "kg"),
+                    Size::new("inertia", solid.inertia.amax(), "kg m^2"),
+                ],
             );
         }
         let forgotten: Vec<&str> = self
@@ -595,28 +873,66 @@ impl Work<'_> {
                 "put each into a `[[part]]` or a `[[lumped_mass]]`, or name it in `leave_out`",
             );
         }
-        let split = rig.lumped_masses.iter().filter(|lumped| lumped.at.at != lumped.moment_at);
+        let split = rig
+            .lumped_masses
+            .iter()
+            .filter(|lumped| lumped.at.at != lumped.moment_at);
         for lumped in split {
-            let about = lumped.at.body.map_or("base", |body| rig.bodies[body].name.as_str());
+            let about = lumped
+                .at
+                .body
+                .map_or("base", |body| rig.bodies[body].name.as_str());
             let says = "has a mass that moments see elsewhere; the model has it at one place";
-            self.report.add(2, about, says, vec![Size::new("moved by", (lumped.at.at - lumped.moment_at).norm(), "m")]);
+            self.report.add(
+                2,
+                about,
+                says,
+                vec![Size::new(
+                    "moved by",
+                    (lumped.at.at - lumped.moment_at).norm(),
+                    "m",
+                )],
+            );
         }
     }
 
     /// Constants of the plan must stand for something.
     fn check_constants(&self, log: &mut Log) {
-        for is in self.names.plan.constants.values().flat_map(|constant| &constant.is) {
+        for is in self
+            .names
+            .plan
+            .constants
+            .values()
+            .flat_map(|constant| &constant.is)
+        {
             let symbols = &self.draft.constants.0;
-            if !symbols.iter().any(|symbol| symbol.stands_for.iter().any(|(what, _)| what == is.get_ref())) {
-                let known: Vec<&str> = symbols.iter().flat_map(|s| s.stands_for.iter().map(|(what, _)| what.as_str())).collect();
-                log.unknown(0, is, "quantity of the model (a point's `.x` or `.y` that is not zero)", &known);
+            if !symbols.iter().any(|symbol| {
+                symbol
+                    .stands_for
+                    .iter()
+                    .any(|(what, _)| what == is.get_ref())
+            }) {
+                let known: Vec<&str> = symbols
+                    .iter()
+                    .flat_map(|s| s.stands_for.iter().map(|(what, _)| what.as_str()))
+                    .collect();
+                log.unknown(
+                    0,
+                    is,
+                    "quantity of the model (a point's `.x` or `.y` that is not zero)",
+                    &known,
+                );
             }
         }
     }
 }
 
 fn signed(name: String, value: f64) -> String {
-    if value < 0.0 { format!("-{name}") } else { name }
+    if value < 0.0 {
+        format!("-{name}")
+    } else {
+        name
+    }
 }
 
 /// An angle within half a turn.

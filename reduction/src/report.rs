@@ -36,7 +36,11 @@ const ROUNDING: f64 = 1e-9;
 
 impl Size {
     pub(crate) fn new(of: &'static str, value: f64, unit: &'static str) -> Self {
-        Self { of, value: value.abs(), unit }
+        Self {
+            of,
+            value: value.abs(),
+            unit,
+        }
     }
 
     /// Whether it is more than rounding.
@@ -47,7 +51,12 @@ impl Size {
 
 impl Report {
     pub(crate) fn add(&mut self, step: u8, about: &str, says: impl Into<String>, sizes: Vec<Size>) {
-        self.findings.push(Finding { step, about: about.to_owned(), says: says.into(), sizes });
+        self.findings.push(Finding {
+            step,
+            about: about.to_owned(),
+            says: says.into(),
+            sizes,
+        });
     }
 
     /// The report for people, one paragraph per step.
@@ -60,7 +69,11 @@ impl Report {
         ];
         let mut text = String::new();
         for (step, title) in (1..).zip(titles) {
-            let mut findings = self.findings.iter().filter(|finding| finding.step == step).peekable();
+            let mut findings = self
+                .findings
+                .iter()
+                .filter(|finding| finding.step == step)
+                .peekable();
             if findings.peek().is_none() {
                 continue;
             }
@@ -69,7 +82,8 @@ impl Report {
             for finding in findings {
                 text.push_str(&format!("  {:<16}{}\n", finding.about, finding.says));
                 if !finding.sizes.is_empty() {
-                    let sizes: Vec<String> = finding.sizes.iter().map(ToString::to_string).collect();
+                    let sizes: Vec<String> =
+                        finding.sizes.iter().map(ToString::to_string).collect();
                     text.push_str(&format!("  {:<16}  {}\n", "", sizes.join(", ")));
                 }
             }
@@ -81,9 +95,15 @@ impl Report {
 impl std::fmt::Display for Size {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if self.is_felt() {
-            write!(f, "{} {} {}", self.of, crate::write::digits(self.value, 4), self.unit)
+            write!(
+                f,
+                "{} {} {}",
+                self.of,
+                crate::write::digits(self.value, 4),
+                self.unit
+            )
         } else {
-            write!(f, "{} none ({:.0e} {})", self.of, self.value, self.unit)
+            write!(f, "{} none", self.of)
         }
     }
 }

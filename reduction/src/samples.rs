@@ -21,7 +21,12 @@ impl Plane {
         let normal = Vector3::from(normal).normalize();
         let x = Vector3::from(x);
         let x = (x - normal * normal.dot(&x)).normalize();
-        Self { at: Vector3::from(at), x, y: normal.cross(&x), normal }
+        Self {
+            at: Vector3::from(at),
+            x,
+            y: normal.cross(&x),
+            normal,
+        }
     }
 
     /// Components of a direction.
@@ -50,12 +55,14 @@ impl Moment {
 
     /// Where an anchor is.
     pub(crate) fn place(&self, anchor: &Anchor) -> Vector3<f64> {
-        self.body(anchor.body).map_or(anchor.at, |body| body.place(&anchor.at))
+        self.body(anchor.body)
+            .map_or(anchor.at, |body| body.place(&anchor.at))
     }
 
     /// How an anchor accelerates.
     pub(crate) fn acceleration(&self, anchor: &Anchor) -> Vector3<f64> {
-        self.body(anchor.body).map_or_else(Vector3::zeros, |body| body.acceleration(&anchor.at))
+        self.body(anchor.body)
+            .map_or_else(Vector3::zeros, |body| body.acceleration(&anchor.at))
     }
 }
 
@@ -75,8 +82,15 @@ impl Samples {
         let mut tracker = Tracker::new(rig)?;
         let q0 = tracker.coordinates().to_vec();
         let rest = vec![0.0; q0.len()];
-        let state = State { q: q0.clone(), qd: rest.clone(), qdd: rest };
-        let nominal = Moment { motion: tracker.follow(&state)?, state };
+        let state = State {
+            q: q0.clone(),
+            qd: rest.clone(),
+            qdd: rest,
+        };
+        let nominal = Moment {
+            motion: tracker.follow(&state)?,
+            state,
+        };
         let mut moments = Vec::new();
         let mut n_out_of_reach = 0;
         for state in states(&q0, number, range) {
@@ -87,13 +101,36 @@ impl Samples {
                 Err(_) => n_out_of_reach += 1,
             }
         }
-        Ok(Self { nominal, moments, n_out_of_reach })
+        Ok(Self {
+            nominal,
+            moments,
+            n_out_of_reach,
+        })
     }
 
     /// The largest of a quantity over all motions.
     pub(crate) fn largest(&self, of: impl Fn(&Moment) -> f64) -> f64 {
-        self.moments.iter().map(of).fold(0.0, |most: f64, x| if x.is_nan() { x } else { most.max(x.abs()) })
+        self.moments.iter().map(of).fold(
+            0.0,
+            |most: f64, x| if x.is_nan() { x } else { most.max(x.abs()) },
+        )
     }
+}
+
+/// The rig's own forces at motions around its nominal configuration, for a model to be held against: one state and
+/// one force per drive each; poses out of reach are left out.
+///
+/// Fails when the rig does not stand, or its drives cannot balance a load.
+pub fn sampled_forces(
+    rig: &Rig,
+    number: usize,
+    range: f64,
+) -> Result<Vec<(State, Vec<f64>)>, PoseError> {
+    let samples = Samples::new(rig, number, range)?;
+    let moments = samples.moments.into_iter();
+    moments
+        .map(|moment| Ok((moment.state, modelmill_rig::forces(rig, &moment.motion)?)))
+        .collect()
 }
 
 fn states(q0: &[f64], number: usize, range: f64) -> impl Iterator<Item = State> {

@@ -12,9 +12,19 @@ pub(crate) fn model_file(draft: &Draft) -> String {
         let _ = writeln!(text, "title = {}", quoted(&draft.title));
     }
     if draft.gravity.iter().any(|g| g != "0") {
-        let _ = writeln!(text, "gravity = [{}, {}, 0]", value(&draft.gravity[0]), value(&draft.gravity[1]));
+        let _ = writeln!(
+            text,
+            "gravity = [{}, {}, 0]",
+            value(&draft.gravity[0]),
+            value(&draft.gravity[1])
+        );
     }
-    table(&mut text, "constants", "value", &draft.constants.0.iter().collect::<Vec<_>>());
+    table(
+        &mut text,
+        "constants",
+        "value",
+        &draft.constants.0.iter().collect::<Vec<_>>(),
+    );
     let mut parameters = Vec::new();
     for class in [&draft.masses, &draft.centres, &draft.inertias] {
         parameters.extend(by_name(class));
@@ -22,15 +32,33 @@ pub(crate) fn model_file(draft: &Draft) -> String {
     table(&mut text, "parameters", "nominal", &parameters);
     text.push_str("\n[coordinates]\n");
     for coordinate in &draft.coordinates {
-        let passive = if coordinate.passive { ", passive = true" } else { "" };
-        let _ = writeln!(text, "{} = {{ nominal = {}{passive} }}", coordinate.name, float(coordinate.nominal));
+        let passive = if coordinate.passive {
+            ", passive = true"
+        } else {
+            ""
+        };
+        let _ = writeln!(
+            text,
+            "{} = {{ nominal = {}{passive} }}",
+            coordinate.name,
+            float(coordinate.nominal)
+        );
     }
     for frame in &draft.frames {
-        let _ = writeln!(text, "\n[[frame]]\nname = \"{}\"\non = \"{}\"", frame.name, frame.on);
+        let _ = writeln!(
+            text,
+            "\n[[frame]]\nname = \"{}\"\non = \"{}\"",
+            frame.name, frame.on
+        );
         let [x, y] = &frame.at;
         let _ = match (x.as_str(), y.as_str()) {
             ("0", "0") => writeln!(text, "modified_dh = {{ theta = \"{}\" }}", frame.angle),
-            (x, "0") => writeln!(text, "modified_dh = {{ a = {}, theta = \"{}\" }}", value(x), frame.angle),
+            (x, "0") => writeln!(
+                text,
+                "modified_dh = {{ a = {}, theta = \"{}\" }}",
+                value(x),
+                frame.angle
+            ),
             (x, y) => writeln!(
                 text,
                 "transform = {{ xyz = [{}, {}, 0] }}\njoint = {{ revolute = \"{}\" }}",
@@ -66,14 +94,20 @@ pub(crate) fn model_file(draft: &Draft) -> String {
         );
     }
     for (name, mass, shares, at) in &draft.lumped_masses {
-        let _ = writeln!(text, "\n[[lumped_mass]]\nname = \"{name}\"\nmass = \"{mass}\"");
+        let _ = writeln!(
+            text,
+            "\n[[lumped_mass]]\nname = \"{name}\"\nmass = \"{mass}\""
+        );
         if *shares > 1 {
             let _ = writeln!(text, "share = \"1/{shares}\"");
         }
         let _ = writeln!(text, "at = \"{at}\"");
     }
     for (name, [one, two]) in &draft.loops {
-        let _ = writeln!(text, "\n[[loop]]\nname = \"{name}\"\njoins = [\"{one}\", \"{two}\"]");
+        let _ = writeln!(
+            text,
+            "\n[[loop]]\nname = \"{name}\"\njoins = [\"{one}\", \"{two}\"]"
+        );
     }
     for (name, moves) in &draft.drives {
         let _ = writeln!(text, "\n[[drive]]\nname = \"{name}\"");
@@ -84,15 +118,31 @@ pub(crate) fn model_file(draft: &Draft) -> String {
     }
     for effect in &draft.effects {
         let places: Vec<String> = effect.at.iter().map(|at| format!("\"{at}\"")).collect();
-        let _ = writeln!(text, "\n[[effect]]\nkind = \"{}\"\nat = [{}]", effect.kind, places.join(", "));
+        let _ = writeln!(
+            text,
+            "\n[[effect]]\nkind = \"{}\"\nat = [{}]",
+            effect.kind,
+            places.join(", ")
+        );
         let list = |values: &[(String, f64)], wrap: fn(&str) -> String| {
-            let entries: Vec<String> = values.iter().map(|(k, v)| format!("{k} = {}", wrap(&float(*v)))).collect();
+            let entries: Vec<String> = values
+                .iter()
+                .map(|(k, v)| format!("{k} = {}", wrap(&float(*v))))
+                .collect();
             entries.join(", ")
         };
         let nominal = |number: &str| format!("{{ nominal = {number} }}");
-        let _ = writeln!(text, "parameters = {{ {} }}", list(&effect.parameters, nominal));
+        let _ = writeln!(
+            text,
+            "parameters = {{ {} }}",
+            list(&effect.parameters, nominal)
+        );
         if !effect.constants.is_empty() {
-            let _ = writeln!(text, "constants = {{ {} }}", list(&effect.constants, str::to_owned));
+            let _ = writeln!(
+                text,
+                "constants = {{ {} }}",
+                list(&effect.constants, str::to_owned)
+            );
         }
     }
     text
@@ -104,7 +154,11 @@ fn table(text: &mut String, name: &str, key: &str, symbols: &[&Symbol]) {
     }
     let _ = writeln!(text, "\n[{name}]");
     for symbol in symbols {
-        let note = if symbol.note.is_empty() { String::new() } else { format!(", note = {}", quoted(&symbol.note)) };
+        let note = if symbol.note.is_empty() {
+            String::new()
+        } else {
+            format!(", note = {}", quoted(&symbol.note))
+        };
         let _ = writeln!(
             text,
             "{} = {{ {key} = {}, unit = \"{}\"{note} }}",
@@ -139,7 +193,11 @@ fn by_name(symbols: &Symbols) -> Vec<&Symbol> {
 
 /// A value of a vector: a bare zero, or an expression.
 fn value(expression: &str) -> String {
-    if expression == "0" { "0".to_owned() } else { format!("\"{expression}\"") }
+    if expression == "0" {
+        "0".to_owned()
+    } else {
+        format!("\"{expression}\"")
+    }
 }
 
 /// A number that TOML takes for a float.
@@ -153,7 +211,11 @@ pub(crate) fn digits(x: f64, n: usize) -> String {
         return format!("{x}");
     }
     let rounded: f64 = format!("{x:.*e}", n.saturating_sub(1)).parse().unwrap_or(x);
-    if (1e-3..1e6).contains(&rounded.abs()) { format!("{rounded}") } else { format!("{rounded:e}") }
+    if (1e-3..1e6).contains(&rounded.abs()) {
+        format!("{rounded}")
+    } else {
+        format!("{rounded:e}")
+    }
 }
 
 /// Text as TOML has it.

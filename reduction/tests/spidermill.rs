@@ -12,30 +12,41 @@ fn workspace(path: &str) -> PathBuf {
 
 fn rig() -> Rig {
     let path = workspace("model-spec/rigs/spidermill-full.toml");
-    modelmill_rig::load_file(&path).unwrap_or_else(|failure| panic!("{failure}")).rig
+    modelmill_rig::load_file(&path)
+        .unwrap_or_else(|failure| panic!("{failure}"))
+        .rig
 }
 
 fn reduced() -> Reduction {
-    let plan = plan_file(&workspace("model-spec/rigs/spidermill-plan.toml")).unwrap_or_else(|f| panic!("{f}"));
+    let plan = plan_file(&workspace("model-spec/rigs/spidermill-plan.toml"))
+        .unwrap_or_else(|f| panic!("{f}"));
     reduce(&rig(), &plan).unwrap_or_else(|failure| panic!("{failure}"))
 }
 
 fn derived(text: &str) -> Derivation {
-    let loaded = modelmill_spec::load("model.toml", text, &mut |_| Err(std::io::Error::other("none")));
+    let loaded = modelmill_spec::load("model.toml", text, &mut |_| {
+        Err(std::io::Error::other("none"))
+    });
     let loaded = loaded.unwrap_or_else(|failure| panic!("{failure}"));
     assert_eq!(loaded.render(false), "", "no warnings");
     modelmill_codegen::derive(&loaded.mechanism).expect("a derivation")
 }
 
 fn bundled() -> Derivation {
-    derived(&std::fs::read_to_string(workspace("model-spec/models/spidermill.toml")).expect("a model"))
+    derived(
+        &std::fs::read_to_string(workspace("model-spec/models/spidermill.toml")).expect("a model"),
+    )
 }
 
 #[test]
 fn the_parameters_are_those_of_table_1() {
     let derivation = derived(&reduced().model);
-    let found: Vec<(&str, f64)> =
-        derivation.mechanism.parameters.iter().map(|p| (p.name.as_str(), p.nominal)).collect();
+    let found: Vec<(&str, f64)> = derivation
+        .mechanism
+        .parameters
+        .iter()
+        .map(|p| (p.name.as_str(), p.nominal))
+        .collect();
     let expected = [
         ("m1", 50.9597),
         ("m2", 7.9538),
@@ -61,7 +72,11 @@ fn the_base_parameters_are_those_of_the_bundled_model() {
         base.map(|base| (base.name, base.expression)).collect()
     };
     assert_eq!(expressions(&ours), expressions(&theirs));
-    for (x, y) in ours.nominal_base_values().iter().zip(theirs.nominal_base_values()) {
+    for (x, y) in ours
+        .nominal_base_values()
+        .iter()
+        .zip(theirs.nominal_base_values())
+    {
         assert!((x - y).abs() < 1e-9 * y.abs(), "{x} {y}");
     }
 }
@@ -77,7 +92,10 @@ fn the_forces_are_those_of_the_whole_robot() {
     for i in 0..60 {
         let wave = |k: f64| (k * f64::from(i)).sin();
         let state = State {
-            q: vec![1.8 + 0.2 * wave(0.7), 1.341_592_653_589_793 + 0.2 * wave(1.1)],
+            q: vec![
+                1.8 + 0.2 * wave(0.7),
+                1.341_592_653_589_793 + 0.2 * wave(1.1),
+            ],
             qd: vec![wave(1.9), wave(2.3)],
             qdd: vec![5.0 * wave(2.9), 5.0 * wave(3.1)],
         };
@@ -90,11 +108,22 @@ fn the_forces_are_those_of_the_whole_robot() {
         }
     }
     let slices = |range: std::ops::Range<usize>| columns[range].iter().map(Vec::as_slice).collect();
-    let states = States { q: slices(0..2), qd: slices(2..4), qdd: slices(4..6), load: Vec::new() };
+    let states = States {
+        q: slices(0..2),
+        qd: slices(2..4),
+        qdd: slices(4..6),
+        load: Vec::new(),
+    };
     let values = derivation.nominal_base_values();
-    let found = Evaluator::new(&derivation).inverse_dynamics(&states, &values).expect("forces");
+    let found = Evaluator::new(&derivation)
+        .inverse_dynamics(&states, &values)
+        .expect("forces");
     for (found, expected) in found.iter().zip(&expected) {
-        let error: f64 = found.iter().zip(expected).map(|(x, y)| (x - y).powi(2)).sum();
+        let error: f64 = found
+            .iter()
+            .zip(expected)
+            .map(|(x, y)| (x - y).powi(2))
+            .sum();
         let norm: f64 = expected.iter().map(|y| y * y).sum();
         let relative = (error / norm).sqrt();
         println!("reduced model against rig: {relative:.1e}");
@@ -107,23 +136,45 @@ fn the_report_names_every_approximation() {
     let report = reduced().report;
     println!("{}", report.text());
     let finding = |about: &str, says: &str| {
-        let found = report.findings.iter().find(|f| f.about == about && f.says.contains(says));
-        found.unwrap_or_else(|| panic!("nothing about {about} {says}")).clone()
+        let found = report
+            .findings
+            .iter()
+            .find(|f| f.about == about && f.says.contains(says));
+        found
+            .unwrap_or_else(|| panic!("nothing about {about} {says}"))
+            .clone()
     };
     // Step 1: the end effector is mounted beside the plane, as the paper says.
     let platform = finding("G4", "not halved");
     assert!((platform.sizes[0].value - 0.02).abs() < 1e-12);
-    assert!(finding("G8", "perpendicular").sizes.iter().all(|size| !size.is_felt()));
+    assert!(
+        finding("G8", "perpendicular")
+            .sizes
+            .iter()
+            .all(|size| !size.is_felt())
+    );
     // Step 2: eq. (1) holds for the cranks, not for the coupling, which only translates.
-    assert!(finding("S1", "50.9597").sizes.iter().all(|size| !size.is_felt()));
+    assert!(
+        finding("S1", "50.9597")
+            .sizes
+            .iter()
+            .all(|size| !size.is_felt())
+    );
     let elbow = finding("elbow_left", "only translates");
-    assert!(!elbow.sizes[0].is_felt() && (elbow.sizes[1].value - 0.018_f64.hypot(0.062)).abs() < 1e-9);
+    assert!(
+        !elbow.sizes[0].is_felt() && (elbow.sizes[1].value - 0.018_f64.hypot(0.062)).abs() < 1e-9
+    );
     // A point mass has no inertia about itself.
     assert!((elbow.sizes[2].value - 0.12).abs() < 1e-9);
     // Step 3: both sides are alike.
     assert!(!finding("m1", "S1 and S7").sizes[0].is_felt());
     // Step 4: the spindles push where they did.
-    assert!(finding("spindle_left", "same points").sizes.iter().all(|size| !size.is_felt()));
+    assert!(
+        finding("spindle_left", "same points")
+            .sizes
+            .iter()
+            .all(|size| !size.is_felt())
+    );
     let steps: Vec<u8> = report.findings.iter().map(|finding| finding.step).collect();
     assert!((1..=4).all(|step| steps.contains(&step)));
 }

@@ -305,7 +305,10 @@ impl Law {
             Self::GravityTilt { tx, ty, tz } => ("gravity_tilt", vec![tx, ty, tz]),
             Self::TimeDelay { T } => ("time_delay", vec![T]),
         };
-        let symbols = Self::values(kind).unwrap_or(&[]).iter().map(|value| value.symbol);
+        let symbols = Self::values(kind)
+            .unwrap_or(&[])
+            .iter()
+            .map(|value| value.symbol);
         (kind, symbols.zip(values).collect())
     }
 

@@ -139,10 +139,7 @@ pub fn parse<T: serde::de::DeserializeOwned>(
     file: usize,
 ) -> Result<T, Box<Diagnostic>> {
     if text.len() > LARGEST_FILE {
-        return Err(Box::new(fault(
-            None,
-            "this file is too large to be meant",
-        )));
+        return Err(Box::new(fault(None, "this file is too large to be meant")));
     }
     toml::from_str(text).map_err(|error| {
         let place = error.span().map(|range| span(file, &range));
