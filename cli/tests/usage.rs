@@ -57,6 +57,8 @@ fn every_command_helps_with_an_example() {
         "identify",
         "compare",
         "simulate",
+        "reduce",
+        "import",
         "completions",
         "tour",
     ] {

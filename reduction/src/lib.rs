@@ -16,6 +16,7 @@ mod drive;
 mod names;
 mod part;
 mod plan;
+mod plan_for;
 mod planar;
 mod reduce;
 mod report;
@@ -24,6 +25,7 @@ mod urdf;
 mod write;
 
 pub use plan::{Plan, plan, plan_file};
+pub use plan_for::plan_for;
 pub use reduce::{Reduction, reduce};
 pub use report::{Finding, Report, Size};
 pub use samples::sampled_forces;

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use modelmill_rig::{Failure, Log, fault, parse, read_limited, span};
+use modelmill_rig::{Failure, Log, Rig, fault, parse, read_limited, span};
 use modelmill_spec::{Diagnostic, SourceFile, Sources};
 use serde::Deserialize;
 use toml::Spanned;
@@ -19,6 +19,15 @@ pub struct Plan {
     pub(crate) entry: PlanEntry,
     /// The file that it was read from.
     pub sources: Sources,
+    /// The rig with points of the plan's own, where it has some.
+    pub(crate) rig: Option<Box<Rig>>,
+}
+
+impl Plan {
+    /// The rig that the plan is for: the one given, with the points that a made plan refers to.
+    pub fn rig<'a>(&'a self, rig: &'a Rig) -> &'a Rig {
+        self.rig.as_deref().unwrap_or(rig)
+    }
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -231,7 +240,11 @@ pub fn plan(path: &str, text: &str) -> Result<Plan, Failure> {
         "expected 4 to 100000 in a range above zero and up to 10",
     );
     if log.0.is_empty() {
-        Ok(Plan { entry, sources })
+        Ok(Plan {
+            entry,
+            sources,
+            rig: None,
+        })
     } else {
         Err(fail(log.0))
     }

@@ -135,6 +135,11 @@ impl Pair {
         matches!(self.shape, Shape::Distance)
     }
 
+    /// Whether this is an angle.
+    pub(crate) fn is_angle(&self) -> bool {
+        matches!(self.shape, Shape::Angle { .. })
+    }
+
     /// Wraps a difference of values: angles into half a turn to either side.
     pub(crate) fn difference(&self, value: f64, target: f64) -> f64 {
         let difference = value - target;

@@ -43,6 +43,18 @@ impl Rig {
         pair.is_distance().then_some([pair.from, pair.to])
     }
 
+    /// Where a revolute joint is on its two bodies; `None` for a joint of another kind.
+    pub fn hinge(&self, joint: usize) -> Option<[Anchor; 2]> {
+        let pair = self.joints.get(joint)?.motion.as_ref()?;
+        pair.is_angle().then_some([pair.from, pair.to])
+    }
+
+    /// The coordinate that measures a joint.
+    pub fn coordinate_of_joint(&self, joint: usize) -> Option<usize> {
+        let pair = self.joints.get(joint)?.motion.as_ref()?;
+        self.coordinates.iter().position(|c| &c.measures == pair)
+    }
+
     /// The coordinate that a drive moves directly, because both measure the same.
     pub fn coordinate_of_drive(&self, drive: usize) -> Option<usize> {
         let pair = &self.drives.get(drive)?.measures;
