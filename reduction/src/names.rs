@@ -5,6 +5,9 @@ use modelmill_rig::{Anchor, Log, Rig, span};
 use crate::part::Part;
 use crate::plan::{Name, PlanEntry};
 
+/// A name that leads nowhere, which was reported.
+pub(crate) struct Unknown;
+
 /// Names that a plan may use.
 pub(crate) struct Names<'a> {
     pub(crate) rig: &'a Rig,
@@ -114,16 +117,16 @@ impl<'a> Names<'a> {
             })
     }
 
-    /// The part that a point is on, `Some(None)` for the base; only leading bodies have a place in the model.
+    /// The part that a point is on, none for the base; only leading bodies have a place in the model.
     pub(crate) fn owner(
         &self,
         parts: &[Part],
         anchor: &Anchor,
         name: &Name,
         log: &mut Log,
-    ) -> Option<Option<usize>> {
+    ) -> Result<Option<usize>, Unknown> {
         let Some(body) = anchor.body else {
-            return Some(None);
+            return Ok(None);
         };
         let part = parts
             .iter()
@@ -148,7 +151,7 @@ impl<'a> Names<'a> {
                 &format!("bodies that lead a part are {}", leads.join(", ")),
             );
         }
-        part.map(Some)
+        part.map(Some).ok_or(Unknown)
     }
 }
 

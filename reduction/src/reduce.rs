@@ -86,13 +86,18 @@ fn run(rig: &Rig, plan: &Plan, log: &mut Log) -> Option<(Draft, Report)> {
         },
         report: Report::default(),
         used: Vec::new(),
+        wholes: Vec::new(),
     };
     work.planar_reduction(log);
+    if !log.0.is_empty() {
+        return None;
+    }
     work.parts(log);
     if !log.0.is_empty() {
         return None;
     }
     work.lumped_masses(log);
+    work.check_equation_1();
     work.loops(log);
     work.drives(log);
     work.effects();
@@ -121,6 +126,8 @@ struct Work<'a> {
     report: Report,
     /// Groups that have a place in the model.
     used: Vec<String>,
+    /// What each part of the draft stands for, in words and exactly.
+    wholes: Vec<(String, Flat)>,
 }
 
 impl Work<'_> {
@@ -539,18 +546,6 @@ impl Work<'_> {
             );
             components[1] = across;
         }
-        let value = |expression: &String| {
-            if expression == "0" {
-                0.0
-            } else {
-                draft.centres.value(expression)
-            }
-        };
-        let said = Flat {
-            mass: draft.masses.value(&mass),
-            centre: Vector2::new(value(&components[0]), value(&components[1])),
-            inertia: draft.inertias.value(&inertia),
-        };
         let groups: Vec<&str> = entry
             .groups
             .get_ref()
@@ -572,7 +567,7 @@ impl Work<'_> {
             ),
             digits(whole.inertia, 8)
         );
-        self.report.add(2, &name, says, residuals(&whole, &said));
+        self.wholes.push((says, whole));
         draft.parts.push(DraftPart {
             name: format!("{name}_body"),
             on: name,
@@ -580,6 +575,23 @@ impl Work<'_> {
             centre: components,
             inertia,
         });
+    }
+
+    /// Eq. (1) for every part, once all parts that share a symbol have given it their values.
+    fn check_equation_1(&mut self) {
+        let draft = &self.draft;
+        for (part, (says, whole)) in draft.parts.iter().zip(&self.wholes) {
+            let value = |expression: &String| match expression.as_str() {
+                "0" => 0.0,
+                name => draft.centres.value(name),
+            };
+            let said = Flat {
+                mass: draft.masses.value(&part.mass),
+                centre: Vector2::new(value(&part.centre[0]), value(&part.centre[1])),
+                inertia: draft.inertias.value(&part.inertia),
+            };
+            self.report.add(2, &part.on, says, residuals(whole, &said));
+        }
     }
 
     /// Step 2, lumped masses.
@@ -643,7 +655,7 @@ impl Work<'_> {
     /// A point of the model, declared when it is first used.
     fn model_point(&mut self, name: &Name, log: &mut Log) -> Option<(String, Anchor)> {
         let anchor = self.names.point(name, log)?;
-        let part = self.names.owner(&self.parts, &anchor, name, log)?;
+        let part = self.names.owner(&self.parts, &anchor, name, log).ok()?;
         let contact = self.contact(&anchor, part);
         self.declare(name.get_ref(), contact);
         Some((name.get_ref().clone(), anchor))
@@ -769,7 +781,7 @@ impl Work<'_> {
                     continue;
                 };
                 let named = Name::new(here.span(), name.clone());
-                let Some(part) = self.names.owner(&self.parts, &end, &named, log) else {
+                let Ok(part) = self.names.owner(&self.parts, &end, &named, log) else {
                     continue;
                 };
                 let mut contact = self.contact(&end, part);
@@ -916,12 +928,7 @@ impl Work<'_> {
                     .iter()
                     .flat_map(|s| s.stands_for.iter().map(|(what, _)| what.as_str()))
                     .collect();
-                log.unknown(
-                    0,
-                    is,
-                    "quantity of the model (a point's `.x` or `.y` that is not zero)",
-                    &known,
-                );
+                log.unknown(0, is, "quantity of the model", &known);
             }
         }
     }

@@ -65,7 +65,7 @@ fn build(merged: &Merged, log: &mut Log) -> Rig {
         rig.points.push(Point {
             name: point.entry.name.get_ref().clone(),
             anchor: Anchor {
-                body: on.flatten(),
+                body: on.unwrap_or(None),
                 at,
             },
         });
@@ -167,7 +167,7 @@ fn body(item: &Item<BodyEntry>, log: &mut Log) -> Body {
                 Vector3::repeat(f64::NAN)
             };
             // A planar model gives zz alone, which no body has; it does no harm where only that one counts.
-            if !(moments.min() >= -1e-9 * moments.amax()) {
+            if moments.min().is_nan() || moments.min() < -1e-9 * moments.amax() {
                 log.error(
                     span(file, &spanned.span()),
                     format!(
@@ -193,9 +193,18 @@ fn body(item: &Item<BodyEntry>, log: &mut Log) -> Body {
 }
 
 /// Index of a body; `Some(None)` is the base.
-fn body_named(rig: &Rig, file: usize, name: &Name, log: &mut Log) -> Option<Option<usize>> {
+/// A name that leads nowhere, which was reported.
+struct Unknown;
+
+/// A body, or the base, which is none.
+fn body_named(
+    rig: &Rig,
+    file: usize,
+    name: &Name,
+    log: &mut Log,
+) -> Result<Option<usize>, Unknown> {
     if name.get_ref() == "base" {
-        return Some(None);
+        return Ok(None);
     }
     let found = rig
         .bodies
@@ -206,7 +215,7 @@ fn body_named(rig: &Rig, file: usize, name: &Name, log: &mut Log) -> Option<Opti
         known.extend(rig.bodies.iter().map(|body| body.name.as_str()));
         log.unknown(file, name, "body", &known);
     }
-    found.map(Some)
+    found.map(Some).ok_or(Unknown)
 }
 
 fn point_named(rig: &Rig, file: usize, name: &Name, log: &mut Log) -> Option<Anchor> {
@@ -306,7 +315,7 @@ fn joint(rig: &Rig, item: &Item<JointEntry>, log: &mut Log) -> Joint {
         );
         return joint;
     }
-    let (Some(first), Some(second)) = bodies else {
+    let (Ok(first), Ok(second)) = bodies else {
         return joint;
     };
     if first == second {

@@ -46,14 +46,6 @@ impl Pose {
             q_WB: UnitQuaternion::new_normalize(q + half * q),
         }
     }
-
-    /// The same pose seen from a base frame that lies at `self` in the new one.
-    pub fn moved_by(&self, frame: &Self) -> Self {
-        Self {
-            p_WB_W: frame.q_WB * self.p_WB_W + frame.p_WB_W,
-            q_WB: frame.q_WB * self.q_WB,
-        }
-    }
 }
 
 /// A body in motion, all in the base frame.

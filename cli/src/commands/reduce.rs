@@ -35,7 +35,14 @@ pub(crate) fn run(args: &ReduceArgs) -> Outcome {
     let reduction = watched(&format!("reducing {}", rig.name), 0, |_| {
         modelmill_reduction::reduce(rig, &plan)
     })
-    .map_err(rendered)?;
+    .map_err(|failure| match args.plan {
+        Some(_) => rendered(failure),
+        None => Failure::Rendered(format!(
+            "{}\nnote: no plan was given, so that every body became a part of its own; a plan (--plan) can make one \
+             part of bodies that move alike, such as parallel cranks, whose joints are redundant",
+            failure.render(terminal::errors_in_colour()).trim_end()
+        )),
+    })?;
     let forces = watched("holding the model against the rig", 0, |_| {
         compare(rig, &reduction)
     })?;
