@@ -1,6 +1,6 @@
 //! Step 4: drives of the rig on the reduced model, and how far their lengths and directions are from the true ones.
 
-use modelmill_rig::{Anchor, Rig};
+use modelmill_rig::Anchor;
 use nalgebra::Vector2;
 
 use crate::part::Part;
@@ -40,8 +40,7 @@ impl Contact {
 
 /// Compares a linear drive of the model with the rig's along the samples.
 pub(crate) fn check_linear(
-    rig: &Rig,
-    drive: usize,
+    name: &str,
     ends: [Anchor; 2],
     contacts: [Contact; 2],
     parts: &[Part],
@@ -69,7 +68,7 @@ pub(crate) fn check_linear(
     });
     report.add(
         4,
-        &rig.drives[drive].name,
+        name,
         "acts between the same points",
         vec![
             Size::new("length is off by", length, "m"),

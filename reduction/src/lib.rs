@@ -19,9 +19,12 @@ mod plan;
 mod plan_for;
 mod planar;
 mod reduce;
+mod reduce_drives;
+mod reduce_parts;
 mod report;
 mod samples;
 mod urdf;
+mod urdf_geometry;
 mod write;
 
 pub use plan::{Plan, plan, plan_file};

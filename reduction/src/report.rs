@@ -1,5 +1,7 @@
 //! What a reduction assumed, and how large each assumption is.
 
+use std::fmt::Write as _;
+
 /// Everything that a reduction assumed, in the order of the paper's four steps.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
@@ -80,11 +82,11 @@ impl Report {
             text.push_str(title);
             text.push('\n');
             for finding in findings {
-                text.push_str(&format!("  {:<16}{}\n", finding.about, finding.says));
+                let _ = writeln!(text, "  {:<16}{}", finding.about, finding.says);
                 if !finding.sizes.is_empty() {
                     let sizes: Vec<String> =
                         finding.sizes.iter().map(ToString::to_string).collect();
-                    text.push_str(&format!("  {:<16}  {}\n", "", sizes.join(", ")));
+                    let _ = writeln!(text, "  {:<16}  {}", "", sizes.join(", "));
                 }
             }
         }

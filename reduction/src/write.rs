@@ -44,6 +44,13 @@ pub(crate) fn model_file(draft: &Draft) -> String {
             float(coordinate.nominal)
         );
     }
+    frames_and_points(&mut text, draft);
+    masses(&mut text, draft);
+    loops_and_drives(&mut text, draft);
+    text
+}
+
+fn frames_and_points(text: &mut String, draft: &Draft) {
     for frame in &draft.frames {
         let _ = writeln!(
             text,
@@ -81,6 +88,9 @@ pub(crate) fn model_file(draft: &Draft) -> String {
             value(&point.at[1])
         );
     }
+}
+
+fn masses(text: &mut String, draft: &Draft) {
     for part in &draft.parts {
         let _ = writeln!(
             text,
@@ -103,6 +113,9 @@ pub(crate) fn model_file(draft: &Draft) -> String {
         }
         let _ = writeln!(text, "at = \"{at}\"");
     }
+}
+
+fn loops_and_drives(text: &mut String, draft: &Draft) {
     for (name, [one, two]) in &draft.loops {
         let _ = writeln!(
             text,
@@ -145,7 +158,6 @@ pub(crate) fn model_file(draft: &Draft) -> String {
             );
         }
     }
-    text
 }
 
 fn table(text: &mut String, name: &str, key: &str, symbols: &[&Symbol]) {

@@ -130,11 +130,14 @@ fn rig() -> modelmill_rig::Rig {
         p_slide,
         slide * Vector3::y(),
     );
+    let named = |table: &str, name: &str, joint: &str| {
+        format!("[[{table}]]\nname = \"{name}\"\njoint = \"{joint}_joint\"\n")
+    };
     for name in ["shoulder", "elbow", "quill"] {
-        text += &format!("[[coordinate]]\nname = \"{name}\"\njoint = \"{name}_joint\"\n");
+        text.push_str(&named("coordinate", name, name));
     }
     for name in ["shoulder", "elbow", "quill"] {
-        text += &format!("[[drive]]\nname = \"{name}_drive\"\njoint = \"{name}_joint\"\n");
+        text.push_str(&named("drive", &format!("{name}_drive"), name));
     }
     text += "[[effect]]\nkind = \"viscous_friction\"\nat = [\"shoulder_drive\"]\nvalues = { Fv = 0.8 }\n";
     modelmill_rig::load("arm.toml", &text, &mut |_| unreachable!())
