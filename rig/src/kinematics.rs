@@ -57,6 +57,13 @@ pub enum PoseError {
         /// The body that is freest to move.
         body: String,
     },
+    /// There are more coordinates than the joints leave freedoms.
+    TooManyCoordinates {
+        /// Freedoms.
+        freedoms: usize,
+        /// Coordinates.
+        coordinates: usize,
+    },
     /// The drives cannot move the mechanism here: no forces of theirs balance a load.
     DrivesDeadlocked,
 }
@@ -73,6 +80,14 @@ impl fmt::Display for PoseError {
                 f,
                 "joints and coordinates do not determine the motion: `{body}` is free to move; keep clear of \
                  singular poses, or hold it by a joint"
+            ),
+            Self::TooManyCoordinates {
+                freedoms,
+                coordinates,
+            } => write!(
+                f,
+                "the joints leave {freedoms} freedoms, and {coordinates} coordinates cannot all be prescribed; give as \
+                 many coordinates and drives as there are freedoms"
             ),
             Self::DrivesDeadlocked => write!(
                 f,
@@ -114,7 +129,8 @@ pub struct Tracker<'r> {
 impl<'r> Tracker<'r> {
     /// Starts at the nominal configuration, closed exactly.
     ///
-    /// Fails when the joints do not close there, or do not determine the pose.
+    /// Fails when the joints do not close there, leave too few freedoms for the coordinates, or with them do not
+    /// determine the pose.
     pub fn new(rig: &'r Rig) -> Result<Self, PoseError> {
         let base = BodyMotion::at_rest(Pose::identity());
         let poses: Vec<Pose> = rig.bodies.iter().map(|body| body.nominal).collect();
@@ -144,7 +160,32 @@ impl<'r> Tracker<'r> {
         };
         let q = tracker.last.clone();
         tracker.close(&q)?;
+        tracker.check_freedoms()?;
         Ok(tracker)
+    }
+
+    /// More coordinates than freedoms would contradict each other as soon as the rig moves. The rank of the joints'
+    /// equations can only be lower at a special pose, so that this never refuses a sound rig.
+    fn check_freedoms(&self) -> Result<(), PoseError> {
+        let n = 6 * self.rig.bodies.len();
+        let coordinates = self.last.len();
+        let n_joint = self.equations.len() - coordinates;
+        let bodies: Vec<BodyMotion> = self.poses.iter().map(|p| BodyMotion::at_rest(*p)).collect();
+        let mut jacobian: DMatrix<f64> = DMatrix::zeros(n_joint.max(n), n);
+        for (i, (pair, _)) in self.equations[..n_joint].iter().enumerate() {
+            let derived = pair.derive(&bodies, &self.base);
+            derived.scatter(pair, |column, value| jacobian[(i, column)] += value);
+        }
+        let r: DMatrix<f64> = ColPivQR::new(jacobian).r();
+        let held = (0..n).filter(|i| r[(*i, *i)].abs() > RANK_TOLERANCE * r[(0, 0)].abs());
+        let freedoms = n - held.count();
+        if coordinates > freedoms {
+            return Err(PoseError::TooManyCoordinates {
+                freedoms,
+                coordinates,
+            });
+        }
+        Ok(())
     }
 
     /// Values of the coordinates at the pose where the tracker stands.

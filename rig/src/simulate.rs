@@ -129,12 +129,18 @@ pub fn forces(rig: &Rig, motion: &Motion) -> Result<Vec<f64>, PoseError> {
             .pair(rig)
             .map_or_else(Measured::default, |pair| measure(pair, motion))
     };
+    // Programs may write places down themselves: an index that leads nowhere does nothing.
+    let load = |drive: usize| mechanical.get(drive).copied().unwrap_or(0.0);
     let mut at_drives = vec![0.0; rig.drives.len()];
     let mut in_joints: Vec<(&Pair, f64)> = Vec::new();
     for effect in &rig.effects {
-        for (place, force) in effect.forces(measured, |drive| mechanical[drive]) {
+        for (place, force) in effect.forces(measured, load) {
             match place {
-                Place::Drive(drive) => at_drives[drive] += force,
+                Place::Drive(drive) => {
+                    if let Some(sum) = at_drives.get_mut(drive) {
+                        *sum += force;
+                    }
+                }
                 place => in_joints.extend(place.pair(rig).map(|pair| (pair, force))),
             }
         }
