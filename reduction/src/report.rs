@@ -71,26 +71,39 @@ impl Report {
         ];
         let mut text = String::new();
         for (step, title) in (1..).zip(titles) {
-            let mut findings = self
+            let findings: Vec<&Finding> = self
                 .findings
                 .iter()
                 .filter(|finding| finding.step == step)
-                .peekable();
-            if findings.peek().is_none() {
+                .collect();
+            if findings.is_empty() {
                 continue;
             }
-            text.push_str(title);
-            text.push('\n');
-            for finding in findings {
-                let _ = writeln!(text, "  {:<16}{}", finding.about, finding.says);
-                if !finding.sizes.is_empty() {
-                    let sizes: Vec<String> =
-                        finding.sizes.iter().map(ToString::to_string).collect();
+            let _ = writeln!(text, "{title}");
+            // What is exact for many groups in a row is said once.
+            for alike in findings.chunk_by(|a, b| a.is_exactly_like(b)) {
+                let one = alike[0];
+                if alike.len() > 1 {
+                    let names: Vec<&str> = alike.iter().map(|f| f.about.as_str()).collect();
+                    let _ = writeln!(text, "  {}\n  {:<16}{}", names.join(", "), "", one.says);
+                } else {
+                    let _ = writeln!(text, "  {:<16}{}", one.about, one.says);
+                }
+                if !one.sizes.is_empty() {
+                    let sizes: Vec<String> = one.sizes.iter().map(ToString::to_string).collect();
                     let _ = writeln!(text, "  {:<16}  {}", "", sizes.join(", "));
                 }
             }
         }
         text
+    }
+}
+
+impl Finding {
+    /// Whether another finding says the same of something else, and both neglect nothing.
+    fn is_exactly_like(&self, other: &Self) -> bool {
+        let is_exact = |finding: &Self| !finding.sizes.iter().any(Size::is_felt);
+        self.says == other.says && is_exact(self) && is_exact(other)
     }
 }
 

@@ -121,7 +121,9 @@ fn check_columns(merged: &Merged, log: &mut Log) {
         let (file, range) = last.unwrap_or((0, 0..0));
         log.error(
             span(file, &range),
-            format!("this rig has {n_coordinates} coordinates and {n_drives} drives"),
+            format!(
+                "coordinates ({n_coordinates}) and drives ({n_drives}) of this rig do not match"
+            ),
             "",
             "give one `[[coordinate]]` and one `[[drive]]` per degree of freedom",
         );

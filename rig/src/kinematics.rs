@@ -86,8 +86,8 @@ impl fmt::Display for PoseError {
                 coordinates,
             } => write!(
                 f,
-                "the joints leave {freedoms} freedoms, and {coordinates} coordinates cannot all be prescribed; give as \
-                 many coordinates and drives as there are freedoms"
+                "the joints leave fewer degrees of freedom ({freedoms}) than there are coordinates ({coordinates}); give as \
+                 many coordinates and drives as there are degrees of freedom"
             ),
             Self::DrivesDeadlocked => write!(
                 f,

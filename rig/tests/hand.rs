@@ -211,3 +211,28 @@ fn power_balances_energy() {
         );
     }
 }
+
+/// What a tracker has kept from earlier poses saves time and changes nothing: jumps and small steps end where a fresh
+/// start ends.
+#[test]
+fn the_past_of_a_tracker_does_not_show() {
+    let rig = common::load("spidermill-with-rods");
+    let fresh = Tracker::new(&rig).expect("a pose");
+    let mut used = fresh.clone();
+    for (i, draw) in states(2, 40).into_iter().enumerate() {
+        // Jumps across the workspace, and between them steps as small as those of a recording.
+        let reach = if i % 4 == 0 { 0.6 } else { 0.004 };
+        let state = State {
+            q: vec![
+                1.8 + reach * draw.q[0],
+                1.341_592_653_589_793 + reach * draw.q[1],
+            ],
+            ..draw
+        };
+        let kept = force(&rig, &mut used, &state);
+        let anew = force(&rig, &mut fresh.clone(), &state);
+        for (x, y) in kept.iter().zip(anew) {
+            close(*x, y, 1e-9);
+        }
+    }
+}
