@@ -1,5 +1,6 @@
 //! `reduce`: a full-body rig to a planar model, with the size of every approximation.
 
+use std::fmt::Write as _;
 use std::path::Path;
 
 use modelmill_codegen::{Evaluator, States};
@@ -59,7 +60,7 @@ pub(crate) fn run(args: &ReduceArgs) -> Outcome {
     let mut text = reduction.report.text();
     text.push_str("Price - forces of the model against those of the rig, relative\n");
     for one in &forces {
-        text.push_str(&format!("  {:<16}{:.1e}\n", one.drive, one.nrms));
+        let _ = writeln!(text, "  {:<16}{:.1e}", one.drive, one.nrms);
     }
     terminal::print(&text)?;
     terminal::note(&format!(
