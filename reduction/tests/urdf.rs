@@ -256,3 +256,29 @@ fn what_makes_no_model_is_said() {
         .replace("<link name='b'/>", "<link name='b'><inertial><mass value='-1'/><inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/></inertial></link>");
     assert!(says(&heavy).contains("`b` is no number that a body can have"));
 }
+
+/// Descriptions that someone is still writing: cut anywhere, or with a line left out, they give an answer and no panic.
+#[test]
+fn unfinished_descriptions_give_an_answer() {
+    let lines: Vec<&str> = ARM.lines().collect();
+    let without = (0..lines.len()).map(|k| [&lines[..k], &lines[k + 1..]].concat().join("\n"));
+    let cut = (0..ARM.len())
+        .step_by(29)
+        .filter_map(|k| ARM.get(..k).map(str::to_owned));
+    let odd = ["\"4\"", "\"0.2 0 0\"", "\"upper\"", "revolute", "xyz"]
+        .into_iter()
+        .flat_map(|old| {
+            ["\"\"", "\"nan\"", "\"1e999 0 0\"", "\"-\""].map(|new| ARM.replace(old, new))
+        });
+    let mut sound = 0;
+    for unfinished in without.chain(cut).chain(odd) {
+        match import_urdf(&unfinished) {
+            Ok(imported) => {
+                sound += 1;
+                assert!(imported.model.contains("[[frame]]"));
+            }
+            Err(error) => assert!(!error.to_string().is_empty()),
+        }
+    }
+    assert!(sound > 0);
+}

@@ -79,3 +79,28 @@ fn a_file_of_megabytes_and_one_of_nonsense() {
         assert!(load("rig.toml", text, none).is_err(), "{text:?}");
     }
 }
+
+/// Files that someone is still writing: cut anywhere, or with a line left out, they give an answer and no panic.
+#[test]
+fn unfinished_files_give_an_answer() {
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/rigs/spidermill-full.toml");
+    let text = std::fs::read_to_string(path).expect("a rig");
+    let none = &mut |_: &Path| Err(std::io::Error::other("none"));
+    let mut sound = 0;
+    let lines: Vec<&str> = text.lines().collect();
+    let without = (0..lines.len())
+        .step_by(5)
+        .map(|k| [&lines[..k], &lines[k + 1..]].concat().join("\n"));
+    let cut = (0..text.len())
+        .step_by(211)
+        .filter_map(|k| text.get(..k).map(str::to_owned));
+    for unfinished in without.chain(cut) {
+        match load("rig.toml", &unfinished, none) {
+            // A comment that is missing does no harm; a joint that is missing may leave a body free.
+            Ok(loaded) => sound += usize::from(Tracker::new(&loaded.rig).is_ok()),
+            Err(failure) => assert!(!failure.render(false).is_empty()),
+        }
+    }
+    assert!(sound > 5);
+}
