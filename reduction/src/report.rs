@@ -109,16 +109,9 @@ impl Finding {
 
 impl std::fmt::Display for Size {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if self.is_felt() {
-            write!(
-                f,
-                "{} {} {}",
-                self.of,
-                crate::write::digits(self.value, 4),
-                self.unit
-            )
-        } else {
-            write!(f, "{} none", self.of)
-        }
+        // What is rounding shows as such by its exponent.
+        let n_digits = if self.is_felt() { 4 } else { 1 };
+        let value = crate::write::digits(self.value, n_digits);
+        write!(f, "{} {value} {}", self.of, self.unit)
     }
 }
