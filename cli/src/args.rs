@@ -70,6 +70,37 @@ pub(crate) enum Command {
         modelmill compare model-spec/models/spidermill.toml \\\n      \
         --data recordings/spidermill-mbs/with-rods-check.csv --parameters fit.json --json")]
     Compare(CompareArgs),
+    /// Drive a full-body rig along a trajectory and record what its sensors read
+    #[command(
+        after_help = "The trajectory (CSV) has a column t and one per coordinate of the rig; its rates and \
+        accelerations are taken from columns with _d and _dd, or else found by differences over five samples. \
+        Effects, noise, resolution, delay and sampling rate are those of the rig file.\n\n\
+        Examples (from the project's root):\n  \
+        modelmill simulate model-spec/rigs/spidermill-full.toml \\\n      \
+        --trajectory recordings/spidermill-mbs/plain-fit.csv --out run.csv\n  \
+        modelmill simulate rig.toml --trajectory traj.csv --out run.csv --seed 7"
+    )]
+    Simulate(SimulateArgs),
+    /// Reduce a full-body rig to a planar model file, and say the size of every approximation
+    #[command(
+        after_help = "The plan (TOML) names the plane, the bodies that become one part, those that become point \
+        masses, and the symbols that parts share; without one every body becomes a part of its own. Every claim is \
+        measured along sampled motions of the rig, and the model's forces are held against the rig's.\n\n\
+        Examples (from the project's root):\n  \
+        modelmill reduce model-spec/rigs/spidermill-full.toml \\\n      \
+        --plan model-spec/rigs/spidermill-plan.toml --out reduced.toml\n  \
+        modelmill reduce linkage.toml --out model.toml --json"
+    )]
+    Reduce(ReduceArgs),
+    /// Make a model file of a URDF, as a starting point
+    #[command(
+        after_help = "Macros (xacro) must be expanded first. Links behind fixed joints join the body that carries \
+        them; every body gets its ten linear parameters.\n\n\
+        Examples:\n  \
+        modelmill import robot.urdf --out robot.toml\n  \
+        modelmill check robot.toml"
+    )]
+    Import(ImportArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Examples:\n  \
         modelmill completions bash > ~/.local/share/bash-completion/completions/modelmill\n  \
@@ -238,6 +269,54 @@ pub(crate) struct CompareArgs {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) preparation: PreparationArgs,
+}
+
+/// `simulate`.
+#[derive(Debug, Args)]
+pub(crate) struct SimulateArgs {
+    /// Rig file (TOML)
+    pub(crate) rig: PathBuf,
+    /// Trajectory (CSV): t and the coordinates, with or without derivatives
+    #[arg(long, value_name = "TRAJ.csv")]
+    pub(crate) trajectory: PathBuf,
+    /// Write the recording to this file
+    #[arg(long, value_name = "RUN.csv")]
+    pub(crate) out: PathBuf,
+    /// Seed of the noise; the rig's own if not given
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// The trajectory calls our column by another name, e.g. `--map theta1=pos_left`; may be repeated
+    #[arg(long, value_name = "OURS=THEIRS", value_parser = crate::preparation::parse_map)]
+    pub(crate) map: Vec<(String, String)>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `reduce`.
+#[derive(Debug, Args)]
+pub(crate) struct ReduceArgs {
+    /// Rig file (TOML)
+    pub(crate) rig: PathBuf,
+    /// Plan of the reduction (TOML); every body a part of its own if not given
+    #[arg(long, value_name = "PLAN.toml")]
+    pub(crate) plan: Option<PathBuf>,
+    /// Write the model to this file
+    #[arg(long, value_name = "MODEL.toml")]
+    pub(crate) out: PathBuf,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `import`.
+#[derive(Debug, Args)]
+pub(crate) struct ImportArgs {
+    /// Robot description (URDF)
+    pub(crate) urdf: PathBuf,
+    /// Write the model to this file
+    #[arg(long, value_name = "MODEL.toml")]
+    pub(crate) out: PathBuf,
 }
 
 /// `completions`.

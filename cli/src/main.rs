@@ -60,6 +60,9 @@ fn run(command: &Command) -> Outcome {
         Command::Evaluate(args) => commands::evaluate::run(args),
         Command::Identify(args) => commands::identify::run(args),
         Command::Compare(args) => commands::compare::run(args),
+        Command::Simulate(args) => commands::simulate::run(args),
+        Command::Reduce(args) => commands::reduce::run(args),
+        Command::Import(args) => commands::import::run(args),
         Command::Completions(args) => commands::completions::run(args),
         Command::Tour(args) => commands::tour::run(args),
     }

@@ -75,7 +75,7 @@ impl PreparationArgs {
     }
 }
 
-fn parse_map(text: &str) -> Result<(String, String), String> {
+pub(crate) fn parse_map(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((ours, theirs)) if !ours.trim().is_empty() && !theirs.trim().is_empty() => {
             Ok((ours.trim().to_owned(), theirs.trim().to_owned()))

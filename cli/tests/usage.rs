@@ -61,6 +61,9 @@ fn every_command_helps_with_an_example() {
         "evaluate",
         "identify",
         "compare",
+        "simulate",
+        "reduce",
+        "import",
         "completions",
         "tour",
     ] {

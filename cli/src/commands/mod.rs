@@ -8,4 +8,7 @@ pub(crate) mod equations;
 pub(crate) mod evaluate;
 pub(crate) mod generate;
 pub(crate) mod identify;
+pub(crate) mod import;
+pub(crate) mod reduce;
+pub(crate) mod simulate;
 pub(crate) mod tour;

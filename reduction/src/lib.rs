@@ -1,0 +1,35 @@
+//! The reduction of a full-body rig to a planar model: the strategy of the SpiderMill paper, section 2.3.
+//!
+//! A rig and a plan go in; a model file comes out, with a report of everything that was assumed and how large it is.
+//! Nothing is taken on trust: the rig is moved through sampled motions, and each claim (this lies in the plane, these
+//! move alike, this only translates, this loop closes) is measured along them. The steps:
+//!
+//! 1. planar reduction - `planar`: bodies as the plane sees them;
+//! 2. substitution parts and lumped masses, eq. (1) - `part`;
+//! 3. symmetry: what shares a symbol - `draft`;
+//! 4. drives - `drive`.
+//!
+//! Beside it, [`import_urdf`] makes a model file of a robot description of ROS.
+
+mod draft;
+mod drive;
+mod names;
+mod part;
+mod plan;
+mod plan_for;
+mod planar;
+mod reduce;
+mod reduce_drives;
+mod reduce_parts;
+mod report;
+mod samples;
+mod urdf;
+mod urdf_geometry;
+mod write;
+
+pub use plan::{Plan, plan, plan_file};
+pub use plan_for::plan_for;
+pub use reduce::{Reduction, reduce};
+pub use report::{Finding, Report, Size};
+pub use samples::sampled_forces;
+pub use urdf::{Imported, UrdfError, import_urdf};

@@ -1,0 +1,165 @@
+//! Names of a plan looked up in its rig: bodies, groups, points, parts. All findings are collected.
+
+use modelmill_rig::{Anchor, Log, Rig, span};
+
+use crate::part::Part;
+use crate::plan::{Name, PlanEntry};
+
+/// A name that leads nowhere, which was reported.
+pub(crate) struct Unknown;
+
+/// Names that a plan may use.
+pub(crate) struct Names<'a> {
+    pub(crate) rig: &'a Rig,
+    pub(crate) plan: &'a PlanEntry,
+    /// Groups with their bodies; a body that no group names is one by itself.
+    pub(crate) groups: Vec<(String, Vec<usize>)>,
+}
+
+impl<'a> Names<'a> {
+    pub(crate) fn new(rig: &'a Rig, plan: &'a PlanEntry, log: &mut Log) -> Self {
+        let bodies: Vec<&str> = rig.bodies.iter().map(|body| body.name.as_str()).collect();
+        let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
+        let mut taken = vec![false; bodies.len()];
+        for group in &plan.group {
+            let mut members = Vec::new();
+            for name in &group.bodies {
+                match bodies.iter().position(|body| body == name.get_ref()) {
+                    None => log.unknown(0, name, "body of the rig", &bodies),
+                    Some(at) if taken[at] => twice(name, "group", log),
+                    Some(at) => {
+                        taken[at] = true;
+                        members.push(at);
+                    }
+                }
+            }
+            if !members.is_empty() {
+                groups.push((group.name.get_ref().clone(), members));
+            }
+        }
+        for (at, body) in bodies.iter().enumerate().filter(|(at, _)| !taken[*at]) {
+            groups.push(((*body).to_owned(), vec![at]));
+        }
+        Self { rig, plan, groups }
+    }
+
+    /// Bodies of groups; each group may be used once.
+    pub(crate) fn bodies(
+        &self,
+        names: &[Name],
+        used: &mut Vec<String>,
+        log: &mut Log,
+    ) -> Vec<usize> {
+        let known: Vec<&str> = self.groups.iter().map(|(name, _)| name.as_str()).collect();
+        let mut bodies = Vec::new();
+        for name in names {
+            match self
+                .groups
+                .iter()
+                .find(|(group, _)| group == name.get_ref())
+            {
+                None => log.unknown(0, name, "group", &known),
+                Some(_) if used.contains(name.get_ref()) => twice(name, "part or lumped mass", log),
+                Some((group, members)) => {
+                    used.push(group.clone());
+                    bodies.extend(members);
+                }
+            }
+        }
+        bodies
+    }
+
+    /// A point by its name in the model or, where `[points]` does not have it, in the rig.
+    pub(crate) fn point(&self, name: &Name, log: &mut Log) -> Option<Anchor> {
+        let renamed = self
+            .plan
+            .points
+            .iter()
+            .find(|(model, _)| model.get_ref() == name.get_ref());
+        let wanted = renamed.map_or(name, |(_, rig)| rig);
+        let found = self
+            .rig
+            .points
+            .iter()
+            .find(|point| &point.name == wanted.get_ref());
+        if found.is_none() {
+            let known: Vec<&str> = self
+                .rig
+                .points
+                .iter()
+                .map(|point| point.name.as_str())
+                .collect();
+            log.unknown(0, wanted, "point of the rig", &known);
+        }
+        found.map(|point| point.anchor)
+    }
+
+    /// What the model calls a point of the rig.
+    pub(crate) fn point_name(&self, anchor: &Anchor) -> Option<String> {
+        let here = |name: &str| {
+            self.rig
+                .points
+                .iter()
+                .any(|point| point.name == name && &point.anchor == anchor)
+        };
+        let renamed = self.plan.points.iter().find(|(_, rig)| here(rig.get_ref()));
+        // A rig's own name may be taken by another point of the model.
+        let free = |name: &str| self.plan.points.keys().all(|model| model.get_ref() != name);
+        renamed
+            .map(|(model, _)| model.get_ref().clone())
+            .or_else(|| {
+                let own = self
+                    .rig
+                    .points
+                    .iter()
+                    .find(|point| &point.anchor == anchor && free(&point.name));
+                own.map(|point| point.name.clone())
+            })
+    }
+
+    /// The part that a point is on, none for the base; only leading bodies have a place in the model.
+    pub(crate) fn owner(
+        &self,
+        parts: &[Part],
+        anchor: &Anchor,
+        name: &Name,
+        log: &mut Log,
+    ) -> Result<Option<usize>, Unknown> {
+        let Some(body) = anchor.body else {
+            return Ok(None);
+        };
+        let part = parts
+            .iter()
+            .position(|part| part.bodies.first() == Some(&body));
+        if part.is_none() {
+            let leads: Vec<&str> = parts
+                .iter()
+                .filter_map(|part| {
+                    part.bodies
+                        .first()
+                        .map(|lead| self.rig.bodies[*lead].name.as_str())
+                })
+                .collect();
+            log.error(
+                span(0, &name.span()),
+                format!(
+                    "`{}` is on `{}`, which leads no part",
+                    name.get_ref(),
+                    self.rig.bodies[body].name
+                ),
+                "expected a point of the base or of a body that leads a part",
+                &format!("bodies that lead a part are {}", leads.join(", ")),
+            );
+        }
+        part.map(Some).ok_or(Unknown)
+    }
+}
+
+fn twice(name: &Name, what: &str, log: &mut Log) {
+    log.error(
+        span(0, &name.span()),
+        format!("`{}` is in more than one {what}", name.get_ref()),
+        "this is the second time",
+        "its mass would count twice; delete one of them",
+    );
+}

@@ -1,0 +1,123 @@
+//! A plan for a rig that has none: every body is a part, hung on the first revolute joint that reaches it from the
+//! base; joints that are left over close loops.
+//!
+//! The plan is written as the text of a plan file over points that are added to a copy of the rig, so that it goes
+//! the same way as a plan by hand.
+
+use std::fmt::Write as _;
+
+use modelmill_rig::{Anchor, Point, Rig};
+use nalgebra::Vector3;
+
+use crate::plan::{Plan, plan};
+
+/// Makes a plan in which every body is a part of its own.
+///
+/// Fails when a body cannot be reached by revolute joints; such rigs need a plan by hand.
+pub fn plan_for(rig: &Rig) -> Result<Plan, String> {
+    let mut rig = rig.clone();
+    let hinges: Vec<(usize, [Anchor; 2])> = (0..rig.joints.len())
+        .filter_map(|j| rig.hinge(j).map(|anchors| (j, anchors)))
+        .collect();
+    if let Some(other) = (0..rig.joints.len()).find(|j| rig.hinge(*j).is_none()) {
+        return Err(format!(
+            "`{}` is no revolute joint: reducing this rig takes a plan (--plan), in which parts and lumped masses stand \
+             for what other joints hold",
+            rig.joints[other].name
+        ));
+    }
+    let mut text = format!("schema = 1\nname = \"{}_reduced\"\n", rig.name);
+    let mut loops = String::new();
+    let mut carried = vec![false; rig.bodies.len()];
+    let is_carried = |carried: &[bool], body: Option<usize>| body.is_none_or(|body| carried[body]);
+    let mut waiting = hinges.clone();
+    while let Some(next) = waiting
+        .iter()
+        .position(|(_, [a, b])| is_carried(&carried, a.body) || is_carried(&carried, b.body))
+    {
+        let (joint, [a, b]) = waiting.remove(next);
+        let name = rig.joints[joint].name.clone();
+        if is_carried(&carried, a.body) && is_carried(&carried, b.body) {
+            let ends = [a, b].map(|anchor| add_point(&mut rig, &name, anchor));
+            let _ = writeln!(
+                loops,
+                "\n[[loop]]\nname = \"{name}\"\njoins = [\"{}\", \"{}\"]",
+                ends[0], ends[1]
+            );
+            continue;
+        }
+        let (at, from) = if is_carried(&carried, a.body) {
+            (a, b)
+        } else {
+            (b, a)
+        };
+        let Some(body) = from.body else { continue };
+        carried[body] = true;
+        let end = far_end(&rig, &hinges, body, &from.at);
+        let points =
+            [at, from, Anchor { at: end, ..from }].map(|anchor| add_point(&mut rig, &name, anchor));
+        let part = &rig.bodies[body].name;
+        let on = at
+            .body
+            .map_or("base", |carrier| rig.bodies[carrier].name.as_str());
+        let coordinate = rig
+            .coordinate_of_joint(joint)
+            .map_or(name, |c| rig.coordinates[c].name.clone());
+        let _ = writeln!(
+            text,
+            "\n[[part]]\nname = \"{part}\"\ngroups = [\"{part}\"]\non = \"{on}\"\nat = \"{}\"\nfrom = \"{}\"\nto = \
+             \"{}\"\ncoordinate = \"{coordinate}\"",
+            points[0], points[1], points[2]
+        );
+    }
+    if let Some(body) = carried.iter().position(|reached| !reached) {
+        return Err(format!(
+            "no revolute joint reaches `{}` from the base",
+            rig.bodies[body].name
+        ));
+    }
+    text.push_str(&loops);
+    let mut plan =
+        plan("the plan made for this rig", &text).map_err(|failure| failure.render(false))?;
+    plan.rig = Some(Box::new(rig));
+    Ok(plan)
+}
+
+/// The end of a body's longitudinal axis: its farthest other joint, else its centre of mass, else along x.
+fn far_end(
+    rig: &Rig,
+    hinges: &[(usize, [Anchor; 2])],
+    body: usize,
+    from: &Vector3<f64>,
+) -> Vector3<f64> {
+    let here = hinges
+        .iter()
+        .flat_map(|(_, anchors)| anchors)
+        .filter(|anchor| anchor.body == Some(body));
+    let candidates = here.map(|anchor| anchor.at);
+    let farthest = candidates.max_by(|a, b| (a - from).norm().total_cmp(&(b - from).norm()));
+    let is_apart = |place: &Vector3<f64>| (place - from).norm() > 1e-6;
+    let centre = rig.bodies[body].centre;
+    farthest
+        .filter(is_apart)
+        .or(Some(centre).filter(is_apart))
+        .unwrap_or(from + Vector3::x())
+}
+
+/// The name of a point at a place: one that is there, or a new one.
+fn add_point(rig: &mut Rig, stem: &str, anchor: Anchor) -> String {
+    if let Some(point) = rig.points.iter().find(|point| point.anchor == anchor) {
+        return point.name.clone();
+    }
+    let mut n = 1;
+    let mut name = format!("{stem}_{n}");
+    while rig.points.iter().any(|point| point.name == name) {
+        n += 1;
+        name = format!("{stem}_{n}");
+    }
+    rig.points.push(Point {
+        name: name.clone(),
+        anchor,
+    });
+    name
+}

@@ -1,0 +1,260 @@
+//! Loops, step 4 and what remains: drives and effects go over, and nothing is forgotten.
+
+use modelmill_rig::{Log, span};
+
+use crate::draft::DraftEffect;
+use crate::drive::check_linear;
+use crate::plan::Name;
+use crate::reduce::{TOLERANCE, Work};
+use crate::report::Size;
+use crate::write::digits;
+
+impl Work<'_> {
+    pub(crate) fn loops(&mut self, log: &mut Log) {
+        let plan = self.names.plan;
+        for entry in &plan.loops {
+            let [one, two] = &entry.joins;
+            let ends = (self.model_point(one, log), self.model_point(two, log));
+            let (Some((first, a)), Some((second, b))) = ends else {
+                continue;
+            };
+            let places = [a, b].map(|anchor| {
+                let part = self
+                    .parts
+                    .iter()
+                    .position(|part| part.bodies.first() == anchor.body.as_ref());
+                self.contact(&anchor, part)
+            });
+            let gap = self.samples.largest(|moment| {
+                let [p, r] = places
+                    .map(|place| place.place(&self.parts, moment, &self.plane, &self.samples));
+                (p - r).norm()
+            });
+            if gap > TOLERANCE || gap.is_nan() {
+                log.error(
+                    span(0, &two.span()),
+                    format!(
+                        "the loop `{}` does not close: its points are up to {} m apart",
+                        entry.name.get_ref(),
+                        digits(gap, 3)
+                    ),
+                    "expected a place that stays at the first point, once parts are shifted",
+                    "",
+                );
+            }
+            self.report.add(
+                2,
+                entry.name.get_ref(),
+                format!("closes where {first} meets {second}"),
+                vec![Size::new("gap", gap, "m")],
+            );
+            self.draft
+                .loops
+                .push((entry.name.get_ref().clone(), [first, second]));
+        }
+    }
+
+    /// Step 4.
+    pub(crate) fn drives(&mut self, log: &mut Log) {
+        let (rig, plan) = (self.names.rig, self.names.plan);
+        let known: Vec<&str> = rig.drives.iter().map(|drive| drive.name.as_str()).collect();
+        for entry in plan
+            .drive
+            .iter()
+            .filter(|entry| !known.contains(&entry.name.get_ref().as_str()))
+        {
+            log.unknown(0, &entry.name, "drive of the rig", &known);
+        }
+        for (d, drive) in rig.drives.iter().enumerate() {
+            let entry = plan
+                .drive
+                .iter()
+                .find(|entry| entry.name.get_ref() == &drive.name);
+            let here = entry.map_or_else(|| &plan.name, |entry| &entry.name);
+            let Some(ends) = rig.ends_of_drive(d) else {
+                let coordinate = rig
+                    .coordinate_of_drive(d)
+                    .map(|c| rig.coordinates[c].name.clone());
+                let active = coordinate.filter(|name| {
+                    self.draft
+                        .coordinates
+                        .iter()
+                        .any(|c| &c.name == name && !c.passive)
+                });
+                match active {
+                    Some(coordinate) => {
+                        self.report
+                            .add(4, &drive.name, format!("turns {coordinate}"), Vec::new());
+                        self.draft.drives.push((drive.name.clone(), Ok(coordinate)));
+                    }
+                    None => log.error(
+                        span(0, &here.span()),
+                        format!(
+                            "the joint of the drive `{}` is the joint of no part",
+                            drive.name
+                        ),
+                        "",
+                        "give the part that hangs in this joint the joint's coordinate",
+                    ),
+                }
+                continue;
+            };
+            let on_axis = entry.is_some_and(|entry| entry.contact_on_axis);
+            let mut contacts = Vec::new();
+            let mut names = Vec::new();
+            for end in ends {
+                let Some(name) = self.names.point_name(&end) else {
+                    continue;
+                };
+                let named = Name::new(here.span(), name.clone());
+                let Ok(part) = self.names.owner(&self.parts, &end, &named, log) else {
+                    continue;
+                };
+                let mut contact = self.contact(&end, part);
+                if on_axis {
+                    contact = contact.on_axis();
+                }
+                self.declare(&name, contact);
+                contacts.push(contact);
+                names.push(name);
+            }
+            if let (&[from, to], [one, two]) = (contacts.as_slice(), names.as_slice()) {
+                let (plane, samples) = (&self.plane, &self.samples);
+                check_linear(
+                    &drive.name,
+                    ends,
+                    [from, to],
+                    &self.parts,
+                    plane,
+                    samples,
+                    &mut self.report,
+                );
+                self.draft
+                    .drives
+                    .push((drive.name.clone(), Err([one.clone(), two.clone()])));
+            }
+        }
+    }
+
+    /// Effects at drives go over into the model; others are left out and named.
+    pub(crate) fn effects(&mut self) {
+        let rig = self.names.rig;
+        for effect in &rig.effects {
+            let (kind, values) = effect.law.described();
+            let drive = |place: &modelmill_rig::Place| match place {
+                modelmill_rig::Place::Drive(d) => {
+                    rig.drives.get(*d).map(|drive| drive.name.clone())
+                }
+                _ => None,
+            };
+            let at: Vec<String> = effect.places.iter().filter_map(drive).collect();
+            let library = modelmill_spec::library();
+            let known = library.iter().find(|known| known.name == kind);
+            let Some(known) = known.filter(|_| at.len() == effect.places.len()) else {
+                self.report.add(
+                    4,
+                    kind,
+                    "acts in the rig and is left out of the model",
+                    Vec::new(),
+                );
+                continue;
+            };
+            let is_parameter = |symbol: &str| known.parameters.iter().any(|p| p.symbol == symbol);
+            let (parameters, constants) = values
+                .into_iter()
+                .map(|(symbol, value)| (symbol.to_owned(), value))
+                .partition(|(symbol, _)| is_parameter(symbol));
+            self.report.add(
+                4,
+                kind,
+                format!("at {} as in the rig", at.join(", ")),
+                Vec::new(),
+            );
+            self.draft.effects.push(DraftEffect {
+                kind: kind.to_owned(),
+                at,
+                parameters,
+                constants,
+            });
+        }
+    }
+
+    /// Every group is in the model, or left out by name.
+    pub(crate) fn nothing_is_forgotten(&mut self, log: &mut Log) {
+        let (rig, plan) = (self.names.rig, self.names.plan);
+        let left = self.names.bodies(&plan.leave_out, &mut self.used, log);
+        for body in left {
+            let solid = crate::planar::solid(rig, body);
+            self.report.add(
+                2,
+                &rig.bodies[body].name,
+                "is left out",
+                vec![
+                    Size::new("mass", solid.mass, "kg"),
+                    Size::new("inertia", solid.inertia.amax(), "kg m^2"),
+                ],
+            );
+        }
+        let forgotten: Vec<&str> = self
+            .names
+            .groups
+            .iter()
+            .map(|(name, _)| name.as_str())
+            .filter(|name| self.used.iter().all(|used| used != name))
+            .collect();
+        if !forgotten.is_empty() {
+            log.error(
+                span(0, &plan.name.span()),
+                format!("the plan forgets {}", forgotten.join(", ")),
+                "",
+                "put each into a `[[part]]` or a `[[lumped_mass]]`, or name it in `leave_out`",
+            );
+        }
+        let split = rig
+            .lumped_masses
+            .iter()
+            .filter(|lumped| lumped.at.at != lumped.moment_at);
+        for lumped in split {
+            let about = lumped
+                .at
+                .body
+                .map_or("base", |body| rig.bodies[body].name.as_str());
+            let says = "has a mass that moments see elsewhere; the model has it at one place";
+            self.report.add(
+                2,
+                about,
+                says,
+                vec![Size::new(
+                    "moved by",
+                    (lumped.at.at - lumped.moment_at).norm(),
+                    "m",
+                )],
+            );
+        }
+    }
+
+    /// Constants of the plan must stand for something.
+    pub(crate) fn check_constants(&self, log: &mut Log) {
+        for is in self
+            .names
+            .plan
+            .constants
+            .values()
+            .flat_map(|constant| &constant.is)
+        {
+            let symbols = &self.draft.constants.0;
+            if !symbols.iter().any(|symbol| {
+                symbol
+                    .stands_for
+                    .iter()
+                    .any(|(what, _)| what == is.get_ref())
+            }) {
+                let known: Vec<&str> = symbols
+                    .iter()
+                    .flat_map(|s| s.stands_for.iter().map(|(what, _)| what.as_str()))
+                    .collect();
+                log.unknown(0, is, "quantity of the model", &known);
+            }
+        }
+    }
+}

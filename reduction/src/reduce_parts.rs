@@ -1,0 +1,517 @@
+//! Step 2 of the reduction: parts hung where they belong, with frame, coordinate, mass, centre and inertia; point
+//! masses where they ride.
+
+use modelmill_rig::{Anchor, Log, span};
+use nalgebra::Vector2;
+
+use crate::draft::{DraftCoordinate, DraftPart, DraftPoint, Frame, rounded};
+use crate::drive::Contact;
+use crate::part::{Part, lump, residuals, substitute};
+use crate::plan::{Name, PartEntry};
+use crate::planar::Flat;
+use crate::reduce::{TOLERANCE, Work, ZERO};
+use crate::samples::Moment;
+use crate::write::digits;
+
+impl Work<'_> {
+    /// Step 2, parts.
+    pub(crate) fn parts(&mut self, log: &mut Log) {
+        let plan = self.names.plan;
+        for entry in &plan.part {
+            if self
+                .parts
+                .iter()
+                .any(|part| &part.name == entry.name.get_ref())
+            {
+                log.error(
+                    span(0, &entry.name.span()),
+                    "there are two parts of this name".to_owned(),
+                    "",
+                    "rename one",
+                );
+            }
+            if let Some(part) = self.part(entry, log) {
+                self.parts.push(part);
+                self.frame(entry, log);
+                self.body(entry, log);
+            }
+        }
+        if plan.part.is_empty() {
+            log.error(
+                span(0, &plan.name.span()),
+                "this plan has no part".to_owned(),
+                "",
+                "write a `[[part]]` for each body that the model is to have",
+            );
+        }
+    }
+
+    /// A part hung where it belongs.
+    pub(crate) fn part(&self, entry: &PartEntry, log: &mut Log) -> Option<Part> {
+        let names = &self.names;
+        let mut used = self.used.clone();
+        let bodies = names.bodies(entry.groups.get_ref(), &mut used, log);
+        let parent = match entry.on.get_ref().as_str() {
+            "base" => None,
+            on => {
+                let known: Vec<&str> = self
+                    .parts
+                    .iter()
+                    .map(|part| part.name.as_str())
+                    .chain(["base"])
+                    .collect();
+                let found = self.parts.iter().position(|part| part.name == on);
+                if found.is_none() {
+                    log.unknown(0, &entry.on, "part above this one", &known);
+                    return None;
+                }
+                found
+            }
+        };
+        let [at, from, to] = [&entry.at, &entry.from, &entry.to].map(|name| names.point(name, log));
+        let (at, from, to) = (at?, from?, to?);
+        let lead = *bodies.first()?;
+        let carrier = parent.map(|parent| self.parts[parent].bodies[0]);
+        for (name, anchor, body) in [
+            (&entry.at, at, carrier),
+            (&entry.from, from, Some(lead)),
+            (&entry.to, to, Some(lead)),
+        ] {
+            if anchor.body != body {
+                let wanted = body.map_or("the base", |b| names.rig.bodies[b].name.as_str());
+                log.error(
+                    span(0, &name.span()),
+                    format!("`{}` is not on {wanted}", name.get_ref()),
+                    "expected a point of this body",
+                    "`at` is on what carries the part, `from` and `to` are on the first body of its first group",
+                );
+                return None;
+            }
+        }
+        let mut part = Part {
+            name: entry.name.get_ref().clone(),
+            bodies,
+            parent,
+            joint: [at, from],
+            to,
+            shift: Vector2::zeros(),
+        };
+        let length = (from.at - to.at).norm();
+        if length < 1e-9 {
+            log.error(
+                span(0, &entry.to.span()),
+                "this part has no length".to_owned(),
+                "expected another point than `from`",
+                "",
+            );
+            return None;
+        }
+        // What the model moves in the plane: the carrier's own shift, and the gap at the joint.
+        let carried = parent.map_or_else(Vector2::zeros, |parent| self.parts[parent].shift);
+        let gap = |moment: &Moment| {
+            self.plane.place(&moment.place(&at)) - self.plane.place(&moment.place(&from)) + carried
+        };
+        part.shift = gap(&self.samples.nominal);
+        let strays = self
+            .samples
+            .largest(|moment| (gap(moment) - part.shift).norm());
+        if strays > TOLERANCE || strays.is_nan() {
+            log.error(
+                span(0, &entry.from.span()),
+                format!(
+                    "`{}` does not hang at `{}`: their distance changes by {} m",
+                    part.name,
+                    entry.at.get_ref(),
+                    digits(strays, 3)
+                ),
+                "expected a place that keeps its distance to `at`",
+                "",
+            );
+            return None;
+        }
+        Some(part)
+    }
+
+    /// Frame and coordinate of the part that was added last.
+    pub(crate) fn frame(&mut self, entry: &PartEntry, log: &mut Log) {
+        let Some(part) = self.parts.last().cloned() else {
+            return;
+        };
+        let carrier = part.parent.map(|parent| self.parts[parent].clone());
+        let (plane, samples) = (self.plane, &self.samples);
+        let angle = |moment: &Moment| {
+            let of = |part: &Part| {
+                part.nominal_angle(&plane, samples) + part.turned(moment, &plane, samples)
+            };
+            of(&part) - carrier.as_ref().map_or(0.0, of)
+        };
+        let coordinate = entry.coordinate.get_ref();
+        let nominal = wrapped(angle(&samples.nominal));
+        let active = self
+            .names
+            .rig
+            .coordinates
+            .iter()
+            .position(|c| &c.name == coordinate);
+        let mut expression = coordinate.clone();
+        if let Some(k) = active {
+            let strays = |sign: f64| {
+                samples.largest(|moment| {
+                    wrapped(
+                        angle(moment)
+                            - nominal
+                            - sign * (moment.state.q[k] - samples.nominal.state.q[k]),
+                    )
+                })
+            };
+            let [ahead, back] = [1.0, -1.0].map(strays);
+            if ahead.min(back) > TOLERANCE {
+                log.error(
+                    span(0, &entry.coordinate.span()),
+                    format!(
+                        "`{coordinate}` of the rig is not the angle of `{}`",
+                        part.name
+                    ),
+                    "expected the coordinate of its joint",
+                    "another name makes a passive coordinate",
+                );
+            }
+            let sign = if ahead <= back { 1.0 } else { -1.0 };
+            let value = samples.nominal.state.q[k];
+            let offset = wrapped(nominal - sign * value);
+            expression = format!(
+                "{}{coordinate}{}",
+                if sign < 0.0 { "-" } else { "" },
+                self.angle_offset(coordinate, offset)
+            );
+            self.draft.coordinates.push(DraftCoordinate {
+                name: coordinate.clone(),
+                nominal: rounded(value),
+                passive: false,
+            });
+        } else {
+            let nominal = (nominal * 1e6).round() / 1e6;
+            self.draft.coordinates.push(DraftCoordinate {
+                name: coordinate.clone(),
+                nominal,
+                passive: true,
+            });
+        }
+        let (on, local) = match &carrier {
+            None => (
+                "base".to_owned(),
+                plane.place(&self.samples.nominal.place(&part.joint[0])),
+            ),
+            Some(carrier) => (
+                carrier.name.clone(),
+                carrier.local(&part.joint[0], &plane, &self.samples),
+            ),
+        };
+        let at = self.components(entry.at.get_ref(), &local);
+        if part.shift.norm() > ZERO {
+            let says = format!(
+                "is shifted by ({}, {}) m to `{}`, which changes no force",
+                digits(part.shift.x, 6),
+                digits(part.shift.y, 6),
+                entry.at.get_ref()
+            );
+            self.report.add(2, &part.name, says, Vec::new());
+        }
+        self.draft.frames.push(Frame {
+            name: part.name.clone(),
+            on,
+            at,
+            angle: expression,
+            note: entry.note.clone().unwrap_or_default(),
+        });
+    }
+
+    /// A constant angle behind a coordinate, as an expression with its sign.
+    pub(crate) fn angle_offset(&mut self, coordinate: &str, offset: f64) -> String {
+        if offset.abs() < 1e-9 {
+            return String::new();
+        }
+        let twelfths = offset / (std::f64::consts::PI / 12.0);
+        if (twelfths - twelfths.round()).abs() < 1e-9 {
+            let sign = if twelfths < 0.0 { '-' } else { '+' };
+            return format!(" {sign} {}*pi/12", twelfths.round().abs());
+        }
+        let name = format!("{coordinate}_offset");
+        self.draft.constants.stand_for(
+            &name,
+            "rad",
+            "from the rig's zero to the part's axis",
+            &name,
+            offset,
+        );
+        format!(" + {name}")
+    }
+
+    /// Expressions of a point's components: constants of the plan, or constants of their own.
+    pub(crate) fn components(&mut self, point: &str, at: &Vector2<f64>) -> [String; 2] {
+        let mut expressions = ["x", "y"].map(str::to_owned);
+        for (axis, value) in expressions.iter_mut().zip([at.x, at.y]) {
+            let what = format!("{point}.{axis}");
+            if value.abs() < ZERO {
+                "0".clone_into(axis);
+                continue;
+            }
+            let named = self
+                .names
+                .plan
+                .constants
+                .iter()
+                .find(|(_, c)| c.is.iter().any(|is| is.get_ref() == &what));
+            let own = format!("{point}_{axis}");
+            let (name, note) = match named {
+                Some((name, constant)) => (
+                    name.get_ref().clone(),
+                    constant.note.clone().unwrap_or_default(),
+                ),
+                None => (own, String::new()),
+            };
+            let symbol = self
+                .draft
+                .constants
+                .0
+                .iter()
+                .find(|symbol| symbol.name == name);
+            if symbol.is_none_or(|symbol| symbol.stands_for.iter().all(|(known, _)| known != &what))
+            {
+                self.draft
+                    .constants
+                    .stand_for(&name, "m", &note, &what, value);
+            }
+            *axis = name;
+        }
+        expressions
+    }
+
+    /// Mass properties of the part that was added last.
+    pub(crate) fn body(&mut self, entry: &PartEntry, log: &mut Log) {
+        let Some(part) = self.parts.last() else {
+            return;
+        };
+        self.used.extend(
+            entry
+                .groups
+                .get_ref()
+                .iter()
+                .map(|name| name.get_ref().clone()),
+        );
+        let name = part.name.clone();
+        let whole = substitute(
+            self.names.rig,
+            part,
+            &self.plane,
+            &self.samples,
+            &mut self.report,
+        );
+        let drops = match entry.off_axis.as_ref().map(|s| s.get_ref().as_str()) {
+            None | Some("keep") => false,
+            Some("drop") => true,
+            Some(_) => {
+                let range = entry.off_axis.as_ref().map_or(0..0, toml::Spanned::span);
+                log.error(
+                    span(0, &range),
+                    "this is no way to treat an offset".to_owned(),
+                    "expected `keep` or `drop`",
+                    "",
+                );
+                false
+            }
+        };
+        let about = |what: &str| format!("{what} of {}", entry.note.as_deref().unwrap_or(&name));
+        let [mass, centre, across, inertia] = symbols_of(entry);
+        let draft = &mut self.draft;
+        draft
+            .masses
+            .stand_for(&mass, "kg", &about("mass"), &name, whole.mass);
+        draft.inertias.stand_for(
+            &inertia,
+            "kg m^2",
+            &about("inertia about the centre of mass"),
+            &name,
+            whole.inertia,
+        );
+        let mut components = ["0", "0"].map(str::to_owned);
+        if whole.centre.x.abs() > ZERO {
+            draft.centres.stand_for(
+                &centre,
+                "m",
+                &about("centre of mass along the axis"),
+                &name,
+                whole.centre.x,
+            );
+            components[0] = centre;
+        }
+        if whole.centre.y.abs() > ZERO && !drops {
+            draft.centres.stand_for(
+                &across,
+                "m",
+                &about("centre of mass beside the axis"),
+                &name,
+                whole.centre.y,
+            );
+            components[1] = across;
+        }
+        let groups: Vec<&str> = entry
+            .groups
+            .get_ref()
+            .iter()
+            .map(|group| group.get_ref().as_str())
+            .collect();
+        let says = format!(
+            "= {}: mass {} kg, centre ({}, {}) m, inertia {} kg m^2",
+            groups.join(" + "),
+            digits(whole.mass, 8),
+            digits(whole.centre.x, 8),
+            digits(
+                if whole.centre.y.abs() > ZERO {
+                    whole.centre.y
+                } else {
+                    0.0
+                },
+                8
+            ),
+            digits(whole.inertia, 8)
+        );
+        self.wholes.push((says, whole));
+        draft.parts.push(DraftPart {
+            name: format!("{name}_body"),
+            on: name,
+            mass,
+            centre: components,
+            inertia,
+        });
+    }
+
+    /// Eq. (1) for every part, once all parts that share a symbol have given it their values.
+    pub(crate) fn check_equation_1(&mut self) {
+        let draft = &self.draft;
+        for (part, (says, whole)) in draft.parts.iter().zip(&self.wholes) {
+            let value = |expression: &String| match expression.as_str() {
+                "0" => 0.0,
+                name => draft.centres.value(name),
+            };
+            let said = Flat {
+                mass: draft.masses.value(&part.mass),
+                centre: Vector2::new(value(&part.centre[0]), value(&part.centre[1])),
+                inertia: draft.inertias.value(&part.inertia),
+            };
+            self.report.add(2, &part.on, says, residuals(whole, &said));
+        }
+    }
+
+    /// Step 2, lumped masses.
+    pub(crate) fn lumped_masses(&mut self, log: &mut Log) {
+        let plan = self.names.plan;
+        for entry in &plan.lumped_mass {
+            let bodies = self
+                .names
+                .bodies(entry.groups.get_ref(), &mut self.used, log);
+            let points: Vec<(String, Anchor)> = entry
+                .at
+                .get_ref()
+                .iter()
+                .filter_map(|name| self.model_point(name, log))
+                .collect();
+            if bodies.is_empty() || points.len() < entry.at.get_ref().len() {
+                continue;
+            }
+            if points.is_empty() {
+                log.error(
+                    span(0, &entry.at.span()),
+                    "this mass is nowhere".to_owned(),
+                    "expected at least one point",
+                    "",
+                );
+                continue;
+            }
+            let name = entry.name.get_ref();
+            let anchors: Vec<Anchor> = points.iter().map(|(_, anchor)| *anchor).collect();
+            let (plane, samples) = (&self.plane, &self.samples);
+            let mass = lump(
+                self.names.rig,
+                name,
+                &bodies,
+                &anchors,
+                plane,
+                samples,
+                &mut self.report,
+            );
+            let symbol = entry.symbol.clone().unwrap_or_else(|| format!("m_{name}"));
+            let note = entry
+                .note
+                .clone()
+                .unwrap_or_else(|| format!("mass of {name}"));
+            self.draft
+                .masses
+                .stand_for(&symbol, "kg", &note, name, mass);
+            for (point, _) in &points {
+                let one = if points.len() == 1 {
+                    name.clone()
+                } else {
+                    format!("{name}_{point}")
+                };
+                self.draft
+                    .lumped_masses
+                    .push((one, symbol.clone(), points.len(), point.clone()));
+            }
+        }
+    }
+
+    /// A point of the model, declared when it is first used.
+    pub(crate) fn model_point(&mut self, name: &Name, log: &mut Log) -> Option<(String, Anchor)> {
+        let anchor = self.names.point(name, log)?;
+        let part = self.names.owner(&self.parts, &anchor, name, log).ok()?;
+        let contact = self.contact(&anchor, part);
+        self.declare(name.get_ref(), contact);
+        Some((name.get_ref().clone(), anchor))
+    }
+
+    pub(crate) fn contact(&self, anchor: &Anchor, part: Option<usize>) -> Contact {
+        let at = match part {
+            None => self.plane.place(&self.samples.nominal.place(anchor)),
+            Some(part) => self.parts[part].local(anchor, &self.plane, &self.samples),
+        };
+        Contact { part, at }
+    }
+
+    pub(crate) fn declare(&mut self, name: &str, contact: Contact) {
+        if self.draft.points.iter().any(|point| point.name == name) {
+            return;
+        }
+        let on = contact
+            .part
+            .map_or("base".to_owned(), |part| self.parts[part].name.clone());
+        let at = self.components(name, &contact.at);
+        self.draft.points.push(DraftPoint {
+            name: name.to_owned(),
+            on,
+            at,
+        });
+    }
+}
+
+/// Names of a part's mass, centre along and beside its axis, and inertia.
+fn symbols_of(entry: &PartEntry) -> [String; 4] {
+    let symbols = &entry.symbols;
+    let all = [
+        (&symbols.mass, "m"),
+        (&symbols.centre, "c"),
+        (&symbols.off_axis, "e"),
+        (&symbols.inertia, "I"),
+    ];
+    all.map(|(given, prefix)| {
+        given
+            .clone()
+            .unwrap_or_else(|| format!("{prefix}_{}", entry.name.get_ref()))
+    })
+}
+
+/// An angle within half a turn.
+fn wrapped(angle: f64) -> f64 {
+    let turn = 2.0 * std::f64::consts::PI;
+    angle - turn * (angle / turn).round()
+}

@@ -1,0 +1,117 @@
+//! What a reduction assumed, and how large each assumption is.
+
+use std::fmt::Write as _;
+
+/// Everything that a reduction assumed, in the order of the paper's four steps.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Report {
+    /// The findings.
+    pub findings: Vec<Finding>,
+}
+
+/// One assumption with its size, or one remark.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// Step of the strategy: 1 planar reduction, 2 substitution parts and lumped masses, 3 symmetry, 4 drives.
+    pub step: u8,
+    /// What it is about: a group, a part, a symbol, a drive.
+    pub about: String,
+    /// What was assumed or found.
+    pub says: String,
+    /// Sizes of what was neglected, each with its name and unit; zero up to rounding where nothing was.
+    pub sizes: Vec<Size>,
+}
+
+/// How large something is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Size {
+    /// Of what.
+    pub of: &'static str,
+    /// How much, not negative.
+    pub value: f64,
+    /// Unit.
+    pub unit: &'static str,
+}
+
+/// Below this a size is rounding.
+const ROUNDING: f64 = 1e-9;
+
+impl Size {
+    pub(crate) fn new(of: &'static str, value: f64, unit: &'static str) -> Self {
+        Self {
+            of,
+            value: value.abs(),
+            unit,
+        }
+    }
+
+    /// Whether it is more than rounding.
+    pub fn is_felt(&self) -> bool {
+        self.value > ROUNDING
+    }
+}
+
+impl Report {
+    pub(crate) fn add(&mut self, step: u8, about: &str, says: impl Into<String>, sizes: Vec<Size>) {
+        self.findings.push(Finding {
+            step,
+            about: about.to_owned(),
+            says: says.into(),
+            sizes,
+        });
+    }
+
+    /// The report for people, one paragraph per step.
+    pub fn text(&self) -> String {
+        let titles = [
+            "Step 1 - Planar reduction",
+            "Step 2 - Substitution parts and lumped masses, eq. (1)",
+            "Step 3 - Symmetry: what shares a symbol",
+            "Step 4 - Drives",
+        ];
+        let mut text = String::new();
+        for (step, title) in (1..).zip(titles) {
+            let findings: Vec<&Finding> = self
+                .findings
+                .iter()
+                .filter(|finding| finding.step == step)
+                .collect();
+            if findings.is_empty() {
+                continue;
+            }
+            let _ = writeln!(text, "{title}");
+            // What is exact for many groups in a row is said once.
+            for alike in findings.chunk_by(|a, b| a.is_exactly_like(b)) {
+                let one = alike[0];
+                if alike.len() > 1 {
+                    let names: Vec<&str> = alike.iter().map(|f| f.about.as_str()).collect();
+                    let _ = writeln!(text, "  {}\n  {:<16}{}", names.join(", "), "", one.says);
+                } else {
+                    let _ = writeln!(text, "  {:<16}{}", one.about, one.says);
+                }
+                if !one.sizes.is_empty() {
+                    let sizes: Vec<String> = one.sizes.iter().map(ToString::to_string).collect();
+                    let _ = writeln!(text, "  {:<16}  {}", "", sizes.join(", "));
+                }
+            }
+        }
+        text
+    }
+}
+
+impl Finding {
+    /// Whether another finding says the same of something else, and both neglect nothing.
+    fn is_exactly_like(&self, other: &Self) -> bool {
+        let is_exact = |finding: &Self| !finding.sizes.iter().any(Size::is_felt);
+        self.says == other.says && is_exact(self) && is_exact(other)
+    }
+}
+
+impl std::fmt::Display for Size {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        // What is rounding shows as such by its exponent.
+        let n_digits = if self.is_felt() { 4 } else { 1 };
+        let value = crate::write::digits(self.value, n_digits);
+        write!(f, "{} {value} {}", self.of, self.unit)
+    }
+}

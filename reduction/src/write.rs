@@ -1,0 +1,236 @@
+//! The draft of a planar model as the text of a model file.
+
+use std::fmt::Write as _;
+
+use crate::draft::{Draft, Symbol, Symbols};
+
+/// The text of a model file.
+pub(crate) fn model_file(draft: &Draft) -> String {
+    let mut text = format!("# {}\n", draft.origin);
+    let _ = writeln!(text, "schema = 1\nname = \"{}\"", draft.name);
+    if !draft.title.is_empty() {
+        let _ = writeln!(text, "title = {}", quoted(&draft.title));
+    }
+    if draft.gravity.iter().any(|g| g != "0") {
+        let _ = writeln!(
+            text,
+            "gravity = [{}, {}, 0]",
+            value(&draft.gravity[0]),
+            value(&draft.gravity[1])
+        );
+    }
+    table(
+        &mut text,
+        "constants",
+        "value",
+        &draft.constants.0.iter().collect::<Vec<_>>(),
+    );
+    let mut parameters = Vec::new();
+    for class in [&draft.masses, &draft.centres, &draft.inertias] {
+        parameters.extend(by_name(class));
+    }
+    table(&mut text, "parameters", "nominal", &parameters);
+    text.push_str("\n[coordinates]\n");
+    for coordinate in &draft.coordinates {
+        let passive = if coordinate.passive {
+            ", passive = true"
+        } else {
+            ""
+        };
+        let _ = writeln!(
+            text,
+            "{} = {{ nominal = {}{passive} }}",
+            coordinate.name,
+            float(coordinate.nominal)
+        );
+    }
+    frames_and_points(&mut text, draft);
+    masses(&mut text, draft);
+    loops_and_drives(&mut text, draft);
+    text
+}
+
+fn frames_and_points(text: &mut String, draft: &Draft) {
+    for frame in &draft.frames {
+        let _ = writeln!(
+            text,
+            "\n[[frame]]\nname = \"{}\"\non = \"{}\"",
+            frame.name, frame.on
+        );
+        let [x, y] = &frame.at;
+        let _ = match (x.as_str(), y.as_str()) {
+            ("0", "0") => writeln!(text, "modified_dh = {{ theta = \"{}\" }}", frame.angle),
+            (x, "0") => writeln!(
+                text,
+                "modified_dh = {{ a = {}, theta = \"{}\" }}",
+                value(x),
+                frame.angle
+            ),
+            (x, y) => writeln!(
+                text,
+                "transform = {{ xyz = [{}, {}, 0] }}\njoint = {{ revolute = \"{}\" }}",
+                value(x),
+                value(y),
+                frame.angle
+            ),
+        };
+        if !frame.note.is_empty() {
+            let _ = writeln!(text, "note = {}", quoted(&frame.note));
+        }
+    }
+    for point in &draft.points {
+        let _ = writeln!(
+            text,
+            "\n[[point]]\nname = \"{}\"\non = \"{}\"\nat = [{}, {}]",
+            point.name,
+            point.on,
+            value(&point.at[0]),
+            value(&point.at[1])
+        );
+    }
+}
+
+fn masses(text: &mut String, draft: &Draft) {
+    for part in &draft.parts {
+        let _ = writeln!(
+            text,
+            "\n[[part]]\nname = \"{}\"\non = \"{}\"\nmass = \"{}\"\ncentre = [{}, {}]\ninertia = {{ zz = \"{}\" }}",
+            part.name,
+            part.on,
+            part.mass,
+            value(&part.centre[0]),
+            value(&part.centre[1]),
+            part.inertia
+        );
+    }
+    for (name, mass, shares, at) in &draft.lumped_masses {
+        let _ = writeln!(
+            text,
+            "\n[[lumped_mass]]\nname = \"{name}\"\nmass = \"{mass}\""
+        );
+        if *shares > 1 {
+            let _ = writeln!(text, "share = \"1/{shares}\"");
+        }
+        let _ = writeln!(text, "at = \"{at}\"");
+    }
+}
+
+fn loops_and_drives(text: &mut String, draft: &Draft) {
+    for (name, [one, two]) in &draft.loops {
+        let _ = writeln!(
+            text,
+            "\n[[loop]]\nname = \"{name}\"\njoins = [\"{one}\", \"{two}\"]"
+        );
+    }
+    for (name, moves) in &draft.drives {
+        let _ = writeln!(text, "\n[[drive]]\nname = \"{name}\"");
+        let _ = match moves {
+            Ok(coordinate) => writeln!(text, "joint = \"{coordinate}\""),
+            Err([from, to]) => writeln!(text, "linear = {{ from = \"{from}\", to = \"{to}\" }}"),
+        };
+    }
+    for effect in &draft.effects {
+        let places: Vec<String> = effect.at.iter().map(|at| format!("\"{at}\"")).collect();
+        let _ = writeln!(
+            text,
+            "\n[[effect]]\nkind = \"{}\"\nat = [{}]",
+            effect.kind,
+            places.join(", ")
+        );
+        let list = |values: &[(String, f64)], wrap: fn(&str) -> String| {
+            let entries: Vec<String> = values
+                .iter()
+                .map(|(k, v)| format!("{k} = {}", wrap(&float(*v))))
+                .collect();
+            entries.join(", ")
+        };
+        let nominal = |number: &str| format!("{{ nominal = {number} }}");
+        let _ = writeln!(
+            text,
+            "parameters = {{ {} }}",
+            list(&effect.parameters, nominal)
+        );
+        if !effect.constants.is_empty() {
+            let _ = writeln!(
+                text,
+                "constants = {{ {} }}",
+                list(&effect.constants, str::to_owned)
+            );
+        }
+    }
+}
+
+fn table(text: &mut String, name: &str, key: &str, symbols: &[&Symbol]) {
+    if symbols.is_empty() {
+        return;
+    }
+    let _ = writeln!(text, "\n[{name}]");
+    for symbol in symbols {
+        let note = if symbol.note.is_empty() {
+            String::new()
+        } else {
+            format!(", note = {}", quoted(&symbol.note))
+        };
+        let _ = writeln!(
+            text,
+            "{} = {{ {key} = {}, unit = \"{}\"{note} }}",
+            symbol.name,
+            float(symbol.value()),
+            symbol.unit
+        );
+    }
+}
+
+/// Symbols by their names, numbers in them by size: m2 before m10.
+fn by_name(symbols: &Symbols) -> Vec<&Symbol> {
+    let mut sorted: Vec<&Symbol> = symbols.0.iter().collect();
+    sorted.sort_by_cached_key(|symbol| {
+        let mut key = String::new();
+        let mut digits = String::new();
+        for c in symbol.name.chars().chain(['\0']) {
+            if c.is_ascii_digit() {
+                digits.push(c);
+                continue;
+            }
+            if !digits.is_empty() {
+                let _ = write!(key, "{digits:0>20}");
+                digits.clear();
+            }
+            key.push(c);
+        }
+        key
+    });
+    sorted
+}
+
+/// A value of a vector: a bare zero, or an expression.
+fn value(expression: &str) -> String {
+    if expression == "0" {
+        "0".to_owned()
+    } else {
+        format!("\"{expression}\"")
+    }
+}
+
+/// A number that TOML takes for a float.
+pub(crate) fn float(x: f64) -> String {
+    format!("{x:?}")
+}
+
+/// A number with some significant digits.
+pub(crate) fn digits(x: f64, n: usize) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return format!("{x}");
+    }
+    let rounded: f64 = format!("{x:.*e}", n.saturating_sub(1)).parse().unwrap_or(x);
+    if (1e-3..1e6).contains(&rounded.abs()) {
+        format!("{rounded}")
+    } else {
+        format!("{rounded:e}")
+    }
+}
+
+/// Text as TOML has it.
+pub(crate) fn quoted(text: &str) -> String {
+    toml::Value::from(text).to_string()
+}

@@ -1,0 +1,529 @@
+//! From merged entries to a rig: names are looked up, numbers checked. All findings are collected.
+
+use modelmill_spec::Diagnostic;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::assemble_sensors::channels;
+use crate::effect::Effect;
+use crate::effect_by_name::EffectPart;
+use crate::file::{
+    BodyEntry, CoordinateEntry, DriveEntry, EffectEntry, JointEntry, LengthEntry, LumpedMassEntry,
+    Name, RigEntry,
+};
+use crate::joint;
+use crate::load::span;
+use crate::log::{Item, Log, above_zero, not_negative, vector};
+use crate::merge::Merged;
+use crate::pair::{Anchor, Pair, Shape};
+use crate::pose::Pose;
+use crate::rig::{Body, Coordinate, Drive, Joint, LumpedMass, Point, Rig};
+use crate::sensor::Sensors;
+
+/// Makes the rig of a chain of files, the rig's own first, then what it extends.
+pub(crate) fn assemble(chain: Vec<(usize, RigEntry)>) -> Result<Rig, Vec<Diagnostic>> {
+    let mut log = Log::default();
+    let mut files = chain.into_iter().rev();
+    let Some((file, first)) = files.next() else {
+        return Err(Vec::new());
+    };
+    let mut merged = Merged::new(file, first, &mut log);
+    for (file, entry) in files {
+        merged.extend(Merged::new(file, entry, &mut log));
+    }
+    let rig = build(&merged, &mut log);
+    if log.0.is_empty() {
+        Ok(rig)
+    } else {
+        log.0
+            .sort_by_key(|found| found.span.map(|span| (span.file, span.start)));
+        Err(log.0)
+    }
+}
+
+/// The rig of merged entries.
+fn build(merged: &Merged, log: &mut Log) -> Rig {
+    let mut rig = Rig {
+        name: merged.name.clone(),
+        title: merged.title.clone(),
+        gravity: merged
+            .gravity
+            .as_ref()
+            .map_or_else(Vector3::zeros, |g| vector(g.file, Some(&g.entry), log)),
+        bodies: merged.bodies.iter().map(|b| body(b, log)).collect(),
+        points: Vec::new(),
+        lumped_masses: Vec::new(),
+        joints: Vec::new(),
+        coordinates: Vec::new(),
+        drives: Vec::new(),
+        effects: Vec::new(),
+        sensors: Sensors::default(),
+        seed: merged.seed.unwrap_or(0),
+    };
+    for point in &merged.points {
+        let on = body_named(&rig, point.file, &point.entry.on, log);
+        let at = vector(point.file, Some(&point.entry.at), log);
+        rig.points.push(Point {
+            name: point.entry.name.get_ref().clone(),
+            anchor: Anchor {
+                body: on.unwrap_or(None),
+                at,
+            },
+        });
+    }
+    for mass in &merged.lumped_masses {
+        rig.lumped_masses.extend(lumped_mass(&rig, mass, log));
+    }
+    for entry in &merged.joints {
+        let joint = joint(&rig, entry, log);
+        rig.joints.push(joint);
+    }
+    for entry in &merged.coordinates {
+        coordinate(&mut rig, entry, log);
+    }
+    for entry in &merged.drives {
+        drive(&mut rig, entry, log);
+    }
+    check_columns(merged, log);
+    for entry in &merged.effects {
+        rig.effects.extend(effect(&rig, entry, log));
+    }
+    rig.sensors = Sensors {
+        rate: merged
+            .rate
+            .as_ref()
+            .map(|rate| above_zero(rate.file, &rate.entry, "a sampling rate", log)),
+        derivatives: merged.derivatives.unwrap_or(merged.encoders.is_empty()),
+        encoders: channels(
+            &merged.encoders,
+            "coordinate",
+            merged.coordinates.iter().map(|c| &c.entry.name),
+            log,
+        ),
+        force_sensors: channels(
+            &merged.force_sensors,
+            "drive",
+            merged.drives.iter().map(|d| &d.entry.name),
+            log,
+        ),
+    };
+    rig
+}
+
+/// A rig needs coordinates, as many drives, and columns that can be told apart.
+fn check_columns(merged: &Merged, log: &mut Log) {
+    let (n_coordinates, n_drives) = (merged.coordinates.len(), merged.drives.len());
+    if n_coordinates == 0 || n_drives != n_coordinates {
+        let drives = merged.drives.last().map(|d| (d.file, d.entry.name.span()));
+        let last = drives.or(merged
+            .coordinates
+            .last()
+            .map(|c| (c.file, c.entry.name.span())));
+        let (file, range) = last.unwrap_or((0, 0..0));
+        log.error(
+            span(file, &range),
+            format!(
+                "coordinates ({n_coordinates}) and drives ({n_drives}) of this rig do not match"
+            ),
+            "",
+            "give one `[[coordinate]]` and one `[[drive]]` per degree of freedom",
+        );
+    }
+    let mut columns = vec!["t".to_owned()];
+    let coordinates = merged
+        .coordinates
+        .iter()
+        .map(|c| (c.file, &c.entry.name, true));
+    let drives = merged.drives.iter().map(|d| (d.file, &d.entry.name, false));
+    for (file, name, is_coordinate) in coordinates.chain(drives) {
+        let suffixes: &[&str] = if is_coordinate {
+            &["", "_d", "_dd"]
+        } else {
+            &[""]
+        };
+        for suffix in suffixes {
+            let column = format!("{}{suffix}", name.get_ref());
+            if columns.contains(&column) {
+                log.error(
+                    span(file, &name.span()),
+                    format!("two columns of a recording would be called `{column}`"),
+                    "",
+                    "choose another name",
+                );
+            }
+            columns.push(column);
+        }
+    }
+}
+
+fn body(item: &Item<BodyEntry>, log: &mut Log) -> Body {
+    let (file, entry) = (item.file, &item.entry);
+    let inertia = entry
+        .inertia
+        .as_ref()
+        .map_or_else(Matrix3::zeros, |spanned| {
+            let i = spanned.get_ref();
+            let matrix = Matrix3::new(i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz);
+            let moments = if matrix.iter().all(|x| x.is_finite()) {
+                matrix.symmetric_eigenvalues()
+            } else {
+                Vector3::repeat(f64::NAN)
+            };
+            // A planar model gives zz alone, which no body has; it does no harm where only that one counts.
+            if moments.min().is_nan() || moments.min() < -1e-9 * moments.amax() {
+                log.error(
+                    span(file, &spanned.span()),
+                    format!(
+                        "no body has this inertia: its principal moments are {:.4}, {:.4}, {:.4}",
+                        moments[0], moments[1], moments[2]
+                    ),
+                    "expected principal moments that are not below zero",
+                    "xy, xz and yz are the entries of the matrix: the negative products of inertia",
+                );
+            }
+            matrix
+        });
+    Body {
+        name: entry.name.get_ref().clone(),
+        nominal: Pose::from_xyz_rpy(
+            vector(file, entry.at.as_ref(), log),
+            vector(file, entry.rpy.as_ref(), log),
+        ),
+        mass: not_negative(file, entry.mass.as_ref(), "a mass", log),
+        centre: vector(file, entry.centre.as_ref(), log),
+        inertia,
+    }
+}
+
+/// Index of a body; `Some(None)` is the base.
+/// A name that leads nowhere, which was reported.
+struct Unknown;
+
+/// A body, or the base, which is none.
+fn body_named(
+    rig: &Rig,
+    file: usize,
+    name: &Name,
+    log: &mut Log,
+) -> Result<Option<usize>, Unknown> {
+    if name.get_ref() == "base" {
+        return Ok(None);
+    }
+    let found = rig
+        .bodies
+        .iter()
+        .position(|body| &body.name == name.get_ref());
+    if found.is_none() {
+        let mut known = vec!["base"];
+        known.extend(rig.bodies.iter().map(|body| body.name.as_str()));
+        log.unknown(file, name, "body", &known);
+    }
+    found.map(Some).ok_or(Unknown)
+}
+
+fn point_named(rig: &Rig, file: usize, name: &Name, log: &mut Log) -> Option<Anchor> {
+    let found = rig
+        .points
+        .iter()
+        .find(|point| &point.name == name.get_ref());
+    if found.is_none() {
+        let known: Vec<&str> = rig.points.iter().map(|point| point.name.as_str()).collect();
+        log.unknown(file, name, "point", &known);
+    }
+    found.map(|point| point.anchor)
+}
+
+fn joint_named(rig: &Rig, file: usize, name: &Name, log: &mut Log) -> Option<usize> {
+    let found = rig
+        .joints
+        .iter()
+        .position(|joint| &joint.name == name.get_ref());
+    match found {
+        None => {
+            let known: Vec<&str> = rig.joints.iter().map(|joint| joint.name.as_str()).collect();
+            log.unknown(file, name, "joint", &known);
+            None
+        }
+        Some(at) if rig.joints[at].motion.is_none() => {
+            log.error(
+                span(file, &name.span()),
+                format!("the joint `{}` has no single coordinate", name.get_ref()),
+                "expected a revolute or a prismatic joint",
+                "",
+            );
+            None
+        }
+        found => found,
+    }
+}
+
+fn lumped_mass(rig: &Rig, item: &Item<LumpedMassEntry>, log: &mut Log) -> Option<LumpedMass> {
+    let (file, entry) = (item.file, &item.entry);
+    let mass = not_negative(file, Some(&entry.mass), "a mass", log);
+    let at = point_named(rig, file, &entry.at, log)?;
+    let moment_at = match &entry.moment_at {
+        None => at,
+        Some(name) => point_named(rig, file, name, log)?,
+    };
+    if let Some(name) = entry
+        .moment_at
+        .as_ref()
+        .filter(|_| moment_at.body != at.body)
+    {
+        log.error(
+            span(file, &name.span()),
+            format!(
+                "`{}` is on another body than `{}`",
+                name.get_ref(),
+                entry.at.get_ref()
+            ),
+            "expected a point of the same body",
+            "both balances are those of one body",
+        );
+    }
+    Some(LumpedMass {
+        mass,
+        at,
+        moment_at: moment_at.at,
+    })
+}
+
+fn joint(rig: &Rig, item: &Item<JointEntry>, log: &mut Log) -> Joint {
+    let (file, entry) = (item.file, &item.entry);
+    let mut joint = Joint {
+        name: entry.name.get_ref().clone(),
+        equations: Vec::new(),
+        motion: None,
+    };
+    let Some(kind) = joint::Kind::named(entry.kind.get_ref()) else {
+        log.unknown(file, &entry.kind, "kind of joint", &joint::Kind::NAMES);
+        return joint;
+    };
+    let [one, two] = entry.between.get_ref();
+    let bodies = (
+        body_named(rig, file, one, log),
+        body_named(rig, file, two, log),
+    );
+    let axis = entry
+        .axis
+        .as_ref()
+        .map_or_else(Vector3::z, |axis| vector(file, Some(axis), log));
+    if !(axis.norm() > 0.0 && axis.norm().is_finite()) {
+        let range = entry.axis.as_ref().map_or(0..0, toml::Spanned::span);
+        log.error(
+            span(file, &range),
+            "this axis has no direction".to_owned(),
+            "expected a vector other than zero",
+            "",
+        );
+        return joint;
+    }
+    let (Ok(first), Ok(second)) = bodies else {
+        return joint;
+    };
+    if first == second {
+        let range = entry.between.span();
+        log.error(
+            span(file, &range),
+            "this joint joins a body to itself".to_owned(),
+            "expected two bodies",
+            "",
+        );
+        return joint;
+    }
+    let Some([from, to]) = joint_anchors(rig, file, entry, [first, second], log) else {
+        return joint;
+    };
+    let nominal = |body: Option<usize>| body.map_or_else(Pose::identity, |b| rig.bodies[b].nominal);
+    let parts = joint::equations(
+        kind,
+        from,
+        to,
+        &axis.normalize(),
+        [nominal(first), nominal(second)],
+    );
+    joint.equations = parts.0;
+    joint.motion = parts.1;
+    joint
+}
+
+/// Where the joint is on each of its bodies.
+fn joint_anchors(
+    rig: &Rig,
+    file: usize,
+    entry: &JointEntry,
+    bodies: [Option<usize>; 2],
+    log: &mut Log,
+) -> Option<[Anchor; 2]> {
+    let nominal = |body: Option<usize>| body.map_or_else(Pose::identity, |b| rig.bodies[b].nominal);
+    let on = |body: Option<usize>, p_W: Vector3<f64>| {
+        let pose = nominal(body);
+        Anchor {
+            body,
+            at: pose.q_WB.inverse() * (p_W - pose.p_WB_W),
+        }
+    };
+    let whole = span(file, &entry.name.span());
+    match (&entry.at, &entry.points) {
+        (Some(at), None) => {
+            let at = vector(file, Some(at), log);
+            Some(bodies.map(|body| on(body, at)))
+        }
+        (None, Some(points)) => {
+            let names = points.get_ref();
+            let anchors: Vec<Anchor> = names
+                .iter()
+                .filter_map(|name| point_named(rig, file, name, log))
+                .collect();
+            if anchors.len() < names.len() {
+                return None;
+            }
+            match anchors.as_slice() {
+                [one] if bodies.contains(&one.body) => {
+                    let pose = nominal(one.body);
+                    let p_W = pose.q_WB * one.at + pose.p_WB_W;
+                    Some(bodies.map(|body| {
+                        if body == one.body {
+                            *one
+                        } else {
+                            on(body, p_W)
+                        }
+                    }))
+                }
+                [one, two] if [one.body, two.body] == bodies => Some([*one, *two]),
+                _ => {
+                    log.error(
+                        span(file, &points.span()),
+                        "these points do not fit the joint's bodies".to_owned(),
+                        "expected one point of either body, or one of each in the order of `between`",
+                        "",
+                    );
+                    None
+                }
+            }
+        }
+        _ => {
+            log.error(
+                whole,
+                "it is not clear where this joint is".to_owned(),
+                "expected one of `at` and `points`",
+                "`at = [x, y, z]` is in the base frame, nominal configuration; `points` names points of its bodies",
+            );
+            None
+        }
+    }
+}
+
+fn length(rig: &Rig, file: usize, entry: &LengthEntry, log: &mut Log) -> Option<Pair> {
+    let from = point_named(rig, file, &entry.from, log);
+    let to = point_named(rig, file, &entry.to, log);
+    let pair = Pair {
+        from: from?,
+        to: to?,
+        shape: Shape::Distance,
+    };
+    if pair.from.body == pair.to.body {
+        log.error(
+            span(file, &entry.to.span()),
+            "the distance of two points of one body never changes".to_owned(),
+            "expected a point of another body",
+            "",
+        );
+        return None;
+    }
+    Some(pair)
+}
+
+fn coordinate(rig: &mut Rig, item: &Item<CoordinateEntry>, log: &mut Log) {
+    let (file, entry) = (item.file, &item.entry);
+    let nominal = entry.nominal.as_ref().map(|n| *n.get_ref());
+    if let Some(wrong) = entry
+        .nominal
+        .as_ref()
+        .filter(|n| !n.get_ref().is_finite() || entry.joint.is_none())
+    {
+        log.error(
+            span(file, &wrong.span()),
+            "this nominal value means nothing".to_owned(),
+            "expected a finite value of a joint's coordinate; a length follows from its points",
+            "",
+        );
+    }
+    let measures = match (&entry.joint, &entry.length) {
+        (Some(name), None) => joint_named(rig, file, name, log).and_then(|joint| {
+            let poses: Vec<Pose> = rig.bodies.iter().map(|body| body.nominal).collect();
+            let motion = rig.joints[joint].motion.as_mut()?;
+            if let Some(nominal) = nominal {
+                joint::set_nominal(motion, nominal, &poses);
+            }
+            Some(*motion)
+        }),
+        (None, Some(points)) => length(rig, file, points, log),
+        _ => {
+            one_of(file, &entry.name, "`joint` and `length`", log);
+            None
+        }
+    };
+    rig.coordinates.extend(measures.map(|measures| Coordinate {
+        name: entry.name.get_ref().clone(),
+        measures,
+    }));
+}
+
+fn drive(rig: &mut Rig, item: &Item<DriveEntry>, log: &mut Log) {
+    let (file, entry) = (item.file, &item.entry);
+    let measures = match (&entry.joint, &entry.linear) {
+        (Some(name), None) => {
+            joint_named(rig, file, name, log).and_then(|joint| rig.joints[joint].motion)
+        }
+        (None, Some(points)) => length(rig, file, points, log),
+        _ => {
+            one_of(file, &entry.name, "`joint` and `linear`", log);
+            None
+        }
+    };
+    rig.drives.extend(measures.map(|measures| Drive {
+        name: entry.name.get_ref().clone(),
+        measures,
+    }));
+}
+
+fn one_of(file: usize, name: &Name, keys: &str, log: &mut Log) {
+    log.error(
+        span(file, &name.span()),
+        format!("it is not clear what `{}` is", name.get_ref()),
+        &format!("expected one of {keys}"),
+        "",
+    );
+}
+
+fn effect(rig: &Rig, item: &Item<EffectEntry>, log: &mut Log) -> Option<Effect> {
+    let (file, entry) = (item.file, &item.entry);
+    let at: Vec<&str> = entry
+        .at
+        .get_ref()
+        .iter()
+        .map(|name| name.get_ref().as_str())
+        .collect();
+    let values: Vec<(&str, f64)> = entry
+        .values
+        .iter()
+        .map(|(name, value)| (name.get_ref().as_str(), *value.get_ref()))
+        .collect();
+    let faults = match rig.effect(entry.kind.get_ref(), &at, &values) {
+        Ok(effect) => return Some(effect),
+        Err(faults) => faults,
+    };
+    for found in faults {
+        let range = match &found.part {
+            EffectPart::Kind => entry.kind.span(),
+            EffectPart::Places => entry.at.span(),
+            EffectPart::Place(i) => entry.at.get_ref()[*i].span(),
+            EffectPart::Value(symbol) => {
+                let named = entry.values.keys().find(|name| name.get_ref() == symbol);
+                named.map_or(entry.kind.span(), toml::Spanned::span)
+            }
+        };
+        log.error(span(file, &range), found.says, &found.expected, &found.help);
+    }
+    None
+}

@@ -1,0 +1,155 @@
+//! Inverse dynamics: the drives' forces that a motion takes.
+//!
+//! Newton and Euler's equations of each body by itself give the forces `f` that all joints and drives together
+//! must supply, `J' lambda + B tau = f`. The reactions `lambda` of redundant joints are not unique, `tau` is:
+//! the rates per unit rate of a coordinate are orthogonal to every reaction, and what they leave of both sides
+//! is a small system for `tau` alone.
+//! Source: E. Haug, "Computer Aided Kinematics and Dynamics of Mechanical Systems" (1989), sections 11.2 and 11.5.
+
+use nalgebra::linalg::FullPivLU;
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use crate::kinematics::{Motion, PoseError};
+use crate::massive;
+use crate::pair::Pair;
+use crate::pose::{BodyMotion, Pose};
+use crate::rig::Rig;
+
+/// A pivot below this share of the largest says that a drive has no leverage.
+const LEVERAGE_TOLERANCE: f64 = 1e-10;
+
+/// Value, rate and acceleration of a coordinate, a joint or a drive.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Measured {
+    /// Length or angle, m or rad.
+    pub value: f64,
+    /// Its first derivative.
+    pub rate: f64,
+    /// Its second derivative.
+    pub acceleration: f64,
+}
+
+/// Forces or torques of all drives, N or N m, in the rig's order; `loads` are forces that effects in the joints
+/// add, each along the motion of its place, and that the drives must supply besides.
+///
+/// Fails where the drives cannot balance a load.
+pub(crate) fn drive_forces(
+    rig: &Rig,
+    motion: &Motion,
+    loads: &[(&Pair, f64)],
+) -> Result<Vec<f64>, PoseError> {
+    let mut needed = body_forces(rig, motion);
+    let base = base();
+    for (pair, force) in loads {
+        let derived = pair.derive(&motion.bodies, &base);
+        derived.scatter(pair, |i, slope| needed[i] += force * slope);
+    }
+    let per_rate = &motion.rates_per_coordinate;
+    let n_dof = per_rate.ncols();
+    let mut leverage = DMatrix::zeros(n_dof, rig.drives.len());
+    for (d, drive) in rig.drives.iter().enumerate() {
+        let derived = drive.measures.derive(&motion.bodies, &base);
+        for k in 0..n_dof {
+            derived.scatter(&drive.measures, |i, slope| {
+                leverage[(k, d)] += per_rate[(i, k)] * slope;
+            });
+        }
+    }
+    let needed = DVector::from_fn(n_dof, |k, _| per_rate.column(k).dot(&needed));
+    let decomposed = FullPivLU::new(leverage);
+    let pivots: DVector<f64> = decomposed.u().diagonal();
+    let largest = pivots.amax();
+    if pivots
+        .iter()
+        .any(|p| p.abs() <= LEVERAGE_TOLERANCE * largest)
+    {
+        return Err(PoseError::DrivesDeadlocked);
+    }
+    let forces = decomposed
+        .solve(&needed)
+        .ok_or(PoseError::DrivesDeadlocked)?;
+    Ok(forces.iter().copied().collect())
+}
+
+/// Value, rate and acceleration of a place.
+pub(crate) fn measure(pair: &Pair, motion: &Motion) -> Measured {
+    let derived = pair.derive(&motion.bodies, &base());
+    let body = |at: Option<usize>| at.map(|b| &motion.bodies[b]);
+    let mut rate = 0.0;
+    let mut acceleration = derived.bias;
+    for (anchor, k) in [(&pair.from, 0), (&pair.to, 2)] {
+        if let Some(body) = body(anchor.body) {
+            let [linear, angular] = [&derived.gradient[k], &derived.gradient[k + 1]];
+            rate += linear.dot(&body.v_WB_W) + angular.dot(&body.w_WB_W);
+            acceleration += linear.dot(&body.a_WB_W) + angular.dot(&body.alpha_WB_W);
+        }
+    }
+    Measured {
+        value: derived.value,
+        rate,
+        acceleration,
+    }
+}
+
+/// Kinetic plus potential energy of all masses, those of effects included, J; the potential is zero at the base
+/// frame's origin.
+pub fn energy(rig: &Rig, motion: &Motion) -> f64 {
+    let gravity = massive::gravity(rig);
+    let mut sum = massive::energy(rig, motion, &gravity);
+    for (body, moves) in rig.bodies.iter().zip(&motion.bodies) {
+        let w = moves.R_WB.transpose() * moves.w_WB_W;
+        sum += 0.5 * body.mass * moves.velocity(&body.centre).norm_squared()
+            + 0.5 * w.dot(&(body.inertia * w))
+            - body.mass * gravity.dot(&moves.place(&body.centre));
+    }
+    let base = base();
+    for lumped in &rig.lumped_masses {
+        let moves = lumped.at.body.map_or(&base, |b| &motion.bodies[b]);
+        sum += lumped.mass
+            * (0.5 * moves.velocity(&lumped.at.at).norm_squared()
+                - gravity.dot(&moves.place(&lumped.at.at)));
+    }
+    sum
+}
+
+/// Forces and moments that each body needs for its motion beside gravity, six per body: the force, and the
+/// moment about the origin of its frame; those for the masses of effects included.
+fn body_forces(rig: &Rig, motion: &Motion) -> DVector<f64> {
+    let gravity = massive::gravity(rig);
+    let mut all = DVector::zeros(6 * rig.bodies.len());
+    let mut add = |body: usize, force: Vector3<f64>, moment: Vector3<f64>| {
+        for i in 0..3 {
+            all[6 * body + i] += force[i];
+            all[6 * body + 3 + i] += moment[i];
+        }
+    };
+    for (b, (body, moves)) in rig.bodies.iter().zip(&motion.bodies).enumerate() {
+        let arm = moves.R_WB * body.centre;
+        let force = body.mass * (moves.acceleration(&body.centre) - gravity);
+        let inertia = moves.R_WB * body.inertia * moves.R_WB.transpose();
+        let w = &moves.w_WB_W;
+        let euler = inertia * moves.alpha_WB_W + w.cross(&(inertia * w));
+        add(b, force, euler + arm.cross(&force));
+    }
+    for lumped in &rig.lumped_masses {
+        if let Some(b) = lumped.at.body {
+            let moves = &motion.bodies[b];
+            let inertial = |at: &Vector3<f64>| lumped.mass * (moves.acceleration(at) - gravity);
+            let arm = moves.R_WB * lumped.moment_at;
+            add(
+                b,
+                inertial(&lumped.at.at),
+                arm.cross(&inertial(&lumped.moment_at)),
+            );
+        }
+    }
+    for effect in &rig.effects {
+        massive::supply(rig, effect, motion, &gravity, &mut add);
+    }
+    all
+}
+
+/// The base as a body that never moves.
+pub(crate) fn base() -> BodyMotion {
+    BodyMotion::at_rest(Pose::identity())
+}

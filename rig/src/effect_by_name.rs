@@ -1,0 +1,292 @@
+//! Effects from names: kind, places and values as rig files and programs write them go in, a checked [`Effect`]
+//! or every fault comes out, each with what was expected and what to do.
+
+use crate::effect::{Effect, Law, Place, ValueSign};
+use crate::pair::Pair;
+use crate::rig::Rig;
+
+/// What is wrong with an effect.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EffectFault {
+    /// Which part of it.
+    pub part: EffectPart,
+    /// What is wrong.
+    pub says: String,
+    /// What was expected; may be empty.
+    pub expected: String,
+    /// What to do; may be empty.
+    pub help: String,
+}
+
+/// A part of an effect's description.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum EffectPart {
+    /// The kind.
+    Kind,
+    /// The list of places.
+    Places,
+    /// One of the places, by its index.
+    Place(usize),
+    /// A value, by its symbol.
+    Value(String),
+}
+
+impl std::fmt::Display for EffectFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.says)?;
+        for more in [&self.expected, &self.help] {
+            if !more.is_empty() {
+                write!(f, "; {more}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for EffectFault {}
+
+/// Where a kind may act.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum ActsAt {
+    DrivesAndJoints,
+    Drives,
+    TwoDrivesOrJoints,
+    LinearDrives,
+    Points,
+    TwoPointsOfABody,
+    Base,
+    Force,
+}
+
+impl ActsAt {
+    fn of(kind: &str) -> Self {
+        match kind {
+            "load_friction" => Self::Drives,
+            "coupled_drive" => Self::TwoDrivesOrJoints,
+            "rod_inertia" => Self::LinearDrives,
+            "point_mass" => Self::Points,
+            "lumped_mass_placement" => Self::TwoPointsOfABody,
+            "gravity_tilt" => Self::Base,
+            "time_delay" => Self::Force,
+            _ => Self::DrivesAndJoints,
+        }
+    }
+
+    fn says(self) -> &'static str {
+        match self {
+            Self::DrivesAndJoints => "a drive, a coordinate or a joint with one coordinate",
+            Self::Drives => "a drive, whose load is known",
+            Self::TwoDrivesOrJoints => "two drives or joints",
+            Self::LinearDrives => "a linear drive",
+            Self::Points => "a point of a body",
+            Self::TwoPointsOfABody => {
+                "two points of one body: where the mass is, and where moments see it"
+            }
+            Self::Base => "`base`",
+            Self::Force => "`force`",
+        }
+    }
+
+    fn n_places(self) -> Option<usize> {
+        match self {
+            Self::TwoDrivesOrJoints | Self::TwoPointsOfABody => Some(2),
+            Self::Base | Self::Force => Some(1),
+            _ => None,
+        }
+    }
+}
+
+impl Rig {
+    /// An effect of this rig by names: a kind ([`Law::KINDS`]), its places, its values by symbol.
+    ///
+    /// Places are drives, coordinates, joints, points, `base` or `force`, as the kind has it. The effect acts once
+    /// it is pushed to [`Rig::effects`]. Fails with every fault of the description.
+    ///
+    /// ```
+    /// # let text = "schema = 1\nname = 'm'\nbody = [{ name = 'cart', mass = 2 }]\n\
+    /// #     joint = [{ name = 'rail', kind = 'prismatic', between = ['base', 'cart'], at = [0, 0, 0], axis = [1, 0, 0] }]\n\
+    /// #     coordinate = [{ name = 'x', joint = 'rail' }]\ndrive = [{ name = 'screw', joint = 'rail' }]";
+    /// # let mut rig = modelmill_rig::load("m.toml", text, &mut |_| unreachable!())?.rig;
+    /// let friction = rig.effect("viscous_friction", &["screw"], &[("Fv", 20.0)]).unwrap();
+    /// rig.effects.push(friction);
+    /// let state = modelmill_rig::State { q: vec![0.0], qd: vec![0.1], qdd: vec![3.0] };
+    /// let force = modelmill_rig::forces(&rig, &modelmill_rig::Tracker::new(&rig)?.follow(&state)?)?[0];
+    /// assert!((force - (2.0 * 3.0 + 20.0 * 0.1)).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn effect(
+        &self,
+        kind: &str,
+        at: &[&str],
+        values: &[(&str, f64)],
+    ) -> Result<Effect, Vec<EffectFault>> {
+        let Some(known) = Law::values(kind) else {
+            return Err(vec![EffectFault {
+                part: EffectPart::Kind,
+                says: format!("there is no kind of effect `{kind}`"),
+                expected: "expected the name of a kind".to_owned(),
+                help: format!("known are {}", list(&Law::KINDS)),
+            }]);
+        };
+        let mut faults = Vec::new();
+        let mut numbers = Vec::new();
+        for value in known {
+            let given = values.iter().find(|(symbol, _)| *symbol == value.symbol);
+            let number = given.map(|(_, number)| *number).or(value.default);
+            let says = match (number, value.sign) {
+                (None, _) => {
+                    faults.push(EffectFault {
+                        part: EffectPart::Kind,
+                        says: format!("`{kind}` lacks the value `{}`", value.symbol),
+                        expected: String::new(),
+                        help: format!(
+                            "write `values = {{ {} = ... }}`, in SI units of the place",
+                            value.symbol
+                        ),
+                    });
+                    continue;
+                }
+                (Some(x), _) if !x.is_finite() => Some("a finite number"),
+                (Some(x), ValueSign::Positive) if x <= 0.0 => Some("a number above zero"),
+                (Some(x), ValueSign::NotNegative) if x < 0.0 => {
+                    Some("a number that is not below zero")
+                }
+                _ => None,
+            };
+            if let Some(says) = says {
+                faults.push(EffectFault {
+                    part: EffectPart::Value(value.symbol.to_owned()),
+                    says: format!(
+                        "`{}` of `{kind}` cannot be {}",
+                        value.symbol,
+                        number.unwrap_or(f64::NAN)
+                    ),
+                    expected: format!("expected {says}"),
+                    help: String::new(),
+                });
+            }
+            numbers.extend(number);
+        }
+        let symbols: Vec<&str> = known.iter().map(|value| value.symbol).collect();
+        for (symbol, _) in values
+            .iter()
+            .filter(|(symbol, _)| !symbols.contains(symbol))
+        {
+            faults.push(EffectFault {
+                part: EffectPart::Value((*symbol).to_owned()),
+                says: format!("there is no value `{symbol}` of `{kind}`"),
+                expected: "expected a symbol of this kind".to_owned(),
+                help: format!("known are {}", list(&symbols)),
+            });
+        }
+        let places = self.places(kind, at, &mut faults);
+        match Law::new(kind, &numbers) {
+            Some(law) if faults.is_empty() => Ok(Effect { law, places }),
+            _ => Err(faults),
+        }
+    }
+
+    fn places(&self, kind: &str, at: &[&str], faults: &mut Vec<EffectFault>) -> Vec<Place> {
+        let acts = ActsAt::of(kind);
+        let mut places = Vec::new();
+        for (i, name) in at.iter().enumerate() {
+            let Some(place) = self.place(acts, name) else {
+                faults.push(EffectFault {
+                    part: EffectPart::Place(i),
+                    says: format!("`{kind}` cannot act at `{name}`"),
+                    expected: format!("expected {}", acts.says()),
+                    help: format!("known are {}", list(&self.place_names(acts))),
+                });
+                continue;
+            };
+            places.push(place);
+        }
+        let wanted = acts.n_places().unwrap_or(at.len().max(1));
+        let mut wrong = at.len() != wanted;
+        if let [Place::Point(a), Place::Point(b)] = places[..]
+            && acts == ActsAt::TwoPointsOfABody
+        {
+            wrong |= self.points[a].anchor.body != self.points[b].anchor.body;
+        }
+        if wrong {
+            faults.push(EffectFault {
+                part: EffectPart::Places,
+                says: format!("`{kind}` does not act at these places together"),
+                expected: format!("expected {}", acts.says()),
+                help: String::new(),
+            });
+        }
+        places
+    }
+
+    fn place(&self, acts: ActsAt, name: &str) -> Option<Place> {
+        let joint = |pair: &Pair| {
+            self.joints
+                .iter()
+                .position(|j| j.motion.as_ref() == Some(pair))
+        };
+        let drive = || self.drives.iter().position(|drive| drive.name == name);
+        match acts {
+            ActsAt::Drives => drive().map(Place::Drive),
+            ActsAt::LinearDrives => drive()
+                .filter(|d| self.drives[*d].measures.is_distance())
+                .map(Place::Drive),
+            ActsAt::DrivesAndJoints | ActsAt::TwoDrivesOrJoints => {
+                let coordinate = || self.coordinates.iter().find(|c| c.name == name);
+                let named = || {
+                    self.joints
+                        .iter()
+                        .position(|j| j.name == name && j.motion.is_some())
+                };
+                drive()
+                    .map(Place::Drive)
+                    .or_else(|| {
+                        coordinate()
+                            .and_then(|c| joint(&c.measures))
+                            .map(Place::Joint)
+                    })
+                    .or_else(|| named().map(Place::Joint))
+            }
+            ActsAt::Points | ActsAt::TwoPointsOfABody => {
+                let point = self.points.iter().position(|point| point.name == name)?;
+                self.points[point].anchor.body.map(|_| Place::Point(point))
+            }
+            ActsAt::Base => (name == "base").then_some(Place::Base),
+            ActsAt::Force => (name == "force").then_some(Place::Force),
+        }
+    }
+
+    fn place_names(&self, acts: ActsAt) -> Vec<&str> {
+        let drives = self.drives.iter().map(|drive| drive.name.as_str());
+        let coordinates = self.coordinates.iter().map(|c| c.name.as_str());
+        let joints = self.joints.iter().map(|joint| joint.name.as_str());
+        let points = self.points.iter().map(|point| point.name.as_str());
+        let all: Vec<&str> = match acts {
+            ActsAt::Base => vec!["base"],
+            ActsAt::Force => vec!["force"],
+            ActsAt::Points | ActsAt::TwoPointsOfABody => points.collect(),
+            ActsAt::Drives | ActsAt::LinearDrives => drives.collect(),
+            _ => drives.chain(coordinates).chain(joints).collect(),
+        };
+        all.into_iter()
+            .filter(|name| self.place(acts, name).is_some())
+            .collect()
+    }
+}
+
+/// A list of names for a message, cut where nobody reads on.
+pub(crate) fn list(names: &[&str]) -> String {
+    let mut list: Vec<String> = names
+        .iter()
+        .take(24)
+        .map(|name| format!("`{name}`"))
+        .collect();
+    if names.len() > 24 {
+        list.push("...".to_owned());
+    }
+    if list.is_empty() {
+        "none".to_owned()
+    } else {
+        list.join(", ")
+    }
+}

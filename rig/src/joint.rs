@@ -1,0 +1,133 @@
+//! Kinds of joints: each as the functions of two bodies' poses that it holds.
+//!
+//! A place on both bodies and an axis in the base frame go in; the equations and the joint's own coordinate come
+//! out. Source: E. Haug, "Computer Aided Kinematics and Dynamics of Mechanical Systems" (1989), table 9.4.
+
+use nalgebra::Vector3;
+
+use crate::pair::{Anchor, Pair, Shape};
+use crate::pose::{BodyMotion, Pose};
+
+/// What a joint allows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Fixed,
+    Revolute,
+    Prismatic,
+    Cylindrical,
+    Spherical,
+    Planar,
+    /// A point of the second body stays on a line of the first.
+    PointOnLine,
+}
+
+impl Kind {
+    /// Names in rig files.
+    pub(crate) const NAMES: [&'static str; 7] = [
+        "fixed",
+        "revolute",
+        "prismatic",
+        "cylindrical",
+        "spherical",
+        "planar",
+        "point_on_line",
+    ];
+
+    /// The kind of a name.
+    pub(crate) fn named(name: &str) -> Option<Self> {
+        const KINDS: [Kind; 7] = [
+            Kind::Fixed,
+            Kind::Revolute,
+            Kind::Prismatic,
+            Kind::Cylindrical,
+            Kind::Spherical,
+            Kind::Planar,
+            Kind::PointOnLine,
+        ];
+        let at = Self::NAMES.iter().position(|known| *known == name)?;
+        Some(KINDS[at])
+    }
+}
+
+/// Equations of a joint, each with its constant value, and its coordinate if it has exactly one.
+///
+/// `axis` is a unit vector in the base frame while the bodies are at `poses`.
+pub(crate) fn equations(
+    kind: Kind,
+    from: Anchor,
+    to: Anchor,
+    axis: &Vector3<f64>,
+    poses: [Pose; 2],
+) -> (Vec<(Pair, f64)>, Option<Pair>) {
+    let (u, v) = across(axis);
+    let on = |side: usize, direction: &Vector3<f64>| poses[side].q_WB.inverse() * direction;
+    let pair = |shape| Pair { from, to, shape };
+    let coincident =
+        || [Vector3::x(), Vector3::y(), Vector3::z()].map(|n| pair(Shape::Component(n)));
+    let on_line = || [&u, &v].map(|n| pair(Shape::Along(on(0, n))));
+    let parallel = || [&u, &v].map(|n| pair(Shape::Cosine(on(0, n), on(1, axis))));
+    let locked =
+        || [(&u, &v), (&v, axis), (axis, &u)].map(|(a, b)| pair(Shape::Cosine(on(0, a), on(1, b))));
+    let mut held: Vec<Pair> = Vec::new();
+    let mut motion = None;
+    match kind {
+        Kind::Fixed => {
+            held.extend(coincident());
+            held.extend(locked());
+        }
+        Kind::Revolute => {
+            held.extend(coincident());
+            held.extend(parallel());
+            motion = Some(pair(Shape::Angle {
+                axis: on(0, axis),
+                x: on(0, &u),
+                x_to: on(1, &u),
+                offset: 0.0,
+            }));
+        }
+        Kind::Prismatic => {
+            held.extend(on_line());
+            held.extend(locked());
+            motion = Some(pair(Shape::Along(on(0, axis))));
+        }
+        Kind::Cylindrical => {
+            held.extend(on_line());
+            held.extend(parallel());
+        }
+        Kind::Spherical => held.extend(coincident()),
+        Kind::Planar => {
+            held.push(pair(Shape::Along(on(0, axis))));
+            held.extend(parallel());
+        }
+        Kind::PointOnLine => held.extend(on_line()),
+    }
+    (held.into_iter().map(|pair| (pair, 0.0)).collect(), motion)
+}
+
+/// Makes a joint's coordinate have a value while the bodies are at `poses`.
+pub(crate) fn set_nominal(motion: &mut Pair, nominal: f64, poses: &[Pose]) {
+    let bodies: Vec<BodyMotion> = poses
+        .iter()
+        .map(|pose| BodyMotion::at_rest(*pose))
+        .collect();
+    let base = BodyMotion::at_rest(Pose::identity());
+    let value = motion.derive(&bodies, &base).value;
+    match &mut motion.shape {
+        Shape::Angle { offset, .. } => *offset += nominal - value,
+        // The anchor of the second body moves along the axis, where the joint leaves it free.
+        Shape::Along(axis) => {
+            let turned = |body: Option<usize>| body.map_or(base.pose.q_WB, |b| poses[b].q_WB);
+            let axis_W = turned(motion.from.body) * *axis;
+            motion.to.at += turned(motion.to.body).inverse() * axis_W * (nominal - value);
+        }
+        Shape::Component(_) | Shape::Cosine(..) | Shape::Distance => {}
+    }
+}
+
+/// Two unit vectors across a unit vector and each other, a right-handed triad with it.
+fn across(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let mut other = Vector3::zeros();
+    other[axis.iamin()] = 1.0;
+    let v = axis.cross(&other).normalize();
+    (v.cross(axis), v)
+}

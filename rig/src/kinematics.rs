@@ -1,0 +1,473 @@
+//! Motion of all bodies from prescribed coordinates: Gauss-Newton on the joints' equations, rates and
+//! accelerations from their derivatives.
+//!
+//! The equations may be redundant, as those of parallel cranks are: each is kept, the least-squares solution
+//! of all is taken, and a residual says that they contradict each other.
+//! Along a trajectory an inverse is kept from pose to pose and solutions are refined (chord method).
+//! The QR decomposition with column pivoting reveals whether they determine the motion at all.
+//! Source: E. Haug, "Computer Aided Kinematics and Dynamics of Mechanical Systems" (1989), sections 3.6 and 9.6.
+
+use std::fmt;
+
+use nalgebra::linalg::ColPivQR;
+use nalgebra::{DMatrix, DVector, Dyn, Vector3};
+
+use crate::pair::{Derived, Pair};
+use crate::pose::{BodyMotion, Pose};
+use crate::rig::Rig;
+
+/// Steps of Gauss-Newton before a pose is given up.
+const MOST_STEPS: usize = 40;
+/// A step below this, m or rad, ends the search: convergence is quadratic, and this is rounding.
+const SMALLEST_STEP: f64 = 1e-11;
+/// A step, or a refinement, that is not shorter than this share of the one before asks for a fresh inverse.
+const SLOWEST: f64 = 0.2;
+/// Rates are refined until their change is below this share.
+const REFINED: f64 = 1e-13;
+/// Joints may gape by this much, m or rad.
+const LARGEST_GAP: f64 = 1e-9;
+/// A pivot below this share of the largest says that a body can move by itself.
+const RANK_TOLERANCE: f64 = 1e-8;
+/// Coordinates move at most this far, m or rad, between two poses of a continuation.
+const CONTINUATION_STEP: f64 = 0.04;
+
+/// Values of the coordinates with their derivatives at one time; one entry per coordinate of the rig.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// Values, rad or m.
+    pub q: Vec<f64>,
+    /// First derivatives.
+    pub qd: Vec<f64>,
+    /// Second derivatives.
+    pub qdd: Vec<f64>,
+}
+
+/// Why there is no motion for a state.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PoseError {
+    /// The joints cannot be closed with these values of the coordinates.
+    OutOfReach {
+        /// The joint, or the coordinate, that gapes most.
+        at: String,
+        /// By how much, m or rad.
+        gap: f64,
+    },
+    /// The coordinates do not determine the motion: a singular pose, or a body that nothing holds.
+    Undetermined {
+        /// The body that is freest to move.
+        body: String,
+    },
+    /// There are more coordinates than the joints leave freedoms.
+    TooManyCoordinates {
+        /// Freedoms.
+        freedoms: usize,
+        /// Coordinates.
+        coordinates: usize,
+    },
+    /// The drives cannot move the mechanism here: no forces of theirs balance a load.
+    DrivesDeadlocked,
+}
+
+impl fmt::Display for PoseError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::OutOfReach { at, gap } => write!(
+                f,
+                "the joints do not close: `{at}` gapes by {gap:.2e}; keep the trajectory inside the workspace, and \
+                 check the points of this joint"
+            ),
+            Self::Undetermined { body } => write!(
+                f,
+                "joints and coordinates do not determine the motion: `{body}` is free to move; keep clear of \
+                 singular poses, or hold it by a joint"
+            ),
+            Self::TooManyCoordinates {
+                freedoms,
+                coordinates,
+            } => write!(
+                f,
+                "the joints leave fewer degrees of freedom ({freedoms}) than there are coordinates ({coordinates}); give as \
+                 many coordinates and drives as there are degrees of freedom"
+            ),
+            Self::DrivesDeadlocked => write!(
+                f,
+                "the drives have no leverage here: no forces of theirs balance the load; keep clear of this pose"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for PoseError {}
+
+/// Motion of all bodies at one time.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    /// One per body of the rig.
+    pub bodies: Vec<BodyMotion>,
+    /// Rates of all bodies per unit rate of each coordinate: column `k` is the least-squares solution of the
+    /// differentiated joints with coordinate `k` at rate one, six rows per body.
+    pub(crate) rates_per_coordinate: DMatrix<f64>,
+}
+
+/// Follows a rig from pose to pose.
+#[derive(Clone, Debug)]
+pub struct Tracker<'r> {
+    rig: &'r Rig,
+    base: BodyMotion,
+    /// The joints' equations with the names of their joints, then the coordinates.
+    equations: Vec<(Pair, f64)>,
+    names: Vec<&'r str>,
+    /// Where the bodies were last, and the coordinates there.
+    poses: Vec<Pose>,
+    last: Vec<f64>,
+    /// Rates per unit rate of each coordinate where bodies were last, from which the next pose is guessed.
+    slopes: Option<DMatrix<f64>>,
+    /// Inverse of the gradient at some pose nearby.
+    inverse: Option<Inverse>,
+}
+
+impl<'r> Tracker<'r> {
+    /// Starts at the nominal configuration, closed exactly.
+    ///
+    /// Fails when the joints do not close there, leave too few freedoms for the coordinates, or with them do not
+    /// determine the pose.
+    pub fn new(rig: &'r Rig) -> Result<Self, PoseError> {
+        let base = BodyMotion::at_rest(Pose::identity());
+        let poses: Vec<Pose> = rig.bodies.iter().map(|body| body.nominal).collect();
+        let at_rest: Vec<BodyMotion> = poses.iter().map(|p| BodyMotion::at_rest(*p)).collect();
+        let joints = rig.joints.iter();
+        let mut equations: Vec<(Pair, f64)> =
+            joints.clone().flat_map(|j| j.equations.clone()).collect();
+        let mut names: Vec<&str> = joints
+            .flat_map(|j| j.equations.iter().map(|_| j.name.as_str()))
+            .collect();
+        let mut last = Vec::new();
+        for coordinate in &rig.coordinates {
+            let value = coordinate.measures.derive(&at_rest, &base).value;
+            equations.push((coordinate.measures, value));
+            names.push(&coordinate.name);
+            last.push(value);
+        }
+        let mut tracker = Self {
+            rig,
+            base,
+            equations,
+            names,
+            poses,
+            last,
+            slopes: None,
+            inverse: None,
+        };
+        let q = tracker.last.clone();
+        tracker.close(&q)?;
+        tracker.check_freedoms()?;
+        Ok(tracker)
+    }
+
+    /// More coordinates than freedoms would contradict each other as soon as the rig moves. The rank of the joints'
+    /// equations can only be lower at a special pose, so that this never refuses a sound rig.
+    fn check_freedoms(&self) -> Result<(), PoseError> {
+        let n = 6 * self.rig.bodies.len();
+        let coordinates = self.last.len();
+        let n_joint = self.equations.len() - coordinates;
+        let bodies: Vec<BodyMotion> = self.poses.iter().map(|p| BodyMotion::at_rest(*p)).collect();
+        let mut jacobian: DMatrix<f64> = DMatrix::zeros(n_joint.max(n), n);
+        for (i, (pair, _)) in self.equations[..n_joint].iter().enumerate() {
+            let derived = pair.derive(&bodies, &self.base);
+            derived.scatter(pair, |column, value| jacobian[(i, column)] += value);
+        }
+        let r: DMatrix<f64> = ColPivQR::new(jacobian).r();
+        let held = (0..n).filter(|i| r[(*i, *i)].abs() > RANK_TOLERANCE * r[(0, 0)].abs());
+        let freedoms = n - held.count();
+        if coordinates > freedoms {
+            return Err(PoseError::TooManyCoordinates {
+                freedoms,
+                coordinates,
+            });
+        }
+        Ok(())
+    }
+
+    /// Values of the coordinates at the pose where the tracker stands.
+    pub fn coordinates(&self) -> &[f64] {
+        &self.last
+    }
+
+    /// The motion of all bodies for a state near the last one, or anywhere that can be reached from there
+    /// along a straight line in the coordinates.
+    ///
+    /// Fails when the joints cannot be closed there or do not determine the motion.
+    pub fn follow(&mut self, state: &State) -> Result<Motion, PoseError> {
+        let far = state
+            .q
+            .iter()
+            .zip(&self.last)
+            .enumerate()
+            .map(|(k, (to, from))| self.rig.coordinates[k].measures.difference(*to, *from))
+            .fold(0.0, |most: f64, step| most.max(step.abs()));
+        // Small steps keep to the assembly in which the rig is drawn.
+        let n_steps = (far / CONTINUATION_STEP).min(1e4).ceil();
+        let from = self.last.clone();
+        let mut step = 1.0;
+        while step < n_steps {
+            let q: Vec<f64> = from
+                .iter()
+                .zip(&state.q)
+                .enumerate()
+                .map(|(k, (from, to))| {
+                    let whole = self.rig.coordinates[k].measures.difference(*to, *from);
+                    from + whole * step / n_steps
+                })
+                .collect();
+            self.close(&q)?;
+            step += 1.0;
+        }
+        self.close(&state.q)?;
+        let motion = self.differentiate(state)?;
+        self.slopes = Some(motion.rates_per_coordinate.clone());
+        Ok(motion)
+    }
+
+    /// Gauss-Newton from the last poses to those where joints are closed and coordinates have values `q`.
+    ///
+    /// One inverse of the gradient serves as long as steps shrink fast with it: along a trajectory that saves
+    /// nearly all decompositions, and the residual, not the inverse, says when the pose is met.
+    fn close(&mut self, q: &[f64]) -> Result<(), PoseError> {
+        let n_joint = self.equations.len() - q.len();
+        for (equation, value) in self.equations[n_joint..].iter_mut().zip(q) {
+            equation.1 = *value;
+        }
+        let mut poses = self.guess(q);
+        let mut outcome = ("", f64::INFINITY);
+        let mut last_length = f64::INFINITY;
+        let mut is_fresh = false;
+        for _ in 0..MOST_STEPS {
+            let bodies: Vec<BodyMotion> = poses.iter().map(|p| BodyMotion::at_rest(*p)).collect();
+            let derived = self.derive(&bodies);
+            let mut residual = DMatrix::zeros(self.equations.len(), 1);
+            for (i, ((pair, target), derived)) in self.equations.iter().zip(&derived).enumerate() {
+                residual[i] = pair.difference(derived.value, *target);
+            }
+            let gap = residual.iamax_full().0;
+            outcome = (self.names[gap], residual[gap].abs());
+            let known = self
+                .inverse
+                .as_ref()
+                .map(|inverse| inverse.solve(&residual));
+            let shrinks =
+                |step: &DMatrix<f64>| step.amax() < SMALLEST_STEP.max(SLOWEST * last_length);
+            let mut step = if let Some(step) = known.filter(shrinks) {
+                step
+            } else {
+                let fresh = self.invert(&derived)?;
+                let step = fresh.solve(&residual);
+                self.inverse = Some(fresh);
+                is_fresh = true;
+                step
+            };
+            let length = step.amax();
+            if !length.is_finite() {
+                break;
+            }
+            if length < SMALLEST_STEP {
+                if outcome.1 > LARGEST_GAP {
+                    // An old inverse may be blind to this gap.
+                    if is_fresh {
+                        break;
+                    }
+                    self.inverse = None;
+                    continue;
+                }
+                displace(&mut poses, &step);
+                self.poses = poses;
+                q.clone_into(&mut self.last);
+                return Ok(());
+            }
+            // A step over more than half a radian leaves the region where the gradient means anything.
+            if length > 0.5 {
+                step *= 0.5 / length;
+                last_length = f64::INFINITY;
+            } else {
+                last_length = length;
+            }
+            is_fresh = false;
+            displace(&mut poses, &step);
+        }
+        // Whatever comes next starts afresh.
+        self.inverse = None;
+        Err(PoseError::OutOfReach {
+            at: outcome.0.to_owned(),
+            gap: outcome.1,
+        })
+    }
+
+    /// Where the bodies will be about when the coordinates are `q`.
+    fn guess(&self, q: &[f64]) -> Vec<Pose> {
+        let mut poses = self.poses.clone();
+        if let Some(slopes) = &self.slopes {
+            let measures = self.rig.coordinates.iter().map(|c| &c.measures);
+            let steps = measures.zip(q).zip(&self.last);
+            // The sign: a correction is taken away.
+            let back = DMatrix::from_iterator(
+                q.len(),
+                1,
+                steps.map(|((m, to), from)| -m.difference(*to, *from)),
+            );
+            displace(&mut poses, &(slopes * back));
+        }
+        poses
+    }
+
+    /// Rates and accelerations at the closed pose.
+    fn differentiate(&mut self, state: &State) -> Result<Motion, PoseError> {
+        let n_equations = self.equations.len();
+        let n_dof = state.q.len();
+        let n_joint = n_equations - n_dof;
+        let mut bodies: Vec<BodyMotion> = self
+            .poses
+            .iter()
+            .map(|pose| BodyMotion::at_rest(*pose))
+            .collect();
+        let derived = self.derive(&bodies);
+        let mut unit = DMatrix::zeros(n_equations, n_dof);
+        for k in 0..n_dof {
+            unit[(n_joint + k, k)] = 1.0;
+        }
+        let rates_per_coordinate = self.solve(&derived, &unit)?;
+        let rates = &rates_per_coordinate * DVector::from_column_slice(&state.qd);
+        let part = |of: &[f64], at: usize| Vector3::new(of[at], of[at + 1], of[at + 2]);
+        for (b, body) in bodies.iter_mut().enumerate() {
+            body.v_WB_W = part(rates.as_slice(), 6 * b);
+            body.w_WB_W = part(rates.as_slice(), 6 * b + 3);
+        }
+        let mut right = DMatrix::zeros(n_equations, 1);
+        for (i, derived) in self.derive(&bodies).iter().enumerate() {
+            let prescribed = if i < n_joint {
+                0.0
+            } else {
+                state.qdd[i - n_joint]
+            };
+            right[i] = prescribed - derived.bias;
+        }
+        let accelerations = self.solve(&derived, &right)?;
+        for (b, body) in bodies.iter_mut().enumerate() {
+            body.a_WB_W = part(accelerations.as_slice(), 6 * b);
+            body.alpha_WB_W = part(accelerations.as_slice(), 6 * b + 3);
+        }
+        Ok(Motion {
+            bodies,
+            rates_per_coordinate,
+        })
+    }
+
+    /// Solves `gradient x = right` by iterative refinement with the inverse at hand; a fresh one if that is slow.
+    fn solve(
+        &mut self,
+        derived: &[Derived],
+        right: &DMatrix<f64>,
+    ) -> Result<DMatrix<f64>, PoseError> {
+        let scale = right.amax().max(f64::MIN_POSITIVE);
+        if let Some(inverse) = &self.inverse {
+            let mut x = inverse.solve(right);
+            let mut last_length = f64::INFINITY;
+            loop {
+                let step = inverse.solve(&(right - self.product(derived, &x)));
+                let length = step.amax();
+                if length <= REFINED * x.amax().max(scale) {
+                    return Ok(x + step);
+                }
+                if length > SLOWEST * last_length || !length.is_finite() {
+                    break;
+                }
+                x += step;
+                last_length = length;
+            }
+        }
+        let fresh = self.invert(derived)?;
+        let mut x = fresh.solve(right);
+        x += fresh.solve(&(right - self.product(derived, &x)));
+        self.inverse = Some(fresh);
+        Ok(x)
+    }
+
+    /// Gradient of all equations times columns of rates.
+    fn product(&self, derived: &[Derived], x: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut product = DMatrix::zeros(self.equations.len(), x.ncols());
+        for (i, ((pair, _), derived)) in self.equations.iter().zip(derived).enumerate() {
+            for k in 0..x.ncols() {
+                let mut sum = 0.0;
+                derived.scatter(pair, |column, value| sum += value * x[(column, k)]);
+                product[(i, k)] = sum;
+            }
+        }
+        product
+    }
+
+    fn derive(&self, bodies: &[BodyMotion]) -> Vec<Derived> {
+        self.equations
+            .iter()
+            .map(|(pair, _)| pair.derive(bodies, &self.base))
+            .collect()
+    }
+
+    fn invert(&self, derived: &[Derived]) -> Result<Inverse, PoseError> {
+        let n = 6 * self.rig.bodies.len();
+        // Rows of zeros complete a matrix with too few equations; its rank then tells.
+        let mut jacobian: DMatrix<f64> = DMatrix::zeros(self.equations.len().max(n), n);
+        for (i, ((pair, _), derived)) in self.equations.iter().zip(derived).enumerate() {
+            derived.scatter(pair, |column, value| jacobian[(i, column)] += value);
+        }
+        if jacobian.iter().all(|x| x.is_finite()) {
+            let qr: ColPivQR<f64, Dyn, Dyn> = ColPivQR::new(jacobian.clone());
+            let r: DMatrix<f64> = qr.r();
+            let largest = r[(0, 0)].abs();
+            let smallest = (0..n).fold(f64::INFINITY, |least: f64, i| least.min(r[(i, i)].abs()));
+            if smallest > RANK_TOLERANCE * largest {
+                let q: DMatrix<f64> = qr.q();
+                let mut inverse = q.rows(0, self.equations.len()).transpose();
+                let solvable = r.solve_upper_triangular_mut(&mut inverse);
+                debug_assert!(solvable, "the rank was checked");
+                qr.p().inv_permute_rows(&mut inverse);
+                return Ok(Inverse(inverse));
+            }
+        }
+        Err(PoseError::Undetermined {
+            body: self.rig.bodies[freest_body(jacobian)].name.clone(),
+        })
+    }
+}
+
+/// The body that moves most in the direction that costs no equation anything.
+fn freest_body(jacobian: DMatrix<f64>) -> usize {
+    let n = jacobian.ncols();
+    if jacobian.iter().any(|x| !x.is_finite()) {
+        return 0;
+    }
+    let svd = jacobian.svd(false, true);
+    svd.v_t.map_or(0, |v_t| {
+        let least = svd.singular_values.imin();
+        (0..n)
+            .max_by(|i, j| v_t[(least, *i)].abs().total_cmp(&v_t[(least, *j)].abs()))
+            .unwrap_or(0)
+            / 6
+    })
+}
+
+/// Moves all bodies by minus a step, six rows per body.
+fn displace(poses: &mut [Pose], step: &DMatrix<f64>) {
+    for (b, pose) in poses.iter_mut().enumerate() {
+        let part = |at: usize| -Vector3::new(step[at], step[at + 1], step[at + 2]);
+        *pose = pose.displaced(&part(6 * b), &part(6 * b + 3));
+    }
+}
+
+/// The least-squares inverse of the gradient of all equations at one pose.
+#[derive(Clone, Debug)]
+struct Inverse(DMatrix<f64>);
+
+impl Inverse {
+    /// Least-squares solutions, one per column of the right-hand side.
+    fn solve(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
+        &self.0 * right
+    }
+}

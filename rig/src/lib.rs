@@ -1,0 +1,51 @@
+//! A machine on the bench, in numbers: a rig file and a trajectory go in, a recording comes out.
+//!
+//! Rigs stand in for hardware: whole machines with parallel cranks, rods, friction and sensors, against which
+//! reduced models are held. So nothing of their mechanics is shared with the mill: every body moves by itself,
+//! joints are equations between bodies, and all numbers are floats. The pipeline:
+//!
+//! 1. [`load_file`] - a rig file, checked;
+//! 2. [`Trajectory`] - coordinates over time;
+//! 3. [`Tracker`] - poses, rates and accelerations of all bodies, redundant loops included;
+//! 4. [`forces`] - what the drives must supply, with all effects;
+//! 5. [`simulate`] - the readings of the sensors.
+#![allow(
+    non_snake_case,
+    reason = "physical quantities carry their frames, as in p_WB_W"
+)]
+
+mod assemble;
+mod assemble_sensors;
+mod dynamics;
+mod effect;
+mod effect_by_name;
+mod file;
+mod joint;
+mod kinematics;
+mod load;
+mod log;
+mod massive;
+mod merge;
+mod noise;
+mod pair;
+mod pose;
+mod rig;
+mod sensor;
+mod simulate;
+mod trajectory;
+
+pub use dynamics::{Measured, energy};
+pub use effect::{Effect, Law, Place, ValueOfKind, ValueSign};
+pub use effect_by_name::{EffectFault, EffectPart};
+pub use kinematics::{Motion, PoseError, State, Tracker};
+pub use load::{Loaded, fault, load, load_file, parse, read_limited, span};
+pub use log::Log;
+pub use modelmill_spec::Failure;
+pub use pair::{Anchor, Pair};
+pub use pose::{BodyMotion, Pose};
+pub use rig::{Body, Coordinate, Drive, Joint, LumpedMass, Point, Rig};
+pub use sensor::{Channel, Sensors};
+pub use simulate::{
+    Instant, Run, SimulationError, forces, forces_along, measured, n_instants, simulate,
+};
+pub use trajectory::{Samples, Trajectory, TrajectoryError};

@@ -1,0 +1,190 @@
+//! Reads a rig file and those that it extends, and makes the rig that they describe.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use modelmill_spec::{Diagnostic, Failure, Severity, SourceFile, Sources, Span};
+
+use crate::assemble::assemble;
+use crate::file::RigEntry;
+use crate::rig::Rig;
+
+/// Larger files are no rig files.
+const LARGEST_FILE: usize = 4 << 20;
+/// Longest chain of variants.
+const LONGEST_CHAIN: usize = 8;
+
+/// A rig file that was read and found sound.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// What the file describes.
+    pub rig: Rig,
+    /// The files that were read.
+    pub sources: Sources,
+}
+
+/// Reads a rig file from disk, and those that it extends.
+///
+/// Fails with findings about the files, each with its place and what to do.
+pub fn load_file(path: &Path) -> Result<Loaded, Failure> {
+    match read_limited(path) {
+        Ok(text) => load(&path.to_string_lossy(), &text, &mut read_limited),
+        Err(error) => Err(failure(
+            Sources::default(),
+            Diagnostic {
+                help: vec![
+                    "give the path of a rig file, such as `model-spec/rigs/spidermill-full.toml`"
+                        .to_owned(),
+                ],
+                ..fault(None, format!("cannot read `{}`: {error}", path.display()))
+            },
+        )),
+    }
+}
+
+/// Reads a file, but not much more than a rig file can be long.
+pub fn read_limited(path: &Path) -> std::io::Result<String> {
+    let mut text = String::new();
+    std::fs::File::open(path)?
+        .take(LARGEST_FILE as u64 + 1)
+        .read_to_string(&mut text)?;
+    Ok(text)
+}
+
+/// Reads a rig from its text; `read` fetches the files that it extends.
+///
+/// ```
+/// let text = r#"
+///     schema = 1
+///     name = "pendulum"
+///     gravity = [0, -9.81, 0]
+///     body = [{ name = "arm", mass = 2, centre = [0.5, 0, 0], inertia = { zz = 0.1 } }]
+///     joint = [{ name = "hinge", kind = "revolute", between = ["base", "arm"], at = [0, 0, 0] }]
+///     coordinate = [{ name = "q", joint = "hinge" }]
+///     drive = [{ name = "motor", joint = "hinge" }]
+/// "#;
+/// let rig = modelmill_rig::load("pendulum.toml", text, &mut |_| unreachable!())?.rig;
+/// let mut tracker = modelmill_rig::Tracker::new(&rig)?;
+/// let state = modelmill_rig::State { q: vec![0.3], qd: vec![0.0], qdd: vec![0.0] };
+/// let torque = modelmill_rig::forces(&rig, &tracker.follow(&state)?)?[0];
+/// assert!((torque - 2.0 * 9.81 * 0.5 * 0.3_f64.cos()).abs() < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn load(
+    path_name: &str,
+    text: &str,
+    read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
+) -> Result<Loaded, Failure> {
+    let mut sources = Sources::default();
+    let mut chain = Vec::new();
+    let mut next = Some((PathBuf::from(path_name), text.to_owned()));
+    while let Some((path, text)) = next.take() {
+        let file = sources.files.len();
+        sources.files.push(SourceFile {
+            path: path.clone(),
+            text: text.clone(),
+        });
+        let entry: RigEntry = match parse(&text, file) {
+            Ok(entry) => entry,
+            Err(found) => return Err(failure(sources, *found)),
+        };
+        if let Some(extends) = &entry.extends {
+            let span = Some(span(file, &extends.span()));
+            let other = path
+                .parent()
+                .unwrap_or(Path::new(""))
+                .join(extends.get_ref());
+            if file + 1 == LONGEST_CHAIN {
+                let help = "check whether two files extend each other".to_owned();
+                let found = fault(span, "this chain of variants is too long");
+                return Err(failure(
+                    sources,
+                    Diagnostic {
+                        help: vec![help],
+                        ..found
+                    },
+                ));
+            }
+            match read(&other) {
+                Ok(text) => next = Some((other, text)),
+                Err(error) => {
+                    let found = fault(span, format!("cannot read `{}`: {error}", other.display()));
+                    let help = "the path is relative to the folder of this file".to_owned();
+                    return Err(failure(
+                        sources,
+                        Diagnostic {
+                            help: vec![help],
+                            ..found
+                        },
+                    ));
+                }
+            }
+        }
+        chain.push((file, entry));
+    }
+    match assemble(chain) {
+        Ok(rig) => Ok(Loaded { rig, sources }),
+        Err(diagnostics) => Err(Failure {
+            diagnostics,
+            sources,
+        }),
+    }
+}
+
+/// Reads the tables of a TOML file; `file` is its index among the sources.
+///
+/// Fails with the place of what does not fit.
+pub fn parse<T: serde::de::DeserializeOwned>(
+    text: &str,
+    file: usize,
+) -> Result<T, Box<Diagnostic>> {
+    if text.len() > LARGEST_FILE {
+        return Err(Box::new(fault(None, "this file is too large to be meant")));
+    }
+    toml::from_str(text).map_err(|error| {
+        let place = error.span().map(|range| span(file, &range));
+        let mut found = fault(place, error.message().lines().next().unwrap_or("this is not TOML"));
+        let message = error.message();
+        found.help.push(
+            if message.contains("unknown field") {
+                "take one of the keys listed, or delete this one"
+            } else if message.contains("missing field") {
+                "add the missing key to this table"
+            } else if message.contains("invalid") && error.span().is_some() {
+                "give a value of the kind that is expected: places are `[x, y, z]` in m, numbers are in SI units"
+            } else {
+                "see https://toml.io for the syntax of TOML, and model-spec/rigs for examples"
+            }
+            .to_owned(),
+        );
+        Box::new(found)
+    })
+}
+
+fn failure(sources: Sources, found: Diagnostic) -> Failure {
+    Failure {
+        diagnostics: vec![found],
+        sources,
+    }
+}
+
+/// A place in a file.
+pub fn span(file: usize, range: &std::ops::Range<usize>) -> Span {
+    Span {
+        file,
+        start: range.start,
+        end: range.end,
+    }
+}
+
+/// An error without further words.
+pub fn fault(span: Option<Span>, message: impl Into<String>) -> Diagnostic {
+    Diagnostic {
+        severity: Severity::Error,
+        message: message.into(),
+        span,
+        label: String::new(),
+        related: None,
+        help: Vec::new(),
+    }
+}

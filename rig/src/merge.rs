@@ -1,0 +1,147 @@
+//! A rig file and those that it extends, as one: entries of a variant replace those of the same name or join them.
+
+use crate::file::{
+    BodyEntry, CoordinateEntry, DriveEntry, EffectEntry, JointEntry, LumpedMassEntry, Name,
+    PointEntry, RigEntry, SensorEntry, Triple,
+};
+use crate::load::span;
+use crate::log::{Item, Log};
+
+/// Entries of all files of a chain.
+pub(crate) struct Merged {
+    pub(crate) name: String,
+    pub(crate) title: String,
+    pub(crate) gravity: Option<Item<Triple>>,
+    pub(crate) seed: Option<u64>,
+    pub(crate) rate: Option<Item<toml::Spanned<f64>>>,
+    pub(crate) derivatives: Option<bool>,
+    pub(crate) bodies: Vec<Item<BodyEntry>>,
+    pub(crate) points: Vec<Item<PointEntry>>,
+    pub(crate) lumped_masses: Vec<Item<LumpedMassEntry>>,
+    pub(crate) joints: Vec<Item<JointEntry>>,
+    pub(crate) coordinates: Vec<Item<CoordinateEntry>>,
+    pub(crate) drives: Vec<Item<DriveEntry>>,
+    pub(crate) effects: Vec<Item<EffectEntry>>,
+    pub(crate) encoders: Vec<Item<SensorEntry>>,
+    pub(crate) force_sensors: Vec<Item<SensorEntry>>,
+}
+
+impl Merged {
+    pub(crate) fn new(file: usize, entry: RigEntry, log: &mut Log) -> Self {
+        if *entry.schema.get_ref() != 1 {
+            log.error(
+                span(file, &entry.schema.span()),
+                format!(
+                    "schema {} of rig files is not known",
+                    entry.schema.get_ref()
+                ),
+                "expected 1",
+                "write `schema = 1`",
+            );
+        }
+        let sampling = entry.sampling.unwrap_or_default();
+        Self {
+            name: entry.name.into_inner(),
+            title: entry.title.unwrap_or_default(),
+            gravity: entry.gravity.map(|entry| Item { file, entry }),
+            seed: entry.seed,
+            rate: sampling.rate.map(|entry| Item { file, entry }),
+            derivatives: sampling.derivatives,
+            bodies: named(file, entry.body, "body", |e| Some(&e.name), log),
+            points: named(file, entry.point, "point", |e| Some(&e.name), log),
+            lumped_masses: named(
+                file,
+                entry.lumped_mass,
+                "lumped mass",
+                |e| e.name.as_ref(),
+                log,
+            ),
+            joints: named(file, entry.joint, "joint", |e| Some(&e.name), log),
+            coordinates: named(file, entry.coordinate, "coordinate", |e| Some(&e.name), log),
+            drives: named(file, entry.drive, "drive", |e| Some(&e.name), log),
+            effects: named(file, entry.effect, "effect", |e| e.name.as_ref(), log),
+            encoders: named(file, entry.encoder, "encoder", |_| None, log),
+            force_sensors: named(file, entry.force_sensor, "force sensor", |_| None, log),
+        }
+    }
+
+    /// Takes over the entries of a variant.
+    pub(crate) fn extend(&mut self, variant: Self) {
+        self.name = variant.name;
+        if !variant.title.is_empty() {
+            self.title = variant.title;
+        }
+        self.gravity = variant.gravity.or(self.gravity.take());
+        self.seed = variant.seed.or(self.seed);
+        self.rate = variant.rate.or(self.rate.take());
+        self.derivatives = variant.derivatives.or(self.derivatives);
+        replace(&mut self.bodies, variant.bodies, |e| Some(&e.name));
+        replace(&mut self.points, variant.points, |e| Some(&e.name));
+        replace(&mut self.lumped_masses, variant.lumped_masses, |e| {
+            e.name.as_ref()
+        });
+        replace(&mut self.joints, variant.joints, |e| Some(&e.name));
+        replace(&mut self.coordinates, variant.coordinates, |e| {
+            Some(&e.name)
+        });
+        replace(&mut self.drives, variant.drives, |e| Some(&e.name));
+        replace(&mut self.effects, variant.effects, |e| e.name.as_ref());
+        self.encoders.extend(variant.encoders);
+        self.force_sensors.extend(variant.force_sensors);
+    }
+}
+
+/// Wraps the entries of one file; names must be words and differ.
+fn named<T>(
+    file: usize,
+    entries: Vec<T>,
+    what: &str,
+    name: impl Fn(&T) -> Option<&Name>,
+    log: &mut Log,
+) -> Vec<Item<T>> {
+    let mut seen: Vec<&str> = Vec::new();
+    for found in entries.iter().filter_map(&name) {
+        let text = found.get_ref().as_str();
+        let is_word = text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+            && text.chars().next().is_some_and(|c| !c.is_ascii_digit());
+        if !is_word || text == "base" {
+            log.error(
+                span(file, &found.span()),
+                format!(
+                    "`{}` cannot be a name",
+                    text.chars().take(60).collect::<String>()
+                ),
+                "expected letters, digits and `_`, other than `base`",
+                "",
+            );
+        }
+        if seen.contains(&text) {
+            log.error(
+                span(file, &found.span()),
+                format!("there are two entries for the {what} `{text}`"),
+                "this is the second one",
+                "rename or delete one of the two",
+            );
+        }
+        seen.push(text);
+    }
+    entries
+        .into_iter()
+        .map(|entry| Item { file, entry })
+        .collect()
+}
+
+/// Entries of a variant replace those of the same name where they stand, or join them.
+fn replace<T>(base: &mut Vec<Item<T>>, variant: Vec<Item<T>>, name: impl Fn(&T) -> Option<&Name>) {
+    for item in variant {
+        let twin = base.iter().position(|other| {
+            name(&item.entry).is_some_and(|mine| {
+                name(&other.entry).is_some_and(|its| its.get_ref() == mine.get_ref())
+            })
+        });
+        match twin {
+            Some(at) => base[at] = item,
+            None => base.push(item),
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! A rig: bodies, joints, drives, effects and sensors, checked and ready to move.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::effect::Effect;
+use crate::pair::{Anchor, Pair};
+use crate::pose::Pose;
+use crate::sensor::Sensors;
+
+/// A full-body description of a machine. Made by [`crate::load`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rig {
+    /// Name.
+    pub name: String,
+    /// What it is, in one line; may be empty.
+    pub title: String,
+    /// Acceleration of gravity in the base frame, m/s^2.
+    pub gravity: Vector3<f64>,
+    /// Bodies.
+    pub bodies: Vec<Body>,
+    /// Named places on bodies and on the base.
+    pub points: Vec<Point>,
+    /// Masses concentrated at points.
+    pub lumped_masses: Vec<LumpedMass>,
+    /// Joints.
+    pub joints: Vec<Joint>,
+    /// Coordinates that the trajectory prescribes, one per degree of freedom.
+    pub coordinates: Vec<Coordinate>,
+    /// Drives, one per degree of freedom.
+    pub drives: Vec<Drive>,
+    /// Friction and the like.
+    pub effects: Vec<Effect>,
+    /// What is measured, and how well.
+    pub sensors: Sensors,
+    /// Seed of the noise where the user gives none.
+    pub seed: u64,
+}
+
+impl Rig {
+    /// The two points that a linear drive pushes apart; `None` for a drive in a joint.
+    pub fn ends_of_drive(&self, drive: usize) -> Option<[Anchor; 2]> {
+        let pair = &self.drives.get(drive)?.measures;
+        pair.is_distance().then_some([pair.from, pair.to])
+    }
+
+    /// Where a revolute joint is on its two bodies; `None` for a joint of another kind.
+    pub fn hinge(&self, joint: usize) -> Option<[Anchor; 2]> {
+        let pair = self.joints.get(joint)?.motion.as_ref()?;
+        pair.is_angle().then_some([pair.from, pair.to])
+    }
+
+    /// The coordinate that measures a joint.
+    pub fn coordinate_of_joint(&self, joint: usize) -> Option<usize> {
+        let pair = self.joints.get(joint)?.motion.as_ref()?;
+        self.coordinates.iter().position(|c| &c.measures == pair)
+    }
+
+    /// The coordinate that a drive moves directly, because both measure the same.
+    pub fn coordinate_of_drive(&self, drive: usize) -> Option<usize> {
+        let pair = &self.drives.get(drive)?.measures;
+        self.coordinates.iter().position(|c| &c.measures == pair)
+    }
+}
+
+/// A rigid body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Body {
+    /// Name.
+    pub name: String,
+    /// Where its frame is in the nominal configuration.
+    pub nominal: Pose,
+    /// Mass, kg.
+    pub mass: f64,
+    /// Centre of mass in the body's frame, m.
+    pub centre: Vector3<f64>,
+    /// Inertia about the centre of mass along the body's axes, kg m^2.
+    pub inertia: Matrix3<f64>,
+}
+
+/// A named place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// Name.
+    pub name: String,
+    /// Where it is.
+    pub anchor: Anchor,
+}
+
+/// A mass at a point of a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LumpedMass {
+    /// Mass, kg.
+    pub mass: f64,
+    /// Where the balance of forces sees it.
+    pub at: Anchor,
+    /// Where the balance of moments about the body's frame sees it, in the body's frame; a real mass is seen
+    /// at one place by both. Some reduced models split the two, and a rig can copy them.
+    pub moment_at: Vector3<f64>,
+}
+
+/// A joint as the equations that it holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// Name.
+    pub name: String,
+    /// Functions of the poses, each with the value that it keeps.
+    pub(crate) equations: Vec<(Pair, f64)>,
+    /// Its coordinate, where it has exactly one: an angle or a displacement.
+    pub(crate) motion: Option<Pair>,
+}
+
+/// A coordinate that the trajectory prescribes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coordinate {
+    /// Name, which is that of its column.
+    pub name: String,
+    /// What it measures.
+    pub(crate) measures: Pair,
+}
+
+/// A drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drive {
+    /// Name, which is that of its column.
+    pub name: String,
+    /// Its own length or angle; a positive force or torque increases it.
+    pub(crate) measures: Pair,
+}

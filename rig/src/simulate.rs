@@ -1,0 +1,298 @@
+//! A run of the rig along a trajectory: motion, forces of the drives with all effects, readings of the sensors.
+
+use std::fmt;
+
+use crate::dynamics::{Measured, drive_forces, measure};
+use crate::effect::{Law, Place};
+use crate::kinematics::{Motion, PoseError, State, Tracker};
+use crate::noise::Noise;
+use crate::pair::Pair;
+use crate::rig::Rig;
+use crate::trajectory::Trajectory;
+
+/// Most samples of one run: beyond, the sampling rate is a slip.
+const MOST_SAMPLES: f64 = 1e7;
+
+/// Exact forces and motion at one time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Instant {
+    /// Coordinates with derivatives, as prescribed.
+    pub state: State,
+    /// Force or torque of each drive, N or N m, effects included.
+    pub forces: Vec<f64>,
+}
+
+/// A recording of the rig.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// Names and numbers of the columns: `t`, coordinates, their derivatives, drives; all of the same length.
+    pub columns: Vec<(String, Vec<f64>)>,
+    /// What the user should know.
+    pub notes: Vec<String>,
+}
+
+/// Why a rig cannot follow a trajectory.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SimulationError {
+    /// The trajectory has another number of coordinates than the rig.
+    Coordinates {
+        /// Those of the rig.
+        rig: usize,
+        /// Those of the trajectory.
+        trajectory: usize,
+    },
+    /// The rig does not stand in its nominal configuration.
+    Nominal(PoseError),
+    /// It cannot be where the trajectory wants it.
+    Pose {
+        /// When, s.
+        time: f64,
+        /// Why.
+        reason: PoseError,
+    },
+    /// No sample is left: the delay is longer than the trajectory.
+    NothingLeft {
+        /// The longest delay, s.
+        delay: f64,
+    },
+    /// The sampling rate makes more samples than anybody wants.
+    TooManySamples {
+        /// Samples per second.
+        rate: f64,
+    },
+}
+
+impl fmt::Display for SimulationError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Coordinates { rig, trajectory } => write!(
+                f,
+                "the rig has {rig} coordinates and the trajectory {trajectory}; give one column for each"
+            ),
+            Self::Nominal(reason) => write!(f, "in the nominal configuration {reason}"),
+            Self::Pose { time, reason } => write!(f, "at t = {time} s {reason}"),
+            Self::NothingLeft { delay } => write!(
+                f,
+                "a sensor lags by {delay} s, longer than the whole trajectory; shorten the delay"
+            ),
+            Self::TooManySamples { rate } => write!(
+                f,
+                "{rate} samples per second make more than {MOST_SAMPLES:.0} samples; lower the rate"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for SimulationError {}
+
+/// The exact motion and forces at given times, without sensors; `progress` is called after each.
+///
+/// Fails where the rig cannot follow.
+pub fn forces_along(
+    rig: &Rig,
+    trajectory: &Trajectory,
+    times: &[f64],
+    mut progress: impl FnMut(),
+) -> Result<Vec<Instant>, SimulationError> {
+    if trajectory.n_coordinates() != rig.coordinates.len() {
+        return Err(SimulationError::Coordinates {
+            rig: rig.coordinates.len(),
+            trajectory: trajectory.n_coordinates(),
+        });
+    }
+    let mut tracker = Tracker::new(rig).map_err(SimulationError::Nominal)?;
+    let mut instants = Vec::with_capacity(times.len());
+    for &time in times {
+        let state = trajectory.at(time);
+        let forces = tracker
+            .follow(&state)
+            .and_then(|motion| forces(rig, &motion))
+            .map_err(|reason| SimulationError::Pose { time, reason })?;
+        instants.push(Instant { state, forces });
+        progress();
+    }
+    Ok(instants)
+}
+
+/// Forces of the drives for a motion, N or N m, with all effects; in the rig's order.
+///
+/// Effects at drives add to their forces; effects in joints are loads that the drives balance, and effects with
+/// mass are loads like those of bodies. A `time_delay` belongs to the sensors and does nothing here.
+/// Fails where the drives cannot balance a load.
+pub fn forces(rig: &Rig, motion: &Motion) -> Result<Vec<f64>, PoseError> {
+    let mechanical = drive_forces(rig, motion, &[])?;
+    if rig.effects.is_empty() {
+        return Ok(mechanical);
+    }
+    let measured = |place: Place| {
+        place
+            .pair(rig)
+            .map_or_else(Measured::default, |pair| measure(pair, motion))
+    };
+    // Programs may write places down themselves: an index that leads nowhere does nothing.
+    let load = |drive: usize| mechanical.get(drive).copied().unwrap_or(0.0);
+    let mut at_drives = vec![0.0; rig.drives.len()];
+    let mut in_joints: Vec<(&Pair, f64)> = Vec::new();
+    for effect in &rig.effects {
+        for (place, force) in effect.forces(measured, load) {
+            match place {
+                Place::Drive(drive) => {
+                    if let Some(sum) = at_drives.get_mut(drive) {
+                        *sum += force;
+                    }
+                }
+                place => in_joints.extend(place.pair(rig).map(|pair| (pair, force))),
+            }
+        }
+    }
+    let mut forces = if in_joints.is_empty() {
+        mechanical
+    } else {
+        drive_forces(rig, motion, &in_joints)?
+    };
+    for (force, added) in forces.iter_mut().zip(&at_drives) {
+        *force += added;
+    }
+    Ok(forces)
+}
+
+/// Value, rate and acceleration of a drive or of a joint with one coordinate; `None` elsewhere.
+pub fn measured(rig: &Rig, place: Place, motion: &Motion) -> Option<Measured> {
+    Some(measure(place.pair(rig)?, motion))
+}
+
+/// How many times the mechanics is solved in a run, for progress.
+pub fn n_instants(rig: &Rig, trajectory: &Trajectory) -> usize {
+    let (times, _) = sample_times(rig, trajectory).unwrap_or_default();
+    times.len() * (1 + delays(rig).len())
+}
+
+/// Drives the rig along a trajectory and measures; `seed` replaces the rig's own.
+///
+/// Fails where the rig cannot follow, and when delays or the sampling rate leave no sensible recording.
+pub fn simulate(
+    rig: &Rig,
+    trajectory: &Trajectory,
+    seed: Option<u64>,
+    mut progress: impl FnMut(),
+) -> Result<Run, SimulationError> {
+    let (times, mut notes) = sample_times(rig, trajectory)?;
+    let present = forces_along(rig, trajectory, &times, &mut progress)?;
+    let mut past: Vec<(f64, Vec<Instant>)> = Vec::new();
+    for delay in delays(rig) {
+        let earlier: Vec<f64> = times.iter().map(|t| t - delay).collect();
+        past.push((
+            delay,
+            forces_along(rig, trajectory, &earlier, &mut progress)?,
+        ));
+    }
+    let at = |delay: f64| {
+        past.iter()
+            .find(|(known, _)| known.to_bits() == delay.to_bits())
+            .map_or(&present, |(_, instants)| instants)
+    };
+    let seed = seed.unwrap_or(rig.seed);
+    let mut channel = 0;
+    let mut noise = || {
+        channel += 1;
+        Noise::new(seed, channel)
+    };
+    let names = rig.coordinates.iter().map(|c| c.name.as_str());
+    let mut columns = vec![("t".to_owned(), times)];
+    for (k, (name, encoder)) in names.clone().zip(&rig.sensors.encoders).enumerate() {
+        let mut noise = noise();
+        let values = at(encoder.delay).iter();
+        let read = values.map(|instant| encoder.read(instant.state.q[k], &mut noise));
+        columns.push((name.to_owned(), read.collect()));
+    }
+    if rig.sensors.derivatives {
+        for (suffix, of) in [
+            ("_d", (|s: &State| &s.qd) as fn(&State) -> &Vec<f64>),
+            ("_dd", |s: &State| &s.qdd),
+        ] {
+            for (k, (name, encoder)) in names.clone().zip(&rig.sensors.encoders).enumerate() {
+                let values = at(encoder.delay)
+                    .iter()
+                    .map(|instant| of(&instant.state)[k]);
+                columns.push((format!("{name}{suffix}"), values.collect()));
+            }
+        }
+    } else {
+        notes.push("positions only, as encoders give them; `derivatives = true` in `[sampling]` adds exact derivatives".to_owned());
+    }
+    for (d, (drive, sensor)) in rig
+        .drives
+        .iter()
+        .zip(&rig.sensors.force_sensors)
+        .enumerate()
+    {
+        let mut noise = noise();
+        let values = at(sensor.delay + force_delay(rig)).iter();
+        let read = values.map(|instant| sensor.read(instant.forces[d], &mut noise));
+        columns.push((drive.name.clone(), read.collect()));
+    }
+    Ok(Run { columns, notes })
+}
+
+/// Times of the samples: those of the trajectory, or evenly spaced; from where every delayed reading lies
+/// inside the trajectory.
+fn sample_times(
+    rig: &Rig,
+    trajectory: &Trajectory,
+) -> Result<(Vec<f64>, Vec<String>), SimulationError> {
+    let given = trajectory.time();
+    let (start, end) = (given[0], given[given.len() - 1]);
+    let all = match rig.sensors.rate {
+        None => given.to_vec(),
+        Some(rate) => {
+            // A last sample that rounding puts just behind the end is meant.
+            let n = ((end - start) * rate + 1e-6).floor();
+            if n > MOST_SAMPLES {
+                return Err(SimulationError::TooManySamples { rate });
+            }
+            let mut times = Vec::new();
+            while times.len() as f64 <= n {
+                times.push((start + times.len() as f64 / rate).min(end));
+            }
+            times
+        }
+    };
+    let longest = delays(rig).into_iter().fold(0.0, f64::max);
+    let n_all = all.len();
+    let times: Vec<f64> = all.into_iter().filter(|t| t - longest >= start).collect();
+    if times.is_empty() {
+        return Err(SimulationError::NothingLeft { delay: longest });
+    }
+    let mut notes = Vec::new();
+    if times.len() < n_all {
+        notes.push(format!(
+            "the first {} samples are left out: a sensor lags by {longest} s, and there is no motion before t = {start} s",
+            n_all - times.len()
+        ));
+    }
+    Ok((times, notes))
+}
+
+/// The different delays of all sensors, zero left out.
+fn delays(rig: &Rig) -> Vec<f64> {
+    let encoders = rig.sensors.encoders.iter().map(|channel| channel.delay);
+    let lag = force_delay(rig);
+    let forces = rig
+        .sensors
+        .force_sensors
+        .iter()
+        .map(|channel| channel.delay + lag);
+    let mut delays: Vec<f64> = encoders.chain(forces).filter(|d| *d > 0.0).collect();
+    delays.sort_by(f64::total_cmp);
+    delays.dedup();
+    delays
+}
+
+/// How much later all forces are read, by effects, s.
+fn force_delay(rig: &Rig) -> f64 {
+    let lag = |law: &Law| match law {
+        Law::TimeDelay { T } => *T,
+        _ => 0.0,
+    };
+    rig.effects.iter().map(|effect| lag(&effect.law)).sum()
+}
