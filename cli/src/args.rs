@@ -70,6 +70,11 @@ pub(crate) enum Command {
         modelmill compare model-spec/models/spidermill.toml \\\n      \
         --data recordings/spidermill-mbs/with-rods-check.csv --parameters fit.json --json")]
     Compare(CompareArgs),
+    /// Solve identified base parameters for physical ones, as in Table 1 of the paper: all real solutions
+    #[command(after_help = "Examples (from the project's root):\n  \
+        modelmill interpret model-spec/models/spidermill-paper.toml --fit fit.json \\\n      \
+        --unknown m2,m4,dc3,Ic12,Ic32")]
+    Interpret(InterpretArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Examples:\n  \
         modelmill completions bash > ~/.local/share/bash-completion/completions/modelmill\n  \
@@ -238,6 +243,22 @@ pub(crate) struct CompareArgs {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) preparation: PreparationArgs,
+}
+
+/// `interpret`.
+#[derive(Debug, Args)]
+pub(crate) struct InterpretArgs {
+    /// Model file (TOML); all parameters that are not unknown keep its nominal values
+    pub(crate) model: PathBuf,
+    /// Identified base parameters: a file that `identify` wrote
+    #[arg(long, value_name = "FIT.json")]
+    pub(crate) fit: PathBuf,
+    /// Parameters of the model file to solve for, separated by commas
+    #[arg(long, value_name = "NAME,...", required = true, value_delimiter = ',')]
+    pub(crate) unknown: Vec<String>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// `completions`.

@@ -59,6 +59,7 @@ fn run(command: &Command) -> Outcome {
         Command::Evaluate(args) => commands::evaluate::run(args),
         Command::Identify(args) => commands::identify::run(args),
         Command::Compare(args) => commands::compare::run(args),
+        Command::Interpret(args) => commands::interpret::run(args),
         Command::Completions(args) => commands::completions::run(args),
         Command::Tour(args) => commands::tour::run(args),
     }

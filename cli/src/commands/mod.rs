@@ -8,4 +8,5 @@ pub(crate) mod equations;
 pub(crate) mod evaluate;
 pub(crate) mod generate;
 pub(crate) mod identify;
+pub(crate) mod interpret;
 pub(crate) mod tour;
