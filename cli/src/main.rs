@@ -8,8 +8,10 @@ mod commands;
 mod data;
 mod entries;
 mod failure;
+mod limits;
 mod model;
 mod output;
+mod plant;
 mod plot;
 mod preparation;
 mod progress;
@@ -60,6 +62,7 @@ fn run(command: &Command) -> Outcome {
         Command::Identify(args) => commands::identify::run(args),
         Command::Compare(args) => commands::compare::run(args),
         Command::Interpret(args) => commands::interpret::run(args),
+        Command::Excite(args) => commands::excite::run(args),
         Command::Completions(args) => commands::completions::run(args),
         Command::Tour(args) => commands::tour::run(args),
     }

@@ -14,11 +14,13 @@
 //! 5. [`FitFile`] - the result on disk and back.
 //!
 //! Beside it, [`interpret`]: physical parameters from identified base parameters, all real solutions;
+//! [`excite`]: the motion that tells base parameters apart best, within limits;
 //! and [`numeric_rank`]: eq. (9) on given values, and the numeric fallback reduction.
 
 pub mod base_fit;
 pub mod derivatives;
 pub mod deviations;
+pub mod excite;
 pub mod figures;
 pub mod filters;
 pub mod interpret;

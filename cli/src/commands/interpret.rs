@@ -278,7 +278,11 @@ impl Answer<'_> {
     fn text(&self) -> String {
         let style = terminal::style();
         let solutions = self.solutions();
-        let unknowns = count(self.unknown.len(), "unknown parameter", "unknown parameters");
+        let unknowns = count(
+            self.unknown.len(),
+            "unknown parameter",
+            "unknown parameters",
+        );
         let equations = count(self.used.len(), "base parameter", "base parameters");
         let head = match self.found {
             Interpretation::Undetermined { .. } => format!(
@@ -290,7 +294,9 @@ impl Answer<'_> {
                 self.model.name,
                 count(solutions.len(), "real solution", "real solutions"),
             ),
-            Interpretation::LeastSquares { is_linear: true, .. } => format!(
+            Interpretation::LeastSquares {
+                is_linear: true, ..
+            } => format!(
                 "{}: {unknowns} from {equations} by weighted least squares",
                 self.model.name
             ),

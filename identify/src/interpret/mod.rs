@@ -20,7 +20,6 @@ use num_traits::Zero;
 
 use crate::undetermined::{Direction, null_directions};
 
-use polynomial::float;
 pub use polynomial::{Polynomial, exact};
 
 /// What is to be solved.

@@ -1,10 +1,8 @@
 //! What planned motion must keep: ranges of coordinates, forces and points, and the distance from singular poses.
 
 use crate::diagnostic::{Diagnostic, Log, Span};
-use crate::mechanism::{
-    CoordinateLimits, Coordinate, Drive, DriveIdx, Limits, Point, PointIdx,
-};
 use crate::exact::CoordinateIdx;
+use crate::mechanism::{Coordinate, CoordinateLimits, Drive, DriveIdx, Limits, Point, PointIdx};
 use crate::range::Range;
 use crate::schema::ModelEntry;
 use crate::suggest;
@@ -35,7 +33,10 @@ pub(super) fn limits(
             log.push(
                 Diagnostic::error(
                     range.span,
-                    format!("`{}` is passive: only its position can be limited", key.name),
+                    format!(
+                        "`{}` is passive: only its position can be limited",
+                        key.name
+                    ),
                 )
                 .label("rates and accelerations are limited where drives act")
                 .help("limit the rates of the active coordinates instead"),
