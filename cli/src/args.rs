@@ -301,7 +301,7 @@ pub(crate) struct ExciteArgs {
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = parse_count)]
     pub(crate) random: usize,
     /// How many of the best random trajectories the search starts from
-    #[arg(long, value_name = "N", default_value_t = 6, value_parser = parse_count)]
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = parse_count)]
     pub(crate) starts: usize,
     /// The same seed gives the same trajectory
     #[arg(long, value_name = "N", default_value_t = 1)]

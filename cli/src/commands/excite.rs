@@ -209,6 +209,11 @@ impl Answer<'_> {
                 "proven": margin.proven,
             })
         });
+        // The search takes the logarithm of the condition number; people do not.
+        let criterion = |value: f64| match self.options.criterion {
+            Criterion::Condition => value.exp(),
+            Criterion::LogDet => value,
+        };
         json!({
             "model": self.model.name,
             "condition_number": found.condition_number,
@@ -219,9 +224,8 @@ impl Answer<'_> {
                 Criterion::Condition => "condition",
                 Criterion::LogDet => "log_det",
             },
-            "value": found.value,
-            "start_value": found.start_value,
-            "ends": found.ends,
+            "value": criterion(found.value),
+            "ends": found.ends.iter().map(|end| criterion(*end)).collect::<Vec<_>>(),
             "evaluations": found.evaluations,
             "violations": self.violations(),
             "limits": limits.collect::<Vec<_>>(),

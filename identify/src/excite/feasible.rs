@@ -29,11 +29,24 @@ pub(super) fn reach(limits: &CoordinateLimits, series: &Series) -> f64 {
 /// Shrinks each series to the limits of its coordinate, and all together to those of the plant; the value of what is
 /// left. `None` if nothing worth having is left.
 pub(super) fn within(measure: &Measure<'_>, series: &[Series]) -> Option<(f64, Vec<Series>)> {
-    let mut kept: Vec<Series> = series
-        .iter()
-        .zip(measure.limits)
-        .map(|(one, limits)| within_ranges(limits, one))
-        .collect();
+    let kept = shrunk(measure, series, 1.0);
+    // What the search left between the motion and its limits is mostly worth having.
+    let filled = shrunk(measure, series, f64::INFINITY);
+    let all = [kept, filled].into_iter();
+    let valued = all.filter_map(|one| within_plant(measure, one));
+    valued.min_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// Each series within the limits of its coordinate.
+fn shrunk(measure: &Measure<'_>, series: &[Series], most: f64) -> Vec<Series> {
+    let pairs = series.iter().zip(measure.limits);
+    pairs
+        .map(|(one, limits)| within_ranges(limits, one, most))
+        .collect()
+}
+
+/// Shrinks all series together to the limits of the plant.
+fn within_plant(measure: &Measure<'_>, mut kept: Vec<Series>) -> Option<(f64, Vec<Series>)> {
     let fine = FINER * super::samples(measure.options);
     let mut factor = 1.0_f64;
     for _ in 0..60 {
@@ -52,14 +65,14 @@ pub(super) fn within(measure: &Measure<'_>, series: &[Series]) -> Option<(f64, V
     None
 }
 
-/// A series shrunk and shifted into its coordinate's limits.
-fn within_ranges(limits: &CoordinateLimits, series: &Series) -> Series {
+/// A series shrunk and shifted into its coordinate's limits, or enlarged to fill them, but by no more than `most`.
+fn within_ranges(limits: &CoordinateLimits, series: &Series, most: f64) -> Series {
     let [low, high] = limits.position;
     let space = SPACE * (high - low);
     let (low, high) = (low + space, high - space);
     let [least, greatest] = series.extremes(0);
     let by_position = (high - low) / (greatest - least).max(f64::MIN_POSITIVE);
-    let factor = reach(limits, series).min(by_position).min(1.0);
+    let factor = reach(limits, series).min(by_position).min(most);
     let mut kept = series.scaled(factor);
     let (below, above) = (
         factor * (series.offset - least),

@@ -115,8 +115,8 @@ impl Default for Options {
             period: 7.29,
             criterion: Criterion::Condition,
             random: 1000,
-            starts: 6,
-            steps: 120,
+            starts: 4,
+            steps: 150,
             seed: 1,
         }
     }
@@ -127,10 +127,8 @@ impl Default for Options {
 pub struct Excitation {
     /// One series for each active coordinate.
     pub series: Vec<Series>,
-    /// Value of the criterion.
+    /// Value of the criterion: the logarithm of the condition number, or `-log det`.
     pub value: f64,
-    /// The same for the best of the random trajectories.
-    pub start_value: f64,
     /// Condition number of the regressor, eq. (13), at [`samples`] steps over the period.
     pub condition_number: f64,
     /// The same for the best of the random trajectories.
@@ -218,10 +216,14 @@ pub fn excite(
     let mut found: Vec<(f64, Vec<Series>)> = Vec::new();
     for start in drawn.best.iter().take(options.starts) {
         let end = search::improve(&measure, &start.1, progress);
-        let kept = feasible::within(&measure, &end);
-        if let Some((value, series)) = kept {
-            found.push((value, series));
-        }
+        found.extend(feasible::within(&measure, &end));
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.truncate(options.starts);
+    let polished = found.len().min(POLISHED);
+    for k in 0..polished {
+        let end = search::polish(&measure, &found[k].1, progress);
+        found.extend(feasible::within(&measure, &end));
     }
     // The start itself is an answer, should no search do better.
     let first = drawn.best[0].clone();
@@ -239,7 +241,6 @@ pub fn excite(
         condition_number: condition(&series),
         start: condition(&first.1),
         value,
-        start_value: first.0,
         random: drawn.feasible,
         evaluations: measure.evaluations(),
         ends,
@@ -248,7 +249,11 @@ pub fn excite(
     })
 }
 
+/// Ends of searches that are polished.
+const POLISHED: usize = 2;
+
 /// Steps that `progress` of [`excite`] is told of, at most.
 pub fn steps(options: &Options) -> usize {
-    options.random + 2 * options.starts * options.steps
+    let rounds = options.starts + POLISHED * search::POLISHES;
+    options.random + rounds * options.steps
 }

@@ -11,8 +11,9 @@ use slsqp::{StopTols, minimize};
 use super::measure::{Measure, excess, half};
 use super::{Motion, Series};
 
-/// Sharpness of the smooth largest value in each round.
-const SHARPNESS: [f64; 2] = [40.0, 300.0];
+/// Sharpness of the smooth largest value, in the first round and in those that polish.
+const FIRST: f64 = 50.0;
+const POLISH: [f64; 2] = [200.0, 800.0];
 /// Step of the differences, in coefficients that are of size 1.
 const STEP: f64 = 1e-5;
 /// The value of a trajectory that the mechanism cannot follow.
@@ -25,6 +26,9 @@ struct Known {
     gradients: Vec<Vec<f64>>,
 }
 
+/// Rounds of polishing.
+pub(super) const POLISHES: usize = POLISH.len();
+
 /// Improves a trajectory; it may exceed limits a little.
 pub(super) fn improve(
     measure: &Measure<'_>,
@@ -32,8 +36,19 @@ pub(super) fn improve(
     progress: &dyn Fn(usize),
 ) -> Vec<Series> {
     let scales = Scales::new(measure);
+    let x = round(measure, &scales, &scales.encode(start), FIRST, progress);
+    scales.decode(&x)
+}
+
+/// Improves a trajectory that was improved before: closer to the limits.
+pub(super) fn polish(
+    measure: &Measure<'_>,
+    start: &[Series],
+    progress: &dyn Fn(usize),
+) -> Vec<Series> {
+    let scales = Scales::new(measure);
     let mut x = scales.encode(start);
-    for sharpness in SHARPNESS {
+    for sharpness in POLISH {
         x = round(measure, &scales, &x, sharpness, progress);
     }
     scales.decode(&x)
@@ -68,7 +83,7 @@ fn round(
     let constraints: Vec<_> = (1..=n_constraints).map(constraint).collect();
     let bounds = vec![(-4.0, 4.0); start.len()];
     let tolerances = StopTols {
-        ftol_rel: 1e-5,
+        ftol_rel: 1e-6,
         ..StopTols::default()
     };
     let outcome = minimize(
