@@ -394,7 +394,7 @@ record! {
 
 record! {
     /// What planned motion must keep; what is not named is not limited.
-    LimitsEntry = "the limits" {
+    LimitsEntry = "the table of limits" {
         /// Limits of coordinates, by name.
         "coordinates" coordinates: optional Named<CoordinateLimitsEntry>,
         /// Limits of drives, by name.
@@ -410,7 +410,7 @@ record! {
 
 record! {
     /// Limits of a coordinate; a passive one has a position only.
-    CoordinateLimitsEntry = "limits of a coordinate" {
+    CoordinateLimitsEntry = "the set of limits of a coordinate" {
         /// Angle or displacement, rad or m: `[low, high]`.
         "position" position: optional Range,
         /// Rate, rad/s or m/s.
@@ -422,7 +422,7 @@ record! {
 
 record! {
     /// Limits of a drive.
-    DriveLimitsEntry = "limits of a drive" {
+    DriveLimitsEntry = "the set of limits of a drive" {
         /// Force or torque of the nominal model, N or N m.
         "force" force: required Range,
     }
@@ -430,7 +430,7 @@ record! {
 
 record! {
     /// A box that a point must stay in, along the axes of the base frame.
-    PointLimitsEntry = "limits of a point" {
+    PointLimitsEntry = "the set of limits of a point" {
         /// m
         "x" x: optional Range,
         /// m
