@@ -49,7 +49,8 @@ pub(crate) fn run(args: &ExciteArgs) -> Outcome {
     let samples = samples(args);
     let motion = Motion::sample(&found.series, samples);
     let time: Vec<f64> = (0..samples)
-        .map(|i| i as f64 * args.period / samples as f64)
+        // Picoseconds are enough, and 7.288 reads better than 7.287999999999999.
+        .map(|i| (1e12 * i as f64 * args.period / samples as f64).round() / 1e12)
         .collect();
     target.write(&csv(&model, &time, &motion))?;
     figure.write(&picture(&model, &plant, &found, &time, &motion))?;
@@ -167,10 +168,24 @@ fn picture(
             .collect();
         figure.panel(title, &curves);
     };
-    let title = format!("position around the mean ({}), rad or m", means.join(", "));
+    let motions = model.motions();
+    let unit = match motions.iter().filter(|(_, is_angle)| *is_angle).count() {
+        0 => "m",
+        angles if angles == motions.len() => "rad",
+        _ => "rad or m",
+    };
+    let title = format!("position around the mean ({}), {unit}", means.join(", "));
     panel(&title, &around, &names);
-    panel("rate, rad/s or m/s", &motion.qd, &names);
-    panel("acceleration, rad/s^2 or m/s^2", &motion.qdd, &names);
+    let per = |seconds: &str| {
+        unit.replace("rad", &format!("rad/{seconds}"))
+            .replace('m', &format!("m/{seconds}"))
+    };
+    panel(&format!("rate, {}", per("s")), &motion.qd, &names);
+    panel(
+        &format!("acceleration, {}", per("s^2")),
+        &motion.qdd,
+        &names,
+    );
     if let Some(forces) = plant.forces(motion) {
         panel(
             "force of the nominal model, N or N m",

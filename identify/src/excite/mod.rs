@@ -1,9 +1,9 @@
 //! Motion that excites a mechanism so that its base parameters are found best: limits go in, a periodic trajectory for
 //! each active coordinate comes out, eq. (14), (15) and (17) of the paper.
 //!
-//! 1. [`random`] - random series within the limits; the best of them are where the search starts.
-//! 2. [`search`] - sequential quadratic programming from each start.
-//! 3. [`feasible`] - what was found, shrunk until no limit is exceeded, between samples either.
+//! 1. `random` - random series within the limits; the best of them are where the search starts.
+//! 2. `search` - sequential quadratic programming from each start.
+//! 3. `feasible` - what was found, shrunk until no limit is exceeded, between samples either.
 //!
 //! How a mechanism moves is the business of the caller, who gives a [`Plant`].
 

@@ -3,8 +3,8 @@
 //!
 //! A base parameter is a polynomial in the unknowns once all other parameters are held at their nominal values. What
 //! the polynomials determine is decided by the exact rank of their Jacobian at random points. As many equations as
-//! unknowns are solved exactly ([`roots`]), so that no real solution is missed; more equations than unknowns by
-//! weighted least squares ([`nearest`]). Deviations follow from those of the base parameters by the Jacobian.
+//! unknowns are solved exactly (`roots`), so that no real solution is missed; more equations than unknowns by
+//! weighted least squares (`nearest`). Deviations follow from those of the base parameters by the Jacobian.
 
 mod groebner;
 mod nearest;
@@ -140,7 +140,7 @@ pub fn interpret(problem: &Problem) -> Result<Interpretation, InterpretError> {
         return Ok(undetermined(problem, &jacobian, n - rank));
     }
     if used.len() > n {
-        return nearest::nearest(problem, &used);
+        return Ok(nearest::nearest(problem, &used));
     }
     let equations: Vec<Polynomial> = used.iter().map(|k| equation(problem, *k)).collect();
     let points = match roots::solve(&equations, n).map_err(|_| InterpretError::TooHard)? {

@@ -8,8 +8,8 @@ use nalgebra::{DMatrix, DVector};
 use super::polynomial::Polynomial;
 use super::roots::{RealSolutions, solve};
 use super::{
-    InterpretError, Interpretation, Physical, Problem, equation, jacobian_at, residuals,
-    roots_of_diagonal, whitened,
+    Interpretation, Physical, Problem, equation, jacobian_at, residuals, roots_of_diagonal,
+    whitened,
 };
 
 /// Subsets of the equations that are solved for starts.
@@ -17,7 +17,7 @@ const MOST_SUBSETS: usize = 40;
 const MOST_STEPS: usize = 500;
 
 /// Solutions of least squares; `used` are the equations in which unknowns stand.
-pub(crate) fn nearest(problem: &Problem, used: &[usize]) -> Result<Interpretation, InterpretError> {
+pub(crate) fn nearest(problem: &Problem, used: &[usize]) -> Interpretation {
     let n = problem.nominal.len();
     let (weights, is_weighted) = whitened(problem.covariance.as_ref(), used, &problem.values);
     let is_linear = used.iter().all(|k| problem.equations[*k].degree() <= 1);
@@ -56,11 +56,11 @@ pub(crate) fn nearest(problem: &Problem, used: &[usize]) -> Result<Interpretatio
         (&weights * e).norm_squared()
     };
     solutions.sort_by(|a, b| error(a).total_cmp(&error(b)));
-    Ok(Interpretation::LeastSquares {
+    Interpretation::LeastSquares {
         solutions,
         is_linear,
         starts: starts.len(),
-    })
+    }
 }
 
 /// A local minimum with its error and covariance; `None` where none is reached.
