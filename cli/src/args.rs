@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::limits::Limit;
 use crate::preparation::PreparationArgs;
 
 /// From a model file to base parameters, equations, fast Rust, and parameters from measurements.
@@ -101,6 +102,18 @@ pub(crate) enum Command {
         modelmill check robot.toml"
     )]
     Import(ImportArgs),
+    /// Solve identified base parameters for physical ones, as in Table 1 of the paper: all real solutions
+    #[command(after_help = "Examples (from the project's root):\n  \
+        modelmill interpret model-spec/models/spidermill-paper.toml --fit fit.json \\\n      \
+        --unknown m2,m4,dc3,Ic12,Ic32")]
+    Interpret(InterpretArgs),
+    /// Search for the periodic trajectory, within limits, that tells the base parameters apart best
+    #[command(after_help = "Examples (from the project's root):\n  \
+        modelmill excite model-spec/models/spidermill.toml --out trajectory.csv\n  \
+        modelmill excite model-spec/models/two_link.toml --harmonics 5 --period 10 \\\n      \
+        --limits q1=-1:1 --limits q1_d=2 --limits q2=-1.5:1.5 --limits q2_d=3 --out trajectory.csv\n\n\
+        Limits stand in the model file's `[limits]`; --limits adds to them or replaces them.")]
+    Excite(ExciteArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Examples:\n  \
         modelmill completions bash > ~/.local/share/bash-completion/completions/modelmill\n  \
@@ -293,6 +306,73 @@ pub(crate) struct SimulateArgs {
     pub(crate) json: bool,
 }
 
+/// `interpret`.
+#[derive(Debug, Args)]
+pub(crate) struct InterpretArgs {
+    /// Model file (TOML); all parameters that are not unknown keep its nominal values
+    pub(crate) model: PathBuf,
+    /// Identified base parameters: a file that `identify` wrote
+    #[arg(long, value_name = "FIT.json")]
+    pub(crate) fit: PathBuf,
+    /// Parameters of the model file to solve for, separated by commas
+    #[arg(long, value_name = "NAME,...", required = true, value_delimiter = ',')]
+    pub(crate) unknown: Vec<String>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// What excitation makes small.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum CriterionArg {
+    /// The condition number of the regressor in SI units, as in eq. (13) of the paper
+    Condition,
+    /// The logarithm of the determinant of W'W/N, negative: the volume of the parameters' uncertainty
+    LogDet,
+}
+
+/// `excite`.
+#[derive(Debug, Args)]
+pub(crate) struct ExciteArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Harmonics of the Fourier series of each active coordinate
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = parse_harmonics)]
+    pub(crate) harmonics: usize,
+    /// Period of the trajectory, s
+    #[arg(long, value_name = "S", default_value_t = 7.29, value_parser = parse_period)]
+    pub(crate) period: f64,
+    /// Limits beside those of the model file, or in their place: a coordinate (`theta1=1.5:2.1`), its rate
+    /// (`theta1_d=1.2`) or acceleration (`theta1_dd=4`), the force of a drive (`spindle_left=1500`), a point
+    /// (`R3m.x=0.2:0.7`), or `singularity=0.3`; may be repeated
+    #[arg(long, value_name = "NAME=RANGE", value_delimiter = ',', value_parser = Limit::parse, allow_hyphen_values = true)]
+    pub(crate) limits: Vec<Limit>,
+    /// What is made small
+    #[arg(long, value_enum, default_value = "condition")]
+    pub(crate) criterion: CriterionArg,
+    /// Random trajectories within the limits that are tried first
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = parse_count)]
+    pub(crate) random: usize,
+    /// How many of the best random trajectories the search starts from
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = parse_count)]
+    pub(crate) starts: usize,
+    /// The same seed gives the same trajectory
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Samples per second in the file
+    #[arg(long, value_name = "HZ", default_value_t = 500.0, value_parser = parse_rate)]
+    pub(crate) rate: f64,
+    /// Write one period of the trajectory to this file: `t`, coordinates, rates, accelerations
+    #[arg(long, value_name = "TRAJ.csv")]
+    pub(crate) out: PathBuf,
+    /// Write its picture to this file; beside the trajectory if not given
+    #[arg(long, value_name = "FILE.svg")]
+    pub(crate) figure: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
 /// `reduce`.
 #[derive(Debug, Args)]
 pub(crate) struct ReduceArgs {
@@ -317,6 +397,34 @@ pub(crate) struct ImportArgs {
     /// Write the model to this file
     #[arg(long, value_name = "MODEL.toml")]
     pub(crate) out: PathBuf,
+}
+
+fn parse_harmonics(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(value) if (1..=50).contains(&value) => Ok(value),
+        _ => Err("expected a whole number from 1 to 50".to_owned()),
+    }
+}
+
+fn parse_count(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(value) if (1..=1_000_000).contains(&value) => Ok(value),
+        _ => Err("expected a whole number from 1 to 1000000".to_owned()),
+    }
+}
+
+fn parse_period(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (1e-3..=1e4).contains(&value) => Ok(value),
+        _ => Err("expected a time in s between 0.001 and 10000, such as 7.29".to_owned()),
+    }
+}
+
+fn parse_rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (1.0..=1e5).contains(&value) => Ok(value),
+        _ => Err("expected samples per second between 1 and 100000, such as 500".to_owned()),
+    }
 }
 
 /// `completions`.

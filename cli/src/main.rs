@@ -8,9 +8,11 @@ mod commands;
 mod data;
 mod entries;
 mod failure;
+mod limits;
 mod model;
 mod output;
 mod piped;
+mod plant;
 mod plot;
 mod preparation;
 mod progress;
@@ -63,6 +65,8 @@ fn run(command: &Command) -> Outcome {
         Command::Simulate(args) => commands::simulate::run(args),
         Command::Reduce(args) => commands::reduce::run(args),
         Command::Import(args) => commands::import::run(args),
+        Command::Interpret(args) => commands::interpret::run(args),
+        Command::Excite(args) => commands::excite::run(args),
         Command::Completions(args) => commands::completions::run(args),
         Command::Tour(args) => commands::tour::run(args),
     }

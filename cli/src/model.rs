@@ -330,6 +330,11 @@ impl Model {
         Ok(values)
     }
 
+    /// The sign that a dynamic parameter must have.
+    pub(crate) fn sign_of(&self, parameter: usize) -> Sign {
+        self.signs[parameter]
+    }
+
     /// Effects whose force depends on the load of the drive.
     pub(crate) fn load_dependent(&self) -> Vec<&str> {
         let effects = self.derivation.mechanism.effects.iter();

@@ -78,6 +78,8 @@ fn paths_in_the_help_exist() {
         "evaluate",
         "identify",
         "compare",
+        "excite",
+        "interpret",
     ] {
         let help = printed(&["help", command]);
         assert_eq!(help, printed(&[command, "--help"]));

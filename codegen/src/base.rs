@@ -1,6 +1,8 @@
 //! What a derivation says about its base parameters: names, expressions, units and values.
 
 use modelmill_spec::Mechanism;
+use num_rational::BigRational;
+use num_traits::One;
 
 use crate::Derivation;
 use crate::exact::Monomial;
@@ -75,6 +77,24 @@ impl Derivation {
             }
         }
         base
+    }
+
+    /// Eq. (7) for given values of the constants, in the order of the model file: each base parameter as a sum of
+    /// products of dynamic parameters with exact factors. Sines, cosines and roots of constants are those of floating
+    /// point.
+    pub fn base_polynomials(&self, constants: &[BigRational]) -> Vec<Vec<(Monomial, BigRational)>> {
+        let reduction = &self.reduction;
+        let product = |k: usize| reduction.products[k].clone();
+        let retained = reduction.retained.iter();
+        let mut polynomials: Vec<Vec<(Monomial, BigRational)>> = retained
+            .map(|k| vec![(product(*k), BigRational::one())])
+            .collect();
+        for line in &reduction.dependencies {
+            for (k, factor) in &line.equals {
+                polynomials[*k].push((product(line.product), factor.value_exact(constants)));
+            }
+        }
+        polynomials
     }
 
     /// Values of the base parameters for the model file's values.

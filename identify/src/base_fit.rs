@@ -5,6 +5,7 @@ use std::fmt;
 use std::path::Path;
 
 use indexmap::IndexMap;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use crate::deviations::Deviations;
@@ -87,6 +88,10 @@ pub struct FitFile {
     pub scaled_condition_number: Option<f64>,
     /// The base parameters, in the order of the regressor's columns.
     pub parameters: Vec<FitParameter>,
+    /// Covariance of the values, row by row in the order of `parameters`, in the products of their units; left away
+    /// where a deviation is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<Vec<Vec<f64>>>,
     /// Values of the model's constants, on which the regressor and the expressions depend.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub constants: IndexMap<String, f64>,
@@ -276,6 +281,33 @@ pub fn fit_parameters(
 }
 
 impl FitFile {
+    /// Covariance of some of the parameters, by their positions: the file's, or else the squares of its standard
+    /// deviations as if the values were independent; `None` where a deviation is missing. The flag says whether the
+    /// file's own was taken.
+    pub fn covariance_of(&self, parameters: &[usize]) -> Option<(DMatrix<f64>, bool)> {
+        let n = parameters.len();
+        let std: Option<Vec<f64>> = parameters
+            .iter()
+            .map(|k| self.parameters.get(*k)?.std)
+            .collect();
+        let std = std?;
+        let whole = self.covariance.as_ref().filter(|rows| {
+            let m = self.parameters.len();
+            rows.len() == m && rows.iter().all(|row| row.len() == m)
+        });
+        Some(match whole {
+            Some(rows) => {
+                let entry = |a: usize, b: usize| rows[parameters[a]][parameters[b]];
+                (DMatrix::from_fn(n, n, entry), true)
+            }
+            None => {
+                let diagonal = std.iter().map(|s| s * s);
+                let diagonal = DVector::from_iterator(n, diagonal);
+                (DMatrix::from_diagonal(&diagonal), false)
+            }
+        })
+    }
+
     /// Reads a fit; fails when the file cannot be read or is something else.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FitFileError> {
         let path = path.as_ref();

@@ -13,13 +13,17 @@
 //! 4. [`figures`] and [`locate`] - how far the model is off, and where.
 //! 5. [`FitFile`] - the result on disk and back.
 //!
-//! Beside it, [`numeric_rank`]: eq. (9) on given values, and the numeric fallback reduction.
+//! Beside it, [`interpret`]: physical parameters from identified base parameters, all real solutions;
+//! [`excite`]: the motion that tells base parameters apart best, within limits;
+//! and [`numeric_rank`]: eq. (9) on given values, and the numeric fallback reduction.
 
 pub mod base_fit;
 pub mod derivatives;
 pub mod deviations;
+pub mod excite;
 pub mod figures;
 pub mod filters;
+pub mod interpret;
 pub mod least_squares;
 pub mod locate;
 mod notes;

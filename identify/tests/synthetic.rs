@@ -185,6 +185,7 @@ fn positions_alone_give_the_parameters_within_a_fifth_of_a_percent() {
         condition_number: Some(solution.condition_number),
         scaled_condition_number: Some(solution.scaled_condition_number),
         parameters: fit_parameters(&infos, &solution, &deviations),
+        covariance: None,
         constants: [("L1".to_owned(), 0.7)].into(),
         undetermined: Vec::new(),
         fit: comparison.finish().expect("figures"),

@@ -19,10 +19,12 @@ mod kinematics;
 mod load;
 mod mechanism;
 mod merge;
+mod motion;
 mod numeric;
 mod parser;
 mod pose;
 mod print;
+mod range;
 #[cfg(test)]
 mod rank_tests;
 mod record;
@@ -38,6 +40,7 @@ pub use exact::*;
 pub use kinds::{ActsOn, Carries, EffectKind, KindConstant, KindParameter, LIBRARY, Sign, library};
 pub use load::{Failure, Loaded, load, load_file};
 pub use mechanism::*;
+pub use motion::{Kinematics, Poses};
 pub use unit::unit_product;
 
 pub use editor::json_schema;

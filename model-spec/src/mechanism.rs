@@ -48,6 +48,8 @@ pub struct Mechanism {
     /// Products of dynamic parameters whose columns should be retained, most wanted first;
     /// each is a product of powers of parameters.
     pub retain: Vec<Vec<(ParameterIdx, u32)>>,
+    /// What planned motion must keep.
+    pub limits: Limits,
     /// How recordings name their columns: ours to theirs.
     pub recording: Recording,
 }
@@ -270,6 +272,30 @@ pub struct EffectTerm {
     pub parameter: ParameterIdx,
     /// Expression over constants and [`crate::PlaceQuantity`].
     pub expression: Exact,
+}
+
+/// What planned motion must keep; ranges are `[low, high]`, and what is not named is not limited.
+#[derive(Clone, Debug, Default)]
+pub struct Limits {
+    /// Of coordinates, each at most once.
+    pub coordinates: Vec<(CoordinateIdx, CoordinateLimits)>,
+    /// Forces of drives, N or N m.
+    pub forces: Vec<(DriveIdx, [f64; 2])>,
+    /// Boxes of points along the axes of the base frame, m.
+    pub points: Vec<(PointIdx, [Option<[f64; 2]>; 3])>,
+    /// Least singular values of the Jacobians of loops and drives stay above this share of those at the nominal pose.
+    pub singularity: Option<f64>,
+}
+
+/// Limits of a coordinate.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CoordinateLimits {
+    /// rad or m
+    pub position: Option<[f64; 2]>,
+    /// rad/s or m/s; contains 0.
+    pub rate: Option<[f64; 2]>,
+    /// rad/s^2 or m/s^2; contains 0.
+    pub acceleration: Option<[f64; 2]>,
 }
 
 /// How recordings name their columns.

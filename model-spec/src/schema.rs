@@ -1,6 +1,7 @@
 //! The tables of a model file as types; readers and the JSON Schema for editors derive from them.
 
 use crate::formula::Formula;
+use crate::range::Range;
 use crate::record::{List, Named, OneOrMany, record};
 use crate::unit::Unit;
 use crate::values::{
@@ -49,6 +50,8 @@ record! {
         "effect_kind" effect_kind: optional List<EffectKindEntry>,
         /// Products of parameters that should stay in the base parameters, most wanted first, such as `m1*dc1^2`.
         "retain" retain: optional List<Formula>,
+        /// What planned motion must keep: `modelmill excite` obeys it.
+        "limits" limits: optional LimitsEntry,
         /// How recordings of this mechanism name their columns.
         "recording" recording: optional RecordingEntry,
     }
@@ -386,6 +389,54 @@ record! {
         "value" value: optional Formula,
         /// Remark.
         "note" note: optional Text,
+    }
+}
+
+record! {
+    /// What planned motion must keep; what is not named is not limited.
+    LimitsEntry = "the table of limits" {
+        /// Limits of coordinates, by name.
+        "coordinates" coordinates: optional Named<CoordinateLimitsEntry>,
+        /// Limits of drives, by name.
+        "drives" drives: optional Named<DriveLimitsEntry>,
+        /// Boxes that points must stay in, by name.
+        "points" points: optional Named<PointLimitsEntry>,
+        /// Distance from singular poses, between 0 and 1: the least singular value of the loops' Jacobian by the
+        /// passive coordinates, and of the drives' by the active ones, stays above this share of its value at the
+        /// nominal pose.
+        "singularity" singularity: optional Number,
+    }
+}
+
+record! {
+    /// Limits of a coordinate; a passive one has a position only.
+    CoordinateLimitsEntry = "the set of limits of a coordinate" {
+        /// Angle or displacement, rad or m: `[low, high]`.
+        "position" position: optional Range,
+        /// Rate, rad/s or m/s.
+        "rate" rate: optional Range,
+        /// Acceleration, rad/s^2 or m/s^2.
+        "acceleration" acceleration: optional Range,
+    }
+}
+
+record! {
+    /// Limits of a drive.
+    DriveLimitsEntry = "the set of limits of a drive" {
+        /// Force or torque of the nominal model, N or N m.
+        "force" force: required Range,
+    }
+}
+
+record! {
+    /// A box that a point must stay in, along the axes of the base frame.
+    PointLimitsEntry = "the set of limits of a point" {
+        /// m
+        "x" x: optional Range,
+        /// m
+        "y" y: optional Range,
+        /// m
+        "z" z: optional Range,
     }
 }
 

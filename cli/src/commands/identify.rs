@@ -100,6 +100,7 @@ pub(crate) fn identify(model: &Model, data: &[Data], check: &[Data]) -> Outcome<
             samples: fit.samples,
             condition_number: finite(solution.condition_number),
             scaled_condition_number: finite(solution.scaled_condition_number),
+            covariance: covariance(&found, parameters.len()),
             parameters,
             constants: constants
                 .iter()
@@ -114,6 +115,19 @@ pub(crate) fn identify(model: &Model, data: &[Data], check: &[Data]) -> Outcome<
         nominal_check,
         notes,
     })
+}
+
+/// The covariance of all base parameters, of which the known ones have none.
+fn covariance(found: &Identified, n: usize) -> Option<Vec<Vec<f64>>> {
+    let mut rows = vec![vec![0.0; n]; n];
+    for (a, i) in found.unknown.iter().enumerate() {
+        for (b, j) in found.unknown.iter().enumerate() {
+            rows[*i][*j] = found.deviations.covariance[(a, b)];
+        }
+    }
+    let is_known = found.deviations.std.iter().all(|s| s.is_finite())
+        && rows.iter().flatten().all(|c| c.is_finite());
+    is_known.then_some(rows)
 }
 
 /// A parameter that is a number of the model file.

@@ -2,6 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use num_rational::BigRational;
+use num_traits::{ToPrimitive, Zero};
+
 use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Rational};
 use crate::field::Element;
 
@@ -167,6 +170,30 @@ impl RationalFunction {
                     })
                 })
                 .sum()
+        };
+        evaluate(&self.numerator) / evaluate(&self.denominator)
+    }
+
+    /// Its exact value for exact constants, by index; sines, cosines and roots are those of floating point.
+    pub fn value_exact(&self, constants: &[BigRational]) -> BigRational {
+        let float = |value: f64| BigRational::from_float(value).unwrap_or_else(BigRational::zero);
+        let evaluate = |p: &Polynomial| -> BigRational {
+            let mut sum = BigRational::zero();
+            for (powers, k) in p {
+                let mut product = k.to_big();
+                for (v, n) in powers {
+                    let angle = |i: &usize| constants[*i].to_f64().unwrap_or(f64::NAN);
+                    let value = match v {
+                        Variable::Constant(i) => constants[*i].clone(),
+                        Variable::Cos(i) => float(angle(i).cos()),
+                        Variable::Sin(i) => float(angle(i).sin()),
+                        Variable::Root(r) => float((*r as f64).sqrt()),
+                    };
+                    product *= num_traits::pow(value, *n as usize);
+                }
+                sum += product;
+            }
+            sum
         };
         evaluate(&self.numerator) / evaluate(&self.denominator)
     }

@@ -7,6 +7,7 @@ mod actuation;
 mod bodies;
 mod effects;
 mod frames;
+mod limits;
 mod symbols;
 
 use crate::diagnostic::{Log, Span};
@@ -50,6 +51,7 @@ pub(crate) fn build(model: &ModelEntry, log: &mut Log) -> (Option<Mechanism>, Ve
         .map_or(&[][..], |list| list.entries.as_slice());
     let effects = effects::effects(model, own_kinds, &mut symbols, &drives, &points, log);
     let retain = effects::retain(model, &symbols, log);
+    let limits = limits::limits(model, &symbols.coordinates, &drives, &points.points, log);
     let columns = actuation::recording(model, &symbols, &drives, log);
     actuation::check_place_names(model, log);
     if log.n_errors() == 0 {
@@ -78,6 +80,7 @@ pub(crate) fn build(model: &ModelEntry, log: &mut Log) -> (Option<Mechanism>, Ve
         drives,
         effects,
         retain,
+        limits,
         recording: Recording { columns },
     };
     bodies::warn_of_negative(model, &mechanism, log);

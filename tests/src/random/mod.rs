@@ -8,9 +8,9 @@ pub use tree::tree;
 
 use modelmill_spec::{
     Axis, Constant, ConstantIdx, Convention, Coordinate, CoordinateIdx, Drive, DriveIdx, DriveKind,
-    Effect, EffectTerm, Exact, Frame, FrameIdx, Function, Inertial, Length, LumpedMass, Mechanism,
-    Motion, Parameter, ParameterIdx, Part, Place, PlaceQuantity, Point, PointIdx, Recording, Step,
-    Symbol,
+    Effect, EffectTerm, Exact, Frame, FrameIdx, Function, Inertial, Length, Limits, LumpedMass,
+    Mechanism, Motion, Parameter, ParameterIdx, Part, Place, PlaceQuantity, Point, PointIdx,
+    Recording, Step, Symbol,
 };
 use nalgebra::{Matrix3, Vector3};
 use num_rational::BigRational;
@@ -73,6 +73,7 @@ impl Draft {
                 drives: Vec::new(),
                 effects: Vec::new(),
                 retain: Vec::new(),
+                limits: Limits::default(),
                 recording: Recording::default(),
             },
         }

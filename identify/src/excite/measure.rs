@@ -1,0 +1,139 @@
+//! What a trajectory is worth, and how far it is from its limits.
+
+use std::cell::Cell;
+
+use nalgebra::DMatrix;
+
+use super::{CoordinateLimits, Criterion, Motion, Options, Plant, Series, samples};
+
+/// A plant with limits and options, counting evaluations.
+pub(super) struct Measure<'a> {
+    pub(super) plant: &'a dyn Plant,
+    pub(super) limits: &'a [CoordinateLimits],
+    pub(super) options: &'a Options,
+    evaluations: Cell<usize>,
+}
+
+impl<'a> Measure<'a> {
+    pub(super) fn new(
+        plant: &'a dyn Plant,
+        limits: &'a [CoordinateLimits],
+        options: &'a Options,
+    ) -> Self {
+        Self {
+            plant,
+            limits,
+            options,
+            evaluations: Cell::new(0),
+        }
+    }
+
+    pub(super) fn evaluations(&self) -> usize {
+        self.evaluations.get()
+    }
+
+    pub(super) fn omega(&self) -> f64 {
+        2.0 * std::f64::consts::PI / self.options.period
+    }
+
+    pub(super) fn motion(&self, series: &[Series]) -> Motion {
+        Motion::sample(series, samples(self.options))
+    }
+
+    /// The criterion, the smaller the better; infinite where the mechanism cannot follow or columns are dependent.
+    /// For the condition number it is its logarithm, which is smoother to search on.
+    pub(super) fn value(&self, motion: &Motion) -> f64 {
+        self.evaluations.set(self.evaluations.get() + 1);
+        let Some(w) = self.plant.regressor(motion) else {
+            return f64::INFINITY;
+        };
+        match self.options.criterion {
+            Criterion::Condition => condition_number(&w).ln(),
+            Criterion::LogDet => log_det(&w),
+        }
+    }
+
+    /// Limits of the coordinates as `(coordinate, derivative, range)`.
+    pub(super) fn ranges(&self) -> Vec<(usize, usize, [f64; 2])> {
+        let of_one = |(i, limits): (usize, &CoordinateLimits)| {
+            let all = [Some(limits.position), limits.rate, limits.acceleration];
+            let given = all.into_iter().enumerate();
+            given
+                .filter_map(|(d, range)| Some((i, d, range?)))
+                .collect::<Vec<_>>()
+        };
+        self.limits.iter().enumerate().flat_map(of_one).collect()
+    }
+}
+
+/// Half the width of a range.
+pub(super) fn half([low, high]: [f64; 2]) -> f64 {
+    0.5 * (high - low)
+}
+
+/// By how much a value exceeds a range, as a share of half of it: -1 in the middle, 0 at the ends.
+pub(super) fn excess(value: f64, range: [f64; 2]) -> f64 {
+    (value - 0.5 * (range[0] + range[1])).abs() / half(range) - 1.0
+}
+
+/// Largest over smallest singular value of a matrix as it is, in its units: eq. (13) of the paper with the 2-norm.
+pub fn condition_number(w: &DMatrix<f64>) -> f64 {
+    ratio(&triangle(w).singular_values())
+}
+
+/// The same with all columns scaled to norm 1, hence free of units.
+pub fn scaled_condition_number(w: &DMatrix<f64>) -> f64 {
+    let mut r = triangle(w);
+    for mut column in r.column_iter_mut() {
+        let norm = column.norm();
+        if norm > 0.0 {
+            column.unscale_mut(norm);
+        }
+    }
+    ratio(&r.singular_values())
+}
+
+/// The least singular value of a small matrix, given by its rows; those that are zero throughout do not count.
+pub fn least_singular_value(rows: &[Vec<f64>]) -> f64 {
+    let columns = rows.first().map_or(0, Vec::len);
+    let gram = DMatrix::from_fn(columns, columns, |i, j| {
+        rows.iter().map(|row| row[i] * row[j]).sum::<f64>()
+    });
+    let least = match columns {
+        0 => return f64::INFINITY,
+        1 => gram[(0, 0)],
+        // The smaller root of the characteristic polynomial.
+        2 => {
+            let (a, b, c) = (gram[(0, 0)], gram[(0, 1)], gram[(1, 1)]);
+            let larger = 0.5 * (a + c + ((a - c).powi(2) + 4.0 * b * b).sqrt());
+            if larger > 0.0 {
+                (a * c - b * b) / larger
+            } else {
+                0.0
+            }
+        }
+        _ => gram.symmetric_eigenvalues().min(),
+    };
+    least.max(0.0).sqrt()
+}
+
+fn ratio(singular: &nalgebra::DVector<f64>) -> f64 {
+    let (least, greatest) = (singular.min(), singular.max());
+    if least > f64::EPSILON * greatest {
+        greatest / least
+    } else {
+        f64::INFINITY
+    }
+}
+
+fn log_det(w: &DMatrix<f64>) -> f64 {
+    let singular = triangle(w).singular_values();
+    let rows = w.nrows() as f64;
+    let logarithms = singular.iter().map(|s| -(s * s / rows).ln());
+    logarithms.sum()
+}
+
+/// The triangle of a QR decomposition, which has the singular values of the matrix.
+fn triangle(w: &DMatrix<f64>) -> DMatrix<f64> {
+    w.clone().qr().r()
+}

@@ -1,0 +1,259 @@
+//! Motion that excites a mechanism so that its base parameters are found best: limits go in, a periodic trajectory for
+//! each active coordinate comes out, eq. (14), (15) and (17) of the paper.
+//!
+//! 1. `random` - random series within the limits; the best of them are where the search starts.
+//! 2. `search` - sequential quadratic programming from each start.
+//! 3. `feasible` - what was found, shrunk until no limit is exceeded, between samples either.
+//!
+//! How a mechanism moves is the business of the caller, who gives a [`Plant`].
+
+mod feasible;
+mod fourier;
+mod measure;
+mod random;
+mod search;
+
+use std::fmt;
+
+use nalgebra::DMatrix;
+
+pub use fourier::Series;
+pub use measure::{condition_number, least_singular_value, scaled_condition_number};
+
+/// Motion of all active coordinates, `[coordinate][sample]`.
+#[derive(Clone, Debug, Default)]
+pub struct Motion {
+    /// rad or m
+    pub q: Vec<Vec<f64>>,
+    /// rad/s or m/s
+    pub qd: Vec<Vec<f64>>,
+    /// rad/s^2 or m/s^2
+    pub qdd: Vec<Vec<f64>>,
+}
+
+impl Motion {
+    /// Series sampled at equal steps over one period, without its end, which is its beginning.
+    pub fn sample(series: &[Series], samples: usize) -> Self {
+        let mut motion = Self::default();
+        for one in series {
+            let step = one.period() / samples as f64;
+            let mut columns = [0, 1, 2].map(|_| Vec::with_capacity(samples));
+            for i in 0..samples {
+                for (column, value) in columns.iter_mut().zip(one.at(i as f64 * step)) {
+                    column.push(value);
+                }
+            }
+            let [q, qd, qdd] = columns;
+            motion.q.push(q);
+            motion.qd.push(qd);
+            motion.qdd.push(qdd);
+        }
+        motion
+    }
+}
+
+/// The mechanism, as far as excitation must know it.
+pub trait Plant {
+    /// The regressor along a motion: rows of samples and drives, columns of base parameters; `None` where the
+    /// mechanism cannot follow.
+    fn regressor(&self, motion: &Motion) -> Option<DMatrix<f64>>;
+
+    /// Names of limits beyond those of coordinates, in the order of [`Plant::excess`].
+    fn limits(&self) -> Vec<String>;
+
+    /// For each of [`Plant::limits`] and each sample, by how much it is exceeded, as a share of half its range:
+    /// negative inside, -1 in the middle; `None` where the mechanism cannot follow.
+    fn excess(&self, motion: &Motion) -> Option<Vec<Vec<f64>>>;
+}
+
+/// Limits of one active coordinate, `[low, high]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CoordinateLimits {
+    /// What messages call it.
+    pub name: String,
+    /// rad or m
+    pub position: [f64; 2],
+    /// rad/s or m/s, around 0
+    pub rate: Option<[f64; 2]>,
+    /// rad/s^2 or m/s^2, around 0
+    pub acceleration: Option<[f64; 2]>,
+}
+
+/// What is made small.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Criterion {
+    /// The condition number of the stacked regressor in its units, eq. (13).
+    #[default]
+    Condition,
+    /// `-log det(W'W / N)`, which does not depend on units.
+    LogDet,
+}
+
+/// How to search.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Harmonics of the series.
+    pub harmonics: usize,
+    /// Period, s.
+    pub period: f64,
+    /// What is made small.
+    pub criterion: Criterion,
+    /// Random feasible trajectories that are tried first.
+    pub random: usize,
+    /// How many of them the search starts from.
+    pub starts: usize,
+    /// Steps of the search from each start, at most.
+    pub steps: usize,
+    /// The same seed gives the same trajectory.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            harmonics: 7,
+            period: 7.29,
+            criterion: Criterion::Condition,
+            random: 1000,
+            starts: 4,
+            steps: 150,
+            seed: 1,
+        }
+    }
+}
+
+/// A trajectory that was found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Excitation {
+    /// One series for each active coordinate.
+    pub series: Vec<Series>,
+    /// Value of the criterion: the logarithm of the condition number, or `-log det`.
+    pub value: f64,
+    /// Condition number of the regressor, eq. (13), at [`samples`] steps over the period.
+    pub condition_number: f64,
+    /// The same for the best of the random trajectories.
+    pub start: f64,
+    /// Random trajectories that kept the limits.
+    pub random: usize,
+    /// Trajectories for which the regressor was evaluated.
+    pub evaluations: usize,
+    /// Value of the criterion where each search ended, the best first.
+    pub ends: Vec<f64>,
+    /// How close the trajectory comes to each limit.
+    pub margins: Vec<Margin>,
+}
+
+/// How close a trajectory comes to a limit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Margin {
+    /// Which limit.
+    pub name: String,
+    /// The largest excess over a period, as a share of half the range: not above 0 where the limit is kept.
+    pub excess: f64,
+    /// Whether the excess is a proven bound for all times, or one from fine sampling and differences.
+    pub proven: bool,
+}
+
+/// Why there is no excitation.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ExciteError {
+    /// No random trajectory kept the limits.
+    NoStart {
+        /// How many were tried.
+        tried: usize,
+        /// The limit that was exceeded most often, if it is not that the mechanism could not follow.
+        most: Option<String>,
+    },
+    /// There are no base parameters or no coordinates.
+    NothingToExcite,
+    /// The regressor has dependent columns along every trajectory that was tried.
+    Deficient,
+}
+
+impl fmt::Display for ExciteError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoStart { tried, most } => {
+                write!(f, "none of {tried} random trajectories kept the limits: ")?;
+                match most {
+                    Some(name) => write!(f, "`{name}` was exceeded most often; widen it"),
+                    None => f.write_str(
+                        "the mechanism could not follow; narrow the positions so that the loops close within them",
+                    ),
+                }
+            }
+            Self::NothingToExcite => f.write_str(
+                "there is nothing to excite: the model has no base parameter that a force depends on",
+            ),
+            Self::Deficient => f.write_str(
+                "no trajectory within the limits tells all base parameters apart; widen the limits or use more harmonics",
+            ),
+        }
+    }
+}
+
+impl std::error::Error for ExciteError {}
+
+/// Samples over a period from which criteria and limits of the plant are computed in the search: 16 for the shortest
+/// wave, but no fewer than 128.
+pub fn samples(options: &Options) -> usize {
+    (16 * options.harmonics).max(128)
+}
+
+/// Finds a trajectory; `progress` is told of each step out of [`steps`].
+pub fn excite(
+    plant: &dyn Plant,
+    limits: &[CoordinateLimits],
+    options: &Options,
+    progress: &dyn Fn(usize),
+) -> Result<Excitation, ExciteError> {
+    if limits.is_empty() {
+        return Err(ExciteError::NothingToExcite);
+    }
+    let measure = measure::Measure::new(plant, limits, options);
+    let drawn = random::draw(&measure, progress)?;
+    let mut found: Vec<(f64, Vec<Series>)> = Vec::new();
+    for start in drawn.best.iter().take(options.starts) {
+        let end = search::improve(&measure, &start.1, progress);
+        found.extend(feasible::within(&measure, &end));
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.truncate(options.starts);
+    let polished = found.len().min(POLISHED);
+    for k in 0..polished {
+        let end = search::polish(&measure, &found[k].1, progress);
+        found.extend(feasible::within(&measure, &end));
+    }
+    // The start itself is an answer, should no search do better.
+    let first = drawn.best[0].clone();
+    found.push(first.clone());
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let ends = found.iter().map(|(value, _)| *value).collect();
+    let (value, series) = found.swap_remove(0);
+    let condition = |series: &[Series]| {
+        let motion = Motion::sample(series, samples(options));
+        plant
+            .regressor(&motion)
+            .map_or(f64::INFINITY, |w| condition_number(&w))
+    };
+    Ok(Excitation {
+        condition_number: condition(&series),
+        start: condition(&first.1),
+        value,
+        random: drawn.feasible,
+        evaluations: measure.evaluations(),
+        ends,
+        margins: feasible::margins(&measure, &series),
+        series,
+    })
+}
+
+/// Ends of searches that are polished.
+const POLISHED: usize = 2;
+
+/// Steps that `progress` of [`excite`] is told of, at most.
+pub fn steps(options: &Options) -> usize {
+    let rounds = options.starts + POLISHED * search::POLISHES;
+    options.random + rounds * options.steps
+}

@@ -1,0 +1,118 @@
+//! Random trajectories that keep the limits, as large as the limits let them be.
+
+use super::feasible::{reach, worst};
+use super::measure::{Measure, half};
+use super::{ExciteError, Series};
+
+/// Trajectories that kept the limits.
+pub(super) struct Drawn {
+    /// The best of them with their values, the best first.
+    pub(super) best: Vec<(f64, Vec<Series>)>,
+    /// How many there were.
+    pub(super) feasible: usize,
+}
+
+/// Draws per trajectory that is wanted, before it is given up.
+const PATIENCE: usize = 20;
+/// How often a trajectory is shrunk to keep the plant's limits before another one is drawn.
+const SHRINKS: usize = 12;
+
+/// Draws as many as the options say.
+pub(super) fn draw(measure: &Measure<'_>, progress: &dyn Fn(usize)) -> Result<Drawn, ExciteError> {
+    let wanted = measure.options.random.max(1);
+    let mut draws = Draws(measure.options.seed);
+    let mut drawn: Vec<(f64, Vec<Series>)> = Vec::new();
+    let names = measure.plant.limits();
+    let mut blame = vec![0_usize; names.len()];
+    let (mut tried, mut feasible) = (0, 0);
+    while feasible < wanted && tried < PATIENCE * wanted {
+        tried += 1;
+        let mut series: Vec<Series> = (0..measure.limits.len())
+            .map(|i| one(measure, i, &mut draws))
+            .collect();
+        let mut is_kept = false;
+        for _ in 0..SHRINKS {
+            match worst(measure, &series, super::samples(measure.options)) {
+                Some((_, excess)) if excess <= 0.0 => {
+                    is_kept = true;
+                    break;
+                }
+                Some((k, _)) if k < blame.len() => blame[k] += 1,
+                _ => {}
+            }
+            series = series.iter().map(|s| s.scaled(0.8)).collect();
+        }
+        if !is_kept {
+            continue;
+        }
+        feasible += 1;
+        progress(1);
+        let value = measure.value(&measure.motion(&series));
+        if value.is_finite() {
+            drawn.push((value, series));
+        }
+    }
+    if feasible == 0 {
+        let most = (0..names.len()).max_by_key(|k| blame[*k]);
+        return Err(ExciteError::NoStart {
+            tried,
+            most: most.filter(|k| blame[*k] > 0).map(|k| names[k].clone()),
+        });
+    }
+    if drawn.is_empty() {
+        return Err(ExciteError::Deficient);
+    }
+    drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // A search polishes each of them; before that, they must hold between samples too.
+    drawn.truncate(4 * measure.options.starts.max(1));
+    let kept: Vec<(f64, Vec<Series>)> = drawn
+        .into_iter()
+        .filter_map(|(_, series)| super::feasible::within(measure, &series))
+        .collect();
+    let mut best = kept;
+    best.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if best.is_empty() {
+        return Err(ExciteError::Deficient);
+    }
+    Ok(Drawn { best, feasible })
+}
+
+/// A series of one coordinate that fills the tightest of its limits, around a mean value that leaves it room.
+fn one(measure: &Measure<'_>, i: usize, draws: &mut Draws) -> Series {
+    let n = measure.options.harmonics;
+    let omega = measure.omega();
+    let [low, high] = measure.limits[i].position;
+    let shape = Series {
+        offset: 0.0,
+        mu: (0..n).map(|_| draws.normal()).collect(),
+        nu: (0..n).map(|_| draws.normal()).collect(),
+        omega,
+    };
+    let [least, greatest] = shape.extremes(0);
+    let by_position = 2.0 * half([low, high]) / (greatest - least);
+    let factor = reach(&measure.limits[i], &shape).min(by_position);
+    let mut series = shape.scaled(factor);
+    let room = (2.0 * half([low, high]) - factor * (greatest - least)).max(0.0);
+    series.offset = low - factor * least + room * draws.uniform();
+    series
+}
+
+/// Random numbers that are the same on every machine (Steele et al., `SplitMix`, 2014).
+struct Draws(u64);
+
+impl Draws {
+    /// Between 0 and 1.
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^= z >> 31;
+        (z >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Nearly normal: the sum of twelve uniform numbers, in which no function of a mathematical library has a part.
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}

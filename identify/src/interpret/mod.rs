@@ -1,0 +1,349 @@
+//! Interpretation as in Table 1 of the paper: identified base parameters go in, and the physical parameters that are
+//! taken as unknown come out, all real solutions of them, with deviations.
+//!
+//! A base parameter is a polynomial in the unknowns once all other parameters are held at their nominal values. What
+//! the polynomials determine is decided by the exact rank of their Jacobian at random points. As many equations as
+//! unknowns are solved exactly (`roots`), so that no real solution is missed; more equations than unknowns by
+//! weighted least squares (`nearest`). Deviations follow from those of the base parameters by the Jacobian.
+
+mod groebner;
+mod nearest;
+mod polynomial;
+mod real_roots;
+mod roots;
+
+use std::fmt;
+
+use nalgebra::{DMatrix, DVector};
+use num_rational::BigRational;
+use num_traits::Zero;
+
+use crate::undetermined::{Direction, null_directions};
+
+pub use polynomial::{Polynomial, exact};
+
+/// What is to be solved.
+#[derive(Clone, Debug)]
+pub struct Problem {
+    /// Each base parameter as a polynomial in the unknowns, all in equally many unknowns.
+    pub equations: Vec<Polynomial>,
+    /// Identified values of the base parameters.
+    pub values: Vec<f64>,
+    /// Their covariance, in the products of their units; `None` where it is not known.
+    pub covariance: Option<DMatrix<f64>>,
+    /// Nominal values of the unknowns.
+    pub nominal: Vec<f64>,
+}
+
+/// What base parameters say about the unknowns.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Interpretation {
+    /// As many independent equations as unknowns: all real solutions, maybe none.
+    Exact {
+        /// The solutions, the one nearest to the nominal values first.
+        solutions: Vec<Physical>,
+    },
+    /// More equations than unknowns: what fits best.
+    LeastSquares {
+        /// Local minima of the weighted error, the best first; the only one where the equations are linear.
+        solutions: Vec<Physical>,
+        /// Whether the equations are linear in the unknowns, so that there is no other minimum.
+        is_linear: bool,
+        /// Points from which minima were looked for.
+        starts: usize,
+    },
+    /// The base parameters do not determine the unknowns.
+    Undetermined {
+        /// Changes of the unknowns that change no base parameter, to first order around the nominal values.
+        directions: Vec<Direction>,
+        /// Which unknowns take part in none of them.
+        determined: Vec<bool>,
+    },
+}
+
+/// A solution.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Physical {
+    /// Values of the unknowns.
+    pub values: Vec<f64>,
+    /// Their standard deviations; `None` where those of the base parameters are not known, or where the solution is a
+    /// multiple one.
+    pub std: Option<Vec<f64>>,
+    /// `base parameter - its value for the solution`, for each equation.
+    pub residuals: Vec<f64>,
+    /// Sum of squares of the residuals by their deviations; `None` where these are not known, 0 for exact solutions.
+    pub chi_squared: Option<f64>,
+}
+
+/// Why there is no interpretation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum InterpretError {
+    /// The equations are of too high degree, or too many, to be solved exactly.
+    TooHard,
+}
+
+impl fmt::Display for InterpretError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooHard => f.write_str(
+                "the equations are of too high degree to be solved exactly; take fewer unknowns, such as those that \
+                 the page of equations shows to be coupled least",
+            ),
+        }
+    }
+}
+
+impl std::error::Error for InterpretError {}
+
+/// Solves for the unknowns. Lists of the problem must be of matching lengths (asserted), values finite.
+///
+/// ```
+/// use modelmill_identify::interpret::{Interpretation, Polynomial, Problem, exact, interpret};
+/// // p1 = m c and p2 = m c^2, with m = 2 kg and c = 0.5 m.
+/// let product = |powers: &[(usize, u32)]| {
+///     let mut p = Polynomial::new(2);
+///     p.add_term(powers, &exact(1.0));
+///     p
+/// };
+/// let problem = Problem {
+///     equations: vec![product(&[(0, 1), (1, 1)]), product(&[(0, 1), (1, 2)])],
+///     values: vec![1.0, 0.5],
+///     covariance: None,
+///     nominal: vec![1.0, 1.0],
+/// };
+/// let Ok(Interpretation::Exact { solutions }) = interpret(&problem) else { panic!() };
+/// assert_eq!(solutions[0].values, [2.0, 0.5]);
+/// ```
+pub fn interpret(problem: &Problem) -> Result<Interpretation, InterpretError> {
+    let n = problem.nominal.len();
+    assert_eq!(
+        problem.equations.len(),
+        problem.values.len(),
+        "one value per equation"
+    );
+    assert!(
+        problem.equations.iter().all(|p| p.n == n),
+        "one nominal value per unknown"
+    );
+    let used: Vec<usize> = (0..problem.equations.len())
+        .filter(|k| (0..n).any(|i| problem.equations[*k].mentions(i)))
+        .collect();
+    let jacobian = |k: &usize| -> Vec<Polynomial> {
+        (0..n)
+            .map(|i| problem.equations[*k].derivative(i))
+            .collect()
+    };
+    let jacobian: Vec<Vec<Polynomial>> = used.iter().map(jacobian).collect();
+    let rank = generic_rank(&jacobian, n);
+    if rank < n {
+        return Ok(undetermined(problem, &jacobian, n - rank));
+    }
+    if used.len() > n {
+        return Ok(nearest::nearest(problem, &used));
+    }
+    let equations: Vec<Polynomial> = used.iter().map(|k| equation(problem, *k)).collect();
+    let points = match roots::solve(&equations, n).map_err(|_| InterpretError::TooHard)? {
+        roots::RealSolutions::Finite(points) => points,
+        // Curves of solutions beside a generic rank that is full: the values are special, and so is what can be said.
+        roots::RealSolutions::Infinite => return Ok(undetermined(problem, &jacobian, 0)),
+    };
+    let mut solutions: Vec<Physical> = points
+        .into_iter()
+        .map(|values| Physical {
+            std: deviations(problem, &used, &values),
+            residuals: residuals(problem, &values),
+            chi_squared: problem.covariance.is_some().then_some(0.0),
+            values,
+        })
+        .collect();
+    let distance = |one: &Physical| -> f64 {
+        let pairs = one.values.iter().zip(&problem.nominal);
+        pairs
+            .map(|(x, x0)| ((x - x0) / (x0.abs() + x.abs()).max(f64::MIN_POSITIVE)).powi(2))
+            .sum()
+    };
+    solutions.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+    Ok(Interpretation::Exact { solutions })
+}
+
+/// `base parameter - value` as a polynomial.
+fn equation(problem: &Problem, k: usize) -> Polynomial {
+    let mut equation = problem.equations[k].clone();
+    equation.add_term(&[], &-exact(problem.values[k]));
+    equation
+}
+
+fn residuals(problem: &Problem, at: &[f64]) -> Vec<f64> {
+    let pairs = problem.equations.iter().zip(&problem.values);
+    pairs.map(|(p, value)| value - p.value(at)).collect()
+}
+
+/// The Jacobian of some equations at a point.
+fn jacobian_at(problem: &Problem, equations: &[usize], at: &[f64]) -> DMatrix<f64> {
+    DMatrix::from_fn(equations.len(), at.len(), |r, i| {
+        problem.equations[equations[r]].derivative(i).value(at)
+    })
+}
+
+/// Standard deviations of a solution of as many equations as unknowns: `J x' = p'` gives `cov x = J^-1 cov p J^-T`.
+fn deviations(problem: &Problem, used: &[usize], at: &[f64]) -> Option<Vec<f64>> {
+    let covariance = problem.covariance.as_ref()?;
+    let mut jacobian = jacobian_at(problem, used, at);
+    // Units must not decide what counts as singular.
+    let scales: Vec<f64> = (0..used.len()).map(|r| jacobian.row(r).norm()).collect();
+    for (r, scale) in scales.iter().enumerate() {
+        if *scale == 0.0 {
+            return None;
+        }
+        jacobian.row_mut(r).unscale_mut(*scale);
+    }
+    let columns: Vec<f64> = (0..at.len()).map(|i| jacobian.column(i).norm()).collect();
+    for (i, scale) in columns.iter().enumerate() {
+        jacobian.column_mut(i).unscale_mut(*scale);
+    }
+    let singular = jacobian.clone().singular_values();
+    if singular.min() < 1e-12 * singular.max() {
+        return None;
+    }
+    let inverse = jacobian.try_inverse()?;
+    let inverse = DMatrix::from_fn(at.len(), used.len(), |i, r| {
+        inverse[(i, r)] / (columns[i] * scales[r])
+    });
+    let part = DMatrix::from_fn(used.len(), used.len(), |a, b| {
+        covariance[(used[a], used[b])]
+    });
+    let result = &inverse * part * inverse.transpose();
+    Some(roots_of_diagonal(&result))
+}
+
+fn roots_of_diagonal(covariance: &DMatrix<f64>) -> Vec<f64> {
+    let diagonal = covariance.diagonal();
+    diagonal.iter().map(|v| v.max(0.0).sqrt()).collect()
+}
+
+/// The rank that the Jacobian has almost everywhere: exact, at random points; the highest of a few.
+fn generic_rank(jacobian: &[Vec<Polynomial>], n: usize) -> usize {
+    let mut state = 0x6d69_6c6c_u64;
+    let mut draw = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        BigRational::from_integer((1 + (state >> 44)).into())
+    };
+    (0..3)
+        .map(|_| {
+            let point: Vec<BigRational> = (0..n).map(|_| draw()).collect();
+            exact_rank(exact_jacobian(jacobian, &point))
+        })
+        .max()
+        .unwrap_or(0)
+}
+
+fn exact_jacobian(jacobian: &[Vec<Polynomial>], point: &[BigRational]) -> Vec<Vec<BigRational>> {
+    let row = |row: &Vec<Polynomial>| row.iter().map(|p| p.exact_value(point)).collect();
+    jacobian.iter().map(row).collect()
+}
+
+fn exact_rank(mut rows: Vec<Vec<BigRational>>) -> usize {
+    let n = rows.first().map_or(0, Vec::len);
+    let mut rank = 0;
+    for c in 0..n {
+        let Some(pivot) = (rank..rows.len()).find(|r| !rows[*r][c].is_zero()) else {
+            continue;
+        };
+        rows.swap(rank, pivot);
+        let (above, below) = rows.split_at_mut(rank + 1);
+        let first = &above[rank];
+        for row in below {
+            if row[c].is_zero() {
+                continue;
+            }
+            let factor = &row[c] / &first[c];
+            for (entry, k) in row.iter_mut().zip(first).skip(c) {
+                *entry -= &factor * k;
+            }
+        }
+        rank += 1;
+    }
+    rank
+}
+
+/// What is not determined, at the nominal values; these are moved a little where they hide something.
+fn undetermined(
+    problem: &Problem,
+    jacobian: &[Vec<Polynomial>],
+    at_least: usize,
+) -> Interpretation {
+    let n = problem.nominal.len();
+    // A product of two unknowns, one of them nominally zero, says nothing there.
+    let point: Vec<f64> = problem
+        .nominal
+        .iter()
+        .map(|x| if *x == 0.0 { 1.0 } else { *x })
+        .collect();
+    let scales = &point;
+    let rows = jacobian.len().max(n);
+    let mut matrix = DMatrix::zeros(rows, n);
+    for (r, row) in jacobian.iter().enumerate() {
+        for (i, p) in row.iter().enumerate() {
+            matrix[(r, i)] = p.value(&point) * scales[i].abs();
+        }
+        let norm = matrix.row(r).norm();
+        if norm > 0.0 {
+            matrix.row_mut(r).unscale_mut(norm);
+        }
+    }
+    let svd = matrix.svd(false, true);
+    let v_t = svd.v_t.expect("right singular vectors are asked for");
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|a, b| svd.singular_values[*a].total_cmp(&svd.singular_values[*b]));
+    let n_null = order
+        .iter()
+        .filter(|i| svd.singular_values[**i] < 1e-10)
+        .count()
+        .max(at_least);
+    let null_space = DMatrix::from_fn(n_null, n, |r, i| v_t[(order[r], i)]);
+    let norms: Vec<f64> = scales.iter().map(|s| 1.0 / s.abs()).collect();
+    let (determined, directions) = null_directions(&null_space, &norms);
+    Interpretation::Undetermined {
+        directions,
+        determined,
+    }
+}
+
+/// Rows and right-hand side divided by deviations: `L^-1` of the covariance's Cholesky factor.
+fn whitened(
+    covariance: Option<&DMatrix<f64>>,
+    used: &[usize],
+    values: &[f64],
+) -> (DMatrix<f64>, bool) {
+    let n = used.len();
+    let part = covariance.map(|c| DMatrix::from_fn(n, n, |a, b| c[(used[a], used[b])]));
+    let factor = part
+        .and_then(nalgebra::Cholesky::new)
+        .and_then(|cholesky| cholesky.l().try_inverse());
+    match factor {
+        Some(inverse) => (inverse, true),
+        None => {
+            let scale = |k: &usize| 1.0 / values[*k].abs().max(f64::MIN_POSITIVE);
+            let weights: Vec<f64> = used.iter().map(scale).collect();
+            let largest = weights.iter().copied().fold(0.0, f64::max);
+            // A value of zero has no size of its own.
+            let weights = weights.iter().map(|w| {
+                if *w >= 1.0 / f64::MIN_POSITIVE {
+                    1.0_f64.min(largest)
+                } else {
+                    *w
+                }
+            });
+            (
+                DMatrix::from_diagonal(&DVector::from_iterator(n, weights)),
+                false,
+            )
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,300 @@
+//! All real solutions of a system of polynomial equations that has finitely many: a Groebner basis goes in, points in
+//! floating point come out, each the nearest to an exact solution.
+//!
+//! Multiplication by a linear form acts on the quotient ring; where its minimal polynomial has as many roots as the
+//! ring has dimensions, each solution's coordinates are polynomials in the form's value (the shape lemma:
+//! D. Cox, J. Little, D. O'Shea, "Using Algebraic Geometry", 2.4). Multiple solutions are made simple by
+//! A. Seidenberg's lemma (1974) first.
+
+use num_rational::BigRational;
+use num_traits::{One, Signed, Zero};
+
+use super::groebner::{TooHard, Work, groebner, is_contradiction, remainder, standard_terms};
+use super::polynomial::{Polynomial, Powers, float, unknown};
+use super::real_roots::{Interval, Univariate, halve, is_squarefree, isolate, squarefree};
+
+/// Most complex solutions of a system.
+const MOST_SOLUTIONS: usize = 64;
+/// Linear forms that are tried before solutions are taken for multiple ones.
+const FORMS: i64 = 6;
+/// Halvings of a root's interval: far below what any number in floating point could tell.
+const MOST_HALVINGS: usize = 2000;
+
+/// The solutions of a system.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum RealSolutions {
+    /// All real solutions.
+    Finite(Vec<Vec<f64>>),
+    /// Complex solutions form curves or surfaces.
+    Infinite,
+}
+
+/// Solves equations `polynomial = 0` in `n` unknowns.
+pub(crate) fn solve(equations: &[Polynomial], n: usize) -> Result<RealSolutions, TooHard> {
+    let mut work = Work::default();
+    let mut basis = groebner(equations, &mut work)?;
+    let mut is_radical = false;
+    loop {
+        if is_contradiction(&basis) {
+            return Ok(RealSolutions::Finite(Vec::new()));
+        }
+        let Some(terms) = standard_terms(&basis, n, MOST_SOLUTIONS)? else {
+            return Ok(RealSolutions::Infinite);
+        };
+        let ring = Quotient {
+            basis: &basis,
+            terms: &terms,
+        };
+        for k in 1..=FORMS {
+            if let Some(shape) = ring.shape(k, &mut work)? {
+                return Ok(RealSolutions::Finite(shape.points()));
+            }
+        }
+        if is_radical {
+            return Err(TooHard);
+        }
+        let mut more = basis.clone();
+        for i in 0..n {
+            let minimal = ring.minimal(&unknown(n, i), &mut work)?;
+            let mut equation = Polynomial::new(n);
+            for (exponent, factor) in squarefree(&minimal).iter().enumerate() {
+                let exponent = u32::try_from(exponent).expect("a small exponent");
+                equation.add_term(&[(i, exponent)], factor);
+            }
+            more.push(equation);
+        }
+        basis = groebner(&more, &mut work)?;
+        is_radical = true;
+    }
+}
+
+/// Polynomials modulo the equations.
+struct Quotient<'a> {
+    basis: &'a [Polynomial],
+    terms: &'a [Powers],
+}
+
+/// The solutions as values of polynomials at the roots of one.
+struct Shape {
+    minimal: Univariate,
+    coordinates: Vec<Univariate>,
+}
+
+impl Quotient<'_> {
+    fn vector(&self, polynomial: &Polynomial) -> Vec<BigRational> {
+        let factor = |term| polynomial.terms.get(term).cloned();
+        let terms = self.terms.iter();
+        terms
+            .map(|term| factor(term).unwrap_or_else(BigRational::zero))
+            .collect()
+    }
+
+    /// 1, form, form^2, ... up to one power more than there are dimensions.
+    fn powers(&self, form: &Polynomial, work: &mut Work) -> Result<Vec<Vec<BigRational>>, TooHard> {
+        let n = form.n;
+        let mut one = Polynomial::new(n);
+        one.add(Powers::one(n), &BigRational::one());
+        let mut power = remainder(&one, self.basis, work)?;
+        let mut vectors = vec![self.vector(&power)];
+        for _ in 0..self.terms.len() {
+            let mut product = Polynomial::new(n);
+            for (term, factor) in &form.terms {
+                product.add_shifted(&power, term, factor);
+            }
+            power = remainder(&product, self.basis, work)?;
+            vectors.push(self.vector(&power));
+        }
+        Ok(vectors)
+    }
+
+    /// The least polynomial that vanishes for the form, modulo the equations.
+    fn minimal(&self, form: &Polynomial, work: &mut Work) -> Result<Univariate, TooHard> {
+        let powers = self.powers(form, work)?;
+        for k in 1..powers.len() {
+            if let Some(mut factors) = combination(&powers[..k], &[&powers[k]]) {
+                let mut minimal: Univariate = factors.remove(0).into_iter().map(|f| -f).collect();
+                minimal.push(BigRational::one());
+                return Ok(minimal);
+            }
+        }
+        unreachable!("more vectors than dimensions are dependent")
+    }
+
+    /// The shape of the solutions for a linear form, if the form tells all of them apart.
+    fn shape(&self, k: i64, work: &mut Work) -> Result<Option<Shape>, TooHard> {
+        let n = self.basis[0].n;
+        let mut form = Polynomial::new(n);
+        let mut weight = 1_i64;
+        for i in 0..n {
+            form.add(
+                Powers::unknown(n, i),
+                &BigRational::from_integer(weight.into()),
+            );
+            weight = (weight * (k + 1) + k) % 1009;
+        }
+        let mut powers = self.powers(&form, work)?;
+        let last = powers.pop().expect("at least one power");
+        let mut targets = vec![last];
+        for i in 0..n {
+            let coordinate = remainder(&unknown(n, i), self.basis, work)?;
+            targets.push(self.vector(&coordinate));
+        }
+        let targets: Vec<&Vec<BigRational>> = targets.iter().collect();
+        let Some(mut factors) = combination(&powers, &targets) else {
+            return Ok(None);
+        };
+        let mut minimal: Univariate = factors.remove(0).into_iter().map(|f| -f).collect();
+        minimal.push(BigRational::one());
+        Ok(is_squarefree(&minimal).then_some(Shape {
+            minimal,
+            coordinates: factors,
+        }))
+    }
+}
+
+impl Shape {
+    fn points(&self) -> Vec<Vec<f64>> {
+        isolate(&self.minimal)
+            .into_iter()
+            .map(|root| self.point(root))
+            .collect()
+    }
+
+    /// A solution: the root's interval is halved until every coordinate is known to the last bit.
+    fn point(&self, mut root: Interval) -> Vec<f64> {
+        let fine = BigRational::new(1.into(), num_bigint::BigInt::from(1) << 60);
+        let tiny = BigRational::new(1.into(), num_bigint::BigInt::from(1) << 1000);
+        for _ in 0..MOST_HALVINGS {
+            let images = self.coordinates.iter().map(|p| root.image(p));
+            let all_known = images.into_iter().all(|image| {
+                let size = image.low.abs().max(image.high.abs());
+                image.width() <= size * &fine || image.width() <= tiny
+            });
+            if all_known {
+                break;
+            }
+            // Some bits more between two looks: looking costs more than halving.
+            for _ in 0..16 {
+                halve(&self.minimal, &mut root);
+            }
+        }
+        let images = self.coordinates.iter().map(|p| root.image(p).middle());
+        images.map(|value| float(&value)).collect()
+    }
+}
+
+/// Each target as a combination of vectors; `None` unless the vectors are independent and span all targets.
+fn combination(
+    vectors: &[Vec<BigRational>],
+    targets: &[&Vec<BigRational>],
+) -> Option<Vec<Vec<BigRational>>> {
+    let (rows, columns) = (vectors[0].len(), vectors.len());
+    let mut matrix: Vec<Vec<BigRational>> = (0..rows)
+        .map(|r| {
+            let left = vectors.iter().map(|v| v[r].clone());
+            left.chain(targets.iter().map(|t| t[r].clone())).collect()
+        })
+        .collect();
+    for c in 0..columns {
+        let pivot = (c..rows).find(|r| !matrix[*r][c].is_zero())?;
+        matrix.swap(c, pivot);
+        let inverse = matrix[c][c].recip();
+        for entry in &mut matrix[c][c..] {
+            *entry *= &inverse;
+        }
+        let row = matrix[c].clone();
+        for other in (0..rows).filter(|r| *r != c) {
+            let factor = matrix[other][c].clone();
+            if factor.is_zero() {
+                continue;
+            }
+            for (entry, k) in matrix[other].iter_mut().zip(&row).skip(c) {
+                *entry -= &factor * k;
+            }
+        }
+    }
+    let spans = matrix[columns..]
+        .iter()
+        .all(|row| row[columns..].iter().all(Zero::is_zero));
+    spans.then(|| {
+        (0..targets.len())
+            .map(|t| {
+                (0..columns)
+                    .map(|c| matrix[c][columns + t].clone())
+                    .collect()
+            })
+            .collect()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::interpret::exact;
+
+    type Terms<'a> = &'a [(f64, &'a [(usize, u32)])];
+
+    fn system(n: usize, equations: &[Terms<'_>]) -> Vec<Polynomial> {
+        let one = |terms: &Terms<'_>| {
+            let mut p = Polynomial::new(n);
+            for (factor, powers) in *terms {
+                p.add_term(powers, &exact(*factor));
+            }
+            p
+        };
+        equations.iter().map(one).collect()
+    }
+
+    fn sorted(solutions: RealSolutions) -> Vec<Vec<f64>> {
+        let RealSolutions::Finite(mut points) = solutions else {
+            panic!("finitely many are expected");
+        };
+        points.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        points
+    }
+
+    #[test]
+    fn a_circle_meets_a_hyperbola_in_four_points() {
+        // x^2 + y^2 = 25, x y = 12
+        let equations = system(
+            2,
+            &[
+                &[(1.0, &[(0, 2)]), (1.0, &[(1, 2)]), (-25.0, &[])],
+                &[(1.0, &[(0, 1), (1, 1)]), (-12.0, &[])],
+            ],
+        );
+        let found = sorted(solve(&equations, 2).unwrap());
+        assert_eq!(found, [[-4.0, -3.0], [-3.0, -4.0], [3.0, 4.0], [4.0, 3.0]]);
+    }
+
+    #[test]
+    fn complex_and_double_solutions_are_told_apart_from_real_and_simple_ones() {
+        // (x - 2)^2 = 0, y^2 = x: one double x, two y.
+        let double = system(
+            2,
+            &[
+                &[(1.0, &[(0, 2)]), (-4.0, &[(0, 1)]), (4.0, &[])],
+                &[(1.0, &[(1, 2)]), (-1.0, &[(0, 1)])],
+            ],
+        );
+        let found = sorted(solve(&double, 2).unwrap());
+        let root = 2.0_f64.sqrt();
+        assert_eq!(found, [[2.0, -root], [2.0, root]]);
+        // x^2 + 1 = 0 has no real solution; x = 1 and x = 2 contradict each other; x y = 1 leaves a curve.
+        let complex = system(1, &[&[(1.0, &[(0, 2)]), (1.0, &[])]]);
+        assert_eq!(sorted(solve(&complex, 1).unwrap()), Vec::<Vec<f64>>::new());
+        let contradiction = system(
+            1,
+            &[
+                &[(1.0, &[(0, 1)]), (-1.0, &[])],
+                &[(1.0, &[(0, 1)]), (-2.0, &[])],
+            ],
+        );
+        assert_eq!(
+            sorted(solve(&contradiction, 1).unwrap()),
+            Vec::<Vec<f64>>::new()
+        );
+        let curve = system(2, &[&[(1.0, &[(0, 1), (1, 1)]), (-1.0, &[])]]);
+        assert_eq!(solve(&curve, 2).unwrap(), RealSolutions::Infinite);
+    }
+}

@@ -1,0 +1,253 @@
+//! Where points are at given coordinates, and how loops move with them: a mechanism goes in once, and is asked many
+//! times, as limits of planned motion need it.
+
+use crate::exact::Symbol;
+use crate::kinematics::Vec3;
+use crate::mechanism::{Axis, Mechanism, PointIdx, Step};
+
+/// The geometry of a mechanism with the file's constants.
+#[derive(Clone, Debug)]
+pub struct Kinematics {
+    n: usize,
+    frames: Vec<(usize, Vec<Move>)>,
+    points: Vec<(usize, Vec3)>,
+    loops: Vec<[usize; 2]>,
+}
+
+/// One elementary motion: `offset + sum of factor * coordinate` about or along an axis.
+#[derive(Clone, Debug)]
+struct Move {
+    axis: usize,
+    is_rotation: bool,
+    offset: f64,
+    coordinates: Vec<(usize, f64)>,
+}
+
+/// All frames at given coordinates.
+#[derive(Clone, Debug)]
+pub struct Poses {
+    frames: Vec<Pose>,
+}
+
+#[derive(Clone, Debug)]
+struct Pose {
+    rotation: [Vec3; 3],
+    origin: Vec3,
+    /// Coordinates that move this frame against its parent: coordinate, factor, whether it turns, axis, origin.
+    moved: Vec<(usize, f64, bool, Vec3, Vec3)>,
+}
+
+impl Kinematics {
+    /// The geometry, ready to be asked.
+    pub fn new(mechanism: &Mechanism) -> Self {
+        let value = |symbol: Symbol| match symbol {
+            Symbol::Coordinate(_) => 0.0,
+            other => mechanism.symbol_nominal(other),
+        };
+        let axis = |axis: &Axis| match axis {
+            Axis::X => 0,
+            Axis::Y => 1,
+            Axis::Z => 2,
+        };
+        let moves = |step: &Step| match step {
+            Step::Rotate(about, angle) => Move {
+                axis: axis(about),
+                is_rotation: true,
+                offset: angle.evaluate(&value),
+                coordinates: angle
+                    .terms
+                    .iter()
+                    .filter_map(|(symbol, n)| match symbol {
+                        Symbol::Coordinate(i) => Some((i.0, f64::from(*n))),
+                        _ => None,
+                    })
+                    .collect(),
+            },
+            Step::Translate(along, length) => Move {
+                axis: axis(along),
+                is_rotation: false,
+                offset: length.evaluate(&value),
+                coordinates: length
+                    .coordinates
+                    .iter()
+                    .map(|(i, factor)| (i.0, crate::print::to_f64(factor)))
+                    .collect(),
+            },
+        };
+        Self {
+            n: mechanism.coordinates.len(),
+            frames: mechanism
+                .frames
+                .iter()
+                .map(|frame| (frame.parent.0, frame.steps.iter().map(moves).collect()))
+                .collect(),
+            points: mechanism
+                .points
+                .iter()
+                .map(|p| (p.frame.0, [0, 1, 2].map(|k| p.at[k].evaluate(&value))))
+                .collect(),
+            loops: mechanism
+                .loops
+                .iter()
+                .map(|l| [l.joins[0].0, l.joins[1].0])
+                .collect(),
+        }
+    }
+
+    /// All frames at given coordinates, rad and m, in the order of the file; one for each (asserted).
+    pub fn poses(&self, coordinates: &[f64]) -> Poses {
+        assert_eq!(coordinates.len(), self.n, "one value for each coordinate");
+        let mut frames: Vec<Pose> = Vec::with_capacity(self.frames.len());
+        for (i, (parent, moves)) in self.frames.iter().enumerate() {
+            let mut pose = if i == 0 {
+                Pose {
+                    rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+                    origin: [0.0; 3],
+                    moved: Vec::new(),
+                }
+            } else {
+                Pose {
+                    rotation: frames[*parent].rotation,
+                    origin: frames[*parent].origin,
+                    moved: Vec::new(),
+                }
+            };
+            for step in moves {
+                let direction: Vec3 = std::array::from_fn(|k| pose.rotation[k][step.axis]);
+                let mut amount = step.offset;
+                for (coordinate, factor) in &step.coordinates {
+                    amount += factor * coordinates[*coordinate];
+                    let is_rotation = step.is_rotation;
+                    pose.moved
+                        .push((*coordinate, *factor, is_rotation, direction, pose.origin));
+                }
+                if step.is_rotation {
+                    turn(&mut pose.rotation, step.axis, amount);
+                } else {
+                    for k in 0..3 {
+                        pose.origin[k] += amount * direction[k];
+                    }
+                }
+            }
+            frames.push(pose);
+        }
+        Poses { frames }
+    }
+
+    /// A point's position in the base frame, m.
+    pub fn point(&self, poses: &Poses, point: PointIdx) -> [f64; 3] {
+        self.position(poses, point.0)
+    }
+
+    fn position(&self, poses: &Poses, point: usize) -> Vec3 {
+        let (frame, at) = &self.points[point];
+        let pose = &poses.frames[*frame];
+        std::array::from_fn(|k| {
+            pose.origin[k] + (0..3).map(|j| pose.rotation[k][j] * at[j]).sum::<f64>()
+        })
+    }
+
+    /// How far apart the two points of each loop are, m: three numbers for each loop.
+    pub fn gaps(&self, poses: &Poses) -> Vec<f64> {
+        let ends = |l: &[usize; 2]| l.map(|point| self.position(poses, point));
+        self.loops
+            .iter()
+            .flat_map(|l| {
+                let [a, b] = ends(l);
+                [0, 1, 2].map(|k| a[k] - b[k])
+            })
+            .collect()
+    }
+
+    /// Derivative of [`Self::gaps`] by all coordinates, one row for each gap.
+    pub fn loop_jacobian(&self, poses: &Poses) -> Vec<Vec<f64>> {
+        let mut rows = vec![vec![0.0; self.n]; 3 * self.loops.len()];
+        for (l, ends) in self.loops.iter().enumerate() {
+            for (point, sign) in ends.iter().zip([1.0, -1.0]) {
+                let at = self.position(poses, *point);
+                let mut frame = self.points[*point].0;
+                while frame != 0 {
+                    for (coordinate, factor, is_rotation, axis, origin) in
+                        &poses.frames[frame].moved
+                    {
+                        let velocity = if *is_rotation {
+                            let arm: Vec3 = std::array::from_fn(|k| at[k] - origin[k]);
+                            [
+                                axis[1] * arm[2] - axis[2] * arm[1],
+                                axis[2] * arm[0] - axis[0] * arm[2],
+                                axis[0] * arm[1] - axis[1] * arm[0],
+                            ]
+                        } else {
+                            *axis
+                        };
+                        for k in 0..3 {
+                            rows[3 * l + k][*coordinate] += sign * factor * velocity[k];
+                        }
+                    }
+                    frame = self.frames[frame].0;
+                }
+            }
+        }
+        rows
+    }
+}
+
+/// Multiplies from the right by an elementary rotation.
+fn turn(rotation: &mut [Vec3; 3], axis: usize, angle: f64) {
+    let (sin, cos) = angle.sin_cos();
+    let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+    for row in rotation {
+        let (first, second) = (row[j], row[k]);
+        row[j] = first * cos + second * sin;
+        row[k] = second * cos - first * sin;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pose::gaps;
+
+    #[test]
+    fn agrees_with_the_nominal_pose_and_with_differences() {
+        for name in ["spidermill", "three_rrr", "four_bar", "panda"] {
+            let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+                .join(format!("models/{name}.toml"));
+            let mechanism = crate::load_file(&path).unwrap().mechanism;
+            let kinematics = Kinematics::new(&mechanism);
+            let mut q: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
+            let expected = gaps(&mechanism);
+            let close = |a: &[f64], b: &[f64], by: f64| {
+                a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < by)
+            };
+            let poses = kinematics.poses(&q);
+            assert!(
+                close(&kinematics.gaps(&poses), &expected.values, 1e-12),
+                "{name}"
+            );
+            // Away from the nominal pose, against differences.
+            for (i, value) in q.iter_mut().enumerate() {
+                *value += 0.1 + 0.03 * f64::from(u8::try_from(i).unwrap());
+            }
+            let rows = kinematics.loop_jacobian(&kinematics.poses(&q));
+            for i in 0..q.len() {
+                let step = 1e-6;
+                let mut moved = |by: f64| {
+                    let old = q[i];
+                    q[i] += by;
+                    let gaps = kinematics.gaps(&kinematics.poses(&q));
+                    q[i] = old;
+                    gaps
+                };
+                let (high, low) = (moved(step), moved(-step));
+                let slope: Vec<f64> = high
+                    .iter()
+                    .zip(&low)
+                    .map(|(a, b)| (a - b) / (2.0 * step))
+                    .collect();
+                let column: Vec<f64> = rows.iter().map(|row| row[i]).collect();
+                assert!(close(&column, &slope, 1e-8), "{name}, coordinate {i}");
+            }
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! Ranges of values: `2.5` for what may reach 2.5 either way, `[-1, 2.5]` for two ends.
+
+use std::borrow::Cow;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+
+use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::document::{Node, Value};
+use crate::record::{Read, wrong_type};
+use crate::values::Number;
+
+/// A range with its place.
+#[derive(Clone, Debug)]
+pub(crate) struct Range {
+    pub(crate) ends: [f64; 2],
+    pub(crate) span: Span,
+}
+
+impl Read for Range {
+    const EXPECTED: &'static str = "two numbers, the lower one first, or one for both directions";
+    const EXAMPLE: &'static str = "[-1.5, 2]";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        let span = node.span;
+        let ends = match &node.value {
+            Value::Number { .. } => {
+                let size = Number::read(node, log)?.value;
+                if size <= 0.0 {
+                    log.push(
+                        Diagnostic::error(span, "this range is empty")
+                            .label("expected a number above 0, which is meant in both directions")
+                            .help("write a range as `[low, high]`, such as `[-2, -1]`"),
+                    );
+                    return None;
+                }
+                [-size, size]
+            }
+            Value::Array(entries) if entries.len() == 2 => {
+                let low = Number::read(&entries[0], log);
+                let high = Number::read(&entries[1], log);
+                [low?.value, high?.value]
+            }
+            _ => return wrong_type::<Self>(node, log),
+        };
+        if ends[0] >= ends[1] {
+            log.push(
+                Diagnostic::error(span, "this range is empty")
+                    .label("expected the lower end first")
+                    .help(format!("for example `[{}, {}]`", ends[1], ends[0])),
+            );
+            return None;
+        }
+        Some(Self { ends, span })
+    }
+}
+
+impl JsonSchema for Range {
+    fn schema_name() -> Cow<'static, str> {
+        "Range".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "description": "Two numbers, the lower one first; one number stands for both directions.",
+            "oneOf": [
+                { "type": "number", "exclusiveMinimum": 0 },
+                { "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 },
+            ],
+        })
+    }
+}
