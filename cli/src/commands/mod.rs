@@ -10,7 +10,7 @@ pub(crate) mod excite;
 pub(crate) mod generate;
 pub(crate) mod identify;
 pub(crate) mod import;
+pub(crate) mod interpret;
 pub(crate) mod reduce;
 pub(crate) mod simulate;
-pub(crate) mod interpret;
 pub(crate) mod tour;
