@@ -195,7 +195,7 @@ fn variables(model: &Model, data: &Data) -> Outcome<Vec<(String, Vec<f64>)>> {
 }
 
 /// Columns of numbers along a recording, evaluated block by block.
-fn columns(
+pub(crate) fn columns(
     model: &Model,
     data: &Data,
     mut evaluate: impl FnMut(&States<'_>) -> Result<Vec<Vec<f64>>, modelmill_codegen::PoseFault>,

@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::estimators::EstimatorArgs;
 use crate::limits::Limit;
 use crate::preparation::PreparationArgs;
+use crate::standstill::StandstillArgs;
 
 /// From a model file to base parameters, equations, fast Rust, and parameters from measurements.
 #[derive(Debug, Parser)]
@@ -62,7 +64,15 @@ pub(crate) enum Command {
         --check recordings/spidermill-mbs/with-rods-check.csv --out fit.json\n  \
         modelmill identify model-spec/models/emps.toml --data emps_train.csv \\\n      \
         --order 4 --cutoff 100 --trim 49 --decimate 10\n  \
-        modelmill identify arm.toml --data a.csv --data b.csv --map t=time_s --map q1=pos_1")]
+        modelmill identify arm.toml --data a.csv --data b.csv --map t=time_s --map q1=pos_1\n\n\
+        Estimating (see the options below --weights):\n  \
+        modelmill identify arm.toml --data run.csv --weights channels --robust\n  \
+        modelmill identify arm.toml --data mean.csv --weights variance --map shoulder_var=var_tau1 --map elbow_var=var_tau2\n  \
+        modelmill identify arm.toml --data run.csv --prior 0.2        nominal values count, to 20 % each\n  \
+        modelmill identify arm.toml --data run.csv --physical         only what bodies can have\n  \
+        modelmill identify arm.toml --data run.csv --essential        only what the recording supports\n  \
+        modelmill identify arm.toml --data run.csv --instruments run.csv --instrument-map q1=q1_reference\n  \
+        modelmill identify arm.toml --data run.csv --instruments period=7.29")]
     Identify(IdentifyArgs),
     /// Hold the model against recordings: error figures, and where the error lives
     #[command(after_help = "Examples (from the project's root):\n  \
@@ -114,6 +124,14 @@ pub(crate) enum Command {
         --limits q1=-1:1 --limits q1_d=2 --limits q2=-1.5:1.5 --limits q2_d=3 --out trajectory.csv\n\n\
         Limits stand in the model file's `[limits]`; --limits adds to them or replaces them.")]
     Excite(ExciteArgs),
+    /// Reproduce the experiment of the paper on the bundled rig, and explain its errors, as one page
+    #[command(
+        after_help = "Writes experiment.html: excitation, runs of the whole robot, Tables 1 and 2 beside the paper's, \
+        and where the errors come from. Needs no files; the same options give the same bytes.\n\n\
+        Examples:\n  modelmill experiment --out docs                     the page that comes with the project\n  \
+        modelmill experiment --out /tmp --random 100 --starts 1 --json"
+    )]
+    Experiment(ExperimentArgs),
     /// Print a completion script for a shell
     #[command(after_help = "Examples:\n  \
         modelmill completions bash > ~/.local/share/bash-completion/completions/modelmill\n  \
@@ -250,7 +268,7 @@ pub(crate) struct EvaluateArgs {
 pub(crate) struct IdentifyArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings (CSV) to identify from; may be repeated
+    /// Recordings (CSV, Parquet, MATLAB 5) to identify from; may be repeated
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
     /// Recordings to check the result on, which the fit does not see; may be repeated
@@ -263,6 +281,10 @@ pub(crate) struct IdentifyArgs {
     #[arg(long)]
     pub(crate) json: bool,
     #[command(flatten)]
+    pub(crate) estimators: EstimatorArgs,
+    #[command(flatten)]
+    pub(crate) standstill: StandstillArgs,
+    #[command(flatten)]
     pub(crate) preparation: PreparationArgs,
 }
 
@@ -271,7 +293,7 @@ pub(crate) struct IdentifyArgs {
 pub(crate) struct CompareArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings (CSV); may be repeated
+    /// Recordings (CSV, Parquet, MATLAB 5); may be repeated
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
     /// Values of the base parameters: `nominal`, or a file that `identify` wrote
@@ -368,6 +390,29 @@ pub(crate) struct ExciteArgs {
     /// Write its picture to this file; beside the trajectory if not given
     #[arg(long, value_name = "FILE.svg")]
     pub(crate) figure: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `experiment`.
+#[derive(Debug, Args)]
+pub(crate) struct ExperimentArgs {
+    /// Write the page `experiment.html` into this folder
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Random trajectories within the limits that the search for the excitation tries first
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = parse_count)]
+    pub(crate) random: usize,
+    /// How many of the best random trajectories the search starts from
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = parse_count)]
+    pub(crate) starts: usize,
+    /// Seed of the search and of the test trajectory
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Samples per second of the runs
+    #[arg(long, value_name = "HZ", default_value_t = 200.0, value_parser = parse_rate)]
+    pub(crate) rate: f64,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub(crate) json: bool,

@@ -1,27 +1,34 @@
 //! Recordings as commands see them: read with the names that the model and the user give, prepared,
 //! and evaluated block by block; faults name the time and the line of the recording.
 
-use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use modelmill_codegen::{PoseFault, PoseReason, States};
 use modelmill_identify::filters::decimate_time;
-use modelmill_identify::{NotFinite, Note, ReadOptions, Recording, Run, Severity};
+use modelmill_identify::{Note, ReadOptions, Recording, Run, Severity, place_word};
 
+use crate::columns::read_options;
 use crate::failure::{Failure, Outcome};
 use crate::model::Model;
 use crate::piped::piped;
 use crate::preparation::PreparationArgs;
 use crate::progress::watched;
 use crate::terminal;
+use crate::variances;
 
 /// States that are evaluated at once: progress moves on, and memory stays small.
 pub(crate) const BLOCK: usize = 4096;
 
 /// A recording that is ready for the model.
+#[derive(Clone)]
 pub(crate) struct Data {
     /// The states and forces.
     pub(crate) run: Run,
+    /// Variances of the forces, `[drive][sample]`, where the recording has the columns `DRIVE_var`.
+    pub(crate) variance: Option<Vec<Vec<f64>>>,
+    /// What each equation counts beside the estimator's weights, interleaved per kept sample; all the same if there are
+    /// none.
+    pub(crate) weights: Option<Vec<f64>>,
 }
 
 /// Reads and prepares recordings; their warnings go to standard error.
@@ -39,22 +46,17 @@ pub(crate) fn read_all(
 
 /// Reads and prepares one recording: one or, where it is cut at gaps in time, several stretches.
 pub(crate) fn read(model: &Model, path: &Path, args: &PreparationArgs) -> Outcome<Vec<Data>> {
+    let name = path.display().to_string();
     let piped = piped(path)?;
     let header = match &piped {
-        Some(bytes) => header(bytes.as_slice()),
-        None => std::fs::File::open(path).map_or_else(|_| Vec::new(), header),
+        Some(bytes) => Recording::names_in_bytes(bytes, &name)?,
+        None => Recording::names_in(path)?,
     };
-    let options = options(model, args, &header)?;
-    let recording = watched(
-        &format!("reading {}", path.display()),
-        0,
-        |_| match &piped {
-            Some(bytes) => {
-                Recording::from_reader(bytes.as_slice(), &path.display().to_string(), &options)
-            }
-            None => Recording::read_with(path, &options),
-        },
-    )?;
+    let options = read_options(model, args, &header, &name)?;
+    let recording = watched(&format!("reading {name}"), 0, |_| match &piped {
+        Some(bytes) => Recording::from_bytes(bytes, &name, &options),
+        None => Recording::read_with(path, &options),
+    })?;
     let mut data = prepare(model, &recording, args)?;
     note_idle_options(&mut data, args);
     for note in data.iter().flat_map(Data::notes) {
@@ -71,7 +73,11 @@ pub(crate) fn read_text(model: &Model, name: &str, text: &str) -> Outcome<Data> 
     let recording = Recording::from_reader(text.as_bytes(), name, &ReadOptions::default())?;
     let preparation = PreparationArgs::none().preparation();
     let run = recording.states_with(&model.active(), &model.drives(), &preparation)?;
-    Ok(Data { run })
+    Ok(Data {
+        run,
+        variance: None,
+        weights: None,
+    })
 }
 
 fn prepare(model: &Model, recording: &Recording, args: &PreparationArgs) -> Outcome<Vec<Data>> {
@@ -82,12 +88,22 @@ fn prepare(model: &Model, recording: &Recording, args: &PreparationArgs) -> Outc
     if let Some(first) = runs.first_mut() {
         let suspicions = recording.suspicions(&model.motions(), preparation.source);
         first.notes.splice(0..0, suspicions);
+        let oddities = recording.oddities(&model.motions(), &model.drives());
+        first.notes.splice(0..0, oddities);
     }
     for run in &mut runs {
         let idle = run.suspicious_forces(&model.drives());
         run.notes.extend(idle);
     }
-    Ok(runs.into_iter().map(|run| Data { run }).collect())
+    let with_variance = runs.into_iter().map(|run| {
+        let variance = variances::of(recording, &run, &model.drives())?;
+        Ok(Data {
+            run,
+            variance,
+            weights: None,
+        })
+    });
+    with_variance.collect()
 }
 
 /// Says that options of the filter do nothing where all derivatives are recorded.
@@ -137,60 +153,15 @@ pub(crate) fn note_twins(data: &mut [Data], check: &mut [Data]) {
     }
 }
 
-/// Names of the columns, roughly: enough to see whether the model's own mapping applies.
-fn header(stream: impl Read) -> Vec<String> {
-    let mut line = Vec::new();
-    let mut reader = BufReader::new(stream).take(1 << 20);
-    if reader.read_until(b'\n', &mut line).is_err() {
-        return Vec::new();
-    }
-    let text = String::from_utf8_lossy(&line);
-    text.split([',', ';', '\t'])
-        .map(|name| name.trim_matches(|c: char| c.is_whitespace() || c == '"' || c == '\u{feff}'))
-        .map(str::to_owned)
-        .collect()
-}
-
-/// Renamings: the user's, then those of the model file for columns that the recording has.
-fn options(model: &Model, args: &PreparationArgs, header: &[String]) -> Outcome<ReadOptions> {
-    let mut known = vec!["t".to_owned()];
-    for name in model.active() {
-        known.extend([format!("{name}_d"), format!("{name}_dd"), name]);
-    }
-    known.extend(model.drives());
-    for (ours, _) in &args.map {
-        if known.contains(ours) {
-            continue;
-        }
-        let why = if model.passive().contains(ours) {
-            "is passive: it is computed from the loops and not read"
-        } else {
-            "is no name of this model"
-        };
-        return Err(Failure::Usage(format!(
-            "--map {ours}=...: `{ours}` {why}; expected one of {}",
-            known.join(", ")
-        )));
-    }
-    let mut renames = args.map.clone();
-    for (ours, theirs) in &model.derivation.mechanism.recording.columns {
-        let free = |name: &String| {
-            args.map
-                .iter()
-                .all(|(mine, other)| mine != ours && other != name)
-        };
-        if free(theirs) && header.contains(theirs) {
-            renames.push((ours.clone(), theirs.clone()));
+impl From<Run> for Data {
+    /// A run without variances whose equations count all the same.
+    fn from(run: Run) -> Self {
+        Self {
+            run,
+            variance: None,
+            weights: None,
         }
     }
-    Ok(ReadOptions {
-        renames,
-        not_finite: if args.skip_bad_samples {
-            NotFinite::LeaveOut
-        } else {
-            NotFinite::Refuse
-        },
-    })
 }
 
 impl Data {
@@ -207,6 +178,15 @@ impl Data {
     /// Times of the samples that are kept.
     pub(crate) fn time(&self) -> Vec<f64> {
         decimate_time(&self.run.time, self.decimation())
+    }
+
+    /// A remark that goes to standard error and into the JSON.
+    pub(crate) fn note(&mut self, note: Note) {
+        match note.severity {
+            Severity::Warning => terminal::warn(&note.says),
+            Severity::Info => terminal::note(&note.says),
+        }
+        self.run.notes.push(note);
     }
 
     /// A warning that goes to standard error and into the JSON.
@@ -237,16 +217,21 @@ impl Data {
         let mut start = 0;
         while start < n {
             let end = (start + BLOCK).min(n);
-            let states = States {
-                q: slices(&self.run.q, start, end),
-                qd: slices(&self.run.qd, start, end),
-                qdd: slices(&self.run.qdd, start, end),
-                load: slices(self.run.force.as_deref().unwrap_or(&[]), start, end),
-            };
+            let states = self.states(start, end);
             visit(&states)?.map_err(|fault| self.fault(model, fault, start))?;
             start = end;
         }
         Ok(())
+    }
+
+    /// Some of the states.
+    pub(crate) fn states(&self, start: usize, end: usize) -> States<'_> {
+        States {
+            q: slices(&self.run.q, start, end),
+            qd: slices(&self.run.qd, start, end),
+            qdd: slices(&self.run.qdd, start, end),
+            load: slices(self.run.force.as_deref().unwrap_or(&[]), start, end),
+        }
     }
 
     fn check_load(&self, model: &Model) -> Outcome {
@@ -264,10 +249,11 @@ impl Data {
     }
 
     /// A pose without answer, with its place in the recording.
-    fn fault(&self, model: &Model, fault: PoseFault, start: usize) -> Failure {
+    pub(crate) fn fault(&self, model: &Model, fault: PoseFault, start: usize) -> Failure {
         let sample = start + fault.sample;
         let time = self.run.time.get(sample).copied().unwrap_or(f64::NAN);
         let line = self.run.lines.get(sample).copied().unwrap_or(0);
+        let place = place_word(&self.run.file);
         let pose: Vec<String> = model
             .active()
             .iter()
@@ -277,7 +263,7 @@ impl Data {
         let (what, todo) = match fault.reason {
             PoseReason::NotFinite { input } => {
                 return Failure::Input(format!(
-                    "{}, line {line} (t = {time} s): `{input}` is no finite number",
+                    "{}, {place} {line} (t = {time} s): `{input}` is no finite number",
                     self.run.file
                 ));
             }
@@ -296,7 +282,7 @@ impl Data {
             ),
         };
         Failure::Input(format!(
-            "{}, line {line} (t = {time} s): {what} ({}); {todo}",
+            "{}, {place} {line} (t = {time} s): {what} ({}); {todo}",
             self.run.file,
             pose.join(", ")
         ))

@@ -4,10 +4,15 @@
 mod along;
 mod args;
 mod bundled;
+mod columns;
 mod commands;
+mod consistent;
 mod data;
 mod entries;
+mod estimation;
+mod estimators;
 mod failure;
+mod instruments;
 mod limits;
 mod model;
 mod output;
@@ -19,9 +24,12 @@ mod progress;
 mod regression;
 mod sampled_rank;
 mod show;
+mod standstill;
+mod suspects;
 mod svg;
 mod table;
 mod terminal;
+mod variances;
 
 use std::process::ExitCode;
 
@@ -67,6 +75,7 @@ fn run(command: &Command) -> Outcome {
         Command::Import(args) => commands::import::run(args),
         Command::Interpret(args) => commands::interpret::run(args),
         Command::Excite(args) => commands::excite::run(args),
+        Command::Experiment(args) => commands::experiment::run(args),
         Command::Completions(args) => commands::completions::run(args),
         Command::Tour(args) => commands::tour::run(args),
     }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use modelmill_codegen::review::base_expression;
 use modelmill_codegen::{BaseParameter, Derivation, Monomial};
+use modelmill_identify::prior::Belief;
 use modelmill_identify::{FitFile, ParameterInfo};
 use modelmill_spec::{
     EffectKind, Exact, Inertial, Loaded, Mechanism, Motion, ParameterIdx, PlaceQuantity, Sign,
@@ -187,7 +188,7 @@ impl Model {
     }
 
     /// Products that a base parameter consists of, with what they are multiplied by for the file's constants.
-    fn products_of(&self, k: usize) -> Vec<(&Monomial, f64)> {
+    pub(crate) fn products_of(&self, k: usize) -> Vec<(&Monomial, f64)> {
         let reduction = &self.derivation.reduction;
         let constants = &self.derivation.mechanism.constants;
         let constants: Vec<f64> = constants.iter().map(|c| c.value).collect();
@@ -199,6 +200,32 @@ impl Model {
             }
         }
         products
+    }
+
+    /// The sign that a dynamic parameter must have.
+    pub(crate) fn sign_of(&self, parameter: usize) -> Sign {
+        self.signs[parameter]
+    }
+
+    /// What the nominal values say beforehand of some base parameters, each product of parameters with the relative standard
+    /// deviation `sigma`; nothing of those that the file gives no value for.
+    pub(crate) fn beliefs(&self, among: &[usize], sigma: f64) -> Vec<Belief> {
+        let parameters = &self.derivation.mechanism.parameters;
+        let values: Vec<f64> = parameters.iter().map(|p| p.nominal).collect();
+        let believed = among.iter().enumerate().filter_map(|(i, k)| {
+            // Summands may cancel, their uncertainties do not.
+            let squares = self
+                .products_of(*k)
+                .iter()
+                .map(|(product, factor)| (factor * product.value(&values)).powi(2))
+                .sum::<f64>();
+            (squares > 0.0).then(|| Belief {
+                parameter: i,
+                value: self.nominal[*k],
+                std: sigma * squares.sqrt(),
+            })
+        });
+        believed.collect()
     }
 
     /// Whether a base parameter consists of numbers of the model file only, so that there is nothing to identify.
@@ -328,11 +355,6 @@ impl Model {
             ));
         }
         Ok(values)
-    }
-
-    /// The sign that a dynamic parameter must have.
-    pub(crate) fn sign_of(&self, parameter: usize) -> Sign {
-        self.signs[parameter]
     }
 
     /// Effects whose force depends on the load of the drive.

@@ -1,9 +1,9 @@
 //! Options that say how recordings are read and prepared, shared by all commands that read them.
 
 use clap::{Args, ValueEnum};
-use modelmill_identify::Preparation;
 use modelmill_identify::derivatives::Source;
 use modelmill_identify::filters::MAX_ORDER;
+use modelmill_identify::{Preparation, Smoothing};
 
 /// Order of the low-pass where none is asked for.
 const USUAL_ORDER: usize = 4;
@@ -12,8 +12,10 @@ const USUAL_ORDER: usize = 4;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Reading and preparing recordings")]
 pub(crate) struct PreparationArgs {
-    /// The recording calls our column by another name, e.g. `--map theta1=pos_left`; may be
-    /// repeated. Ours are `t`, a coordinate, a coordinate with `_d` or `_dd`, and a drive
+    /// The recording calls our column by another name, e.g. `--map theta1=pos_left`, or ours is a
+    /// sum of its columns, in other units perhaps: `--map "q6=(pos6 - pos5)/32 - 90 [deg]"`; may be
+    /// repeated. Ours are `t`, a coordinate, a coordinate with `_d` or `_dd`, a drive, and a drive
+    /// with `_var` for the variance of its force
     #[arg(long, value_name = "OURS=THEIRS", value_parser = parse_map)]
     pub(crate) map: Vec<(String, String)>,
     /// Cut-off of the low-pass on positions, Hz; chosen from the signal if not given
@@ -32,9 +34,18 @@ pub(crate) struct PreparationArgs {
     /// Which rates and accelerations are taken
     #[arg(long, value_enum, default_value = "recorded")]
     pub(crate) derivatives: DerivativesArg,
+    /// How positions are smoothed and differentiated
+    #[arg(long, value_enum, default_value = "butterworth")]
+    pub(crate) smoothing: SmoothingArg,
+    /// Period of the motion for `--smoothing fourier`, s; found from the positions if not given
+    #[arg(long, value_name = "S", value_parser = parse_period)]
+    pub(crate) period: Option<f64>,
     /// Leave out samples with NaN, infinite or empty fields instead of refusing the recording
     #[arg(long)]
     pub(crate) skip_bad_samples: bool,
+    /// Read only the samples between these times, s
+    #[arg(long, value_name = "FROM,TO", value_parser = parse_between, allow_hyphen_values = true)]
+    pub(crate) between: Option<(f64, f64)>,
 }
 
 /// Where derivatives come from.
@@ -44,6 +55,17 @@ pub(crate) enum DerivativesArg {
     Recorded,
     /// All from positions, whatever the file holds
     Positions,
+}
+
+/// How positions are smoothed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SmoothingArg {
+    /// Butterworth's low-pass run both ways, then central differences
+    Butterworth,
+    /// Polynomials of degree 4 over windows that suit the cut-off
+    SavitzkyGolay,
+    /// A Fourier series up to the cut-off, for periodic motions
+    Fourier,
 }
 
 impl PreparationArgs {
@@ -56,7 +78,10 @@ impl PreparationArgs {
             trim: None,
             decimate: 1,
             derivatives: DerivativesArg::Recorded,
+            smoothing: SmoothingArg::Butterworth,
+            period: None,
             skip_bad_samples: false,
+            between: None,
         }
     }
 
@@ -70,6 +95,13 @@ impl PreparationArgs {
             source: match self.derivatives {
                 DerivativesArg::Recorded => Source::RecordedFirst,
                 DerivativesArg::Positions => Source::Positions,
+            },
+            smoothing: match self.smoothing {
+                SmoothingArg::Butterworth => Smoothing::Butterworth,
+                SmoothingArg::SavitzkyGolay => Smoothing::SavitzkyGolay,
+                SmoothingArg::Fourier => Smoothing::Fourier {
+                    period: self.period,
+                },
             },
         }
     }
@@ -91,6 +123,13 @@ fn parse_cutoff(text: &str) -> Result<f64, String> {
     }
 }
 
+fn parse_period(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("expected a time above 0 in s, such as 7.29".to_owned()),
+    }
+}
+
 fn parse_order(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(order) if (1..=MAX_ORDER).contains(&order) => Ok(order),
@@ -109,6 +148,17 @@ fn parse_trim(text: &str) -> Result<(usize, usize), String> {
     match text.split_once(',') {
         Some((start, end)) => Ok((count(start)?, count(end)?)),
         None => count(text).map(|both| (both, both)),
+    }
+}
+
+fn parse_between(text: &str) -> Result<(f64, f64), String> {
+    let times = text.split_once(',').map(|(from, to)| {
+        let time = |text: &str| text.trim().parse::<f64>().ok().filter(|t| t.is_finite());
+        (time(from), time(to))
+    });
+    match times {
+        Some((Some(from), Some(to))) if from < to => Ok((from, to)),
+        _ => Err("expected two times in s, the first before the second, such as 10,60".to_owned()),
     }
 }
 

@@ -1,20 +1,28 @@
 //! Least squares over recordings: rows of the regressor are made block by block and kept only if
 //! they fit a modest memory; else they are made again for every pass.
 
-use modelmill_codegen::Evaluator;
-use modelmill_identify::deviations::{Visit, autocorrelated};
+use modelmill_codegen::{Evaluator, PoseFault, States};
+use modelmill_identify::deviations::Visit;
+use modelmill_identify::essential::{Dropped, EssentialOptions, essential};
+use modelmill_identify::estimate::{Estimate, EstimateOptions, Weighting, estimate};
 use modelmill_identify::filters::decimate_table;
-use modelmill_identify::{Deviations, LeastSquares, LeastSquaresError, Solution};
+use modelmill_identify::instruments::instrumental;
+use modelmill_identify::physical::Physical;
+use modelmill_identify::prior::with_prior;
+use modelmill_identify::{Deviations, LeastSquaresError, Solution};
 
 use crate::along::{interleaved, measured};
+use crate::consistent;
 use crate::data::Data;
+use crate::estimators::{EstimatorArgs, Weights};
 use crate::failure::{Failure, Outcome};
 use crate::model::Model;
 use crate::progress::{Done, watched};
 use crate::table::count;
+use crate::variances;
 
-/// Numbers of the regressor that are kept between passes: 256 MB.
-const KEPT: usize = 1 << 25;
+/// Numbers of the regressor that are kept between passes: 32 MB; beyond, making them again costs less than memory.
+const KEPT: usize = 1 << 22;
 
 /// What least squares found.
 pub(crate) struct Identified {
@@ -24,11 +32,34 @@ pub(crate) struct Identified {
     pub(crate) deviations: Deviations,
     /// The base parameters that solution and deviations are about, by position.
     pub(crate) unknown: Vec<usize>,
+    /// What the rows were multiplied by.
+    pub(crate) weighting: Option<Weighting>,
+    /// What more was asked for.
+    pub(crate) more: More,
+}
+
+/// What is beside least squares.
+pub(crate) enum More {
+    /// Nothing.
+    Nothing,
+    /// Parameters were left out; those by position among the unknown ones, and by how much the residual rose.
+    Essential(Vec<Dropped>, f64),
+    /// Nominal values counted as measurements.
+    Prior(usize),
+    /// Physical parameters that bodies can have, beside the residual norm of the solution without that demand.
+    Physical(Box<Physical>, Vec<String>, f64),
+    /// Instrumental variables: how strong they are, and what least squares finds.
+    Instruments(f64, Vec<f64>),
 }
 
 /// Identifies the base parameters of a model from recordings, eq. (12). What is a number of the model file is no unknown:
-/// its force is taken off the measured one.
-pub(crate) fn identify(model: &Model, data: &[Data]) -> Outcome<Identified> {
+/// its force is taken off the measured one. `instruments` has one recording for each of `data`, or none.
+pub(crate) fn identify(
+    model: &Model,
+    data: &[Data],
+    instruments: &[Data],
+    args: &EstimatorArgs,
+) -> Outcome<Identified> {
     if model.base.is_empty() {
         return Err(Failure::Input(format!(
             "{}: no parameter has an effect on the drives, so there is nothing to identify",
@@ -49,62 +80,163 @@ pub(crate) fn identify(model: &Model, data: &[Data]) -> Outcome<Identified> {
     let samples: usize = data.iter().map(Data::samples).sum();
     let mut runs = data
         .iter()
-        .map(|one| Rows::new(model, one, &known, &unknown))
+        .enumerate()
+        .map(|(k, one)| {
+            Rows::new(
+                model,
+                one,
+                instruments.get(k),
+                &known,
+                &unknown,
+                args.weights,
+            )
+        })
         .collect::<Outcome<Vec<Rows<'_>>>>()?;
-    let equations: usize = runs.iter().map(|run| run.measured.len()).sum();
-    if equations < unknown.len() {
-        return Err(Failure::Input(format!(
-            "{}: {} of all drives make {} for {}; use a longer recording{}",
-            data.iter()
-                .map(|one| one.run.file.as_str())
-                .collect::<Vec<_>>()
-                .join(", "),
-            count(equations / model.drives().len().max(1), "sample", "samples"),
-            count(equations, "equation", "equations"),
-            count(
-                unknown.len(),
-                "unknown base parameter",
-                "unknown base parameters"
-            ),
-            if data.iter().any(|one| one.decimation() > 1) {
-                ", or decimate less"
-            } else {
-                ""
-            }
-        )));
-    }
-    // One pass for the solution, two for the deviations.
-    watched("identifying", 3 * samples, |done| {
-        let mut regression = LeastSquares::new(unknown.len());
+    enough(data, &runs, unknown.len(), model)?;
+    // Plain least squares: one pass for the solution, two for the deviations. How often rows are reweighted nobody knows.
+    let reweighted = args.weights == Weights::Channels || args.robust.is_some();
+    let passes = if reweighted { 0 } else { 3 };
+    watched("identifying", passes * samples, |done| {
         for run in &mut runs {
             run.keep_if_small(done)?;
-            run.show::<Failure>(done, &mut |w, y| regression.add_rows(w, y))?;
         }
-        let solution = regression.solve_near(&nominal)?;
-        let deviations = autocorrelated(&solution, model.drives().len(), |visit| {
-            for run in &runs {
-                run.show::<Failure>(done, visit)?;
-            }
-            Ok::<(), Failure>(())
-        })?;
-        Ok(Identified {
-            solution,
-            deviations,
-            unknown: unknown.clone(),
-        })
+        let channels = model.drives().len();
+        let show = |visit: &mut Visit<'_>| -> Outcome {
+            runs.iter()
+                .try_for_each(|run| run.show::<Failure>(done, visit))
+        };
+        if !instruments.is_empty() {
+            let found = instrumental(unknown.len(), channels, show)?;
+            let more = More::Instruments(found.strength, found.least_squares.values);
+            return Ok(Identified {
+                solution: found.solution,
+                deviations: found.deviations,
+                unknown: unknown.clone(),
+                weighting: None,
+                more,
+            });
+        }
+        let options = EstimateOptions {
+            by_channel: args.weights == Weights::Channels,
+            huber: args.robust,
+            ..EstimateOptions::default()
+        };
+        let found = estimate(&nominal, channels, &options, show)?;
+        refine(model, found, &unknown, &nominal, args)
     })
 }
 
-/// The rows of one recording.
+/// What is done with the reduced rows.
+fn refine(
+    model: &Model,
+    found: Estimate,
+    unknown: &[usize],
+    nominal: &[f64],
+    args: &EstimatorArgs,
+) -> Outcome<Identified> {
+    let Estimate {
+        mut solution,
+        mut deviations,
+        weighting,
+        triangle,
+    } = found;
+    let mut more = More::Nothing;
+    let asks = args.prior.is_some() || args.essential || args.physical;
+    if asks && solution.rows <= solution.rank {
+        return Err(Failure::Input(format!(
+            "{} for {}: no degree of freedom is left for the residuals, from which --prior, --essential and --physical learn \
+             what the recording is worth; use a longer recording",
+            count(solution.rows, "equation", "equations"),
+            count(solution.rank, "base parameter", "base parameters")
+        )));
+    }
+    if let Some(sigma) = args.prior {
+        let beliefs = model.beliefs(unknown, sigma);
+        if beliefs.is_empty() {
+            return Err(Failure::Input(format!(
+                "{}: --prior needs nominal values, but the file gives none for anything unknown; write `nominal = ...` in \
+                 [parameters]",
+                model.path
+            )));
+        }
+        (solution, deviations) = with_prior(&triangle, &solution, &deviations, nominal, &beliefs)?;
+        more = More::Prior(beliefs.len());
+    } else if args.essential {
+        let found = essential(
+            &triangle,
+            &solution,
+            &deviations,
+            &EssentialOptions::default(),
+        )?;
+        solution.values = found.values;
+        solution.classical_std = found.classical_std;
+        solution.condition_number = found.condition_number;
+        solution.scaled_condition_number = found.scaled_condition_number;
+        // What is left out says so itself.
+        solution.undetermined.clear();
+        solution.determined = deviations.std.iter().map(|_| true).collect();
+        deviations.effective_samples = (found.std.iter().zip(&solution.classical_std))
+            .map(|(std, classical)| deviations.samples as f64 * (classical / std).powi(2))
+            .collect();
+        deviations.std = found.std;
+        more = More::Essential(found.dropped, found.rise);
+    } else if args.physical {
+        let before = solution.residual_norm;
+        let (found, bodies) = consistent::find(model, &triangle, &solution, &deviations, unknown)?;
+        solution.values.clone_from(&found.base);
+        solution.residual_norm = found.residual_norm;
+        deviations.std.clone_from(&found.base_std);
+        // Nominal values say what the recordings do not.
+        solution.undetermined.clear();
+        solution.determined = found.base.iter().map(|_| true).collect();
+        more = More::Physical(Box::new(found), bodies, before);
+    }
+    let is_weighted = weighting.by_channel || weighting.huber.is_some();
+    Ok(Identified {
+        solution,
+        deviations,
+        unknown: unknown.to_vec(),
+        weighting: is_weighted.then_some(weighting),
+        more,
+    })
+}
+
+/// Fails when there are fewer equations than unknown parameters.
+fn enough(data: &[Data], runs: &[Rows<'_>], unknown: usize, model: &Model) -> Outcome {
+    let equations: usize = runs.iter().map(|run| run.measured.len()).sum();
+    if equations >= unknown {
+        return Ok(());
+    }
+    Err(Failure::Input(format!(
+        "{}: {} of all drives make {} for {}; use a longer recording{}",
+        data.iter()
+            .map(|one| one.run.file.as_str())
+            .collect::<Vec<_>>()
+            .join(", "),
+        count(equations / model.drives().len().max(1), "sample", "samples"),
+        count(equations, "equation", "equations"),
+        count(unknown, "unknown base parameter", "unknown base parameters"),
+        if data.iter().any(|one| one.decimation() > 1) {
+            ", or decimate less"
+        } else {
+            ""
+        }
+    )))
+}
+
+/// The rows of one recording: regressors of the instruments, if there are any, and of the recording itself.
 struct Rows<'a> {
     model: &'a Model,
     data: &'a Data,
+    instruments: Option<&'a Data>,
     /// Columns that are known, with their parameters' values.
     known: &'a [(usize, f64)],
     /// The other columns.
     unknown: &'a [usize],
     /// Interleaved per sample, decimated.
     measured: Vec<f64>,
+    /// What rows are multiplied by, if not by 1.
+    factors: Option<Vec<f64>>,
     kept: Option<Vec<f64>>,
 }
 
@@ -112,22 +244,55 @@ impl<'a> Rows<'a> {
     fn new(
         model: &'a Model,
         data: &'a Data,
+        instruments: Option<&'a Data>,
         known: &'a [(usize, f64)],
         unknown: &'a [usize],
+        weights: Weights,
     ) -> Outcome<Self> {
+        let drives = model.drives();
+        let spread = if weights == Weights::Variance {
+            let Some(variance) = &data.variance else {
+                let columns: Vec<String> = drives
+                    .iter()
+                    .map(|d| format!("`{}`", variances::column(d)))
+                    .collect();
+                return Err(Failure::Input(format!(
+                    "{}: --weights variance needs the variance of every drive's force, in the columns {}; name yours with \
+                     --map, or use --weights channels",
+                    data.run.file,
+                    columns.join(", ")
+                )));
+            };
+            Some(variances::factors(
+                variance,
+                &data.run,
+                &drives,
+                data.decimation(),
+            )?)
+        } else {
+            None
+        };
+        let factors = product(spread, data.weights.as_deref());
         Ok(Self {
             model,
             data,
+            instruments,
             known,
             unknown,
             measured: interleaved(&measured(data)?),
+            factors,
             kept: None,
         })
     }
 
+    /// Numbers of a row before the known columns leave.
+    fn width(&self) -> usize {
+        self.model.base.len() * (1 + usize::from(self.instruments.is_some()))
+    }
+
     /// Decimation needs the whole table at hand; else it is kept if it is not too large.
     fn keep_if_small(&mut self, done: &Done) -> Outcome {
-        let width = self.model.base.len() * self.model.drives().len();
+        let width = self.width() * self.model.drives().len();
         let decimation = self.data.decimation();
         if decimation == 1 && self.data.samples() * width > KEPT {
             return Ok(());
@@ -153,58 +318,106 @@ impl<'a> Rows<'a> {
         visit: &mut Visit<'_>,
     ) -> Result<(), E> {
         if let Some(table) = &self.kept {
-            self.show_unknown(table, &self.measured, visit)?;
+            self.show_unknown(table, 0, visit)?;
             done.add(self.data.samples());
             return Ok(());
         }
-        let n = self.model.base.len();
         let mut row = 0;
         self.blocks::<E>(&mut |w| {
-            let rows = w.len() / n;
-            self.show_unknown(w, &self.measured[row..row + rows], visit)?;
+            let rows = w.len() / self.width();
+            self.show_unknown(w, row, visit)?;
             row += rows;
             done.add(rows / self.model.drives().len().max(1));
             Ok(())
         })
     }
 
-    /// Shows rows of the unknown columns, with what the known ones make taken off the measured values.
+    /// Shows rows of the unknown columns, with what the known ones make taken off the measured values, and weighed;
+    /// `first` is the first of the rows.
     fn show_unknown(
         &self,
         w: &[f64],
-        measured: &[f64],
+        first: usize,
         visit: &mut Visit<'_>,
     ) -> Result<(), LeastSquaresError> {
-        if self.known.is_empty() {
+        let at = first..first + w.len() / self.width();
+        let measured = &self.measured[at.clone()];
+        let factors = self.factors.as_ref().map(|factors| &factors[at]);
+        if self.known.is_empty() && factors.is_none() {
             return visit(w, measured);
         }
-        let mut rows = Vec::with_capacity(measured.len() * self.unknown.len());
+        let n = self.model.base.len();
+        let mut rows = Vec::with_capacity(w.len());
         let mut rest = Vec::with_capacity(measured.len());
-        for (row, y) in w.chunks_exact(self.model.base.len()).zip(measured) {
-            rows.extend(self.unknown.iter().map(|k| row[*k]));
-            rest.push(y - self.known.iter().map(|(k, p)| row[*k] * p).sum::<f64>());
+        for (i, (row, y)) in w.chunks_exact(self.width()).zip(measured).enumerate() {
+            let factor = factors.map_or(1.0, |factors| factors[i]);
+            for part in row.chunks_exact(n) {
+                rows.extend(self.unknown.iter().map(|k| factor * part[*k]));
+            }
+            // The recording's own regressor comes last.
+            let own = &row[self.width() - n..];
+            rest.push(factor * (y - self.known.iter().map(|(k, p)| own[*k] * p).sum::<f64>()));
         }
         visit(&rows, &rest)
     }
 
-    /// Blocks of the regressor, row by row.
+    /// Blocks of the regressor, row by row; behind each row of the instruments the one of the recording.
     fn blocks<E: From<Failure>>(
         &self,
         visit: &mut dyn FnMut(&[f64]) -> Result<(), E>,
     ) -> Result<(), E> {
         let evaluator = Evaluator::new(&self.model.derivation);
-        let mut rows = Vec::new();
+        let drives = self.model.drives().len();
+        let width = self.width();
+        let (mut rows, mut start) = (Vec::new(), 0);
         self.data.for_each_block(self.model, |states| {
-            let matrix = match evaluator.regressor(states) {
-                Ok(matrix) => matrix,
-                Err(fault) => return Ok(Err(fault)),
-            };
             rows.clear();
-            for i in 0..matrix.nrows() {
-                rows.extend((0..matrix.ncols()).map(|j| matrix[(i, j)]));
+            rows.resize(states.len() * drives * width, 0.0);
+            if let Some(instruments) = self.instruments {
+                let theirs = instruments.states(start, start + states.len());
+                fill(&evaluator, &theirs, drives, width, 0, &mut rows)
+                    .map_err(|fault| instruments.fault(self.model, fault, start))?;
+            }
+            start += states.len();
+            let place = width - self.model.base.len();
+            if let Err(fault) = fill(&evaluator, states, drives, width, place, &mut rows) {
+                return Ok(Err(fault));
             }
             visit(&rows)?;
             Ok(Ok(()))
         })
     }
+}
+
+/// What rows are multiplied by when both the variances and the equations left out have their say.
+fn product(spread: Option<Vec<f64>>, weights: Option<&[f64]>) -> Option<Vec<f64>> {
+    match (spread, weights) {
+        (Some(spread), Some(weights)) => {
+            Some(spread.iter().zip(weights).map(|(s, w)| s * w).collect())
+        }
+        (spread, weights) => spread.or_else(|| weights.map(<[f64]>::to_vec)),
+    }
+}
+
+/// Writes the regressor of some states into rows of `width` numbers, from `place` on.
+fn fill(
+    evaluator: &Evaluator<'_>,
+    states: &States<'_>,
+    drives: usize,
+    width: usize,
+    place: usize,
+    rows: &mut [f64],
+) -> Result<(), PoseFault> {
+    let mut first = 0;
+    evaluator.regressor_blocks(states, |len, columns| {
+        let n = columns.len() / drives.max(1);
+        for (k, column) in columns.iter().enumerate() {
+            let at = first * width + (k / n) * width + place + k % n;
+            for (slot, value) in rows[at..].iter_mut().step_by(drives * width).zip(*column) {
+                *slot = *value;
+            }
+        }
+        first += len * drives;
+        Ok(())
+    })
 }

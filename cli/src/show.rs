@@ -21,6 +21,7 @@ pub(crate) fn parameters(parameters: &[FitParameter]) -> Vec<String> {
                 },
                 match (p.status, p.std) {
                     (Status::Known, _) => "known".to_owned(),
+                    (Status::NotEssential, _) => "not essential".to_owned(),
                     (Status::Undetermined, _) => "not determined".to_owned(),
                     (Status::Identified, Some(std)) => significant(std, 2),
                     (Status::Identified, None) => "—".to_owned(),
@@ -68,6 +69,7 @@ pub(crate) fn figures(named: &[(&str, &Figures)]) -> Vec<String> {
             "all".to_owned(),
             percent(figures.nrms),
             String::new(),
+            String::new(),
             significant(figures.rms, 4),
             String::new(),
         ]);
@@ -76,6 +78,7 @@ pub(crate) fn figures(named: &[(&str, &Figures)]) -> Vec<String> {
                 String::new(),
                 channel.clone(),
                 percent(one.nrms),
+                percent(one.abs_ratio),
                 percent(one.mean_relative),
                 significant(one.rms, 4),
                 significant(one.max_abs, 4),
@@ -88,6 +91,7 @@ pub(crate) fn figures(named: &[(&str, &Figures)]) -> Vec<String> {
             ("", Align::Left),
             ("drive", Align::Left),
             ("nrms", Align::Right),
+            ("sum|e|/sum|f|", Align::Right),
             ("mean relative", Align::Right),
             ("rms", Align::Right),
             ("largest", Align::Right),

@@ -12,6 +12,15 @@ const TOP: f64 = 44.0;
 const POINTS: usize = 820;
 const COLOURS: [&str; 3] = ["#1f5fa8", "#c2452d", "#2f7d4f"];
 
+/// How a panel looks, beyond what its curves say.
+#[derive(Default)]
+pub(crate) struct Look<'a> {
+    /// Largest magnitude that is shown, what is beyond is cut off; that of the curves if absent.
+    pub(crate) limit: Option<f64>,
+    /// Times of vertical lines, s.
+    pub(crate) marks: &'a [f64],
+}
+
 /// A figure as it grows.
 pub(crate) struct Figure<'a> {
     title: String,
@@ -33,14 +42,19 @@ impl<'a> Figure<'a> {
 
     /// Adds a panel with its curves, one value for each time.
     pub(crate) fn panel(&mut self, title: &str, curves: &[(&str, &[f64])]) {
+        self.panel_with(title, curves, &Look::default());
+    }
+
+    /// The same with a scale of its own or marks.
+    pub(crate) fn panel_with(&mut self, title: &str, curves: &[(&str, &[f64])], look: &Look<'_>) {
         let top = TOP + GAP + self.panels as f64 * (PANEL + GAP);
-        let limit = curves
+        let largest = curves
             .iter()
             .flat_map(|(_, values)| values.iter())
-            .fold(0.0_f64, |m, v| m.max(v.abs()))
-            .max(f64::MIN_POSITIVE);
+            .fold(0.0_f64, |m, v| m.max(v.abs()));
+        let limit = look.limit.unwrap_or(largest).max(f64::MIN_POSITIVE);
         let plot_width = WIDTH - LEFT - RIGHT;
-        let y = |value: f64| top + PANEL * (0.5 - 0.5 * value / limit);
+        let y = |value: f64| top + PANEL * (0.5 - 0.5 * (value / limit).clamp(-1.0, 1.0));
         let body = &mut self.body;
         let _ = writeln!(
             body,
@@ -52,10 +66,28 @@ impl<'a> Figure<'a> {
             top - 8.0,
             escape(title)
         );
+        let (first, last) = (
+            self.time.first().copied().unwrap_or(0.0),
+            self.time.last().copied().unwrap_or(0.0),
+        );
+        for mark in look.marks {
+            let share = (mark - first) / (last - first).max(f64::MIN_POSITIVE);
+            let _ = writeln!(
+                body,
+                r##"<line x1="{0:.1}" x2="{0:.1}" y1="{top:.1}" y2="{1:.1}" stroke="#888" stroke-dasharray="3 3"/>"##,
+                LEFT + plot_width * share,
+                top + PANEL
+            );
+        }
+        // A scale that was asked for is a round number.
+        let text = |value: f64| match look.limit {
+            Some(_) => value.to_string(),
+            None => format!("{value:.4}"),
+        };
         for (value, label) in [
-            (limit, format!("{limit:.4}")),
+            (limit, text(limit)),
             (0.0, "0".to_owned()),
-            (-limit, format!("{:.4}", -limit)),
+            (-limit, text(-limit)),
         ] {
             let label = if label.len() > 9 {
                 format!("{value:.2e}")
@@ -69,7 +101,10 @@ impl<'a> Figure<'a> {
                 y(value) + 4.0
             );
         }
+        // Names stand side by side, the last at the right end.
+        let width = |name: &str| (6.5 * name.chars().count() as f64 + 15.0).max(80.0);
         for (k, (name, values)) in curves.iter().enumerate() {
+            let behind: f64 = curves[k + 1..].iter().map(|(name, _)| width(name)).sum();
             let colour = COLOURS[k % COLOURS.len()];
             let n = values.len().max(2) - 1;
             let mut points = String::new();
@@ -82,7 +117,7 @@ impl<'a> Figure<'a> {
                 r#"<polyline points="{}" fill="none" stroke="{colour}" stroke-width="1.2"/>
 <text x="{:.1}" y="{:.1}" text-anchor="end" fill="{colour}">{}</text>"#,
                 points.trim_end(),
-                WIDTH - RIGHT - 80.0 * (curves.len() - 1 - k) as f64,
+                WIDTH - RIGHT - behind,
                 top - 8.0,
                 escape(name)
             );
@@ -136,7 +171,7 @@ fn thinned(values: &[f64]) -> Vec<(usize, f64)> {
     points
 }
 
-fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")

@@ -1,20 +1,20 @@
 //! The block evaluator: runs a program over many states inside the process, so that a changed model file can be tried
 //! on a recording at once, without a compiler.
 
-use std::cell::RefCell;
+mod machine;
+
 use std::fmt;
 
 use modelmill_runtime::{Loops, PoseError, Scales, follow, settle};
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
-use crate::expr::{Atom, Unary};
-use crate::lower::{Guard, Op, Program, Stage};
+use crate::expr::Atom;
+use crate::lower::{Op, Program};
 use crate::programs::{LoopPrograms, PassivePosition};
 use crate::{Derivation, Programs};
 
-/// States per block: small enough for the cache, large enough to hide the interpretation.
-const BLOCK: usize = 64;
+use machine::{Block, Machine, Scalar};
 
 /// Motion of the active coordinates, one slice of equal length per coordinate, in the order of the model file.
 #[derive(Clone, Debug, Default)]
@@ -143,6 +143,20 @@ impl<'a> Evaluator<'a> {
         self.matrix(&self.programs.regressor, states)
     }
 
+    /// H_min block by block, for regressions over many states: `visit` gets how many states a block has (at most 64) and
+    /// one column per drive and base parameter (drives outermost), a number for each state. Nothing is kept between blocks.
+    ///
+    /// Fails at the first state without an answer, and when `visit` does; what stands before a fault may have been shown.
+    pub fn regressor_blocks<E: From<PoseFault>>(
+        &self,
+        states: &States<'_>,
+        mut visit: impl FnMut(usize, &[&[f64]]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        self.run_blocks(&self.programs.regressor, states, &[], |block| {
+            visit(block.len, &block.columns)
+        })
+    }
+
     /// H for all products of p_g, laid out like [`Self::regressor`].
     pub fn full_regressor(&self, states: &States<'_>) -> Result<DMatrix<f64>, PoseFault> {
         self.matrix(&self.programs.full_regressor, states)
@@ -190,6 +204,23 @@ impl<'a> Evaluator<'a> {
         states: &States<'_>,
         base: &[f64],
     ) -> Result<Vec<Vec<f64>>, PoseFault> {
+        let mut outputs = vec![Vec::with_capacity(states.len()); program.outputs.len()];
+        self.run_blocks(program, states, base, |block| {
+            for (output, column) in outputs.iter_mut().zip(&block.columns) {
+                output.extend_from_slice(column);
+            }
+            Ok::<(), PoseFault>(())
+        })?;
+        Ok(outputs)
+    }
+
+    fn run_blocks<E: From<PoseFault>>(
+        &self,
+        program: &Program,
+        states: &States<'_>,
+        base: &[f64],
+        visit: impl FnMut(&Block<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
         let (mut n, mut fault) = (states.len(), self.not_finite(program, states, base));
         if let Some(fault) = &fault {
             n = fault.sample;
@@ -204,8 +235,7 @@ impl<'a> Evaluator<'a> {
             }
         }
         let machine = Machine::new(program, |atom| self.fixed(atom, base));
-        // States before the first fault known so far may still have an earlier one.
-        let outputs = machine.run(n, |atom| match atom {
+        let input = |atom| match atom {
             Atom::Coordinate(i) => match self.place(i) {
                 Place::Active(k) => states.q[k],
                 Place::Passive(k) => &passive[k],
@@ -216,8 +246,10 @@ impl<'a> Evaluator<'a> {
             Atom::Pi | Atom::Constant(_) | Atom::Parameter(_) | Atom::Base(_) => {
                 unreachable!("fixed atoms are no inputs of a state")
             }
-        })?;
-        fault.map_or(Ok(outputs), Err)
+        };
+        // States before the first fault known so far may still have an earlier one.
+        machine.run(n, input, visit)?;
+        fault.map_or(Ok(()), |fault| Err(fault.into()))
     }
 
     /// The first state with an input that is no finite number; constants and base parameters belong to the first one.
@@ -401,235 +433,5 @@ impl Loops for Poses<'_> {
                 active: (2 * n..2 * n + n_active).map(output).collect(),
             },
         )
-    }
-}
-
-/// A program for one state at a time, as Newton's method needs it.
-struct Scalar<'a> {
-    program: &'a Program,
-    /// Values of all operations; those of the fixed stage stay.
-    values: RefCell<Vec<f64>>,
-}
-
-impl<'a> Scalar<'a> {
-    fn new(machine: Machine<'a>) -> Self {
-        Self {
-            program: machine.program,
-            values: RefCell::new(machine.fixed),
-        }
-    }
-
-    /// Runs the program and reads what is wanted of its outputs.
-    fn run<R>(
-        &self,
-        input: impl Fn(Atom) -> f64,
-        read: impl FnOnce(&dyn Fn(usize) -> f64) -> R,
-    ) -> R {
-        let mut values = self.values.borrow_mut();
-        let ops = self.program.ops.iter().zip(&self.program.stages);
-        for (i, (op, stage)) in ops.enumerate() {
-            if *stage == Stage::State {
-                values[i] = match op {
-                    Op::Input(atom) => input(*atom),
-                    _ => scalar(op, |v| values[v]),
-                };
-            }
-        }
-        read(&|k| values[self.program.outputs[k].index()])
-    }
-}
-
-/// A program with its fixed stage done and its values assigned to reusable slots.
-struct Machine<'a> {
-    program: &'a Program,
-    /// Values of the fixed stage.
-    fixed: Vec<f64>,
-    /// Those among them that the state stage needs, with their slots.
-    kept: Vec<(usize, f64)>,
-    /// Slot of each operation of the state stage, and of fixed values that are needed there.
-    slots: Vec<usize>,
-    n_slots: usize,
-}
-
-impl<'a> Machine<'a> {
-    fn new(program: &'a Program, atom: impl Fn(Atom) -> f64) -> Self {
-        let mut fixed = vec![0.0; program.ops.len()];
-        for (i, op) in program.ops.iter().enumerate() {
-            if program.stages[i] == Stage::Fixed {
-                fixed[i] = match op {
-                    Op::Input(input) => atom(*input),
-                    _ => scalar(op, |v| fixed[v]),
-                };
-            }
-        }
-        let mut last_use: Vec<usize> = (0..program.ops.len()).collect();
-        let mut needed = vec![false; program.ops.len()];
-        for (i, op) in program.ops.iter().enumerate() {
-            let is_state = program.stages[i] == Stage::State;
-            op.for_each_operand(|v| {
-                last_use[v.index()] = i;
-                needed[v.index()] |= is_state;
-            });
-        }
-        for value in program
-            .outputs
-            .iter()
-            .copied()
-            .chain(program.guards.iter().map(|g| g.value()))
-        {
-            last_use[value.index()] = program.ops.len();
-            needed[value.index()] = true;
-        }
-        let mut slots = vec![0; program.ops.len()];
-        let (mut free, mut n_slots): (Vec<usize>, usize) = (Vec::new(), 0);
-        // Fixed values keep their slots.
-        for i in (0..program.ops.len()).filter(|i| program.stages[*i] == Stage::Fixed) {
-            if needed[i] {
-                slots[i] = n_slots;
-                n_slots += 1;
-            }
-        }
-        let mut ends: Vec<Vec<usize>> = vec![Vec::new(); program.ops.len() + 1];
-        for i in 0..program.ops.len() {
-            if program.stages[i] == Stage::State {
-                slots[i] = free.pop().unwrap_or_else(|| {
-                    n_slots += 1;
-                    n_slots - 1
-                });
-                ends[last_use[i]].push(slots[i]);
-            }
-            free.append(&mut ends[i]);
-        }
-        let kept = (0..program.ops.len())
-            .filter(|i| needed[*i] && program.stages[*i] == Stage::Fixed)
-            .map(|i| (slots[i], fixed[i]))
-            .collect();
-        Self {
-            program,
-            fixed,
-            kept,
-            slots,
-            n_slots,
-        }
-    }
-
-    fn run<'s>(
-        &self,
-        n: usize,
-        input: impl Fn(Atom) -> &'s [f64],
-    ) -> Result<Vec<Vec<f64>>, PoseFault> {
-        let mut outputs: Vec<Vec<f64>> = vec![Vec::with_capacity(n); self.program.outputs.len()];
-        let inputs: Vec<Option<&[f64]>> = self
-            .program
-            .ops
-            .iter()
-            .zip(&self.program.stages)
-            .map(|(op, stage)| match op {
-                Op::Input(atom) if *stage == Stage::State => Some(input(*atom)),
-                _ => None,
-            })
-            .collect();
-        let mut memory = vec![[0.0; BLOCK]; self.n_slots];
-        for (slot, value) in &self.kept {
-            memory[*slot] = [*value; BLOCK];
-        }
-        let mut start = 0;
-        while start < n {
-            let len = BLOCK.min(n - start);
-            for (i, op) in self.program.ops.iter().enumerate() {
-                if self.program.stages[i] == Stage::Fixed {
-                    continue;
-                }
-                match inputs[i] {
-                    Some(values) => {
-                        memory[self.slots[i]][..len].copy_from_slice(&values[start..start + len]);
-                    }
-                    None => memory[self.slots[i]] = self.block(op, &memory),
-                }
-            }
-            if let Some((k, guard)) = self.first_fault(len, &memory) {
-                let reason = match guard {
-                    Guard::Reachable(_) => PoseReason::OutOfReach,
-                    Guard::Regular(..) => PoseReason::Singular,
-                    Guard::Finite(_) => PoseReason::Undefined,
-                };
-                let sample = start + k;
-                return Err(PoseFault { sample, reason });
-            }
-            for (output, value) in outputs.iter_mut().zip(&self.program.outputs) {
-                output.extend_from_slice(&self.values(value.index(), &memory)[..len]);
-            }
-            start += len;
-        }
-        Ok(outputs)
-    }
-
-    /// The first state of a block at which a guard fails, and the guard: of several, the one that emitted code sees first.
-    fn first_fault(&self, len: usize, memory: &[[f64; BLOCK]]) -> Option<(usize, Guard)> {
-        let failing = self.program.guards.iter().filter_map(|guard| {
-            let values = self.values(guard.value().index(), memory);
-            let k = values[..len].iter().position(|v| !guard.passes(*v))?;
-            Some((k, *guard))
-        });
-        failing.min_by_key(|(k, guard)| (*k, guard.value()))
-    }
-
-    fn values<'m>(&self, index: usize, memory: &'m [[f64; BLOCK]]) -> &'m [f64; BLOCK] {
-        &memory[self.slots[index]]
-    }
-
-    fn block(&self, op: &Op, memory: &[[f64; BLOCK]]) -> [f64; BLOCK] {
-        let get = |v: &crate::ValueId| self.values(v.index(), memory);
-        match op {
-            Op::Add(a, b) => each(get(a), get(b), |x, y| x + y),
-            Op::Sub(a, b) => each(get(a), get(b), |x, y| x - y),
-            Op::Mul(a, b) => each(get(a), get(b), |x, y| x * y),
-            Op::Div(a, b) => each(get(a), get(b), |x, y| x / y),
-            Op::Atan2(a, b) => each(get(a), get(b), f64::atan2),
-            Op::Neg(a) => get(a).map(|x| -x),
-            Op::Sin(a) => get(a).map(f64::sin),
-            Op::Cos(a) => get(a).map(f64::cos),
-            Op::Unary(function, a) => get(a).map(|x| unary(*function, x)),
-            Op::Number(_) | Op::Input(_) => unreachable!("numbers are fixed and inputs are copied"),
-        }
-    }
-}
-
-/// Generic, so that each operation is a loop of its own that the compiler can make wide.
-fn each(a: &[f64; BLOCK], b: &[f64; BLOCK], operation: impl Fn(f64, f64) -> f64) -> [f64; BLOCK] {
-    let mut result = [0.0; BLOCK];
-    for k in 0..BLOCK {
-        result[k] = operation(a[k], b[k]);
-    }
-    result
-}
-
-fn unary(function: Unary, x: f64) -> f64 {
-    match function {
-        Unary::Sqrt => x.sqrt(),
-        Unary::Sign if x == 0.0 => 0.0,
-        Unary::Sign => x.signum(),
-        Unary::Abs => x.abs(),
-        Unary::Tanh => x.tanh(),
-        Unary::Exp => x.exp(),
-        Unary::Sin => x.sin(),
-        Unary::Cos => x.cos(),
-    }
-}
-
-fn scalar(op: &Op, value: impl Fn(usize) -> f64) -> f64 {
-    let get = |v: &crate::ValueId| value(v.index());
-    match op {
-        Op::Number(number) => number.to_f64(),
-        Op::Input(_) => unreachable!("inputs are given"),
-        Op::Add(a, b) => get(a) + get(b),
-        Op::Sub(a, b) => get(a) - get(b),
-        Op::Mul(a, b) => get(a) * get(b),
-        Op::Div(a, b) => get(a) / get(b),
-        Op::Neg(a) => -get(a),
-        Op::Sin(a) => get(a).sin(),
-        Op::Cos(a) => get(a).cos(),
-        Op::Atan2(y, x) => get(y).atan2(get(x)),
-        Op::Unary(function, a) => unary(*function, get(a)),
     }
 }

@@ -36,6 +36,8 @@ pub enum Status {
     Identified,
     /// The recordings do not say it: the value is the nearest to the nominal ones that fits.
     Undetermined,
+    /// Left out at 0, as the recordings do not support it beside the others (`identify --essential`).
+    NotEssential,
     /// A number of the model file, which was taken off the measured forces before the fit.
     Known,
 }
@@ -65,6 +67,9 @@ pub struct FitParameter {
     /// Standard deviation for independent residuals, for comparison only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub classical_std: Option<f64>,
+    /// How many independent samples would give the same standard deviation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub effective_samples: Option<f64>,
     /// Unit of the values.
     pub unit: String,
     /// The value that the model file's nominal values give.
@@ -269,6 +274,7 @@ pub fn fit_parameters(
             value: solution.values[i],
             std: finite(deviations.std[i]),
             classical_std: finite(solution.classical_std[i]),
+            effective_samples: finite(deviations.effective_samples[i]).filter(|x| *x > 0.0),
             unit: info.unit.clone(),
             nominal: info.nominal,
             status: if solution.determined[i] {

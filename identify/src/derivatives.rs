@@ -25,6 +25,22 @@ pub enum Source {
     Positions,
 }
 
+/// How positions become smooth positions, rates and accelerations.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Smoothing {
+    /// Butterworth's low-pass run both ways, then central differences: the field's standard.
+    #[default]
+    Butterworth,
+    /// Local polynomials (Savitzky-Golay) of the width that suits the cut-off.
+    SavitzkyGolay,
+    /// A Fourier series up to the cut-off; the period, s, is found from the positions when absent.
+    Fourier {
+        /// The period, s.
+        period: Option<f64>,
+    },
+}
+
 /// How states are prepared from a recording. [`Preparation::default`] suits a file of positions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -42,6 +58,8 @@ pub struct Preparation {
     pub decimate: usize,
     /// Which derivatives are prepared.
     pub source: Source,
+    /// How they are prepared.
+    pub smoothing: Smoothing,
 }
 
 impl Default for Preparation {
@@ -52,6 +70,7 @@ impl Default for Preparation {
             trim: None,
             decimate: 1,
             source: Source::RecordedFirst,
+            smoothing: Smoothing::Butterworth,
         }
     }
 }

@@ -84,15 +84,26 @@ pub fn autocorrelated<E: From<LeastSquaresError>>(
     channels: usize,
     mut show: impl FnMut(&mut Visit<'_>) -> Result<(), E>,
 ) -> Result<Deviations, E> {
+    let mut scores = Scores::new(solution, channels.max(1));
+    from_influences(solution, channels, |take| scores.run(&mut show, take))
+}
+
+/// Takes each sample's influence on the parameters and its residuals.
+pub(crate) type Take<'a> = dyn FnMut(&[f64], &[f64]) + 'a;
+
+/// Deviations from a showing of each sample's influence, which is made twice.
+pub(crate) fn from_influences<E>(
+    solution: &Solution,
+    channels: usize,
+    mut run: impl FnMut(&mut Take<'_>) -> Result<(), E>,
+) -> Result<Deviations, E> {
     let n = solution.values.len();
     let channels = channels.max(1);
     let samples = solution.rows / channels;
     let lags = lags_for_bandwidth(samples);
-    let mut scores = Scores::new(solution, channels);
-
     let mut memory = LagProducts::new(n, lags + 1);
     let mut residuals = LagProducts::new(channels, 1);
-    scores.run(&mut show, |influence, errors| {
+    run(&mut |influence, errors| {
         memory.push(influence);
         residuals.push(errors);
     })?;
@@ -106,7 +117,7 @@ pub fn autocorrelated<E: From<LeastSquaresError>>(
     let mut previous = vec![0.0; n];
     let mut white = vec![0.0; n];
     let mut first = true;
-    scores.run(&mut show, |influence, _| {
+    run(&mut |influence, _| {
         for j in 0..n {
             white[j] = influence[j]
                 - if first {
@@ -238,7 +249,7 @@ impl<'a> Scores<'a> {
     fn run<E: From<LeastSquaresError>>(
         &mut self,
         show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
-        mut take: impl FnMut(&[f64], &[f64]),
+        take: &mut Take<'_>,
     ) -> Result<(), E> {
         let n = self.solution.values.len();
         let to_parameters = self.solution.unit_covariance();

@@ -4,6 +4,7 @@
 //! `nrms` is `|measured - model| / |measured|` in the 2-norm over the samples, all channels
 //! stacked for the total. `mean_relative` is the paper's mean of `|error| / |measured|`, whose
 //! peaks where the measured force passes through zero are the reason to read `nrms` beside it.
+//! `abs_ratio` is `sum |error| / sum |measured|`, as Volkmann et al. (IEEE ICMA 2020) give it.
 
 use std::fmt;
 
@@ -31,6 +32,9 @@ pub struct ChannelFigures {
     /// Mean of `|error| / |measured|` over samples with a measured value other than zero;
     /// absent when there are none.
     pub mean_relative: Option<f64>,
+    /// `sum |error| / sum |measured|`; absent when nothing but zero was measured.
+    #[serde(default)]
+    pub abs_ratio: Option<f64>,
     /// Largest `|error|`, in the unit of the force.
     pub max_abs: f64,
     /// Root mean square of the error, in the unit of the force.
@@ -108,6 +112,8 @@ struct Sums {
     error: f64,
     measured: f64,
     relative: f64,
+    abs_error: f64,
+    abs_measured: f64,
     max_abs: f64,
     zero_measured: usize,
 }
@@ -152,6 +158,8 @@ impl Comparison {
                 }
                 sums.error += error * error;
                 sums.measured += y * y;
+                sums.abs_error += error;
+                sums.abs_measured += y.abs();
                 sums.max_abs = sums.max_abs.max(error);
                 if *y == 0.0 {
                     sums.zero_measured += 1;
@@ -178,6 +186,7 @@ impl Comparison {
             let figures = ChannelFigures {
                 nrms: ratio(sums.error, sums.measured),
                 mean_relative: (counted > 0).then(|| sums.relative / counted as f64),
+                abs_ratio: (sums.abs_measured > 0.0).then(|| sums.abs_error / sums.abs_measured),
                 max_abs: sums.max_abs,
                 rms: (sums.error / samples).sqrt(),
                 zero_measured: sums.zero_measured,
@@ -237,6 +246,7 @@ mod tests {
         let a = &figures.channels["a"];
         assert!((a.nrms.unwrap() - (1.25_f64 / 9.0).sqrt()).abs() < 1e-15);
         assert!((a.mean_relative.unwrap() - 0.5 / 3.0).abs() < 1e-15);
+        assert!((a.abs_ratio.unwrap() - 1.5 / 5.0).abs() < 1e-15);
         assert_eq!(
             (a.max_abs.to_bits(), a.zero_measured),
             (1.0_f64.to_bits(), 1)

@@ -3,7 +3,8 @@
 //! Rows go in block by block and are reduced at once by Householder reflections to the upper
 //! triangle `[R | Q'y]` with the residual norm in its corner, so the memory needed does not
 //! depend on the number of samples and the normal equations, which would square the condition
-//! number, are never formed.
+//! number, are never formed. Rows of one channel are reduced together: the force of a joint does
+//! not depend on the links before it, and columns that are zero in a whole block cost nothing.
 //! Sources: G. H. Golub, "Numerical methods for solving linear least squares problems", Numer.
 //! Math. 7 (1965); J. Demmel et al., "Communication-optimal parallel and sequential QR and LU
 //! factorizations", SIAM J. Sci. Comput. 34 (2012) for the sequential tall-skinny form;
@@ -13,6 +14,7 @@ use std::fmt;
 
 use nalgebra::DMatrix;
 
+use crate::reflections::{Block, LANES, fold};
 use crate::solution::{Solution, solve_triangle};
 
 /// Why a regression cannot be set up or solved.
@@ -55,6 +57,11 @@ pub enum LeastSquaresError {
     },
     /// The singular value iteration did not converge; only extreme numbers can cause it.
     NoConvergence,
+    /// The instruments say too little about the regressor.
+    WeakInstruments {
+        /// The smallest canonical correlation between both.
+        correlation: f64,
+    },
     /// The second pass over the rows did not show the rows of the first.
     PassesDiffer {
         /// Rows of the first pass.
@@ -88,6 +95,12 @@ impl fmt::Display for LeastSquaresError {
             Self::NoConvergence => f.write_str(
                 "the singular values do not converge; the numbers of the regressor differ too much in size",
             ),
+            Self::WeakInstruments { correlation } => write!(
+                f,
+                "the instruments do not determine the parameters: the smallest canonical correlation between them and the \
+                 regressor is {correlation:.1e}; are they of the same motion, and in step with the recording? Does the \
+                 recording itself determine all parameters? Identify without instruments to see"
+            ),
             Self::PassesDiffer { first, now } => write!(
                 f,
                 "the second pass showed {now} rows where the first showed {first}; show the same rows in all passes"
@@ -98,8 +111,15 @@ impl fmt::Display for LeastSquaresError {
 
 impl std::error::Error for LeastSquaresError {}
 
-/// Rows that are reduced together; a block of seven columns then fits the fastest cache.
-const BLOCK_ROWS: usize = 256;
+/// Numbers that are reduced together at most, so that they stay in the fastest caches.
+const BLOCK_NUMBERS: usize = 4096;
+
+/// Rows that are reduced together for that many columns.
+fn block_rows(width: usize) -> usize {
+    (BLOCK_NUMBERS / width)
+        .clamp(64, 512)
+        .next_multiple_of(LANES)
+}
 
 /// A regression that takes its rows block by block.
 ///
@@ -118,21 +138,40 @@ pub struct LeastSquares {
     rows: usize,
     /// `(n + 1) x (n + 1)`, row-major upper triangle `[R, Q'y; 0, +-|residual|]`.
     triangle: Vec<f64>,
-    /// `n + 1` columns of `BLOCK_ROWS`, filled up to `pending`.
+    /// Rows per block.
+    block_rows: usize,
+    /// For each channel a block of rows.
+    channels: Vec<Pending>,
+}
+
+/// Rows that wait to be reduced: `n + 1` columns of `block_rows`, filled up to `rows`.
+#[derive(Debug, Clone)]
+struct Pending {
     block: Vec<f64>,
-    pending: usize,
+    rows: usize,
 }
 
 impl LeastSquares {
     /// A regression for `n_parameters` parameters, without rows yet.
     pub fn new(n_parameters: usize) -> Self {
+        Self::with_channels(n_parameters, 1)
+    }
+
+    /// The same for rows that take turns between channels (`row = sample * channels + channel`): those of one channel are
+    /// reduced together, which saves work where a channel does not depend on all parameters. The result is the same.
+    pub fn with_channels(n_parameters: usize, channels: usize) -> Self {
         let width = n_parameters + 1;
+        let block_rows = block_rows(width);
+        let pending = Pending {
+            block: vec![0.0; width * block_rows],
+            rows: 0,
+        };
         Self {
             n_parameters,
             rows: 0,
             triangle: vec![0.0; width * width],
-            block: vec![0.0; width * BLOCK_ROWS],
-            pending: 0,
+            block_rows,
+            channels: vec![pending; channels.max(1)],
         }
     }
 
@@ -156,17 +195,82 @@ impl LeastSquares {
     ) -> Result<(), LeastSquaresError> {
         let n = self.n_parameters;
         check_rows(regressor, measured, n, self.rows)?;
-        for (row, y) in regressor.chunks_exact(n).zip(measured) {
+        let n_channels = self.channels.len();
+        for (i, (row, y)) in regressor.chunks_exact(n).zip(measured).enumerate() {
+            let channel = (self.rows + i) % n_channels;
+            let (stride, pending) = (self.block_rows, &mut self.channels[channel]);
             for (column, value) in row.iter().enumerate() {
-                self.block[column * BLOCK_ROWS + self.pending] = *value;
+                pending.block[column * stride + pending.rows] = *value;
             }
-            self.block[n * BLOCK_ROWS + self.pending] = *y;
-            self.pending += 1;
-            if self.pending == BLOCK_ROWS {
-                self.reduce_block();
+            pending.block[n * stride + pending.rows] = *y;
+            pending.rows += 1;
+            if pending.rows == stride {
+                self.reduce_block(channel);
             }
         }
         self.rows += measured.len();
+        Ok(())
+    }
+
+    /// Takes rows of one channel, column by column: the fastest way in. All columns are as long as `measured`.
+    /// Fails as [`LeastSquares::add_rows`] does; nothing is taken then.
+    ///
+    /// ```
+    /// use modelmill_identify::LeastSquares;
+    /// let mut regression = LeastSquares::new(2);
+    /// regression.add_columns(0, &[&[1.0, 1.0, 1.0], &[0.0, 1.0, 2.0]], &[1.0, 3.0, 5.0])?;
+    /// assert!((regression.solve()?.values[1] - 2.0).abs() < 1e-12);
+    /// # Ok::<(), modelmill_identify::LeastSquaresError>(())
+    /// ```
+    pub fn add_columns(
+        &mut self,
+        channel: usize,
+        columns: &[&[f64]],
+        measured: &[f64],
+    ) -> Result<(), LeastSquaresError> {
+        let n = self.n_parameters;
+        if n == 0 {
+            return Err(LeastSquaresError::NoParameters);
+        }
+        let rows = measured.len();
+        if columns.len() != n || columns.iter().any(|column| column.len() != rows) {
+            return Err(LeastSquaresError::Shape {
+                regressor: columns.iter().map(|column| column.len()).sum(),
+                measured: rows,
+                columns: n,
+            });
+        }
+        let all = columns
+            .iter()
+            .map(|column| (*column, true))
+            .chain([(measured, false)]);
+        for (place, (column, is_regressor)) in all.enumerate() {
+            if !all_finite(column)
+                && let Some(i) = column.iter().position(|value| !value.is_finite())
+            {
+                return Err(LeastSquaresError::NotFinite {
+                    row: self.rows + i,
+                    column: is_regressor.then_some(place),
+                });
+            }
+        }
+        let channel = channel % self.channels.len();
+        let stride = self.block_rows;
+        let mut done = 0;
+        while done < rows {
+            let pending = &mut self.channels[channel];
+            let (from, more) = (pending.rows, (stride - pending.rows).min(rows - done));
+            let slots = pending.block.chunks_exact_mut(stride);
+            for (slot, column) in slots.zip(columns.iter().chain([&measured])) {
+                slot[from..from + more].copy_from_slice(&column[done..done + more]);
+            }
+            pending.rows += more;
+            done += more;
+            if pending.rows == stride {
+                self.reduce_block(channel);
+            }
+        }
+        self.rows += rows;
         Ok(())
     }
 
@@ -180,7 +284,7 @@ impl LeastSquares {
                 expected: n,
             });
         }
-        other.reduce_block();
+        other.reduce();
         let rows = self.rows + other.rows;
         for row in other.triangle.chunks_exact(n + 1) {
             self.add_rows(&row[..n], &row[n..])?;
@@ -189,40 +293,41 @@ impl LeastSquares {
         Ok(())
     }
 
-    /// Householder reflections that fold the pending rows into the triangle.
-    fn reduce_block(&mut self) {
-        let width = self.n_parameters + 1;
-        let m = self.pending;
-        for k in 0..width {
-            let (head, tail) = self.block.split_at_mut((k + 1) * BLOCK_ROWS);
-            let pivot = &head[k * BLOCK_ROWS..k * BLOCK_ROWS + m];
-            let below = dot(pivot, pivot);
-            if below == 0.0 {
-                continue;
-            }
-            let alpha = self.triangle[k * width + k];
-            let beta = -(alpha * alpha + below).sqrt().copysign(alpha);
-            // The reflection is 1 - tau v v' with v = (1, pivot / v0).
-            let v0 = alpha - beta;
-            let tau = -v0 / beta;
-            self.triangle[k * width + k] = beta;
-            for (j, column) in (k + 1..width).zip(tail.chunks_exact_mut(BLOCK_ROWS)) {
-                let column = &mut column[..m];
-                let sum = tau * (self.triangle[k * width + j] + dot(pivot, column) / v0);
-                self.triangle[k * width + j] -= sum;
-                subtract_scaled(column, sum / v0, pivot);
-            }
+    /// Folds the pending rows of a channel into the triangle.
+    fn reduce_block(&mut self, channel: usize) {
+        let (stride, pending) = (self.block_rows, &mut self.channels[channel]);
+        let rows = pending.rows.next_multiple_of(LANES);
+        for column in pending.block.chunks_exact_mut(stride) {
+            column[pending.rows..rows].fill(0.0);
         }
-        self.pending = 0;
+        let block = Block {
+            columns: &mut pending.block,
+            stride,
+            rows,
+        };
+        fold(&mut self.triangle, block);
+        pending.rows = 0;
+    }
+
+    /// Folds all pending rows into the triangle.
+    fn reduce(&mut self) {
+        for channel in 0..self.channels.len() {
+            self.reduce_block(channel);
+        }
+    }
+
+    /// The whole triangle `[R, Q'y; 0, +-|residual|]`, `(n + 1) x (n + 1)` by rows.
+    pub(crate) fn reduced(&self) -> Vec<f64> {
+        let mut complete = self.clone();
+        complete.reduce();
+        complete.triangle
     }
 
     /// The triangle `R` of the regressor, `n x n`: same singular values, same column norms and
     /// same dependencies as the stacked regressor.
     pub fn triangle(&self) -> DMatrix<f64> {
-        let mut complete = self.clone();
-        complete.reduce_block();
-        let n = self.n_parameters;
-        DMatrix::from_fn(n, n, |i, j| complete.triangle[i * (n + 1) + j])
+        let (n, triangle) = (self.n_parameters, self.reduced());
+        DMatrix::from_fn(n, n, |i, j| triangle[i * (n + 1) + j])
     }
 
     /// The least-squares solution. Where the rows do not determine all parameters, the
@@ -249,9 +354,7 @@ impl LeastSquares {
         if self.rows == 0 {
             return Err(LeastSquaresError::NoRows);
         }
-        let mut complete = self.clone();
-        complete.reduce_block();
-        solve_triangle(&complete.triangle, complete.rows, nominal)
+        solve_triangle(&self.reduced(), self.rows, nominal)
     }
 }
 
@@ -272,8 +375,6 @@ pub(crate) fn check_rows(
             columns,
         });
     }
-    // A sum is not finite when a summand is not; the place is looked for only then.
-    let all_finite = |values: &[f64]| (0.0 * values.iter().sum::<f64>()).is_finite();
     if !all_finite(regressor)
         && let Some(i) = regressor.iter().position(|value| !value.is_finite())
     {
@@ -293,28 +394,17 @@ pub(crate) fn check_rows(
     Ok(())
 }
 
-/// Dot product in eight independent sums, which the compiler turns into vector instructions.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+/// Whether all numbers are finite; a sum is not when a summand is not. Independent sums go at the speed of memory.
+fn all_finite(values: &[f64]) -> bool {
     let mut sums = [0.0; 8];
-    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a8
-        .remainder()
-        .iter()
-        .zip(b8.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
-    for (x, y) in a8.zip(b8) {
+    let eights = values.chunks_exact(8);
+    let rest: f64 = eights.remainder().iter().sum();
+    for eight in eights {
         for lane in 0..8 {
-            sums[lane] += x[lane] * y[lane];
+            sums[lane] += 0.0 * eight[lane];
         }
     }
-    sums.iter().sum::<f64>() + rest
-}
-
-fn subtract_scaled(target: &mut [f64], factor: f64, source: &[f64]) {
-    for (t, s) in target.iter_mut().zip(source) {
-        *t -= factor * s;
-    }
+    (sums.iter().sum::<f64>() + 0.0 * rest).is_finite()
 }
 
 #[cfg(test)]
@@ -383,6 +473,67 @@ mod tests {
         halves.merge(second).unwrap();
         assert_eq!(halves.rows(), rows);
         near(halves.solve().unwrap().values[3], dense[3], 1e-11);
+    }
+
+    /// Rows of three channels, of which the later ones do not see the first columns: by rows, by channels and by columns.
+    #[test]
+    fn channels_and_columns_reduce_to_the_same_triangle() {
+        let mut noise = Noise::new(6);
+        let (n, samples) = (11, 777);
+        let sees = |channel: usize, j: usize| j >= 4 * channel;
+        let w: Vec<f64> = (0..3 * samples * n)
+            .map(|i| {
+                if sees(i / n % 3, i % n) {
+                    noise.normal()
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        let y: Vec<f64> = (0..3 * samples).map(|_| noise.normal()).collect();
+        let mut by_rows = LeastSquares::new(n);
+        by_rows.add_rows(&w, &y).unwrap();
+        let mut by_channels = LeastSquares::with_channels(n, 3);
+        for (w, y) in w.chunks(3 * n * 50).zip(y.chunks(3 * 50)) {
+            by_channels.add_rows(w, y).unwrap();
+        }
+        let mut by_columns = LeastSquares::with_channels(n, 3);
+        for start in (0..samples).step_by(64) {
+            let end = (start + 64).min(samples);
+            for channel in 0..3 {
+                let rows = (start..end).map(|sample| 3 * sample + channel);
+                let columns: Vec<Vec<f64>> = (0..n)
+                    .map(|j| rows.clone().map(|row| w[row * n + j]).collect())
+                    .collect();
+                let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+                let right: Vec<f64> = rows.map(|row| y[row]).collect();
+                by_columns.add_columns(channel, &columns, &right).unwrap();
+            }
+        }
+        let dense = DMatrix::from_row_slice(3 * samples, n, &w);
+        let expected = dense
+            .svd(true, true)
+            .solve(&DVector::from_column_slice(&y), 0.0)
+            .unwrap();
+        for regression in [&by_rows, &by_channels, &by_columns] {
+            assert_eq!(regression.rows(), 3 * samples);
+            let solution = regression.solve().unwrap();
+            for j in 0..n {
+                near(solution.values[j], expected[j], 1e-10);
+            }
+        }
+        let bad = [1.0, f64::NAN, 1.0];
+        let columns = vec![&bad[..]; n];
+        let error = by_columns.add_columns(0, &columns, &[1.0; 3]).unwrap_err();
+        assert_eq!(
+            error,
+            LeastSquaresError::NotFinite {
+                row: 3 * samples + 1,
+                column: Some(0)
+            }
+        );
+        assert!(by_columns.add_columns(0, &columns[1..], &[1.0; 3]).is_err());
+        assert_eq!(by_columns.rows(), 3 * samples);
     }
 
     /// The normal equations lose everything at a condition number of 1e8; the QR must not.

@@ -1,19 +1,19 @@
-//! Recordings: CSV text goes in, named columns of numbers come out.
+//! Recordings: a file of CSV text, Parquet or MATLAB's format 5 goes in, named columns of numbers come out.
 //!
-//! One header line, one line per sample, separated by commas, semicolons or tabs; a UTF-8 byte
-//! order mark and CR LF are fine. A column that holds something else than numbers harms only
-//! those who ask for it: it is named in the notes, and [`Recording::column`] refuses it with the
-//! line at fault. [`Recording::states`](crate::recording::Recording::states) makes a
-//! [`Run`](crate::Run) of it.
+//! A column that holds something else than numbers harms only those who ask for it: it is named in
+//! the notes, and [`Recording::column`] refuses it with the line at fault.
+//! [`Recording::states`](crate::recording::Recording::states) makes a [`Run`](crate::Run) of it.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Cursor, Read};
+use std::io::{Cursor, Read, Seek};
 use std::path::Path;
 
+use bytes::Bytes;
 use indexmap::IndexMap;
 
-use crate::notes::{Note, count_of, nearest};
+use crate::notes::{Note, nearest};
 use crate::recording_error::{Fault, RecordingError};
+use crate::{csv_text, mat_file, parquet_file};
 
 /// What becomes of samples with NaN, infinite or empty fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -25,44 +25,81 @@ pub enum NotFinite {
     LeaveOut,
 }
 
+/// A column of ours that is an affine sum of the file's: `offset + sum of factor * column`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Computed {
+    /// Our name.
+    pub name: String,
+    /// The file's columns with their factors.
+    pub terms: Vec<(String, f64)>,
+    /// What is added.
+    pub offset: f64,
+}
+
 /// How a recording is read.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ReadOptions {
     /// `(ours, theirs)`: the column that the file calls `theirs` is known as `ours`.
     pub renames: Vec<(String, String)>,
+    /// Columns that are computed from the file's; each replaces one of its name.
+    pub computed: Vec<Computed>,
     /// What becomes of NaN, infinite and empty fields.
     pub not_finite: NotFinite,
+    /// Our names of the columns that are needed; the others are neither looked at nor kept.
+    /// All are kept if there is no such list.
+    pub wanted: Option<Vec<String>>,
+    /// Only samples whose time `t` lies between these two, s; the others are passed over, counted and said.
+    pub between: Option<(f64, f64)>,
+    /// Most numbers that are kept; a recording that holds more is refused before memory runs out.
+    pub most_numbers: usize,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self {
+            renames: Vec::new(),
+            computed: Vec::new(),
+            not_finite: NotFinite::default(),
+            wanted: None,
+            between: None,
+            most_numbers: 1 << 26,
+        }
+    }
 }
 
 /// A recording in memory: columns of equal length by name, in the file's order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
-    file: String,
-    columns: IndexMap<String, Column>,
-    lines: Vec<u64>,
-    notes: Vec<Note>,
+    pub(crate) file: String,
+    pub(crate) columns: IndexMap<String, Column>,
+    /// Names of the columns of the file that were not needed.
+    pub(crate) others: Vec<String>,
+    pub(crate) lines: Vec<u64>,
+    pub(crate) notes: Vec<Note>,
 }
 
+/// The numbers of a column, NaN where there are none, and what is wrong with it.
 #[derive(Debug, Clone, PartialEq, Default)]
-struct Column {
-    values: Vec<f64>,
-    text: Option<Defect>,
-    not_finite: Option<Defect>,
+pub(crate) struct Column {
+    pub(crate) values: Vec<f64>,
+    pub(crate) text: Option<Defect>,
+    pub(crate) not_finite: Option<Defect>,
 }
 
 /// Fields of a column that cannot be used: the first of them and how many there are.
 #[derive(Debug, Clone, PartialEq)]
-struct Defect {
-    line: u64,
-    text: String,
-    count: usize,
+pub(crate) struct Defect {
+    pub(crate) line: u64,
+    pub(crate) text: String,
+    pub(crate) count: usize,
 }
 
 impl Recording {
-    /// Reads a CSV file; `renames` are pairs `(ours, theirs)`.
+    /// Reads a file; `renames` are pairs `(ours, theirs)`.
+    /// Parquet and MATLAB's format 5 are told from CSV text by their first bytes.
     ///
     /// Fails when the file cannot be read, is empty, has no header, duplicate or missing names,
-    /// or lines of unequal length.
+    /// lines of unequal length, or more numbers than [`ReadOptions::most_numbers`].
     pub fn read(path: impl AsRef<Path>, renames: &[(&str, &str)]) -> Result<Self, RecordingError> {
         let renames = renames
             .iter()
@@ -82,18 +119,55 @@ impl Recording {
         path: impl AsRef<Path>,
         options: &ReadOptions,
     ) -> Result<Self, RecordingError> {
-        let path = path.as_ref();
-        let file = path.display().to_string();
-        let is_directory = path.is_dir();
-        let unreadable = |reason: String| RecordingError {
-            file: file.clone(),
-            fault: Fault::Unreadable { reason },
+        let (stream, file, format) = open(path.as_ref())?;
+        let recording = match format {
+            Format::Csv => csv_text::read(stream, &file, options),
+            Format::Parquet => parquet_file::read(stream, &file, options),
+            Format::Mat => mat_file::read(stream, &file, options),
         };
-        if is_directory {
-            return Err(unreadable("it is a folder, not a file".to_owned()));
-        }
-        let stream = File::open(path).map_err(|error| unreadable(error.to_string()))?;
-        Self::from_reader(stream, &file, options)
+        recording.map_err(|fault| RecordingError { file, fault })
+    }
+
+    /// The names of a file's columns as the file has them; fails when it cannot be read.
+    pub fn names_in(path: impl AsRef<Path>) -> Result<Vec<String>, RecordingError> {
+        let (stream, file, format) = open(path.as_ref())?;
+        let names = match format {
+            Format::Csv => csv_text::names_of(stream),
+            Format::Parquet => parquet_file::names_of(stream),
+            Format::Mat => mat_file::names_of(stream),
+        };
+        names.map_err(|fault| RecordingError { file, fault })
+    }
+
+    /// [`Recording::read_with`] of a file that is in memory, as what came through a pipe must be; `file` is what messages
+    /// call it.
+    pub fn from_bytes(
+        bytes: &[u8],
+        file: &str,
+        options: &ReadOptions,
+    ) -> Result<Self, RecordingError> {
+        let recording = format_of(bytes).and_then(|format| match format {
+            Format::Csv => csv_text::read(bytes, file, options),
+            Format::Parquet => parquet_file::read(Bytes::copy_from_slice(bytes), file, options),
+            Format::Mat => mat_file::read(Cursor::new(bytes), file, options),
+        });
+        recording.map_err(|fault| RecordingError {
+            file: file.to_owned(),
+            fault,
+        })
+    }
+
+    /// [`Recording::names_in`] of a file that is in memory.
+    pub fn names_in_bytes(bytes: &[u8], file: &str) -> Result<Vec<String>, RecordingError> {
+        let names = format_of(bytes).and_then(|format| match format {
+            Format::Csv => csv_text::names_of(bytes),
+            Format::Parquet => parquet_file::names_of(Bytes::copy_from_slice(bytes)),
+            Format::Mat => mat_file::names_of(Cursor::new(bytes)),
+        });
+        names.map_err(|fault| RecordingError {
+            file: file.to_owned(),
+            fault,
+        })
     }
 
     /// Reads CSV text from a stream; `file` is what messages call it.
@@ -110,7 +184,7 @@ impl Recording {
         file: &str,
         options: &ReadOptions,
     ) -> Result<Self, RecordingError> {
-        read(stream, file, options).map_err(|fault| RecordingError {
+        csv_text::read(stream, file, options).map_err(|fault| RecordingError {
             file: file.to_owned(),
             fault,
         })
@@ -126,9 +200,10 @@ impl Recording {
         self.lines.len()
     }
 
-    /// Names of all columns after renaming, in the file's order.
+    /// Names of all columns after renaming, those that were not needed at the end.
     pub fn names(&self) -> impl Iterator<Item = &str> {
-        self.columns.keys().map(String::as_str)
+        let others = self.others.iter().map(String::as_str);
+        self.columns.keys().map(String::as_str).chain(others)
     }
 
     /// Whether there is a column of that name.
@@ -203,6 +278,7 @@ impl Recording {
         Self {
             file,
             columns: columns.collect(),
+            others: self.others.clone(),
             lines: self.lines[start..end].to_vec(),
             notes: Vec::new(),
         }
@@ -216,7 +292,12 @@ impl Recording {
     }
 }
 
-fn missing<'a>(name: &str, present: impl Iterator<Item = &'a str>, by_renaming: bool) -> Fault {
+/// The fault of a column that is not there.
+pub(crate) fn missing<'a>(
+    name: &str,
+    present: impl Iterator<Item = &'a str>,
+    by_renaming: bool,
+) -> Fault {
     let present: Vec<String> = present.map(str::to_owned).collect();
     Fault::MissingColumn {
         name: name.to_owned(),
@@ -226,313 +307,49 @@ fn missing<'a>(name: &str, present: impl Iterator<Item = &'a str>, by_renaming: 
     }
 }
 
-/// The longest header line that is looked at; beyond it the file is no recording.
-const LONGEST_HEADER: u64 = 1 << 20;
+/// What a file holds, told by its first bytes.
+enum Format {
+    Csv,
+    Parquet,
+    Mat,
+}
 
-fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<Recording, Fault> {
-    let mut stream = BufReader::with_capacity(1 << 16, stream);
-    let (header, first_lines) = read_header(&mut stream)?;
-    let mut notes = Vec::new();
-    let separator = find_separator(&header)?;
-    if separator != b',' {
-        let name = if separator == b';' {
-            "semicolons"
-        } else {
-            "tabs"
-        };
-        notes.push(Note::info(format!(
-            "The columns of {file} are separated by {name}."
-        )));
-    }
-    let lines_of_text = EvenLines::new(Cursor::new(first_lines).chain(stream));
-    let mut reader = csv::ReaderBuilder::new()
-        .delimiter(separator)
-        .flexible(true)
-        .trim(csv::Trim::All)
-        .from_reader(lines_of_text);
-    let theirs: Vec<String> = reader
-        .headers()
-        .map_err(unreadable)?
-        .iter()
-        .map(str::to_owned)
-        .collect();
-    let names = {
-        check_names(&theirs)?;
-        rename(&theirs, &options.renames)?
+/// Opens a file: the stream at its beginning, what messages call it, and its format.
+fn open(path: &Path) -> Result<(File, String, Format), RecordingError> {
+    let file = path.display().to_string();
+    let fail = |fault| RecordingError {
+        file: path.display().to_string(),
+        fault,
     };
-    let mut columns: Vec<Column> = vec![Column::default(); names.len()];
-    let mut lines = Vec::new();
-    let mut left_out = Vec::new();
-    let mut record = csv::ByteRecord::new();
-    let mut sample = Vec::with_capacity(names.len());
-    while reader.read_byte_record(&mut record).map_err(unreadable)? {
-        // The reader stands behind the line's end here; where it began, blank lines are not
-        // passed over yet.
-        let line = reader.position().line() - 1;
-        if record.len() != names.len() {
-            return Err(Fault::RaggedLine {
-                line,
-                have: record.len(),
-                expected: names.len(),
-            });
-        }
-        sample.clear();
-        sample.extend(record.iter().map(parse));
-        if options.not_finite == NotFinite::LeaveOut
-            && sample.iter().any(|field| matches!(field, Field::NotFinite))
-        {
-            left_out.push(line);
-            continue;
-        }
-        lines.push(line);
-        for ((column, field), text) in columns.iter_mut().zip(&sample).zip(&record) {
-            column.push(field, line, text);
-        }
+    let unreadable = |reason: String| fail(Fault::Unreadable { reason });
+    if path.is_dir() {
+        return Err(unreadable("it is a folder, not a file".to_owned()));
     }
-    if lines.is_empty() {
-        return Err(Fault::NoSamples);
+    let mut stream = File::open(path).map_err(|error| unreadable(error.to_string()))?;
+    let mut first = Vec::new();
+    // What cannot be looked at twice, such as a pipe, can only be text.
+    if stream.stream_position().is_err() {
+        return Ok((stream, file, Format::Csv));
     }
-    if let Some(first) = left_out.first() {
-        notes.push(Note::warning(format!(
-            "{} of {} samples of {file} {} NaN, infinite or empty fields and {} left out, the first in line {first}.",
-            left_out.len(),
-            left_out.len() + lines.len(),
-            if left_out.len() == 1 { "holds" } else { "hold" },
-            if left_out.len() == 1 { "is" } else { "are" },
-        )));
-    }
-    let columns: IndexMap<String, Column> = names.into_iter().zip(columns).collect();
-    for (name, column) in &columns {
-        for (defect, what) in [
-            (&column.text, "text that is no number"),
-            (&column.not_finite, "NaN, infinite or empty fields"),
-        ] {
-            if let Some(Defect { line, count, .. }) = defect {
-                notes.push(Note::warning(format!(
-                    "Column `{name}` of {file} holds {what} ({}, the first in line {line}) and cannot be used.",
-                    count_of(*count, "field", "fields")
-                )));
-            }
-        }
-    }
-    Ok(Recording {
-        file: file.to_owned(),
-        columns,
-        lines,
-        notes,
-    })
+    (&mut stream)
+        .take(19)
+        .read_to_end(&mut first)
+        .and_then(|_| stream.rewind())
+        .map_err(|error| unreadable(error.to_string()))?;
+    let format = format_of(&first).map_err(fail)?;
+    Ok((stream, file, format))
 }
 
-enum Field {
-    Number(f64),
-    NotFinite,
-    Text,
-}
-
-fn parse(bytes: &[u8]) -> Field {
-    if bytes.is_empty() {
-        return Field::NotFinite;
-    }
-    match std::str::from_utf8(bytes)
-        .ok()
-        .and_then(|text| text.parse::<f64>().ok())
-    {
-        Some(number) if number.is_finite() => Field::Number(number),
-        Some(_) => Field::NotFinite,
-        None => Field::Text,
-    }
-}
-
-impl Column {
-    fn push(&mut self, field: &Field, line: u64, bytes: &[u8]) {
-        let defect = match field {
-            Field::Number(number) => {
-                self.values.push(*number);
-                return;
-            }
-            Field::NotFinite => &mut self.not_finite,
-            Field::Text => &mut self.text,
-        };
-        self.values.push(f64::NAN);
-        defect
-            .get_or_insert_with(|| Defect {
-                line,
-                text: String::from_utf8_lossy(bytes).chars().take(60).collect(),
-                count: 0,
-            })
-            .count += 1;
-    }
-}
-
-/// The same text with LF at the end of every line, the last one included, so that the lines of
-/// records can be told: the CSV reader counts a line only when it meets its LF.
-struct EvenLines<R> {
-    inner: R,
-    last: u8,
-    ended: bool,
-}
-
-impl<R: Read> EvenLines<R> {
-    fn new(inner: R) -> Self {
-        Self {
-            inner,
-            last: b'\n',
-            ended: false,
-        }
-    }
-}
-
-impl<R: Read> Read for EvenLines<R> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        if buffer.is_empty() || self.ended {
-            return Ok(0);
-        }
-        loop {
-            let have = self.inner.read(buffer)?;
-            if have == 0 {
-                self.ended = true;
-                if self.last == b'\n' {
-                    return Ok(0);
-                }
-                buffer[0] = b'\n';
-                return Ok(1);
-            }
-            let mut kept = 0;
-            for i in 0..have {
-                if buffer[i] != b'\r' {
-                    buffer[kept] = buffer[i];
-                    kept += 1;
-                }
-            }
-            // Zero would mean the end of the text.
-            if kept > 0 {
-                self.last = buffer[kept - 1];
-                return Ok(kept);
-            }
-        }
-    }
-}
-
-/// The header as text without its byte order mark, and the bytes to read again, from the header on.
-fn read_header(stream: &mut impl BufRead) -> Result<(String, Vec<u8>), Fault> {
-    let mut bytes = Vec::new();
-    let unreadable = |error: io::Error| Fault::Unreadable {
-        reason: error.to_string(),
-    };
-    // Blank lines on top stay in the text, so that the lines are counted as in the file.
-    let mut limited = stream.take(LONGEST_HEADER);
-    while bytes.trim_ascii().is_empty() {
-        if limited.read_until(b'\n', &mut bytes).map_err(unreadable)? == 0 {
-            return Err(Fault::Empty);
-        }
-    }
-    let looks_like = match bytes.as_slice() {
-        [b'P', b'A', b'R', b'1', ..] => Some("a Parquet file"),
-        [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] => Some("UTF-16 text"),
-        [b'P', b'K', 3, 4, ..] => Some("a spreadsheet or ZIP archive"),
-        [0x1F, 0x8B, ..] => Some("a gzip archive"),
-        [b'M', b'A', b'T', b'L', b'A', b'B', ..] => Some("a MATLAB file"),
-        _ if bytes.contains(&0) => Some("binary data"),
-        line if line.trim_ascii().contains(&b'\r') => {
-            Some("text with lone carriage returns as line ends")
-        }
-        _ if bytes.len() as u64 == LONGEST_HEADER => Some("a file without lines"),
-        _ => None,
-    };
-    if let Some(looks_like) = looks_like {
-        return Err(Fault::NotCsv { looks_like });
-    }
-    let text = bytes
-        .strip_prefix(b"\xEF\xBB\xBF")
-        .unwrap_or(&bytes)
-        .to_vec();
-    let Ok(header) = std::str::from_utf8(&text) else {
-        return Err(Fault::NotCsv {
-            looks_like: "text in another encoding than UTF-8",
-        });
-    };
-    let header = header.trim().to_owned();
-    if header.is_empty() {
-        return Err(Fault::Empty);
-    }
-    Ok((header, text))
-}
-
-fn find_separator(header: &str) -> Result<u8, Fault> {
-    let present: Vec<u8> = [b',', b';', b'\t']
-        .into_iter()
-        .filter(|s| header.as_bytes().contains(s))
-        .collect();
-    let is_number = |text: &str| text.trim().trim_matches('"').parse::<f64>().is_ok();
-    match present.as_slice() {
-        [separator] => {
-            let mut fields = header.split(char::from(*separator));
-            if fields.all(is_number) {
-                Err(Fault::NoHeader)
-            } else {
-                Ok(*separator)
-            }
-        }
-        [] if is_number(header) => Err(Fault::NoHeader),
-        // A single column is hardly a recording, but it is clear what it says.
-        [] if !header.contains([' ', '|', ':']) => Ok(b','),
-        _ => Err(Fault::UnclearSeparator {
-            header: header.chars().take(80).collect(),
+/// The format that the first bytes of a file tell; fails for those that are known and not read.
+fn format_of(bytes: &[u8]) -> Result<Format, Fault> {
+    match bytes.get(..19).unwrap_or(bytes) {
+        [b'P', b'A', b'R', b'1', ..] => Ok(Format::Parquet),
+        b"MATLAB 5.0 MAT-file" => Ok(Format::Mat),
+        b"MATLAB 7.3 MAT-file" | [0x89, b'H', b'D', b'F', ..] => Err(Fault::Format {
+            format: "a MATLAB 7.3 or HDF5 file",
+            says: "only MATLAB's format 5 is read; save it again with `save(name, ..., '-v7')`, or as CSV or Parquet"
+                .to_owned(),
         }),
-    }
-}
-
-fn check_names(names: &[String]) -> Result<(), Fault> {
-    for (i, name) in names.iter().enumerate() {
-        if name.is_empty() {
-            return Err(Fault::UnnamedColumn { place: i + 1 });
-        }
-    }
-    find_duplicate(names, false)
-}
-
-fn find_duplicate(names: &[String], by_renaming: bool) -> Result<(), Fault> {
-    let mut seen = std::collections::BTreeMap::new();
-    for (i, name) in names.iter().enumerate() {
-        if let Some(first) = seen.insert(name, i) {
-            return Err(Fault::DuplicateColumn {
-                name: name.clone(),
-                places: [first + 1, i + 1],
-                by_renaming,
-            });
-        }
-    }
-    Ok(())
-}
-
-fn rename(names: &[String], renames: &[(String, String)]) -> Result<Vec<String>, Fault> {
-    let mut renamed = names.to_vec();
-    for (i, (ours, theirs)) in renames.iter().enumerate() {
-        if renames[..i].iter().any(|(o, t)| o == ours || t == theirs) {
-            let twice_ours = renames[..i].iter().any(|(o, _)| o == ours);
-            return Err(Fault::DuplicateRenaming {
-                name: if twice_ours { ours } else { theirs }.clone(),
-            });
-        }
-        match names.iter().position(|name| name == theirs) {
-            Some(place) => renamed[place].clone_from(ours),
-            None => return Err(missing(theirs, names.iter().map(String::as_str), true)),
-        }
-    }
-    find_duplicate(&renamed, true)?;
-    Ok(renamed)
-}
-
-fn unreadable(error: csv::Error) -> Fault {
-    match error.into_kind() {
-        csv::ErrorKind::Io(error) => Fault::Unreadable {
-            reason: error.to_string(),
-        },
-        csv::ErrorKind::Utf8 { .. } => Fault::NotCsv {
-            looks_like: "text in another encoding than UTF-8",
-        },
-        other => Fault::Unreadable {
-            reason: format!("{other:?}"),
-        },
+        _ => Ok(Format::Csv),
     }
 }

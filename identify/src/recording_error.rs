@@ -33,6 +33,31 @@ pub enum Fault {
         /// What it looks like.
         looks_like: &'static str,
     },
+    /// The file is of a format that is read, but not in this form.
+    Format {
+        /// What it is.
+        format: &'static str,
+        /// What is wrong, and what to do.
+        says: String,
+    },
+    /// The recording holds more numbers than may be kept in memory.
+    TooLarge {
+        /// The line at which reading ended.
+        line: u64,
+        /// Samples before it.
+        samples: usize,
+        /// Columns that are needed.
+        columns: usize,
+        /// First and last time of those samples, s, where they are known.
+        until: Option<(f64, f64)>,
+    },
+    /// No sample lies in the time that was asked for.
+    NoneBetween {
+        /// From, s.
+        from: f64,
+        /// To, s.
+        to: f64,
+    },
     /// The first line holds numbers where column names are expected.
     NoHeader,
     /// The separator cannot be told from the first line.
@@ -115,6 +140,11 @@ pub enum Fault {
         /// Time there, s.
         here: f64,
     },
+    /// A quote opens a field that does not end in its line.
+    OpenQuote {
+        /// The line in which it opens.
+        line: u64,
+    },
     /// Too few samples for what is asked.
     TooFewSamples {
         /// Samples there are.
@@ -124,6 +154,8 @@ pub enum Fault {
         /// What they are needed for.
         purpose: &'static str,
     },
+    /// A Fourier series was asked for, but the motion has no period that could be found.
+    NoPeriod,
     /// The cut-off's period is longer than the recording.
     CutoffTooLow {
         /// The cut-off, Hz.
@@ -146,13 +178,27 @@ impl fmt::Display for RecordingError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let file = &self.file;
         match self.fault.line() {
-            Some(line) => write!(f, "{file}, line {line}: {}", self.fault),
+            Some(line) => write!(f, "{file}, {} {line}: {}", place_word(file), self.fault),
             None => write!(f, "{file}: {}", self.fault),
         }
     }
 }
 
 impl std::error::Error for RecordingError {}
+
+/// What a sample of a file stands in: text has lines, tables have rows.
+pub fn place_word(file: &str) -> &'static str {
+    let ends = |end: &str| {
+        std::path::Path::new(file)
+            .extension()
+            .is_some_and(|extension| extension.eq_ignore_ascii_case(end))
+    };
+    if ends("parquet") || ends("pq") || ends("mat") {
+        "row"
+    } else {
+        "line"
+    }
+}
 
 impl Fault {
     /// The line concerned, where there is one.
@@ -161,7 +207,9 @@ impl Fault {
             Self::RaggedLine { line, .. }
             | Self::NotANumber { line, .. }
             | Self::NotFinite { line, .. }
-            | Self::TimeNotIncreasing { line, .. } => Some(*line),
+            | Self::OpenQuote { line }
+            | Self::TimeNotIncreasing { line, .. }
+            | Self::TooLarge { line, .. } => Some(*line),
             Self::NoHeader | Self::UnclearSeparator { .. } => Some(1),
             _ => None,
         }
@@ -186,7 +234,32 @@ impl fmt::Display for Fault {
             ),
             Self::NotCsv { looks_like } => write!(
                 f,
-                "this looks like {looks_like}, not like CSV text; export it as UTF-8 CSV with a header"
+                "this looks like {looks_like}, not like a recording; save it as CSV (UTF-8, with a header), Parquet or MATLAB's format 5"
+            ),
+            Self::Format { format, says } => write!(f, "this is {format}: {says}"),
+            Self::TooLarge {
+                samples,
+                columns,
+                until,
+                ..
+            } => {
+                write!(
+                    f,
+                    "the recording is too large to be kept in memory: up to here {samples} samples of {columns} columns are \
+                     {:.1} GB; ",
+                    8e-9 * (*samples as f64) * (*columns as f64)
+                )?;
+                match until {
+                    Some((from, to)) => write!(
+                        f,
+                        "take a part of it, for example `--between {from},{to}`, or several such parts one after the other"
+                    ),
+                    None => f.write_str("take a part of it with `--between FROM,TO` (s)"),
+                }
+            }
+            Self::NoneBetween { from, to } => write!(
+                f,
+                "no sample lies between t = {from} s and {to} s, as `--between` asks; give times that the recording has"
             ),
             Self::NoHeader => f.write_str(
                 "the first line holds numbers, but column names are expected there; \
@@ -324,6 +397,14 @@ impl fmt::Display for Fault {
                     }
                 )
             }
+            Self::OpenQuote { .. } => f.write_str(
+                "a quote opens here, but the field that it begins does not end in the same line; delete the quote, or \
+                 close it",
+            ),
+            Self::NoPeriod => f.write_str(
+                "the motion does not repeat itself within the recording, so no period can be found; give it with \
+                 `--period S`, or take another smoothing",
+            ),
             Self::CutoffTooLow {
                 cutoff_hz,
                 lowest_hz,

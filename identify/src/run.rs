@@ -7,12 +7,15 @@ use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 
-use crate::derivatives::{Preparation, Source, choose_cutoff, differentiate, mean_rate, prepare};
+use crate::derivatives::{Preparation, Smoothing, Source, choose_cutoff, mean_rate};
 use crate::filters::LowPass;
+use crate::local_polynomials;
 use crate::notes::{Note, Severity, count_of};
+use crate::periods::{self, Repeats};
 use crate::recording::Recording;
 use crate::recording_checks::{GAP, median};
 use crate::recording_error::{Fault, RecordingError, list};
+use crate::smoothing::{Recorded, Way};
 
 /// States along a run, ready for the regressor. All columns have the length of `time`.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,6 +37,8 @@ pub struct Run {
     pub missing_force: Vec<String>,
     /// Line in the file for each sample.
     pub lines: Vec<u64>,
+    /// How well the run repeats itself, if its motion is periodic and the forces are known.
+    pub repeats: Option<Repeats>,
     /// What was done to the recording.
     pub prepared: PreparedAs,
     /// What the user should know, the recording's own notes included.
@@ -213,9 +218,11 @@ impl Recording {
             force,
             missing_force,
             lines: (0..time.len()).map(|i| self.line(i).unwrap_or(0)).collect(),
+            repeats: None,
             prepared,
             notes,
         };
+        self.note_repeats(&columns, drives, &mut run);
         for [q, qd, qdd] in states {
             run.q.push(q);
             run.qd.push(qd);
@@ -278,7 +285,8 @@ impl Recording {
         } else if longest - shortest > 0.01 * median {
             notes.push(Note::warning(format!(
                 "The steps of {} are uneven, from {shortest:.6} s to {longest:.6} s; \
-                 differences use the true times, the low-pass takes the steps as even.",
+                 differences use the true times, the low-pass takes the steps as even \
+                 (`--smoothing savitzky-golay` uses the true times there too).",
                 self.file()
             )));
         }
@@ -339,20 +347,41 @@ impl Recording {
         prepared.cutoff_hz = Some(cutoff);
         prepared.cutoff_chosen = preparation.cutoff_hz.is_none();
         prepared.trimmed = self.transients(rate / cutoff, time.len(), preparation, notes);
+        let positions: Vec<&[f64]> = columns.iter().map(|c| c.q).collect();
+        let way = match preparation.smoothing {
+            Smoothing::Butterworth => Way::Butterworth { order },
+            Smoothing::SavitzkyGolay => Way::Polynomials {
+                half_width: local_polynomials::half_width(cutoff, rate),
+            },
+            Smoothing::Fourier { period } => {
+                let period = period.or_else(|| periods::find_period(time, &positions));
+                let period = period.ok_or_else(|| self.fault(Fault::NoPeriod))?;
+                let harmonics = periods::count(cutoff * period).max(1);
+                // A series has no transients at its ends.
+                prepared.trimmed = (0, 0);
+                Way::Series { period, harmonics }
+            }
+        };
         notes.push(Note::info(format!(
-            "Derivatives of {} in {} are prepared: Butterworth of order {order} at {cutoff:.4} Hz{}, zero phase, \
-             then central differences.",
+            "Derivatives of {} in {} are prepared: {}.",
             list(&prepared.coordinates),
             self.file(),
-            if prepared.cutoff_chosen { " (chosen from the signal)" } else { "" },
+            way.says(cutoff, prepared.cutoff_chosen),
         )));
         columns
             .iter()
             .map(|column| {
-                column.prepare(time, cutoff, order).map_err(|error| {
+                let all = column.prepare(time, cutoff, way).map_err(|error| {
                     self.fault(Fault::Filter {
                         column: column.name.clone(),
                         error,
+                    })
+                })?;
+                all.ok_or_else(|| {
+                    self.fault(Fault::TooFewSamples {
+                        have: time.len(),
+                        need: way.need(),
+                        purpose: "smoothing at this cut-off",
                     })
                 })
             })
@@ -426,22 +455,6 @@ impl Recording {
         )));
         Ok(())
     }
-
-    fn note_standstill(&self, coordinates: &[String], run: &mut Run) {
-        for (name, q) in coordinates.iter().zip(&run.q) {
-            let (low, high) = q
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-                    (l.min(*v), h.max(*v))
-                });
-            if q.len() > 1 && high <= low {
-                run.notes.push(Note::warning(format!(
-                    "`{name}` does not move in {}: what depends on its motion cannot be identified.",
-                    self.file()
-                )));
-            }
-        }
-    }
 }
 
 impl Run {
@@ -476,42 +489,8 @@ fn wanted_names(coordinates: &[String], drives: &[String]) -> Vec<String> {
     for name in coordinates {
         names.extend([name.clone(), format!("{name}_d"), format!("{name}_dd")]);
     }
-    names.extend(drives.iter().cloned());
+    for drive in drives {
+        names.extend([drive.clone(), format!("{drive}_var")]);
+    }
     names
-}
-
-/// What the file holds of a coordinate.
-struct Recorded<'a> {
-    name: String,
-    q: &'a [f64],
-    qd: Option<&'a [f64]>,
-    qdd: Option<&'a [f64]>,
-}
-
-impl Recorded<'_> {
-    fn is_complete(&self) -> bool {
-        self.qd.is_some() && self.qdd.is_some()
-    }
-
-    fn complete(&self) -> Option<[Vec<f64>; 3]> {
-        Some([self.q.to_vec(), self.qd?.to_vec(), self.qdd?.to_vec()])
-    }
-
-    /// What is recorded is kept; what is missing is derived from the nearest that is there.
-    fn prepare(
-        &self,
-        time: &[f64],
-        cutoff: f64,
-        order: usize,
-    ) -> Result<[Vec<f64>; 3], crate::FilterError> {
-        if let Some(complete) = self.complete() {
-            return Ok(complete);
-        }
-        if let Some(qd) = self.qd {
-            let smooth = LowPass::butterworth(order, cutoff, mean_rate(time))?.zero_phase(qd)?;
-            return Ok([self.q.to_vec(), qd.to_vec(), differentiate(time, &smooth)]);
-        }
-        let all = prepare(time, self.q, cutoff, order)?;
-        Ok([all.q, all.qd, self.qdd.map_or(all.qdd, <[f64]>::to_vec)])
-    }
 }

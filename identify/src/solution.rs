@@ -49,6 +49,16 @@ impl Solution {
         &self.r_inverse * self.r_inverse.transpose()
     }
 
+    /// Takes the inverse and the classical deviations of another solution for the same parameters, which says how far
+    /// values follow from gradients.
+    pub(crate) fn take_inverse_of(&mut self, other: Self) {
+        self.r_inverse = other.r_inverse;
+        self.classical_std = other.classical_std;
+        for (mine, theirs) in self.determined.iter_mut().zip(other.determined) {
+            *mine &= theirs;
+        }
+    }
+
     /// Variance of the residuals with the degrees of freedom taken off; NaN without any left.
     pub fn residual_variance(&self) -> f64 {
         match self.rows.saturating_sub(self.rank) {

@@ -50,7 +50,7 @@ fn files_that_are_no_recordings() {
     );
     check_refused(
         "PAR1\u{1}\u{2}",
-        "run.csv: this looks like a Parquet file, not like CSV text; export it as UTF-8 CSV with a header",
+        "run.csv: this looks like a Parquet file, not like a recording; save it as CSV (UTF-8, with a header), Parquet or MATLAB's format 5",
     );
     let utf16: Vec<u8> = std::iter::once(0xFEFF)
         .chain("t,q\n0,1\n".encode_utf16())
@@ -106,6 +106,41 @@ fn faults_of_header_and_lines() {
         "t,q\n0\n",
         "run.csv, line 2: 1 field where the header has 2; complete or remove the line",
     );
+}
+
+#[test]
+fn a_quote_left_open_is_named_where_it_opens() {
+    let check = |text: &str, line: u64| {
+        let error = read(text).expect_err("the recording is faulty");
+        assert_eq!(error.fault, Fault::OpenQuote { line }, "{text:?}: {error}");
+        assert!(
+            error.to_string().starts_with(&format!(
+                "run.csv, line {line}: a quote opens here, but the field that it begins does not end in the same line;"
+            )),
+            "{error}"
+        );
+    };
+    // To the end of the text, with and without an end of its last line.
+    check("t,q,f\n0,1,2\n\n0.1,\"1,2\n0.2,1,2\n0.3,1,2\n", 4);
+    check("t,q,f\n0,1,2\n\n0.1,\"1,2\n0.2,1,2\n0.3,1,2", 4);
+    check("t,q,f\n0,1,2\n0.1,1,2\n0.2,1,\"2\n", 4);
+    // To the next quote, so that fields are missing, or are no numbers.
+    check(
+        "t,q,f\r\n0,1,2\r\n0.1,\"1,2\r\n0.2,1\",2\r\n0.3,1\r\n0.4,\"1\",2\r\n",
+        3,
+    );
+    check("t,q,f\n0,1,2\n0.1,\"1\n\n0.2\",2,1\n0.3,1,2\n", 3);
+    // In the header, below a blank line.
+    check("\nt,\"q,f\n0,1,2\n", 2);
+    // A remark of two lines in a column that nobody asks for is no fault.
+    let text = "t,q,remark\n0,1,\"it\nbegins\"\n0.1,\" 2 \",\n";
+    let options = ReadOptions {
+        wanted: Some(names(&["t", "q"])),
+        ..ReadOptions::default()
+    };
+    let recording = Recording::from_reader(text.as_bytes(), "run.csv", &options).unwrap();
+    assert_eq!(recording.column("q").unwrap(), [1.0, 2.0]);
+    assert_eq!(recording.line(1), Some(4));
 }
 
 #[test]
@@ -451,6 +486,7 @@ fn mutilated_recordings_get_an_answer() {
         let options = ReadOptions {
             renames: Vec::new(),
             not_finite,
+            ..ReadOptions::default()
         };
         match Recording::from_reader(bytes.as_slice(), "run.csv", &options) {
             Ok(recording) => {

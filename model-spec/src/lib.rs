@@ -5,6 +5,7 @@
 
 mod angle;
 mod build;
+mod column;
 mod diagnostic;
 mod document;
 mod editor;
@@ -35,6 +36,7 @@ mod unclosed;
 mod unit;
 mod values;
 
+pub use column::{ColumnFault, ColumnSum, Quantity, read_column};
 pub use diagnostic::{Diagnostic, Severity, SourceFile, Sources, Span};
 pub use exact::*;
 pub use kinds::{ActsOn, Carries, EffectKind, KindConstant, KindParameter, LIBRARY, Sign, library};

@@ -301,6 +301,7 @@ pub struct CoordinateLimits {
 /// How recordings name their columns.
 #[derive(Clone, Debug, Default)]
 pub struct Recording {
-    /// Pairs of our name (`t`, a coordinate, with `_d` or `_dd`, a drive) and theirs.
+    /// Pairs of our name (`t`, a coordinate, with `_d` or `_dd`, a drive) and theirs: a column, or a sum of columns
+    /// as [`crate::read_column`] reads it.
     pub columns: Vec<(String, String)>,
 }

@@ -268,7 +268,7 @@ fn models_have_the_published_numbers_of_base_parameters() {
         ("models/parallelogram.toml", 3),
         ("models/five_bar.toml", 11),
         ("models/three_rrr.toml", 19),
-        ("tx40.toml", 36),
+        ("tx40-rigid.toml", 36),
         ("ur5.toml", 36),
         ("tx40-ia.toml", 40),
         ("ur5-ia.toml", 40),

@@ -443,7 +443,10 @@ record! {
 record! {
     /// How recordings name their columns.
     RecordingEntry = "the recording" {
-        /// Our names (`t`, a coordinate, a coordinate with `_d` or `_dd`, a drive) and theirs.
+        /// Our names (`t`, a coordinate, a coordinate with `_d` or `_dd`, a drive, a drive with `_var` for the
+        /// variance of its force) and theirs: the name of a column,
+        /// or a sum of columns such as `(pos6 - pos5)/32 - pi/2`, with a unit in brackets behind it if it is not in
+        /// SI units: `pos1 [deg]`.
         "columns" columns: optional Named<Text>,
     }
 }

@@ -3,12 +3,14 @@
 //! There is no allocation and no unsafe code here, and without the feature `std` no standard library either.
 #![cfg_attr(not(feature = "std"), no_std)]
 
+mod lanes;
 mod loops;
 mod real;
 mod solve;
 
 use core::fmt;
 
+pub use lanes::{LARGEST_ANGLE, sin_cos_lanes};
 pub use loops::{Loops, Scales, correct, follow, settle};
 pub use real::Real;
 pub use solve::solve;

@@ -74,5 +74,5 @@ fn ur5_in_standard_denavit_hartenberg_agrees_with_pinocchio() {
 
 #[test]
 fn tx40_in_roll_pitch_yaw_agrees_with_pinocchio() {
-    check("tx40");
+    check("tx40-rigid");
 }

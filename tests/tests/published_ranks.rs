@@ -39,7 +39,7 @@ macro_rules! ranks {
 ranks! {
     puma560_has_36_and_40_with_drive_inertia: "puma560" => 36, "puma560-ia" => 40;
     rx90_has_36_and_40_with_drive_inertia: "rx90" => 36, "rx90-ia" => 40;
-    tx40_has_36_and_40_with_drive_inertia: "tx40" => 36, "tx40-ia" => 40;
+    tx40_has_36_and_40_with_drive_inertia: "tx40-rigid" => 36, "tx40-ia" => 40;
     ur5_has_36_and_40_with_drive_inertia: "ur5" => 36, "ur5-ia" => 40;
     stanford_has_33_and_37_with_drive_inertia: "stanford" => 33, "stanford-ia" => 37;
     panda_has_43_and_48_with_drive_inertia: "panda" => 43, "panda-ia" => 48;

@@ -23,7 +23,9 @@ macro_rules! snapshots {
 }
 
 snapshots! {
+    cloos: "cloos",
     emps: "emps",
+    emps_directional: "emps-directional",
     five_bar: "five_bar",
     four_bar: "four_bar",
     panda: "panda",
@@ -36,6 +38,7 @@ snapshots! {
     stanford: "stanford",
     three_rrr: "three_rrr",
     two_link: "two_link",
+    tx40: "tx40",
 }
 
 #[test]

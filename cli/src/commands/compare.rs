@@ -8,6 +8,7 @@ use crate::data::{self, Data};
 use crate::failure::{Failure, Outcome};
 use crate::model;
 use crate::show;
+use crate::suspects;
 use crate::table::count;
 use crate::terminal;
 
@@ -17,6 +18,7 @@ pub(crate) fn run(args: &CompareArgs) -> Outcome {
     let values = model.values(&args.parameters)?;
     let mut data = data::read_all(&model, &args.data, &args.preparation)?;
     data::note_twins(&mut data, &mut []);
+    suspects::examine(&model, &mut data);
     let measured = data
         .iter()
         .map(along::measured)

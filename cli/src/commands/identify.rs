@@ -1,23 +1,33 @@
 //! `identify`: base parameters from recordings by least squares.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use modelmill_identify::base_fit::fit_parameters;
 use modelmill_identify::deviations::FEWEST_ROWS;
-use modelmill_identify::{Figures, FitFile, FitParameter, Note, ParameterInfo, Severity, Status};
+use modelmill_identify::{
+    Figures, FitFile, FitParameter, Note, ParameterInfo, Repeats, Severity, Status,
+};
 use modelmill_spec::Sign;
 use serde_json::json;
 
 use crate::along;
 use crate::args::IdentifyArgs;
 use crate::data::{self, Data};
+use crate::estimation;
+use crate::estimators::EstimatorArgs;
 use crate::failure::{Failure, Outcome};
+use crate::instruments;
 use crate::model::{self, Model};
 use crate::output::Target;
-use crate::regression::{self, Identified};
+use crate::regression::{self, Identified, More};
 use crate::show;
+use crate::standstill;
+use crate::suspects;
 use crate::table::{count, number};
 use crate::terminal;
+
+/// Instruments whose smallest canonical correlation with the regressor is below this deserve a warning.
+const WEAK_INSTRUMENTS: f64 = 0.2;
 
 /// A fit with the figures that the nominal parameters have on the same recordings.
 pub(crate) struct Result {
@@ -27,14 +37,27 @@ pub(crate) struct Result {
     pub(crate) nominal_fit: Figures,
     /// The same on the recordings of the check.
     pub(crate) nominal_check: Option<Figures>,
+    /// How the parameters were estimated, and what that says.
+    estimator: serde_json::Value,
+    /// The same for people.
+    estimator_text: Vec<String>,
     /// What the user should know about the result; the fit holds it too.
     pub(crate) notes: Vec<Note>,
+    /// Periods and noise floors of periodic recordings, by their names.
+    pub(crate) repeats: Vec<(String, Repeats)>,
 }
 
 /// Identifies, prints and perhaps writes the fit.
 pub(crate) fn run(args: &IdentifyArgs) -> Outcome {
     let model = model::derive(&args.model)?;
-    let inputs = model.files.iter().chain(&args.data).chain(&args.check);
+    let files = args.estimators.instruments.iter().map(PathBuf::from);
+    let instruments: Vec<PathBuf> = files.filter(|file| file.exists()).collect();
+    let inputs = model
+        .files
+        .iter()
+        .chain(&args.data)
+        .chain(&args.check)
+        .chain(&instruments);
     let target = args
         .out
         .as_ref()
@@ -43,7 +66,11 @@ pub(crate) fn run(args: &IdentifyArgs) -> Outcome {
     let mut data = data::read_all(&model, &args.data, &args.preparation)?;
     let mut check = data::read_all(&model, &args.check, &args.preparation)?;
     data::note_twins(&mut data, &mut check);
-    let result = identify(&model, &data, &check)?;
+    suspects::examine(&model, &mut data);
+    suspects::examine(&model, &mut check);
+    standstill::leave_out(&model, &mut data, &args.standstill)?;
+    let instruments = instruments::read(&model, &data, &args.estimators, &args.preparation)?;
+    let result = identify(&model, &data, &instruments, &check, &args.estimators)?;
     for note in &result.notes {
         match note.severity {
             Severity::Warning => terminal::warn(&note.says),
@@ -68,12 +95,23 @@ pub(crate) fn run(args: &IdentifyArgs) -> Outcome {
 }
 
 /// Identifies a model from some recordings and holds it against others.
-pub(crate) fn identify(model: &Model, data: &[Data], check: &[Data]) -> Outcome<Result> {
-    let found = regression::identify(model, data)?;
+pub(crate) fn identify(
+    model: &Model,
+    data: &[Data],
+    instruments: &[Data],
+    check: &[Data],
+    args: &EstimatorArgs,
+) -> Outcome<Result> {
+    let found = regression::identify(model, data, instruments, args)?;
     let solution = &found.solution;
     let infos = model.infos();
     let unknown: Vec<ParameterInfo> = found.unknown.iter().map(|k| infos[*k].clone()).collect();
     let mut parameters = fit_parameters(&unknown, solution, &found.deviations);
+    if let More::Essential(dropped, _) = &found.more {
+        for one in dropped {
+            parameters[one.parameter].status = Status::NotEssential;
+        }
+    }
     for (k, info) in infos.iter().enumerate() {
         if model.is_known(k) {
             parameters.insert(k, known(info, model.nominal[k]));
@@ -84,6 +122,10 @@ pub(crate) fn identify(model: &Model, data: &[Data], check: &[Data]) -> Outcome<
     let names: Vec<String> = unknown.into_iter().map(|info| info.expression).collect();
     let (fit, nominal_fit) = both_figures(model, data, &values)?;
     let recordings = data.iter().chain(check);
+    let repeats = recordings
+        .clone()
+        .filter_map(|one| Some((one.run.file.clone(), one.run.repeats.clone()?)))
+        .collect();
     let (check, nominal_check) = if check.is_empty() {
         (None, None)
     } else {
@@ -113,7 +155,10 @@ pub(crate) fn identify(model: &Model, data: &[Data], check: &[Data]) -> Outcome<
         },
         nominal_fit,
         nominal_check,
+        estimator: estimation::json(model, &found, args),
+        estimator_text: estimation::text(model, &found, &infos),
         notes,
+        repeats,
     })
 }
 
@@ -138,6 +183,7 @@ fn known(info: &ParameterInfo, value: f64) -> FitParameter {
         value,
         std: None,
         classical_std: None,
+        effective_samples: None,
         unit: info.unit.clone(),
         nominal: info.nominal,
         status: Status::Known,
@@ -157,6 +203,25 @@ fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Ve
     }
     let unknown: Vec<&FitParameter> = found.unknown.iter().map(|k| &parameters[*k]).collect();
     let names: Vec<String> = unknown.iter().map(|p| p.expression.clone()).collect();
+    if let More::Instruments(strength, _) = &found.more
+        && *strength < WEAK_INSTRUMENTS
+    {
+        notes.push(Note::warning(format!(
+            "The instruments say little: their smallest correlation with the regressor is {}. Are they of the same motion, \
+             and in step with the recording?",
+            number(*strength)
+        )));
+    }
+    if found
+        .weighting
+        .as_ref()
+        .is_some_and(|weighting| !weighting.settled)
+    {
+        notes.push(Note::warning(
+            "The weights have not settled: residuals depend on the weights from one solution to the next; leave out --weights \
+             or --robust.",
+        ));
+    }
     for direction in &solution.undetermined {
         let kept: Vec<String> = direction
             .changes
@@ -271,6 +336,15 @@ impl Result {
                 "nominal".to_owned(),
                 json!({ "fit": self.nominal_fit, "check": self.nominal_check }),
             );
+            object.insert("estimator".to_owned(), self.estimator.clone());
+            if !self.repeats.is_empty() {
+                let repeats = self
+                    .repeats
+                    .iter()
+                    .map(|(file, repeats)| (file.clone(), json!(repeats)));
+                let repeats: serde_json::Map<String, serde_json::Value> = repeats.collect();
+                object.insert("repeats".to_owned(), json!(repeats));
+            }
         }
         Ok(value)
     }
@@ -297,6 +371,7 @@ impl Result {
             fit.scaled_condition_number
                 .map_or_else(|| "infinite".to_owned(), number),
         ));
+        lines.extend(self.estimator_text.iter().map(|line| format!("  {line}")));
         lines.push(String::new());
         lines.push(style.bold("error"));
         let has_nominal = (0..model.base.len()).any(|k| model.has_nominal(k));

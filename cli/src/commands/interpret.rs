@@ -42,7 +42,7 @@ pub(crate) fn run(args: &InterpretArgs) -> Outcome {
 }
 
 /// Indices of the unknown parameters, in the order in which they are asked for.
-fn unknown(model: &Model, names: &[String]) -> Outcome<Vec<usize>> {
+pub(crate) fn unknown(model: &Model, names: &[String]) -> Outcome<Vec<usize>> {
     let parameters = &model.derivation.mechanism.parameters;
     let mut found = Vec::new();
     for name in names.iter().map(|name| name.trim()) {
@@ -65,7 +65,7 @@ fn unknown(model: &Model, names: &[String]) -> Outcome<Vec<usize>> {
 }
 
 /// The equations in the unknowns alone, and which base parameters hold an unknown.
-fn problem(
+pub(crate) fn problem(
     model: &Model,
     unknown: &[usize],
     values: &[f64],

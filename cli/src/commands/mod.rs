@@ -7,6 +7,7 @@ pub(crate) mod diff;
 pub(crate) mod equations;
 pub(crate) mod evaluate;
 pub(crate) mod excite;
+pub(crate) mod experiment;
 pub(crate) mod generate;
 pub(crate) mod identify;
 pub(crate) mod import;

@@ -11,6 +11,7 @@ use crate::bundled::{self, PLAIN, Runs, WITH_RODS};
 use crate::commands::equations;
 use crate::commands::identify::{self, Result as Identified};
 use crate::data::{self, Data};
+use crate::estimators::EstimatorArgs;
 use crate::failure::{Failure, Outcome};
 use crate::model::{self, Model};
 use crate::output;
@@ -131,7 +132,7 @@ impl<'a> Chapter<'a> {
     fn new(model: &'a Model, runs: &'static Runs) -> Outcome<Self> {
         let fit = data::read_text(model, runs.fit.0, runs.fit.1)?;
         let mut check = vec![data::read_text(model, runs.check.0, runs.check.1)?];
-        let result = identify::identify(model, &[fit], &check)?;
+        let result = identify::identify(model, &[fit], &[], &check, &EstimatorArgs::default())?;
         Ok(Self {
             model,
             runs,

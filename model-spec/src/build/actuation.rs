@@ -6,6 +6,7 @@ use crate::build::Places;
 use crate::build::bodies::check_unique;
 use crate::build::frames::{Points, twice};
 use crate::build::symbols::Symbols;
+use crate::column;
 use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::exact::{CoordinateIdx, Exact, Symbol};
 use crate::mechanism::{Drive, DriveKind, Loop};
@@ -287,14 +288,16 @@ pub(super) fn recording(
         let name = &coordinate.name;
         known.extend([name.clone(), format!("{name}_d"), format!("{name}_dd")]);
     }
-    known.extend(drives.iter().map(|drive| drive.name.clone()));
+    for drive in drives {
+        known.extend([drive.name.clone(), format!("{}_var", drive.name)]);
+    }
     let mut pairs: Vec<(String, String)> = Vec::new();
     for (key, theirs) in &columns.entries {
         if !known.contains(&key.name) {
             if !log.is_full() {
                 log.push(
                     Diagnostic::error(key.span, format!("unknown column `{}`", key.name))
-                        .label("expected `t`, a coordinate, with `_d` or `_dd` for its derivatives, or a drive")
+                        .label("expected `t`, a coordinate, with `_d` or `_dd` for its derivatives, or a drive, with `_var` for the variance of its force")
                         .help(suggest::advice(
                             &key.name,
                             "columns",
@@ -308,6 +311,12 @@ pub(super) fn recording(
             log.push(
                 Diagnostic::error(theirs.span, "this column name is empty")
                     .label("expected the column's name in the recordings"),
+            );
+        }
+        if let Some(says) = column::fault_without_recording(&theirs.text) {
+            log.push(
+                Diagnostic::error(theirs.span, format!("this describes no column: {says}"))
+                    .label("expected a column's name, or a sum of columns such as `(pos6 - pos5)/32 - pi/2 [deg]`"),
             );
         }
         pairs.push((key.name.clone(), theirs.text.clone()));

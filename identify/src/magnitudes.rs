@@ -1,0 +1,78 @@
+//! Medians of streams: magnitudes go in one by one, their median comes out to three digits, in a
+//! memory that does not grow.
+
+/// Bits of a magnitude that tell its bin: exponent and six bits behind it, 64 bins for each octave.
+const BITS: u32 = 17;
+
+/// Counts of magnitudes in bins of equal ratio.
+#[derive(Debug, Clone)]
+pub(crate) struct Magnitudes {
+    counts: Vec<u64>,
+    total: u64,
+}
+
+impl Magnitudes {
+    pub(crate) fn new() -> Self {
+        Self {
+            counts: vec![0; 1 << BITS],
+            total: 0,
+        }
+    }
+
+    /// Counts a magnitude, which is finite and not negative.
+    pub(crate) fn add(&mut self, magnitude: f64) {
+        self.counts[bin(magnitude)] += 1;
+        self.total += 1;
+    }
+
+    /// The median, interpolated inside its bin; 0 for nothing.
+    pub(crate) fn median(&self) -> f64 {
+        let half = self.total as f64 / 2.0;
+        let mut before = 0.0;
+        for (at, count) in self
+            .counts
+            .iter()
+            .enumerate()
+            .filter(|(_, count)| **count > 0)
+        {
+            let count = *count as f64;
+            if before + count >= half {
+                let (low, high) = (edge(at), edge(at + 1));
+                return low + (high - low) * (half - before) / count;
+            }
+            before += count;
+        }
+        0.0
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, reason = "18 bits at most")]
+fn bin(magnitude: f64) -> usize {
+    // The sign bit of a magnitude is zero.
+    ((magnitude.to_bits() & (u64::MAX >> 1)) >> (63 - BITS)) as usize
+}
+
+fn edge(bin: usize) -> f64 {
+    f64::from_bits((bin as u64) << (63 - BITS))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_noise::Noise;
+
+    #[test]
+    fn the_median_agrees_with_the_sorted_one() {
+        let mut noise = Noise::new(2);
+        for scale in [1e-9, 1.0, 3e7] {
+            let mut magnitudes = Magnitudes::new();
+            let mut all: Vec<f64> = (0..4001).map(|_| scale * noise.normal().abs()).collect();
+            for x in &all {
+                magnitudes.add(*x);
+            }
+            all.sort_by(f64::total_cmp);
+            assert!((magnitudes.median() / all[2000] - 1.0).abs() < 5e-3);
+        }
+        assert!(Magnitudes::new().median().abs() < f64::MIN_POSITIVE);
+    }
+}

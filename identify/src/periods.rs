@@ -1,0 +1,347 @@
+//! Periodic runs: positions go in; the period, a Fourier series with its exact derivatives, and what the forces repeat
+//! themselves by come out.
+//!
+//! Sources: J. Swevers, C. Ganseman, D. B. Tuekel, J. de Schutter, H. Van Brussel, "Optimal robot excitation and
+//! identification", IEEE Trans. Robotics and Automation 13 (1997): a periodic motion is a finite Fourier series, so that
+//! its derivatives follow without differences, and the spread over its periods is the noise.
+
+use std::f64::consts::TAU;
+
+use indexmap::IndexMap;
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use crate::derivatives::Prepared;
+
+/// Points of the coarse search for a period.
+const GRID: usize = 2048;
+/// Two motions a period apart may differ by this part of the motion's variance.
+const SAME: f64 = 2e-3;
+
+/// How well a periodic run repeats itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Repeats {
+    /// The period, s.
+    pub period: f64,
+    /// Whole periods in the run.
+    pub periods: usize,
+    /// Spread of the forces over the periods, relative to their size (2-norms, all drives together): no model can be
+    /// better than that on one period.
+    pub noise_floor: f64,
+    /// The same for each drive.
+    pub channels: IndexMap<String, f64>,
+}
+
+/// The shortest period after which all positions are where they were, s; `None` if there is none of which the run holds
+/// two. Positions that do not move say nothing.
+pub fn find_period(time: &[f64], positions: &[&[f64]]) -> Option<f64> {
+    let moving: Vec<(&[f64], f64)> = positions
+        .iter()
+        .map(|q| (*q, variance(q)))
+        .filter(|(_, variance)| *variance > 0.0)
+        .collect();
+    if moving.is_empty() || time.len() < 16 {
+        return None;
+    }
+    // Ever longer beginnings of the run, on ever coarser grids, so that many short periods are found as such.
+    let mut samples = time.len().min(GRID);
+    loop {
+        let found = coarse_period(&time[..samples], &moving)
+            .map(|(period, step)| refine(time, &moving, period, step))
+            .filter(|(_, apart)| *apart < SAME);
+        if let Some((period, _)) = found {
+            return Some(period);
+        }
+        if samples == time.len() {
+            return None;
+        }
+        samples = (4 * samples).min(time.len());
+    }
+}
+
+/// A period by the first return of a motion to itself on an even grid, with the grid's step.
+fn coarse_period(time: &[f64], moving: &[(&[f64], f64)]) -> Option<(f64, f64)> {
+    let (start, end) = (*time.first()?, *time.last()?);
+    let m = time.len().min(GRID);
+    let step = (end - start) / (m - 1) as f64;
+    let grids: Vec<Vec<f64>> = moving
+        .iter()
+        .map(|(q, variance)| {
+            let scale = (2.0 * variance * moving.len() as f64).sqrt();
+            let at =
+                |i: usize| interpolate(time, &q[..time.len()], start + step * i as f64) / scale;
+            (0..m).map(at).collect()
+        })
+        .collect();
+    // How far the motion is from itself some steps later, 1 for unrelated motions.
+    let apart = |lag: usize| -> f64 {
+        let sum: f64 = grids
+            .iter()
+            .map(|q| {
+                let pairs = q.iter().zip(&q[lag..]);
+                pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>()
+            })
+            .sum();
+        sum / (m - lag) as f64
+    };
+    let far: Vec<f64> = (0..=m / 2).map(apart).collect();
+    let left = far.iter().position(|d| *d > 0.3)?;
+    let candidate = (left + 1..far.len() - 1)
+        .find(|i| far[*i] < 0.1 && far[*i] <= far[i - 1] && far[*i] <= far[i + 1])?;
+    Some((step * candidate as f64, step))
+}
+
+/// A period on the true time base of the whole run, to a small part of a step, and how far the motion is from itself
+/// after it.
+fn refine(time: &[f64], moving: &[(&[f64], f64)], period: f64, step: f64) -> (f64, f64) {
+    let end = time[time.len() - 1];
+    let stride = (time.len() / (4 * GRID)).max(1);
+    let apart = |period: f64| -> f64 {
+        let (mut sum, mut n) = (0.0, 0);
+        for i in (0..time.len()).step_by(stride) {
+            if time[i] + period > end {
+                break;
+            }
+            for (q, variance) in moving {
+                let other = interpolate(time, q, time[i] + period);
+                sum += (other - q[i]).powi(2) / (2.0 * variance * moving.len() as f64);
+            }
+            n += 1;
+        }
+        sum / f64::from(n.max(1))
+    };
+    let period = smallest(apart, period - 1.5 * step, period + 1.5 * step);
+    (period, apart(period))
+}
+
+/// The spread of forces over the periods of a run; `None` where it holds fewer than two, or no force.
+pub fn repeats(
+    time: &[f64],
+    period: f64,
+    names: &[String],
+    forces: &[Vec<f64>],
+) -> Option<Repeats> {
+    let (start, end) = (*time.first()?, *time.last()?);
+    let step = (end - start) / (time.len() - 1) as f64;
+    // The last sample of the last period lies one step before the next one would begin.
+    let periods = count((end + step - start) / period + 1e-6);
+    let phases = count((period / step).round());
+    if periods < 2 || phases < 2 {
+        return None;
+    }
+    let spread = |force: &[f64]| {
+        let (mut error, mut size) = (0.0, 0.0);
+        for phase in 0..phases {
+            let at = |k: usize| {
+                let t = start + period * (k as f64 + phase as f64 / phases as f64);
+                force[nearest(time, t)]
+            };
+            let mean = (0..periods).map(at).sum::<f64>() / periods as f64;
+            for k in 0..periods {
+                error += (at(k) - mean).powi(2) / (periods - 1) as f64;
+                size += at(k).powi(2) / periods as f64;
+            }
+        }
+        (error, size)
+    };
+    let sums: Vec<(f64, f64)> = forces.iter().map(|force| spread(force)).collect();
+    let ratio = |(error, size): (f64, f64)| (size > 0.0).then(|| (error / size).sqrt());
+    let total = sums
+        .iter()
+        .fold((0.0, 0.0), |(e, s), (error, size)| (e + error, s + size));
+    Some(Repeats {
+        period,
+        periods,
+        noise_floor: ratio(total)?,
+        channels: names
+            .iter()
+            .cloned()
+            .zip(sums)
+            .filter_map(|(name, sums)| Some((name, ratio(sums)?)))
+            .collect(),
+    })
+}
+
+/// The least squares projection of positions on a Fourier series of `harmonics` of the period, and its exact
+/// derivatives; `None` if there are too few samples for so many harmonics.
+pub fn project(time: &[f64], positions: &[f64], period: f64, harmonics: usize) -> Option<Prepared> {
+    let columns = 2 * harmonics + 1;
+    if time.len() < 2 * columns {
+        return None;
+    }
+    let basis = |t: f64, row: &mut [f64]| {
+        row[0] = 1.0;
+        for k in 1..=harmonics {
+            let (sin, cos) = (TAU * k as f64 * (t - time[0]) / period).sin_cos();
+            row[2 * k - 1] = cos;
+            row[2 * k] = sin;
+        }
+    };
+    // Normal equations: the columns are all but orthogonal, so nothing is lost by them.
+    let mut normal = DMatrix::zeros(columns, columns);
+    let mut right = DVector::zeros(columns);
+    let mut row = vec![0.0; columns];
+    for (t, q) in time.iter().zip(positions) {
+        basis(*t, &mut row);
+        let row = DVector::from_column_slice(&row);
+        normal.ger(1.0, &row, &row, 1.0);
+        right.axpy(*q, &row, 1.0);
+    }
+    let series = normal.cholesky()?.solve(&right);
+    let mut prepared = Prepared {
+        q: Vec::with_capacity(time.len()),
+        qd: Vec::with_capacity(time.len()),
+        qdd: Vec::with_capacity(time.len()),
+    };
+    for t in time {
+        basis(*t, &mut row);
+        let (mut q, mut qd, mut qdd) = (series[0], 0.0, 0.0);
+        for k in 1..=harmonics {
+            let w = TAU * k as f64 / period;
+            let (cos, sin) = (row[2 * k - 1], row[2 * k]);
+            let (a, b) = (series[2 * k - 1], series[2 * k]);
+            let value = a * cos + b * sin;
+            q += value;
+            qd += w * (b * cos - a * sin);
+            qdd -= w * w * value;
+        }
+        prepared.q.push(q);
+        prepared.qd.push(qd);
+        prepared.qdd.push(qdd);
+    }
+    Some(prepared)
+}
+
+/// A count that was computed as a float, rounded down; what is negative counts as none.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a float becomes the nearest count there is"
+)]
+pub(crate) fn count(value: f64) -> usize {
+    value as usize
+}
+
+fn variance(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n
+}
+
+/// Index of the sample whose time is nearest.
+fn nearest(time: &[f64], at: f64) -> usize {
+    let after = time.partition_point(|t| *t < at);
+    match after {
+        0 => 0,
+        after if after == time.len() => after - 1,
+        after if time[after] - at < at - time[after - 1] => after,
+        after => after - 1,
+    }
+}
+
+fn interpolate(time: &[f64], values: &[f64], at: f64) -> f64 {
+    let after = time.partition_point(|t| *t < at).clamp(1, time.len() - 1);
+    let (t0, t1) = (time[after - 1], time[after]);
+    let part = ((at - t0) / (t1 - t0)).clamp(0.0, 1.0);
+    values[after - 1] + part * (values[after] - values[after - 1])
+}
+
+/// Where a function with one dip is smallest, by golden sections.
+fn smallest(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    for _ in 0..40 {
+        let (a, b) = (high - golden * (high - low), low + golden * (high - low));
+        if f(a) < f(b) {
+            high = b;
+        } else {
+            low = a;
+        }
+    }
+    0.5 * (low + high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_noise::Noise;
+
+    const PERIOD: f64 = 2.37;
+
+    fn motion(t: f64) -> [f64; 3] {
+        let w = TAU / PERIOD;
+        let term = |k: f64, a: f64, phase: f64| {
+            let angle = k * w * t + phase;
+            [
+                a * angle.sin(),
+                a * k * w * angle.cos(),
+                -a * (k * w).powi(2) * angle.sin(),
+            ]
+        };
+        let (a, b) = (term(1.0, 0.8, 0.3), term(3.0, 0.3, 1.1));
+        [0, 1, 2].map(|i| a[i] + b[i])
+    }
+
+    /// Uneven times, as a clock that drifts gives them.
+    fn times(n: u32) -> Vec<f64> {
+        (0..n)
+            .map(|i| f64::from(i) * 0.004 + 0.0009 * (f64::from(i) * 0.7).sin())
+            .collect()
+    }
+
+    #[test]
+    fn the_period_is_found_on_the_true_time_base() {
+        let time = times(2500);
+        let mut noise = Noise::new(4);
+        let q: Vec<f64> = time
+            .iter()
+            .map(|t| motion(*t)[0] + 1e-4 * noise.normal())
+            .collect();
+        let period = find_period(&time, &[&q, &vec![1.0; q.len()]]).expect("a period");
+        assert!((period - PERIOD).abs() < 1e-3, "{period}");
+        // Less than two periods, or none at all.
+        assert_eq!(find_period(&time[..1100], &[&q[..1100]]), None);
+        let drifting: Vec<f64> = time.iter().map(|t| t * t).collect();
+        assert_eq!(find_period(&time, &[&drifting]), None);
+        assert_eq!(find_period(&time, &[&vec![1.0; q.len()]]), None);
+    }
+
+    #[test]
+    fn many_short_periods_are_not_taken_for_few_long_ones() {
+        let time = times(200_000);
+        let q: Vec<f64> = time.iter().map(|t| motion(*t)[0]).collect();
+        let period = find_period(&time, &[&q]).expect("a period");
+        assert!((period - PERIOD).abs() < 1e-3, "{period}");
+    }
+
+    #[test]
+    fn a_series_gives_exact_derivatives() {
+        let time = times(2500);
+        let q: Vec<f64> = time.iter().map(|t| motion(*t)[0]).collect();
+        let prepared = project(&time, &q, PERIOD, 5).expect("enough samples");
+        for (i, t) in time.iter().enumerate() {
+            let truth = motion(*t);
+            assert!((prepared.q[i] - truth[0]).abs() < 1e-9);
+            assert!((prepared.qd[i] - truth[1]).abs() < 1e-8);
+            assert!((prepared.qdd[i] - truth[2]).abs() < 1e-7);
+        }
+        assert_eq!(project(&time[..10], &q[..10], PERIOD, 5), None);
+    }
+
+    #[test]
+    fn the_spread_over_periods_is_the_noise() {
+        let time: Vec<f64> = (0..5925).map(|i| f64::from(i) * 0.004).collect();
+        let mut noise = Noise::new(9);
+        let force: Vec<f64> = time
+            .iter()
+            .map(|t| 100.0 * motion(*t)[0] + 3.0 * noise.normal())
+            .collect();
+        let size = (force.iter().map(|f| f * f).sum::<f64>() / force.len() as f64).sqrt();
+        let found = repeats(&time, PERIOD, &["a".to_owned()], &[force]).expect("ten periods");
+        assert_eq!(found.periods, 10);
+        assert!(
+            (found.noise_floor * size / 3.0 - 1.0).abs() < 0.05,
+            "{found:?}"
+        );
+        assert!((found.channels["a"] - found.noise_floor).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,65 @@
+//! What a prepared run tells of itself: periods and the spread of its forces over them, and standstill.
+
+use crate::notes::Note;
+use crate::periods;
+use crate::recording::Recording;
+use crate::run::Run;
+use crate::smoothing::Recorded;
+
+impl Recording {
+    /// Looks for a period, over which the spread of the forces is the noise floor.
+    pub(crate) fn note_repeats(&self, columns: &[Recorded<'_>], drives: &[String], run: &mut Run) {
+        let positions: Vec<&[f64]> = columns.iter().map(|column| column.q).collect();
+        let Some(forces) = &run.force else { return };
+        let Some(period) = periods::find_period(&run.time, &positions) else {
+            return;
+        };
+        run.repeats = periods::repeats(&run.time, period, drives, forces);
+        if let Some(repeats) = &run.repeats {
+            run.notes.push(Note::info(format!(
+                "The motion in {} repeats itself every {period:.6} s, {} times in all; over these periods the forces spread \
+                 by {:.3} % of their size, the noise floor.",
+                self.file(),
+                repeats.periods,
+                100.0 * repeats.noise_floor
+            )));
+        }
+    }
+
+    /// Says which coordinates stand still, for how much of the time.
+    pub(crate) fn note_standstill(&self, coordinates: &[String], run: &mut Run) {
+        for (name, q) in coordinates.iter().zip(&run.q) {
+            let (low, high) = q
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+                    (l.min(*v), h.max(*v))
+                });
+            if q.len() > 1 && high <= low {
+                run.notes.push(Note::warning(format!(
+                    "`{name}` does not move in {}: what depends on its motion cannot be identified.",
+                    self.file()
+                )));
+            }
+        }
+        let mut resting = Vec::new();
+        for (name, qd) in coordinates.iter().zip(&run.qd) {
+            let fastest = qd.iter().map(|rate| rate.abs()).fold(0.0, f64::max);
+            let slow = qd
+                .iter()
+                .filter(|rate| rate.abs() <= 0.01 * fastest)
+                .count();
+            // A motion that reverses now and then is slow for a per cent or two of its time.
+            if fastest > 0.0 && 10 * slow > qd.len() {
+                resting.push(format!("`{name}` for {} %", 100 * slow / qd.len()));
+            }
+        }
+        if !resting.is_empty() {
+            run.notes.push(Note::info(format!(
+                "In {} there is standstill, a rate below a hundredth of the fastest: {} of the samples. Friction takes any \
+                 value there; `--standstill 0.01` leaves such equations out of a fit.",
+                self.file(),
+                resting.join(", ")
+            )));
+        }
+    }
+}

@@ -1,0 +1,298 @@
+//! Recordings in other formats than CSV give the same numbers as CSV does, and faulty ones an answer.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use modelmill_identify::{Computed, Fault, NotFinite, ReadOptions, Recording};
+use parquet::basic::Compression;
+use parquet::data_type::{DoubleType, FloatType, Int64Type};
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::parser::parse_message_type;
+
+fn scratch(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join(name)
+}
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/fixtures")
+        .join(name)
+}
+
+const SAMPLES: usize = 20_000;
+
+fn time(k: usize) -> f64 {
+    k as f64 * 0.001
+}
+
+/// Two row groups, time stamps in microseconds, a float and a nullable double whose sample 7 is null.
+fn write_parquet(path: &Path, compression: Compression) {
+    let schema = parse_message_type(
+        "message run { required int64 stamp (TIMESTAMP(MICROS,true)); required float q; \
+         optional double motor; required double spare; }",
+    )
+    .expect("a schema");
+    let properties = WriterProperties::builder()
+        .set_compression(compression)
+        .build();
+    let file = File::create(path).expect("a writable folder");
+    let mut writer =
+        SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).expect("a writer");
+    for group in 0..2 {
+        let rows = group * SAMPLES / 2..(group + 1) * SAMPLES / 2;
+        let mut columns = writer.next_row_group().expect("a row group");
+        let stamps: Vec<i64> = rows
+            .clone()
+            .map(|k| 1_700_000_000_000_000 + 1000 * i64::try_from(k).expect("a small count"))
+            .collect();
+        let mut column = columns.next_column().expect("no fault").expect("a column");
+        column
+            .typed::<Int64Type>()
+            .write_batch(&stamps, None, None)
+            .expect("written");
+        column.close().expect("closed");
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "the column is of that type"
+        )]
+        let q: Vec<f32> = rows.clone().map(|k| time(k).sin() as f32).collect();
+        let mut column = columns.next_column().expect("no fault").expect("a column");
+        column
+            .typed::<FloatType>()
+            .write_batch(&q, None, None)
+            .expect("written");
+        column.close().expect("closed");
+        let force: Vec<f64> = rows
+            .clone()
+            .filter(|k| *k != 7)
+            .map(|k| 3.0 * time(k))
+            .collect();
+        let levels: Vec<i16> = rows.clone().map(|k| i16::from(k != 7)).collect();
+        let mut column = columns.next_column().expect("no fault").expect("a column");
+        column
+            .typed::<DoubleType>()
+            .write_batch(&force, Some(&levels), None)
+            .expect("written");
+        column.close().expect("closed");
+        let spare: Vec<f64> = rows.map(|_| f64::NAN).collect();
+        let mut column = columns.next_column().expect("no fault").expect("a column");
+        column
+            .typed::<DoubleType>()
+            .write_batch(&spare, None, None)
+            .expect("written");
+        column.close().expect("closed");
+        columns.close().expect("closed");
+    }
+    writer.close().expect("closed");
+}
+
+fn options() -> ReadOptions {
+    ReadOptions {
+        renames: vec![("t".to_owned(), "stamp".to_owned())],
+        wanted: Some(["t", "q", "motor"].map(str::to_owned).to_vec()),
+        ..ReadOptions::default()
+    }
+}
+
+#[test]
+fn parquet_gives_numbers_times_and_nulls() {
+    for (name, compression) in [
+        ("plain", Compression::UNCOMPRESSED),
+        ("snappy", Compression::SNAPPY),
+        ("lz4", Compression::LZ4_RAW),
+    ] {
+        let path = scratch(&format!("{name}.parquet"));
+        write_parquet(&path, compression);
+        assert_eq!(
+            Recording::names_in(&path).unwrap(),
+            ["stamp", "q", "motor", "spare"]
+        );
+        let recording = Recording::read_with(&path, &options()).unwrap();
+        assert_eq!(recording.samples(), SAMPLES);
+        for k in [0, 1, 9_999, 10_000, 19_999] {
+            assert!((recording.column("t").unwrap()[k] - time(k)).abs() < 1e-12);
+            assert!((recording.column("q").unwrap()[k] - time(k).sin()).abs() < 1e-6);
+        }
+        let missing = recording.column("motor").unwrap_err().to_string();
+        assert!(
+            missing.contains(", row 8: column `motor` holds `null or NaN`"),
+            "{missing}"
+        );
+        let kept = Recording::read_with(
+            &path,
+            &ReadOptions {
+                not_finite: NotFinite::LeaveOut,
+                ..options()
+            },
+        )
+        .unwrap();
+        assert_eq!(kept.samples(), SAMPLES - 1);
+        assert_eq!(kept.line(7), Some(9));
+        assert!((kept.column("motor").unwrap()[7] - 3.0 * time(8)).abs() < 1e-12);
+    }
+}
+
+/// What came through a pipe is in memory: it gives what the file gives.
+#[test]
+fn every_format_is_read_from_memory_too() {
+    let parquet = scratch("memory.parquet");
+    write_parquet(&parquet, Compression::SNAPPY);
+    let csv = scratch("memory.csv");
+    std::fs::write(&csv, "t,q\n0,1.5\n0.1,1.6\n").unwrap();
+    for path in [
+        &parquet,
+        &csv,
+        &fixture("run-v7.mat"),
+        &fixture("run-v6.mat"),
+    ] {
+        let bytes = std::fs::read(path).unwrap();
+        let file = path.display().to_string();
+        assert_eq!(
+            Recording::names_in_bytes(&bytes, &file).unwrap(),
+            Recording::names_in(path).unwrap()
+        );
+        let options = if *path == parquet {
+            options()
+        } else {
+            ReadOptions::default()
+        };
+        let from_bytes = Recording::from_bytes(&bytes, &file, &options).unwrap();
+        let from_file = Recording::read_with(path, &options).unwrap();
+        assert_eq!(from_bytes.samples(), from_file.samples());
+        let column = from_file.column("t").unwrap();
+        assert_eq!(from_bytes.column("t").unwrap(), column);
+        assert_eq!(from_bytes.notes(), from_file.notes());
+    }
+    let broken = std::fs::read(&parquet).unwrap();
+    let broken = &broken[..broken.len() / 2];
+    for says in [
+        Recording::names_in_bytes(broken, "-")
+            .unwrap_err()
+            .to_string(),
+        Recording::from_bytes(b"MATLAB 7.3 MAT-file, Platform", "-", &options())
+            .unwrap_err()
+            .to_string(),
+    ] {
+        assert!(says.starts_with("-: this is a "), "{says}");
+    }
+}
+
+#[test]
+fn only_the_time_that_is_asked_for_is_read() {
+    let path = scratch("between.parquet");
+    write_parquet(&path, Compression::SNAPPY);
+    let part = |between| {
+        Recording::read_with(
+            &path,
+            &ReadOptions {
+                between: Some(between),
+                most_numbers: 30_010,
+                ..options()
+            },
+        )
+    };
+    let recording = part((2.0, 12.0)).unwrap();
+    assert!((9_999..=10_001).contains(&recording.samples()));
+    assert!(recording.notes()[0].says.contains("time stamps"));
+    assert!(
+        recording.notes()[1]
+            .says
+            .contains("from t = 2 s to 12 s are read; 2000 samples before")
+    );
+    assert_eq!(
+        part((30.0, 40.0)).unwrap_err().fault,
+        Fault::NoneBetween {
+            from: 30.0,
+            to: 40.0
+        }
+    );
+    let says = part((0.0, 20.0)).unwrap_err().to_string();
+    assert!(
+        says.contains("too large to be kept in memory") && says.contains("--between 0,10"),
+        "{says}"
+    );
+}
+
+#[test]
+fn broken_files_get_an_answer() {
+    let path = scratch("broken.parquet");
+    write_parquet(&path, Compression::SNAPPY);
+    let bytes = std::fs::read(&path).unwrap();
+    for length in [4, 100, bytes.len() / 2, bytes.len() - 1] {
+        std::fs::write(&path, &bytes[..length]).unwrap();
+        let says = Recording::read_with(&path, &options())
+            .unwrap_err()
+            .to_string();
+        assert!(
+            says.contains("this is a Parquet file: it cannot be read"),
+            "{says}"
+        );
+    }
+    let path = scratch("broken.mat");
+    let bytes = std::fs::read(fixture("run-v7.mat")).unwrap();
+    for length in [40, 130, bytes.len() / 2] {
+        std::fs::write(&path, &bytes[..length]).unwrap();
+        let says = Recording::read(&path, &[]).unwrap_err().to_string();
+        assert!(says.contains("this is a MATLAB file"), "{says}");
+    }
+    std::fs::write(&path, b"MATLAB 7.3 MAT-file, Platform: GLNXA64").unwrap();
+    let says = Recording::read(&path, &[]).unwrap_err().to_string();
+    assert!(says.contains("-v7"), "{says}");
+}
+
+/// Both files were written by scipy 1.17, the one with compressed and upright arrays, the other with arrays that lie.
+#[test]
+fn matlab_files_give_vectors_and_columns_of_matrices() {
+    for name in ["run-v7.mat", "run-v6.mat"] {
+        let recording = Recording::read(fixture(name), &[("q1", "q_1"), ("motor", "F")]).unwrap();
+        assert_eq!(recording.samples(), 50, "{name}");
+        for k in [0, 1, 49] {
+            let t = k as f64 * 0.01;
+            for (column, expected) in [
+                ("t", t),
+                ("q1", t.sin()),
+                ("q_2", (2.0 * t).cos()),
+                ("motor", 3.0 * k as f64),
+            ] {
+                let value = recording.column(column).unwrap()[k];
+                assert!(
+                    (value - expected).abs() < 1e-12,
+                    "{name}: {column} is {value}"
+                );
+            }
+        }
+    }
+    let recording = Recording::read(fixture("run-v7.mat"), &[]).unwrap();
+    let says = &recording.notes()[0].says;
+    assert!(says.contains("`gain`") && says.contains("`z`"), "{says}");
+}
+
+#[test]
+fn sums_of_columns_are_computed_and_keep_their_faults() {
+    let text = "t,a,b\n0,1,10\n1,2,NaN\n2,3,30\n";
+    let read = |terms: &[(&str, f64)], not_finite| {
+        let options = ReadOptions {
+            computed: vec![Computed {
+                name: "a".to_owned(),
+                terms: terms
+                    .iter()
+                    .map(|(name, f)| ((*name).to_owned(), *f))
+                    .collect(),
+                offset: 0.5,
+            }],
+            not_finite,
+            wanted: Some(vec!["t".to_owned(), "a".to_owned()]),
+            ..ReadOptions::default()
+        };
+        Recording::from_reader(text.as_bytes(), "run.csv", &options)
+    };
+    let own = read(&[("a", 2.0)], NotFinite::Refuse).unwrap();
+    assert_eq!(own.column("a").unwrap(), [2.5, 4.5, 6.5]);
+    let sum = read(&[("a", 2.0), ("b", -1.0)], NotFinite::Refuse).unwrap();
+    assert!(sum.column("a").unwrap_err().to_string().contains("line 3"));
+    let left = read(&[("a", 2.0), ("b", -1.0)], NotFinite::LeaveOut).unwrap();
+    assert_eq!(left.column("a").unwrap(), [-7.5, -23.5]);
+    assert!(read(&[("c", 1.0)], NotFinite::Refuse).is_err());
+}

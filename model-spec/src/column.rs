@@ -1,0 +1,471 @@
+//! Columns of recordings as a model file or a command line describes them: `"q_meas_m"`, `"qm5/45"`,
+//! `"(qm6 - qm5)/32 - pi/2"`, `"pos1 [deg]"` go in, together with the names that a recording has; an affine sum of
+//! its columns in SI units comes out.
+//!
+//! A text that is the name of a column, letter by letter, is that column, whatever else it could mean.
+
+use std::fmt;
+
+use num_traits::ToPrimitive;
+
+use crate::diagnostic::{Log, Span};
+use crate::exact::Function;
+use crate::formula::{Ast, AstKind};
+use crate::mechanism::{DriveKind, Mechanism, Motion};
+use crate::parser::parse;
+use crate::suggest;
+
+/// What a column of a recording holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Time, s.
+    Time,
+    /// An angle or its first or second derivative, rad, rad/s, rad/s^2.
+    Angle(u8),
+    /// A length or its first or second derivative, m, m/s, m/s^2.
+    Length(u8),
+    /// A force, N.
+    Force,
+    /// A torque, N m.
+    Torque,
+    /// The variance of a force, N^2.
+    ForceVariance,
+    /// The variance of a torque, (N m)^2.
+    TorqueVariance,
+}
+
+/// `offset + sum of factor * column`, in SI units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ColumnSum {
+    /// Columns of the recording with their factors, none of which is zero; in the order of the text.
+    pub terms: Vec<(String, f64)>,
+    /// What is added.
+    pub offset: f64,
+}
+
+/// Why a text describes no column of a recording.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ColumnFault {
+    /// It names a column that the recording does not have.
+    Missing {
+        /// The name.
+        column: String,
+        /// The closest name that the recording has.
+        nearest: Option<String>,
+    },
+    /// It cannot be read, or is no affine sum of columns.
+    Malformed {
+        /// What is wrong, as a clause.
+        says: String,
+    },
+}
+
+impl fmt::Display for ColumnFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Missing { column, nearest } => {
+                write!(f, "the recording has no column `{column}`")?;
+                match nearest {
+                    Some(nearest) => write!(f, "; is `{nearest}` meant?"),
+                    None => Ok(()),
+                }
+            }
+            Self::Malformed { says } => f.write_str(says),
+        }
+    }
+}
+
+impl std::error::Error for ColumnFault {}
+
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+const TURN: f64 = std::f64::consts::TAU;
+
+/// Units of columns with the factor that leads to SI, the SI unit first.
+fn units(quantity: Quantity) -> &'static [(&'static str, f64)] {
+    match quantity {
+        Quantity::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("min", 60.0)],
+        Quantity::Angle(0) => &[("rad", 1.0), ("deg", DEGREE), ("mrad", 1e-3), ("rev", TURN)],
+        Quantity::Angle(1) => &[
+            ("rad/s", 1.0),
+            ("deg/s", DEGREE),
+            ("rpm", TURN / 60.0),
+            ("rev/s", TURN),
+        ],
+        Quantity::Angle(_) => &[("rad/s^2", 1.0), ("deg/s^2", DEGREE), ("rev/s^2", TURN)],
+        Quantity::Length(0) => &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6)],
+        Quantity::Length(1) => &[
+            ("m/s", 1.0),
+            ("mm/s", 1e-3),
+            ("cm/s", 1e-2),
+            ("mm/min", 1e-3 / 60.0),
+        ],
+        Quantity::Length(_) => &[("m/s^2", 1.0), ("mm/s^2", 1e-3), ("cm/s^2", 1e-2)],
+        Quantity::Force => &[("N", 1.0), ("kN", 1e3), ("mN", 1e-3)],
+        Quantity::Torque => &[
+            ("N m", 1.0),
+            ("Nm", 1.0),
+            ("N mm", 1e-3),
+            ("Nmm", 1e-3),
+            ("N cm", 1e-2),
+            ("Ncm", 1e-2),
+            ("mN m", 1e-3),
+            ("mNm", 1e-3),
+            ("kN m", 1e3),
+            ("kNm", 1e3),
+        ],
+        Quantity::ForceVariance => &[("N^2", 1.0), ("kN^2", 1e6), ("mN^2", 1e-6)],
+        Quantity::TorqueVariance => &[("N^2 m^2", 1.0), ("(N m)^2", 1.0), ("Nm^2", 1.0)],
+    }
+}
+
+impl Mechanism {
+    /// The names that columns of recordings have in this model, with what each holds: `t`, every active coordinate
+    /// with its two derivatives (`_d`, `_dd`), and every drive with the variance of its force (`_var`).
+    pub fn columns(&self) -> Vec<(String, Quantity)> {
+        let mut columns = vec![("t".to_owned(), Quantity::Time)];
+        for coordinate in self.coordinates.iter().filter(|c| !c.passive) {
+            for (order, suffix) in (0..).zip(["", "_d", "_dd"]) {
+                let quantity = match coordinate.motion {
+                    Motion::Revolute => Quantity::Angle(order),
+                    Motion::Prismatic => Quantity::Length(order),
+                };
+                columns.push((format!("{}{suffix}", coordinate.name), quantity));
+            }
+        }
+        for drive in &self.drives {
+            let is_torque = match &drive.kind {
+                DriveKind::Joint(coordinate) => {
+                    self.coordinates[coordinate.0].motion == Motion::Revolute
+                }
+                DriveKind::Linear { .. } => false,
+            };
+            let (force, variance) = if is_torque {
+                (Quantity::Torque, Quantity::TorqueVariance)
+            } else {
+                (Quantity::Force, Quantity::ForceVariance)
+            };
+            columns.push((drive.name.clone(), force));
+            columns.push((format!("{}_var", drive.name), variance));
+        }
+        columns
+    }
+}
+
+/// Reads the description of a column that holds `quantity`, for a recording whose columns are called `names`.
+///
+/// The text is the name of a column or an expression in names of columns, the model's constants (`constants` gives
+/// their values) and numbers, affine in the columns; a unit in brackets at its end, such as `[deg]`, says what it is
+/// in if not in SI units.
+/// Fails when it names a column that is not there, is not affine, or has a unit that does not suit the quantity.
+///
+/// ```
+/// use modelmill_spec::{Quantity, read_column};
+/// let names = ["time_s".to_owned(), "qm5".to_owned(), "qm6".to_owned()];
+/// let sum = read_column("(qm6 - qm5)/32 [deg]", Quantity::Angle(0), &names, &|_| None)?;
+/// assert_eq!(sum.terms[1].0, "qm5");
+/// assert!((sum.terms[1].1 + std::f64::consts::PI / 180.0 / 32.0).abs() < 1e-18);
+/// # Ok::<(), modelmill_spec::ColumnFault>(())
+/// ```
+pub fn read_column(
+    text: &str,
+    quantity: Quantity,
+    names: &[String],
+    constants: &dyn Fn(&str) -> Option<f64>,
+) -> Result<ColumnSum, ColumnFault> {
+    let text = text.trim();
+    let single = |name: &str, factor: f64| ColumnSum {
+        terms: vec![(name.to_owned(), factor)],
+        offset: 0.0,
+    };
+    let has = |name: &str| names.iter().any(|other| other == name);
+    if has(text) {
+        return Ok(single(text, 1.0));
+    }
+    let (body, unit) = split_unit(text);
+    let factor = match unit {
+        Some(unit) => factor_of(unit, quantity)?,
+        None => 1.0,
+    };
+    if has(body) {
+        return Ok(single(body, factor));
+    }
+    let missing = |column: &str| ColumnFault::Missing {
+        column: column.to_owned(),
+        nearest: suggest::nearest(column, names.iter().map(String::as_str)).map(str::to_owned),
+    };
+    let span = Span {
+        file: 0,
+        start: 0,
+        end: text.len(),
+    };
+    let mut log = Log::default();
+    let Some(ast) = parse(body, span, None, &mut log) else {
+        // What cannot be read as an expression is taken for a name with blanks and the like.
+        if !body.contains(['+', '*', '/', '^', '(']) {
+            return Err(missing(body));
+        }
+        let faults = log.finish();
+        let fault = faults.first();
+        return Err(ColumnFault::Malformed {
+            says: format!(
+                "`{body}` is neither the name of a column nor an expression: {}",
+                fault.map_or("it cannot be read", |fault| fault.message.as_str())
+            ),
+        });
+    };
+    let sum = affine(&ast, &|name| {
+        if has(name) {
+            Some(Value::column(name))
+        } else {
+            constants(name).map(Value::number)
+        }
+    })
+    .map_err(|fault| match fault {
+        Unread::Name(name) => missing(&name),
+        Unread::Says(says) => ColumnFault::Malformed {
+            says: format!("in `{body}` {says}"),
+        },
+    })?;
+    if sum.terms.is_empty() {
+        return Err(ColumnFault::Malformed {
+            says: format!("`{body}` holds no column of the recording"),
+        });
+    }
+    Ok(ColumnSum {
+        terms: sum
+            .terms
+            .into_iter()
+            .map(|(name, value)| (name, factor * value))
+            .collect(),
+        offset: factor * sum.offset,
+    })
+}
+
+/// Why a text can be the description of no column of any recording; `None` if it can be.
+pub(crate) fn fault_without_recording(text: &str) -> Option<String> {
+    let (body, _) = split_unit(text.trim());
+    let span = Span {
+        file: 0,
+        start: 0,
+        end: text.len(),
+    };
+    let ast = parse(body, span, None, &mut Log::default())?;
+    match affine(&ast, &|name| Some(Value::column(name))) {
+        Err(Unread::Says(says)) => Some(says),
+        _ => None,
+    }
+}
+
+/// The text before a unit in brackets at its end, and the unit.
+fn split_unit(text: &str) -> (&str, Option<&str>) {
+    let split = text
+        .strip_suffix(']')
+        .and_then(|rest| rest.rsplit_once('['));
+    match split {
+        Some((body, unit)) if !body.trim().is_empty() => (body.trim(), Some(unit.trim())),
+        _ => (text, None),
+    }
+}
+
+fn factor_of(unit: &str, quantity: Quantity) -> Result<f64, ColumnFault> {
+    let units = units(quantity);
+    let found = units.iter().find(|(name, _)| *name == unit);
+    found
+        .map(|(_, factor)| *factor)
+        .ok_or_else(|| ColumnFault::Malformed {
+            says: format!(
+                "the unit `{unit}` does not suit it; expected one of {}",
+                units
+                    .iter()
+                    .map(|(name, _)| format!("`{name}`"))
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            ),
+        })
+}
+
+/// An affine value while it is worked out.
+#[derive(Clone, Debug, Default)]
+struct Value {
+    terms: Vec<(String, f64)>,
+    offset: f64,
+}
+
+/// Why an expression has no affine value.
+enum Unread {
+    Name(String),
+    Says(String),
+}
+
+impl Value {
+    fn number(offset: f64) -> Self {
+        Self {
+            terms: Vec::new(),
+            offset,
+        }
+    }
+
+    fn column(name: &str) -> Self {
+        Self {
+            terms: vec![(name.to_owned(), 1.0)],
+            offset: 0.0,
+        }
+    }
+
+    fn add(mut self, other: Self) -> Self {
+        for (name, factor) in other.terms {
+            match self.terms.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, sum)) => *sum += factor,
+                None => self.terms.push((name, factor)),
+            }
+        }
+        self.terms.retain(|(_, factor)| *factor != 0.0);
+        self.offset += other.offset;
+        self
+    }
+
+    fn map(mut self, f: impl Fn(f64) -> f64) -> Self {
+        for (_, factor) in &mut self.terms {
+            *factor = f(*factor);
+        }
+        self.offset = f(self.offset);
+        self
+    }
+}
+
+/// The affine value of an expression.
+fn affine(ast: &Ast, look_up: &dyn Fn(&str) -> Option<Value>) -> Result<Value, Unread> {
+    let of = |ast: &Ast| affine(ast, look_up);
+    let number = |ast: &Ast, what: &str| {
+        let value = affine(ast, look_up)?;
+        if value.terms.is_empty() {
+            return Ok(value.offset);
+        }
+        Err(Unread::Says(format!(
+            "a column stands {what}; expected a sum of columns, each times a number, and numbers"
+        )))
+    };
+    let value = match &ast.kind {
+        AstKind::Rational(value) => Value::number(value.to_f64().unwrap_or(f64::NAN)),
+        AstKind::Pi => Value::number(std::f64::consts::PI),
+        AstKind::Name(name) => look_up(name).ok_or_else(|| Unread::Name(name.clone()))?,
+        AstKind::Sum(terms) => {
+            let mut sum = Value::default();
+            for term in terms {
+                sum = sum.add(of(term)?);
+            }
+            sum
+        }
+        AstKind::Negative(inner) => of(inner)?.map(|value| -value),
+        AstKind::Product(factors) => {
+            let mut product = Value::number(1.0);
+            for factor in factors {
+                let factor = of(factor)?;
+                product = if factor.terms.is_empty() {
+                    product.map(|value| value * factor.offset)
+                } else if product.terms.is_empty() {
+                    factor.map(|value| value * product.offset)
+                } else {
+                    return Err(Unread::Says(
+                        "columns are multiplied with each other; expected a sum of columns, each times a number"
+                            .to_owned(),
+                    ));
+                };
+            }
+            product
+        }
+        AstKind::Quotient(above, below) => {
+            let below = number(below, "below a fraction line")?;
+            of(above)?.map(|value| value / below)
+        }
+        AstKind::Power(base, 1) => of(base)?,
+        AstKind::Power(base, exponent) => {
+            Value::number(number(base, "in a power")?.powi(*exponent))
+        }
+        AstKind::Apply(function, inner) => {
+            Value::number(apply(*function, number(inner, "in a function")?))
+        }
+    };
+    if value.offset.is_finite() && value.terms.iter().all(|(_, factor)| factor.is_finite()) {
+        Ok(value)
+    } else {
+        Err(Unread::Says(
+            "a number is not finite; is something divided by zero?".to_owned(),
+        ))
+    }
+}
+
+fn apply(function: Function, x: f64) -> f64 {
+    match function {
+        Function::Sin => x.sin(),
+        Function::Cos => x.cos(),
+        Function::Sqrt => x.sqrt(),
+        Function::Abs => x.abs(),
+        Function::Sign if x == 0.0 => 0.0,
+        Function::Sign => x.signum(),
+        Function::Tanh => x.tanh(),
+        Function::Exp => x.exp(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+
+    fn read(text: &str) -> Result<ColumnSum, ColumnFault> {
+        let names = ["t_s", "qm5", "qm6", "pos 1 [deg]", "pos"].map(str::to_owned);
+        read_column(text, Quantity::Angle(0), &names, &|name| {
+            (name == "N5").then_some(45.0)
+        })
+    }
+
+    #[track_caller]
+    fn check(text: &str, terms: &[(&str, f64)], offset: f64) {
+        let sum = read(text).unwrap_or_else(|fault| panic!("{text}: {fault}"));
+        assert_eq!(sum.terms.len(), terms.len(), "{text}");
+        for ((name, factor), (expected, value)) in sum.terms.iter().zip(terms) {
+            assert_eq!(name, expected);
+            assert!((factor - value).abs() < 1e-16, "{text}: {factor}");
+        }
+        assert!((sum.offset - offset).abs() < 1e-15, "{text}");
+    }
+
+    #[test]
+    fn sums_of_columns_are_read() {
+        check("qm5", &[("qm5", 1.0)], 0.0);
+        check("qm5/45", &[("qm5", 1.0 / 45.0)], 0.0);
+        check("qm5/N5", &[("qm5", 1.0 / 45.0)], 0.0);
+        check(
+            "(qm6 - qm5)/32 - pi/2",
+            &[("qm6", 1.0 / 32.0), ("qm5", -1.0 / 32.0)],
+            -PI / 2.0,
+        );
+        check("2*(qm5 + 1) - qm5", &[("qm5", 1.0)], 2.0);
+        check("pos [deg]", &[("pos", PI / 180.0)], 0.0);
+        check("pos - 90 [deg]", &[("pos", PI / 180.0)], -PI / 2.0);
+        // The very name of a column is that column, and a unit may follow it.
+        check("pos 1 [deg]", &[("pos 1 [deg]", 1.0)], 0.0);
+        check("pos 1 [deg] [deg]", &[("pos 1 [deg]", PI / 180.0)], 0.0);
+    }
+
+    #[test]
+    fn what_cannot_be_read_says_why() {
+        let says = |text: &str| read(text).unwrap_err().to_string();
+        assert_eq!(
+            says("qm7/45"),
+            "the recording has no column `qm7`; is `qm5` meant?"
+        );
+        assert_eq!(says("gear box"), "the recording has no column `gear box`");
+        assert!(says("qm5*qm6").contains("multiplied with each other"));
+        assert!(says("1/qm5").contains("below a fraction line"));
+        assert!(says("sin(qm5)").contains("in a function"));
+        assert!(says("qm5^2").contains("in a power"));
+        assert!(says("qm5/0").contains("zero") || says("qm5/0").contains("finite"));
+        assert!(says("qm5 - qm5 + 1").contains("no column"));
+        assert!(says("qm5 +").contains("neither the name of a column nor an expression"));
+        assert!(says("qm5 [mm]").contains("`mm` does not suit it; expected one of `rad`, `deg`"));
+    }
+}

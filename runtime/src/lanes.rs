@@ -1,0 +1,167 @@
+//! Sine and cosine of many angles at once: arrays go in, arrays come out, without a branch or a call inside the loop, so
+//! that the compiler turns it into vectors of whatever width the caller is compiled for.
+//!
+//! Argument reduction in three parts of pi/2 and polynomials on [-pi/4, pi/4] after K. C. Ng's `k_sin.c`, `k_cos.c` and
+//! `e_rem_pio2.c` of FDLIBM 5.3 (Sun Microsystems, 1993; freely distributable). The error stays below 1 ulp for angles up
+//! to [`LARGEST_ANGLE`]; arrays with a larger one, or with one that is no finite number, go through
+//! [`Real::sin_cos`](crate::Real::sin_cos) one by one.
+
+use crate::Real;
+
+/// Largest angle, rad, for which the reduction in three parts is exact enough: 2^20 quarters of a turn.
+pub const LARGEST_ANGLE: f64 = 1_647_099.0;
+
+/// Sine and cosine of each angle, rad; the same on every machine.
+#[allow(
+    clippy::inline_always,
+    reason = "a function of its own would be compiled for the narrowest vectors"
+)]
+#[inline(always)]
+pub fn sin_cos_lanes<const N: usize>(angle: &[f64; N], sin: &mut [f64; N], cos: &mut [f64; N]) {
+    let mut regular = true;
+    for x in angle {
+        regular &= x.abs() < LARGEST_ANGLE;
+    }
+    if regular {
+        for k in 0..N {
+            (sin[k], cos[k]) = reduced_sin_cos(angle[k]);
+        }
+    } else {
+        for k in 0..N {
+            (sin[k], cos[k]) = Real::sin_cos(angle[k]);
+        }
+    }
+}
+
+/// One angle below [`LARGEST_ANGLE`], without branches.
+#[allow(clippy::inline_always, reason = "as above")]
+#[allow(
+    clippy::excessive_precision,
+    reason = "as printed in the sources; the nearest doubles are meant"
+)]
+#[inline(always)]
+fn reduced_sin_cos(x: f64) -> (f64, f64) {
+    // Adding and subtracting 1.5 * 2^52 rounds to a whole number, which then stands in the lowest bits.
+    const ROUND: f64 = 6_755_399_441_055_744.0;
+    const PIO2_1: f64 = 1.570_796_326_734_125_614_17;
+    const PIO2_2: f64 = 6.077_100_506_303_965_976_60e-11;
+    const PIO2_2T: f64 = 2.022_266_248_795_950_631_54e-21;
+    let shifted = x * core::f64::consts::FRAC_2_PI + ROUND;
+    let quarter = shifted.to_bits();
+    let turns = shifted - ROUND;
+    let first = x - turns * PIO2_1;
+    let second = turns * PIO2_2;
+    let head = first - second;
+    let tail = turns * PIO2_2T - ((first - head) - second);
+    let y = head - tail;
+    let rest = (head - y) - tail;
+    let (s, c) = (kernel_sin(y, rest), kernel_cos(y, rest));
+    let swap = 0u64.wrapping_sub(quarter & 1);
+    let (s, c) = (s.to_bits(), c.to_bits());
+    let sin = (s & !swap) | (c & swap);
+    let cos = (c & !swap) | (s & swap);
+    let sin_sign = (quarter & 2) << 62;
+    let cos_sign = (quarter.wrapping_add(1) & 2) << 62;
+    (
+        f64::from_bits(sin ^ sin_sign),
+        f64::from_bits(cos ^ cos_sign),
+    )
+}
+
+#[allow(clippy::inline_always, reason = "as above")]
+#[allow(clippy::excessive_precision, reason = "as above")]
+#[inline(always)]
+fn kernel_sin(x: f64, tail: f64) -> f64 {
+    const S1: f64 = -1.666_666_666_666_663_243_48e-1;
+    const S2: f64 = 8.333_333_333_322_489_461_24e-3;
+    const S3: f64 = -1.984_126_982_985_794_931_34e-4;
+    const S4: f64 = 2.755_731_370_707_006_767_89e-6;
+    const S5: f64 = -2.505_076_025_340_686_341_95e-8;
+    const S6: f64 = 1.589_690_995_211_550_102_21e-10;
+    let z = x * x;
+    let v = z * x;
+    let r = S2 + z * (S3 + z * S4) + z * (z * z) * (S5 + z * S6);
+    x - ((z * (0.5 * tail - v * r) - tail) - v * S1)
+}
+
+#[allow(clippy::inline_always, reason = "as above")]
+#[allow(clippy::excessive_precision, reason = "as above")]
+#[inline(always)]
+fn kernel_cos(x: f64, tail: f64) -> f64 {
+    const C1: f64 = 4.166_666_666_666_660_190_37e-2;
+    const C2: f64 = -1.388_888_888_887_410_957_49e-3;
+    const C3: f64 = 2.480_158_728_947_672_941_78e-5;
+    const C4: f64 = -2.755_731_435_139_066_330_35e-7;
+    const C5: f64 = 2.087_572_321_298_174_827_90e-9;
+    const C6: f64 = -1.135_964_755_778_819_482_65e-11;
+    let z = x * x;
+    let w = z * z;
+    let r = z * (C1 + z * (C2 + z * C3)) + w * w * (C4 + z * (C5 + z * C6));
+    let half = 0.5 * z;
+    let lead = 1.0 - half;
+    lead + (((1.0 - lead) - half) + (z * r - x * tail))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Distance in units of the last place of the larger one.
+    fn ulps(a: f64, b: f64) -> f64 {
+        let size = a.abs().max(b.abs()).max(f64::MIN_POSITIVE);
+        let ulp = f64::from_bits(size.to_bits() + 1) - size;
+        (a - b).abs() / ulp
+    }
+
+    #[track_caller]
+    fn check(angles: [f64; 8]) -> f64 {
+        let (mut s, mut c) = ([0.0; 8], [0.0; 8]);
+        sin_cos_lanes(&angles, &mut s, &mut c);
+        let mut worst: f64 = 0.0;
+        for k in 0..8 {
+            let (sin, cos) = libm::sincos(angles[k]);
+            worst = worst.max(ulps(s[k], sin)).max(ulps(c[k], cos));
+        }
+        assert!(worst <= 1.0, "{worst} ulp at {angles:?}");
+        worst
+    }
+
+    /// Both are within 1 ulp of the truth, and neighbouring doubles at most where they differ.
+    #[test]
+    fn lanes_agree_with_the_library_to_the_last_place() {
+        let mut x: u64 = 1;
+        for scale in [1e-9, 0.5, 3.0, 50.0, 1e4, 1.6e6] {
+            for _ in 0..20_000 {
+                let angles = core::array::from_fn(|_| {
+                    x = x
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1_442_695_040_888_963_407);
+                    ((x >> 11) as f64 / (1u64 << 53) as f64 - 0.5) * 2.0 * scale
+                });
+                check(angles);
+            }
+        }
+    }
+
+    /// Where sine or cosine nearly vanishes, all digits come from the reduction.
+    #[test]
+    fn near_multiples_of_a_quarter_turn_the_reduction_keeps_its_digits() {
+        for quarter in [1_u32, 2, 3, 4, 101, 1002, 65_537, 1_000_003, 1_048_000] {
+            let angle = f64::from(quarter) * core::f64::consts::FRAC_PI_2;
+            let up = |n: u64| f64::from_bits(angle.to_bits() + n);
+            check([angle, up(1), up(2), up(3), -angle, -up(1), -up(2), -up(5)]);
+        }
+    }
+
+    #[test]
+    fn huge_angles_and_what_is_no_number_go_through_the_library() {
+        let (mut s, mut c) = ([0.0; 4], [0.0; 4]);
+        sin_cos_lanes(&[1e20, 0.3, f64::NAN, f64::INFINITY], &mut s, &mut c);
+        let (sin, cos) = Real::sin_cos(1e20_f64);
+        assert_eq!(
+            (s[0].to_bits(), c[0].to_bits()),
+            (sin.to_bits(), cos.to_bits())
+        );
+        assert!(s[2].is_nan() && c[3].is_nan() && ulps(s[1], Real::sin_cos(0.3_f64).0) <= 1.0);
+    }
+}
