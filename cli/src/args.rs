@@ -81,6 +81,12 @@ pub(crate) enum Command {
         modelmill compare model-spec/models/spidermill.toml \\\n      \
         --data recordings/spidermill-mbs/with-rods-check.csv --parameters fit.json --json")]
     Compare(CompareArgs),
+    /// Find which physical effect the model lacks, from recordings
+    #[command(after_help = "Examples (from the project's root):\n  \
+        modelmill diagnose model-spec/models/spidermill.toml \\\n      \
+        --data recordings/spidermill-mbs/with-rods-fit.csv \\\n      \
+        --check recordings/spidermill-mbs/with-rods-check.csv")]
+    Diagnose(DiagnoseArgs),
     /// Drive a full-body rig along a trajectory and record what its sensors read
     #[command(
         after_help = "The trajectory (CSV) has a column t and one per coordinate of the rig; its rates and \
@@ -299,6 +305,27 @@ pub(crate) struct CompareArgs {
     /// Values of the base parameters: `nominal`, or a file that `identify` wrote
     #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
     pub(crate) parameters: ParameterSource,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) preparation: PreparationArgs,
+}
+
+/// `diagnose`.
+#[derive(Debug, Args)]
+pub(crate) struct DiagnoseArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Recordings to find it in (CSV, Parquet, MATLAB 5); may be repeated
+    #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
+    pub(crate) data: Vec<PathBuf>,
+    /// Recordings that decide what is believed; without any, blocks of --data take turns
+    #[arg(long, value_name = "RUN", num_args = 1..)]
+    pub(crate) check: Vec<PathBuf>,
+    /// Hold all parameters at their nominal values, so that what is wrong with them shows too
+    #[arg(long)]
+    pub(crate) held: bool,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub(crate) json: bool,

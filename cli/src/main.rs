@@ -8,6 +8,7 @@ mod columns;
 mod commands;
 mod consistent;
 mod data;
+mod diagnosis;
 mod entries;
 mod estimation;
 mod estimators;
@@ -70,6 +71,7 @@ fn run(command: &Command) -> Outcome {
         Command::Evaluate(args) => commands::evaluate::run(args),
         Command::Identify(args) => commands::identify::run(args),
         Command::Compare(args) => commands::compare::run(args),
+        Command::Diagnose(args) => commands::diagnose::run(args),
         Command::Simulate(args) => commands::simulate::run(args),
         Command::Reduce(args) => commands::reduce::run(args),
         Command::Import(args) => commands::import::run(args),

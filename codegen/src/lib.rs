@@ -40,6 +40,25 @@ pub use reduce::{Dependency, Method, Polynomial, Powers, RationalFunction, Reduc
 use expr::Graph;
 use regressor::Equations;
 
+/// Derives the inverse dynamics of a mechanism without reducing it: every product that has an effect stands for itself, so
+/// that the regressor holds all columns of eq. (4), effects included.
+///
+/// For looking at many effects at once, most of which the model will never have.
+pub fn derive_unreduced(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
+    finite::check_values(mechanism)?;
+    let mut graph = Graph::new();
+    let equations = regressor::equations(&mut graph, mechanism)?;
+    let reduction = reduce::unreduced(&equations.products, &equations.columns);
+    let programs = programs::programs(&mut graph, mechanism, &equations, &reduction)?;
+    Ok(Derivation {
+        mechanism: mechanism.clone(),
+        graph,
+        reduction,
+        programs,
+        equations,
+    })
+}
+
 /// Everything that the mill knows about a mechanism.
 pub struct Derivation {
     /// The mechanism that was derived.

@@ -24,6 +24,7 @@ pub mod base_fit;
 mod csv_text;
 pub mod derivatives;
 pub mod deviations;
+pub mod diagnose;
 pub mod essential;
 pub mod estimate;
 pub mod excite;

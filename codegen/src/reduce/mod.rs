@@ -70,6 +70,8 @@ pub enum Method {
         /// At how many points of motion `H p_g = H_min p_min` was shown, with fresh constants.
         confirmed_at: usize,
     },
+    /// Not at all: every product with an effect is retained.
+    Unreduced,
     /// On the model file's values, in floating point: the factors are rounded numbers.
     Numeric {
         /// What the others leave of the retained column that is nearest to being dependent, relative to its size.
@@ -183,6 +185,24 @@ pub(crate) fn reduce(
             )
         }
         exact => exact,
+    }
+}
+
+/// Every product that has an effect is retained.
+pub(crate) fn unreduced(candidates: &[Monomial], columns: &[Vec<ExprId>]) -> Reduction {
+    let is_zero = |column: &Vec<ExprId>| column.iter().all(|x| *x == Graph::ZERO);
+    let pick = |zero: bool| -> Vec<Monomial> {
+        let pairs = candidates.iter().zip(columns);
+        let wanted = pairs.filter(|(_, column)| is_zero(column) == zero);
+        wanted.map(|(product, _)| product.clone()).collect()
+    };
+    let products = pick(false);
+    Reduction {
+        retained: (0..products.len()).collect(),
+        without_effect: pick(true),
+        products,
+        dependencies: Vec::new(),
+        method: Method::Unreduced,
     }
 }
 

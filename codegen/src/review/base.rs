@@ -181,6 +181,7 @@ pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
             "Columns that are constant combinations of retained ones at every state, eq. (6). \
              They were found in exact arithmetic and confirmed at {confirmed_at} further states with other values of the constants."
         ),
+        Method::Unreduced => "Columns are not reduced.".to_owned(),
         Method::Numeric { least_kept, most_dropped, because } => format!(
             "Columns that are constant combinations of retained ones, eq. (6), found numerically on the values of this file: \
              {because}. The factors are rounded. \

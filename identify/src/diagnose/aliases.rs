@@ -1,0 +1,99 @@
+//! What a recording cannot tell apart: effects that, put in place of a found one, explain it as well.
+
+use super::bench::{Bench, Pick, n_columns};
+use super::pool::solve;
+use super::problem::Effect;
+
+/// How much worse (twice the logarithm of the likelihood, with the samples that the residual is worth) a set may be and
+/// still not be told from the best.
+const APART: f64 = 9.0;
+/// A column of which others leave less than this share of squares lies in their span.
+const WITHIN: f64 = 1e-6;
+
+/// An effect that cannot be told from a found one.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Alias {
+    pub(crate) effect: Effect,
+    /// How much worse it is, in the units of [`APART`]; negative if better.
+    pub(crate) worse: f64,
+}
+
+impl Bench<'_> {
+    /// For each effect of a set, what could stand in its place.
+    pub(crate) fn aliases(&mut self, picks: &[Pick]) -> Vec<Vec<Alias>> {
+        self.weigh(picks);
+        let (factors, squares) = self.fit(picks, super::pool::On::All);
+        let rest = self.rest(picks, &factors);
+        let mut all = Vec::new();
+        for i in 0..picks.len() {
+            let mut others = picks.to_vec();
+            let pick = others.remove(i);
+            self.look(&others);
+            let channels: Vec<usize> = (0..rest.len()).collect();
+            let worth = self.worth(&rest, &channels);
+            let table = self.table(picks);
+            let mut found: Vec<Alias> = Vec::new();
+            for candidate in self.present.iter().flatten() {
+                if picks.iter().any(|p| p.candidate == candidate.candidate) {
+                    continue;
+                }
+                let more = self.is_within(&pick, candidate, &others);
+                if more && candidate.columns.len() > pick.columns.len() {
+                    continue; // It holds the found one and more, so that nothing speaks for it.
+                }
+                let mut set = others.clone();
+                set.push(candidate.clone());
+                let trial = self.try_in(&table, set);
+                let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
+                if worse < APART && trial.wrong_sign.is_empty() {
+                    found.push(Alias {
+                        effect: self.candidate(candidate).effect.clone(),
+                        worse,
+                    });
+                }
+            }
+            // One effect may stand for two, as friction that differs by direction for friction and an offset.
+            for j in 0..others.len() {
+                let mut fewer = others.clone();
+                let second = fewer.remove(j);
+                for candidate in self.present.iter().flatten() {
+                    let is_new = picks.iter().all(|p| p.candidate != candidate.candidate);
+                    let size = n_columns(&[pick.clone(), second.clone()]);
+                    if !is_new || candidate.columns.len() > size {
+                        continue;
+                    }
+                    let mut set = fewer.clone();
+                    set.push(candidate.clone());
+                    let trial = self.try_in(&table, set);
+                    let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
+                    let effect = &self.candidate(candidate).effect;
+                    if worse < APART
+                        && trial.wrong_sign.is_empty()
+                        && found.iter().all(|alias| alias.effect != *effect)
+                    {
+                        found.push(Alias {
+                            effect: effect.clone(),
+                            worse,
+                        });
+                    }
+                }
+            }
+            found.sort_by(|a, b| a.worse.total_cmp(&b.worse));
+            all.push(found);
+        }
+        all
+    }
+
+    /// Whether all columns of one effect lie in the span of the base, some effects and another one.
+    pub(crate) fn is_within(&self, one: &Pick, other: &Pick, beside: &[Pick]) -> bool {
+        let mut span = self.columns(beside);
+        span.extend(&other.columns);
+        one.columns.iter().all(|k| {
+            let mut which = span.clone();
+            which.push(*k);
+            let gram = self.pool.gram(&which, &self.weights, super::pool::On::All);
+            let own = gram[(which.len() - 1, which.len() - 1)];
+            solve(&gram).1 <= WITHIN * own
+        })
+    }
+}

@@ -1,0 +1,163 @@
+//! Whether a set of effects is better than another: by what they leave where they were not fitted.
+//!
+//! Residuals of mechanisms resemble their neighbours, so that tests that count samples find effects everywhere. Blocks of
+//! time that follow each other are compared instead: on the recordings of the check if there are any, else each fold of the
+//! fit with factors from the others. The information criterion counts as many samples as the residual is worth.
+//! Sources: J. Racine, "Consistent cross-validatory model-selection for dependent data: hv-block cross-validation",
+//! J. Econometrics 99 (2000); G. Schwarz, Annals of Statistics 6 (1978).
+
+use serde::Serialize;
+
+use super::bench::{Bench, Pick};
+use super::pool::{On, dot, solve};
+
+/// Blocks that the error of a stretch is cut into.
+const BLOCKS: usize = 12;
+/// Folds of the cross-validation where there is no check.
+const FOLDS: usize = 10;
+/// A change must lower the squared error on its channels by this share where it was not fitted.
+pub(crate) const LEAST_GAIN: f64 = 0.02;
+/// How many of its own deviations over the blocks the gain must be above zero.
+const LEAST_T: f64 = 2.5;
+
+/// What speaks for one set of effects beside another.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Evidence {
+    /// Share of the squared error that leaves, on the channels where the change acts, where the sets were not fitted.
+    pub gain: f64,
+    /// The gain in units of its standard deviation over contiguous blocks.
+    pub blocks_t: f64,
+    /// By how much the information criterion falls, with the effective number of samples.
+    pub bic: f64,
+    /// How many independent equations the residual before is worth.
+    pub effective_samples: f64,
+}
+
+impl Evidence {
+    /// Whether it is enough to believe in a change.
+    pub fn holds(&self) -> bool {
+        self.gain >= LEAST_GAIN && self.blocks_t >= LEAST_T && self.bic > 0.0
+    }
+
+    /// What is lacking, in words.
+    pub fn lacks(&self, has_check: bool) -> Option<&'static str> {
+        if self.gain <= 0.0 || self.blocks_t < LEAST_T {
+            Some(if has_check {
+                "not supported by the check"
+            } else {
+                "not supported by cross-validation"
+            })
+        } else if self.gain < LEAST_GAIN {
+            Some("too small to matter")
+        } else if self.bic <= 0.0 {
+            Some("not worth its parameters")
+        } else {
+            None
+        }
+    }
+}
+
+impl Bench<'_> {
+    /// Evidence for the set `after` beside `before`; `channels` are those on which they differ.
+    pub(crate) fn evidence(&self, before: &[Pick], after: &[Pick], channels: &[usize]) -> Evidence {
+        let [old, new] = [before, after].map(|picks| self.held_out(picks, channels));
+        let n = old.len() as f64;
+        let differences: Vec<f64> = old.iter().zip(&new).map(|(a, b)| a - b).collect();
+        let mean = differences.iter().sum::<f64>() / n;
+        let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>();
+        let error = (variance / (n * (n - 1.0).max(1.0))).sqrt();
+        let total: f64 = old.iter().sum();
+        let [old_fit, new_fit] = [before, after].map(|picks| {
+            let (factors, _) = self.fit(picks, On::All);
+            let rest = self.rest(picks, &factors);
+            let squares = |d: &usize| self.weights[*d] * dot(&rest[*d], &rest[*d]);
+            let sum: f64 = channels.iter().map(squares).sum();
+            (sum, self.worth(&rest, channels))
+        });
+        let count = |picks: &[Pick]| -> f64 {
+            let freedoms = picks.iter().map(|p| self.candidate(p).freedoms());
+            freedoms.sum::<usize>() as f64
+        };
+        let worth = old_fit.1;
+        Evidence {
+            gain: if total > 0.0 { n * mean / total } else { 0.0 },
+            blocks_t: if error > 0.0 { mean / error } else { 0.0 },
+            bic: worth * (old_fit.0 / new_fit.0.max(f64::MIN_POSITIVE)).ln()
+                - (count(after) - count(before)) * worth.ln(),
+            effective_samples: worth,
+        }
+    }
+
+    /// Weighted squared errors of some channels in blocks of time to which the set was not fitted.
+    pub(crate) fn held_out(&self, picks: &[Pick], channels: &[usize]) -> Vec<f64> {
+        let layout = &self.problem.layout;
+        let square = |rest: &[Vec<f64>], range: &std::ops::Range<usize>| -> f64 {
+            let of = |d: &usize| {
+                let part = &rest[*d][range.clone()];
+                self.weights[*d] * dot(part, part)
+            };
+            channels.iter().map(of).sum()
+        };
+        let blocks = layout.blocks(BLOCKS);
+        if layout.has_check() {
+            let (factors, _) = self.fit(picks, On::Fit);
+            let rest = self.rest(picks, &factors);
+            let fit = layout.fit_samples();
+            let checked = blocks.iter().filter(|block| block.start >= fit);
+            return checked.map(|block| square(&rest, block)).collect();
+        }
+        let mut which = self.columns(picks);
+        which.push(self.measured);
+        let whole = self.pool.gram(&which, &self.weights, On::All);
+        let folds = layout.blocks(FOLDS);
+        let fold_errors = folds.iter().map(|fold| {
+            let mut part = whole.clone();
+            for i in 0..which.len() {
+                for j in 0..=i {
+                    let (a, b) = (self.pool.column(which[i]), self.pool.column(which[j]));
+                    let pairs = a.0.iter().zip(&b.0).zip(&self.weights);
+                    let own: f64 = pairs
+                        .map(|((a, b), weight)| match (a, b) {
+                            (Some(a), Some(b)) => weight * dot(&a[fold.clone()], &b[fold.clone()]),
+                            _ => 0.0,
+                        })
+                        .sum();
+                    part[(i, j)] -= own;
+                    if i != j {
+                        part[(j, i)] -= own;
+                    }
+                }
+            }
+            let (factors, _) = solve(&part);
+            // Only the fold itself is of interest.
+            let mut error = 0.0;
+            for d in channels {
+                let mut rest: Vec<f64> = self.pool.column(self.measured).0[*d]
+                    .as_ref()
+                    .map_or_else(|| vec![0.0; fold.len()], |y| y[fold.clone()].to_vec());
+                for (k, factor) in which.iter().zip(factors.iter()) {
+                    if let Some(values) = &self.pool.column(*k).0[*d] {
+                        for (r, x) in rest.iter_mut().zip(&values[fold.clone()]) {
+                            *r -= factor * x;
+                        }
+                    }
+                }
+                error += self.weights[*d] * dot(&rest, &rest);
+            }
+            error
+        });
+        fold_errors.collect()
+    }
+
+    /// Channels on which some effects act.
+    pub(crate) fn acted_on(&self, picks: &[Pick]) -> Vec<usize> {
+        let mut channels: Vec<usize> = picks
+            .iter()
+            .flat_map(|pick| &pick.columns)
+            .flat_map(|k| self.pool.column(*k).channels())
+            .collect();
+        channels.sort_unstable();
+        channels.dedup();
+        channels
+    }
+}

@@ -1,0 +1,80 @@
+//! How noisy a force is by itself, and how many of its residuals are worth counting.
+
+/// White noise of a signal that is smooth otherwise: the robust spread of its fourth differences, which neither slow motion
+/// nor a few jumps change. An estimate from below where the noise was filtered.
+///
+/// Source: the idea of J. von Neumann's mean square successive difference (Ann. Math. Stat. 12, 1941), with the median
+/// absolute deviation for jumps.
+pub fn white_noise(values: &[f64]) -> f64 {
+    if values.len() < 10 {
+        return 0.0;
+    }
+    let mut differences: Vec<f64> = values
+        .windows(5)
+        .map(|w| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs())
+        .collect();
+    differences.sort_by(f64::total_cmp);
+    // The variance of such a difference is 70 times that of the noise; the median of its magnitude 0.6745 of its spread.
+    differences[differences.len() / 2] / (0.674_489_75 * 70.0_f64.sqrt())
+}
+
+/// How many independent values a series is worth: `n / (1 + 2 sum of its autocorrelations)`, summed as long as pairs of
+/// neighbours stay positive (C. J. Geyer, Statistical Science 7, 1992).
+pub fn effective_samples(values: &[f64]) -> f64 {
+    let n = values.len();
+    let mean = values.iter().sum::<f64>() / n.max(1) as f64;
+    let centred: Vec<f64> = values.iter().map(|x| x - mean).collect();
+    let variance = super::pool::dot(&centred, &centred);
+    if n < 4 || variance == 0.0 {
+        return n as f64;
+    }
+    let correlation =
+        |lag: usize| super::pool::dot(&centred[..n - lag], &centred[lag..]) / variance;
+    let mut sum = 1.0;
+    let mut lag = 1;
+    while lag + 1 < n / 4 {
+        let pair = correlation(lag) + correlation(lag + 1);
+        if pair <= 0.0 {
+            break;
+        }
+        sum += 2.0 * pair;
+        lag += 2;
+    }
+    (n as f64 / sum).clamp(2.0, n as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_noise::Noise;
+
+    #[test]
+    fn noise_is_seen_under_motion_and_jumps() {
+        let mut noise = Noise::new(3);
+        let signal: Vec<f64> = (0..4000)
+            .map(|i| {
+                let t = 0.004 * f64::from(i);
+                300.0 * t.sin() + 25.0 * (2.0 * t).cos().signum() + 2.0 * noise.normal()
+            })
+            .collect();
+        assert!((white_noise(&signal) - 2.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn a_filtered_series_is_worth_less() {
+        let mut noise = Noise::new(5);
+        let mut last = 0.0;
+        let white: Vec<f64> = (0..20_000).map(|_| noise.normal()).collect();
+        let red: Vec<f64> = white
+            .iter()
+            .map(|e| {
+                last = 0.9 * last + e;
+                last
+            })
+            .collect();
+        assert!(effective_samples(&white) > 15_000.0);
+        // (1 + 0.9) / (1 - 0.9) = 19 for such a series.
+        let worth = 20_000.0 / effective_samples(&red);
+        assert!((14.0..25.0).contains(&worth), "{worth}");
+    }
+}

@@ -1,0 +1,230 @@
+//! Inner products of columns, channel by channel and apart for fit and check, so that any set of columns is fitted in
+//! microseconds.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::problem::{Column, Layout};
+
+/// Columns with their inner products.
+pub(crate) struct Pool {
+    columns: Vec<Column>,
+    fit: Range<usize>,
+    check: Range<usize>,
+    /// `products[part][channel][i][j]` for `j <= i`; part 0 is the fit, part 1 the check.
+    products: [Vec<Vec<Vec<f64>>>; 2],
+}
+
+impl Pool {
+    pub(crate) fn new(layout: &Layout) -> Self {
+        let channels = layout.channels.len();
+        let fit = layout.fit_samples();
+        Self {
+            columns: Vec::new(),
+            fit: 0..fit,
+            check: fit..layout.samples(),
+            products: [vec![Vec::new(); channels], vec![Vec::new(); channels]],
+        }
+    }
+
+    /// Adds a column; its place.
+    pub(crate) fn add(&mut self, column: Column) -> usize {
+        self.columns.push(column);
+        let new = self.columns.len() - 1;
+        let parts = [self.fit.clone(), self.check.clone()];
+        for (range, channels) in parts.into_iter().zip(&mut self.products) {
+            for (d, rows) in channels.iter_mut().enumerate() {
+                let row = match &self.columns[new].0[d] {
+                    None => Vec::new(),
+                    Some(own) => (self.columns.iter())
+                        .map(|other| match &other.0[d] {
+                            Some(other) => dot(&own[range.clone()], &other[range.clone()]),
+                            None => 0.0,
+                        })
+                        .collect(),
+                };
+                rows.push(row);
+            }
+        }
+        new
+    }
+
+    pub(crate) fn column(&self, k: usize) -> &Column {
+        &self.columns[k]
+    }
+
+    /// Weighted inner products of some columns on fit, check or both.
+    pub(crate) fn gram(&self, which: &[usize], weights: &[f64], on: On) -> DMatrix<f64> {
+        let parts = match on {
+            On::Fit => 0..1,
+            On::All => 0..2,
+        };
+        let n = which.len();
+        let mut gram = DMatrix::zeros(n, n);
+        for i in 0..n {
+            for j in 0..=i {
+                let (a, b) = (which[i].max(which[j]), which[i].min(which[j]));
+                let mut sum = 0.0;
+                for part in &self.products[parts.clone()] {
+                    for (rows, weight) in part.iter().zip(weights) {
+                        sum += weight * rows[a].get(b).copied().unwrap_or(0.0);
+                    }
+                }
+                gram[(i, j)] = sum;
+                gram[(j, i)] = sum;
+            }
+        }
+        gram
+    }
+
+    /// What is left of the column `of` when others are taken off with some factors.
+    pub(crate) fn rest(&self, of: usize, others: &[usize], factors: &[f64]) -> Vec<Vec<f64>> {
+        let samples = self.check.end;
+        let mut rest: Vec<Vec<f64>> = (self.columns[of].0.iter())
+            .map(|values| values.clone().unwrap_or_else(|| vec![0.0; samples]))
+            .collect();
+        for (k, factor) in others.iter().zip(factors) {
+            for (rest, values) in rest.iter_mut().zip(&self.columns[*k].0) {
+                if let Some(values) = values {
+                    for (r, x) in rest.iter_mut().zip(values) {
+                        *r -= factor * x;
+                    }
+                }
+            }
+        }
+        rest
+    }
+}
+
+/// Samples that count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum On {
+    /// Those of the fit.
+    Fit,
+    /// All.
+    All,
+}
+
+/// Inner product; several sums at once, which is faster and rounds less.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (chunks_a, chunks_b) = (a.chunks_exact(8), b.chunks_exact(8));
+    let tail: f64 = chunks_a
+        .remainder()
+        .iter()
+        .zip(chunks_b.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
+    for (x, y) in chunks_a.zip(chunks_b) {
+        for (sum, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
+            *sum += x * y;
+        }
+    }
+    sums.iter().sum::<f64>() + tail
+}
+
+/// A least squares fit from inner products: factors of the first columns, by which the last is explained best, and the
+/// sum of squares that is left. Columns that depend on those before them get the factor zero.
+pub(crate) fn solve(gram: &DMatrix<f64>) -> (DVector<f64>, f64) {
+    let n = gram.nrows() - 1;
+    // Cholesky's decomposition with columns scaled to 1.
+    let scale: Vec<f64> = (0..=n).map(|i| gram[(i, i)].sqrt()).collect();
+    let mut lower = DMatrix::<f64>::zeros(n + 1, n + 1);
+    let mut kept = vec![false; n];
+    for i in 0..=n {
+        if scale[i] == 0.0 {
+            continue;
+        }
+        for j in 0..=i {
+            if j < i && !kept[j] {
+                continue;
+            }
+            let mut sum = gram[(i, j)] / (scale[i] * scale[j]);
+            for k in 0..j {
+                sum -= lower[(i, k)] * lower[(j, k)];
+            }
+            if j < i {
+                lower[(i, j)] = sum / lower[(j, j)];
+            } else if i == n {
+                lower[(n, n)] = sum.max(0.0);
+            } else if sum > DEPENDENT {
+                kept[i] = true;
+                lower[(i, i)] = sum.sqrt();
+            } else {
+                for k in 0..j {
+                    lower[(i, k)] = 0.0;
+                }
+            }
+        }
+    }
+    let mut factors = DVector::zeros(n);
+    for i in (0..n).rev() {
+        if !kept[i] {
+            continue;
+        }
+        let mut sum = lower[(n, i)];
+        for k in i + 1..n {
+            if kept[k] {
+                sum -= lower[(k, i)] * factors[k];
+            }
+        }
+        factors[i] = sum / lower[(i, i)];
+    }
+    for i in 0..n {
+        if kept[i] {
+            factors[i] *= scale[n] / scale[i];
+        }
+    }
+    (factors, lower[(n, n)] * scale[n] * scale[n])
+}
+
+/// Share of a column's squares below which what others leave of it is rounding.
+pub(crate) const DEPENDENT: f64 = 1e-9;
+
+#[cfg(test)]
+mod tests {
+    use super::super::problem::Stretch;
+    use super::*;
+
+    #[test]
+    fn sets_of_columns_are_fitted_as_by_svd() {
+        let layout = Layout {
+            channels: vec!["a".into(), "b".into()],
+            stretches: vec![Stretch {
+                name: String::new(),
+                samples: 50,
+                step: 0.1,
+                is_check: false,
+            }],
+        };
+        let wave = |k: f64| -> Vec<f64> { (0..50).map(|i| (k * f64::from(i)).sin()).collect() };
+        let mut pool = Pool::new(&layout);
+        let one = pool.add(Column(vec![Some(wave(0.1)), None]));
+        let two = pool.add(Column(vec![Some(wave(0.3)), Some(wave(0.5))]));
+        let copy = pool.add(Column(vec![Some(wave(0.1)), None]));
+        let mut measured = Column(vec![Some(wave(1.3)), Some(wave(0.9))]);
+        measured.add(2.0, pool.column(one));
+        measured.add(-3.0, pool.column(two));
+        let y = pool.add(measured.clone());
+        let weights = [1.0, 4.0];
+        let (factors, squares) = solve(&pool.gram(&[one, two, copy, y], &weights, On::All));
+        let column = |k: usize| -> Vec<f64> {
+            let part = |d: usize| pool.column(k).0[d].clone().unwrap_or_else(|| vec![0.0; 50]);
+            let weighed = part(1).into_iter().map(|x| 2.0 * x);
+            part(0).into_iter().chain(weighed).collect()
+        };
+        let matrix = DMatrix::from_columns(&[column(one).into(), column(two).into()]);
+        let right = DVector::from(column(y));
+        let expected = matrix.clone().svd(true, true).solve(&right, 0.0).unwrap();
+        assert!(
+            (factors[0] - expected[0]).abs() < 1e-10 && (factors[1] - expected[1]).abs() < 1e-10
+        );
+        assert_eq!(factors[2], 0.0);
+        let rest = (matrix * expected - right).norm_squared();
+        assert!((squares - rest).abs() < 1e-9 * rest);
+        let residual = pool.rest(y, &[one, two], &[factors[0], factors[1]]);
+        let weighed = dot(&residual[0], &residual[0]) + 4.0 * dot(&residual[1], &residual[1]);
+        assert!((weighed - rest).abs() < 1e-9 * rest);
+    }
+}

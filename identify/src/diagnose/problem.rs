@@ -1,0 +1,187 @@
+//! What a diagnosis starts from: measured forces, the columns that the model has, and those that effects would add.
+
+/// Numbers along all recordings, for each channel one for every sample: recordings of the fit first, then those of the
+/// check; `None` for a channel on which the column is zero throughout.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Column(pub Vec<Option<Vec<f64>>>);
+
+impl Column {
+    /// A column from all of its channels; those that are zero throughout are left out.
+    pub fn new(channels: Vec<Vec<f64>>) -> Self {
+        let sparse = |values: Vec<f64>| values.iter().any(|x| *x != 0.0).then_some(values);
+        Self(channels.into_iter().map(sparse).collect())
+    }
+
+    /// Adds a multiple of another column.
+    pub fn add(&mut self, factor: f64, other: &Self) {
+        for (slot, values) in self.0.iter_mut().zip(&other.0) {
+            let Some(values) = values else { continue };
+            match slot {
+                Some(sum) => {
+                    for (s, x) in sum.iter_mut().zip(values) {
+                        *s += factor * x;
+                    }
+                }
+                None => *slot = Some(values.iter().map(|x| factor * x).collect()),
+            }
+        }
+    }
+
+    /// Channels on which it is not zero.
+    pub fn channels(&self) -> impl Iterator<Item = usize> + '_ {
+        self.0
+            .iter()
+            .enumerate()
+            .filter_map(|(d, values)| values.as_ref().map(|_| d))
+    }
+
+    /// Whether it is zero everywhere.
+    pub fn is_zero(&self) -> bool {
+        self.0.iter().all(Option::is_none)
+    }
+}
+
+/// A stretch of samples that follow each other in time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stretch {
+    /// The recording it comes from.
+    pub name: String,
+    /// Number of samples.
+    pub samples: usize,
+    /// Mean time between them, s.
+    pub step: f64,
+    /// Whether it belongs to the check.
+    pub is_check: bool,
+}
+
+/// Channels and stretches of time, those of the fit first.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Layout {
+    /// Names of the drives.
+    pub channels: Vec<String>,
+    /// Stretches in the order in which columns hold them.
+    pub stretches: Vec<Stretch>,
+}
+
+impl Layout {
+    /// Samples of each channel.
+    pub fn samples(&self) -> usize {
+        self.stretches.iter().map(|s| s.samples).sum()
+    }
+
+    /// Samples of the fit, which come first.
+    pub fn fit_samples(&self) -> usize {
+        let fit = self.stretches.iter().filter(|s| !s.is_check);
+        fit.map(|s| s.samples).sum()
+    }
+
+    /// Whether there is a recording to check on.
+    pub fn has_check(&self) -> bool {
+        self.fit_samples() < self.samples()
+    }
+
+    /// Contiguous blocks, about `per_stretch` in each stretch, as ranges of samples.
+    pub fn blocks(&self, per_stretch: usize) -> Vec<std::ops::Range<usize>> {
+        let mut blocks = Vec::new();
+        let mut start = 0;
+        for stretch in &self.stretches {
+            let count = per_stretch.min(stretch.samples / 20).max(1);
+            for k in 0..count {
+                let at = |k: usize| start + k * stretch.samples / count;
+                blocks.push(at(k)..at(k + 1));
+            }
+            start += stretch.samples;
+        }
+        blocks
+    }
+}
+
+/// A kind of effect at its places, which share the parameters.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+pub struct Effect {
+    /// Name of the kind.
+    pub kind: String,
+    /// Where it acts.
+    pub at: Vec<String>,
+}
+
+/// The sign that an estimate must have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sign {
+    /// Not below zero.
+    Positive,
+    /// Not above zero.
+    Negative,
+    /// Either.
+    Any,
+}
+
+/// A parameter of an effect.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EffectParameter {
+    /// Its symbol in the kind.
+    pub symbol: String,
+    /// SI unit.
+    pub unit: String,
+    /// The sign that makes physical sense.
+    pub sign: Sign,
+}
+
+/// The columns of an effect for one choice of its constants.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    /// Constants that are searched for, with their values.
+    pub constants: Vec<(String, f64)>,
+    /// A column for each parameter.
+    pub columns: Vec<Column>,
+}
+
+/// Where the columns of an effect come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Source {
+    /// They are known, for each choice of the constants.
+    Columns(Vec<Choice>),
+    /// A small change of a constant of the model: for each parameter, what every base column changes by.
+    Tangent(Vec<Vec<Column>>),
+    /// All forces come later than the motion; the parameter is the delay, s.
+    Delay,
+}
+
+/// An effect that may be missing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// What and where.
+    pub effect: Effect,
+    /// Its parameters, one for each column.
+    pub parameters: Vec<EffectParameter>,
+    /// Constants that are searched for; they count as parameters.
+    pub searched: usize,
+    /// Its columns.
+    pub source: Source,
+}
+
+impl Candidate {
+    /// Numbers that are free in it.
+    pub fn freedoms(&self) -> usize {
+        self.parameters.len() + self.searched
+    }
+}
+
+/// Everything that a diagnosis needs to know.
+#[derive(Clone, Debug, Default)]
+pub struct Problem {
+    /// Channels and stretches.
+    pub layout: Layout,
+    /// Measured forces, without those that are known.
+    pub measured: Column,
+    /// Forces of the parameters that are held, if any are; already taken off `measured`.
+    pub held: Option<Column>,
+    /// Columns of the parameters that are free.
+    pub base: Vec<Column>,
+    /// What may be missing.
+    pub candidates: Vec<Candidate>,
+    /// Variables on which forces may depend, by name: positions, rates, accelerations, loads; one number per sample.
+    pub variables: Vec<(String, Vec<f64>)>,
+    /// White noise of each channel's force.
+    pub noise: Vec<f64>,
+}

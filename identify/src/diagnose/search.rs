@@ -1,0 +1,243 @@
+//! The search for the smallest set of effects that explains what the model cannot say: forward over sets, with every
+//! member tried against every other candidate, back again, and simpler ones preferred.
+
+use super::bench::{Bench, Finer, Pick, Trial};
+use super::evidence::Evidence;
+
+/// Sets that are followed at once.
+const BEAM: usize = 6;
+/// Sets of a size that are put to the test before the search gives up.
+const TESTED: usize = 8;
+/// Most effects that are looked for.
+const MOST: usize = 40;
+
+/// A step of the ladder: the set of effects after it, with what spoke for the change.
+#[derive(Clone, Debug)]
+pub(crate) struct Step {
+    pub(crate) picks: Vec<Pick>,
+    pub(crate) evidence: Evidence,
+}
+
+/// Why the best candidates of a step were refused.
+#[derive(Clone, Debug)]
+pub(crate) struct Refused {
+    pub(crate) pick: Pick,
+    pub(crate) evidence: Evidence,
+    pub(crate) wrong_sign: bool,
+}
+
+/// What the search found.
+pub(crate) struct Found {
+    /// Sets, one change after the other; the last is the answer.
+    pub(crate) steps: Vec<Step>,
+    /// What was best of the rest, and why it was refused.
+    pub(crate) refused: Vec<Refused>,
+}
+
+impl Bench<'_> {
+    /// Searches forward until nothing more is supported.
+    pub(crate) fn search(&mut self, finer: &Finer<'_>, progress: &mut dyn FnMut(usize)) -> Found {
+        let mut accepted: Vec<Pick> = Vec::new();
+        let mut steps = Vec::new();
+        let mut beam: Vec<Vec<Pick>> = vec![Vec::new()];
+        let mut refused;
+        loop {
+            progress(steps.len());
+            self.weigh(&accepted);
+            self.look(&accepted);
+            let trials = self.grow(&accepted, &beam);
+            let mut chosen = None;
+            refused = Vec::new();
+            for trial in trials.iter().take(TESTED) {
+                let news: Vec<Pick> = difference(&trial.picks, &accepted);
+                let channels = self.acted_on(&news);
+                let evidence = self.evidence(&accepted, &trial.picks, &channels);
+                let wrong_sign = !trial.wrong_sign.is_empty();
+                if evidence.holds() && !wrong_sign {
+                    chosen = Some((trial.clone(), evidence));
+                    break;
+                }
+                if let [pick] = news.as_slice() {
+                    refused.push(Refused {
+                        pick: pick.clone(),
+                        evidence,
+                        wrong_sign,
+                    });
+                }
+            }
+            let Some((trial, evidence)) = chosen else {
+                break;
+            };
+            beam = trials
+                .iter()
+                .filter(|other| other.wrong_sign.is_empty())
+                .take(BEAM)
+                .map(|other| other.picks.clone())
+                .collect();
+            let (picks, evidence) = self.simplest(&accepted, trial, evidence, &trials);
+            accepted = self.refine(picks, finer);
+            if !beam.contains(&accepted) {
+                beam.insert(0, accepted.clone());
+            }
+            let evidence_of_step = evidence;
+            steps.push(Step {
+                picks: accepted.clone(),
+                evidence: evidence_of_step,
+            });
+            if accepted.len() >= MOST {
+                break;
+            }
+        }
+        let pruned = self.prune(accepted.clone());
+        if pruned != accepted {
+            steps.push(Step {
+                picks: pruned,
+                evidence: Evidence::default(),
+            });
+        }
+        Found { steps, refused }
+    }
+
+    /// All sets that one more effect makes of those in the beam, the best of them improved by exchanges; best first.
+    fn grow(&mut self, accepted: &[Pick], beam: &[Vec<Pick>]) -> Vec<Trial> {
+        let all: Vec<Pick> = beam.iter().flatten().cloned().collect();
+        let table = self.table(&all);
+        let (factors, _) = self.fit(accepted, super::pool::On::All);
+        let rest = self.rest(accepted, &factors);
+        let channels: Vec<usize> = (0..rest.len()).collect();
+        let worth = self.worth(&rest, &channels);
+        let score = |trial: &Trial| {
+            let wrong = if trial.wrong_sign.is_empty() {
+                0.0
+            } else {
+                1e12
+            };
+            worth * trial.squares.max(f64::MIN_POSITIVE).ln()
+                + trial.freedoms as f64 * worth.ln().max(1.0)
+                + wrong
+        };
+        let mut trials: Vec<Trial> = Vec::new();
+        for set in beam {
+            for pick in self.present.iter().flatten() {
+                if set.iter().any(|p| p.candidate == pick.candidate) {
+                    continue;
+                }
+                let mut picks = set.clone();
+                // What holds more than a member takes its place.
+                if pick.columns.len() > 1 {
+                    picks.retain(|p| !self.is_within(p, pick, &[]));
+                }
+                picks.push(pick.clone());
+                if trials.iter().all(|known| !same(&known.picks, &picks)) {
+                    trials.push(self.try_in(&table, picks));
+                }
+            }
+        }
+        trials.sort_by(|a, b| score(a).total_cmp(&score(b)));
+        trials.truncate(40);
+        // Constants that suited other sets may suit these less.
+        for k in 0..trials.len().min(BEAM) {
+            let tuned = self.retune(trials[k].picks.clone());
+            if tuned != trials[k].picks {
+                trials[k] = self.trial(tuned);
+            }
+        }
+        trials.sort_by(|a, b| score(a).total_cmp(&score(b)));
+        let all: Vec<Pick> = trials.iter().flat_map(|t| t.picks.clone()).collect();
+        let table = self.table(&all);
+        // Every member of the best sets against every other candidate.
+        for k in 0..trials.len().min(BEAM) {
+            let mut best = trials[k].clone();
+            loop {
+                let mut better: Option<Trial> = None;
+                for i in 0..best.picks.len() {
+                    for pick in self.present.iter().flatten() {
+                        if best.picks.iter().any(|p| p.candidate == pick.candidate) {
+                            continue;
+                        }
+                        let mut picks = best.picks.clone();
+                        picks[i] = pick.clone();
+                        let trial = self.try_in(&table, picks);
+                        let bound = better.as_ref().map_or(score(&best) - 1e-9, &score);
+                        if score(&trial) < bound {
+                            better = Some(trial);
+                        }
+                    }
+                }
+                match better {
+                    Some(trial) => best = trial,
+                    None => break,
+                }
+            }
+            if trials.iter().all(|known| !same(&known.picks, &best.picks)) {
+                trials.push(best);
+            }
+        }
+        trials.sort_by(|a, b| score(a).total_cmp(&score(b)));
+        trials
+    }
+
+    /// Of the sets that are as good as the best as far as the blocks can tell, the one with the fewest freedoms; of several
+    /// the first, for kinds come in the order of the library.
+    fn simplest(
+        &self,
+        accepted: &[Pick],
+        best: Trial,
+        evidence: Evidence,
+        trials: &[Trial],
+    ) -> (Vec<Pick>, Evidence) {
+        let mut chosen = (best, evidence);
+        for trial in trials.iter().take(40) {
+            if trial.freedoms >= chosen.0.freedoms || !trial.wrong_sign.is_empty() {
+                continue;
+            }
+            let news = difference(&trial.picks, accepted);
+            let channels = self.acted_on(&news);
+            let ratio = trial.squares / chosen.0.squares.max(f64::MIN_POSITIVE);
+            if chosen.1.effective_samples * ratio.ln() > 2.0 {
+                continue;
+            }
+            let own = self.evidence(accepted, &trial.picks, &channels);
+            if own.holds() {
+                chosen = (trial.clone(), own);
+            }
+        }
+        (chosen.0.picks, chosen.1)
+    }
+
+    /// Takes out, one by one, what is no longer needed.
+    fn prune(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
+        self.weigh(&picks);
+        loop {
+            let without = |i: usize| {
+                let mut rest = picks.clone();
+                rest.remove(i);
+                rest
+            };
+            let tests = (0..picks.len()).map(|i| {
+                let rest = without(i);
+                let channels = self.acted_on(std::slice::from_ref(&picks[i]));
+                (i, self.evidence(&rest, &picks, &channels))
+            });
+            let weakest = tests
+                .filter(|(_, evidence)| !evidence.holds())
+                .min_by(|a, b| a.1.gain.total_cmp(&b.1.gain));
+            match weakest {
+                Some((i, _)) => picks = without(i),
+                None => return picks,
+            }
+        }
+    }
+}
+
+/// Picks of a set whose candidate is not in another.
+pub(crate) fn difference(set: &[Pick], other: &[Pick]) -> Vec<Pick> {
+    let is_new = |pick: &&Pick| other.iter().all(|p| p.candidate != pick.candidate);
+    let new: Vec<Pick> = set.iter().filter(is_new).cloned().collect();
+    if new.is_empty() { set.to_vec() } else { new }
+}
+
+/// Whether two sets hold the same candidates.
+fn same(a: &[Pick], b: &[Pick]) -> bool {
+    a.len() == b.len() && (a.iter()).all(|p| b.iter().any(|q| q.candidate == p.candidate))
+}
