@@ -36,18 +36,24 @@ pub(crate) fn find(
     check: &[Data],
     held: Held,
 ) -> Outcome<(Problem, Diagnosis)> {
+    let t0 = std::time::Instant::now();
     let candidates = watched("writing down what may be missing", 0, |_| {
         candidates(path, loaded)
     })?;
+    eprintln!("cand {:?}", t0.elapsed());
     let all: Vec<(&Data, bool)> = (fit.iter().map(|one| (one, false)))
         .chain(check.iter().map(|one| (one, true)))
         .collect();
+    let t0 = std::time::Instant::now();
     let problem = problem(&candidates, model, &all, held)?;
+    eprintln!("problem {:?}", t0.elapsed());
+    let t0 = std::time::Instant::now();
     let finer =
         |candidate: usize, constant: f64| finer(&candidates, model, &all, candidate, constant);
     let diagnosis = watched("looking for what is missing", 0, |_| {
         diagnose(&problem, &finer, &mut |_| {})
     });
+    eprintln!("search {:?}", t0.elapsed());
     Ok((problem, diagnosis))
 }
 

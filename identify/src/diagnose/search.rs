@@ -8,6 +8,8 @@ use super::evidence::Evidence;
 const BEAM: usize = 6;
 /// Sets of a size that are put to the test before the search gives up.
 const TESTED: usize = 8;
+/// A rival whose squares are within this factor is tried with finer constants.
+const CLOSE: f64 = 1.5;
 /// Most effects that are looked for.
 const MOST: usize = 40;
 
@@ -75,7 +77,8 @@ impl Bench<'_> {
                 .map(|other| other.picks.clone())
                 .collect();
             let (picks, evidence) = self.simplest(&accepted, trial, evidence, &trials);
-            accepted = self.refine(picks, finer);
+            let refined = self.refine(picks, finer);
+            accepted = self.polish(refined, finer);
             if !beam.contains(&accepted) {
                 beam.insert(0, accepted.clone());
             }
@@ -175,6 +178,45 @@ impl Bench<'_> {
         }
         trials.sort_by(|a, b| score(a).total_cmp(&score(b)));
         trials
+    }
+
+    /// Tries members of a set against candidates that come close, each with constants that are searched finely: on their
+    /// grids the wrong one may have been nearer to its best value.
+    fn polish(&mut self, mut picks: Vec<Pick>, finer: &Finer<'_>) -> Vec<Pick> {
+        let is_searched = |bench: &Self, pick: &Pick| bench.candidate(pick).searched > 0;
+        for i in 0..picks.len() {
+            let mut others = picks.clone();
+            let own = others.remove(i);
+            let table = self.table(&picks);
+            let now = self.try_in(&table, picks.clone());
+            let rivals: Vec<Pick> = self
+                .present
+                .iter()
+                .flatten()
+                .filter(|rival| {
+                    let is_new = picks.iter().all(|p| p.candidate != rival.candidate);
+                    is_new && (is_searched(self, rival) || is_searched(self, &own))
+                })
+                .filter(|rival| self.candidate(rival).freedoms() <= self.candidate(&own).freedoms())
+                .cloned()
+                .collect();
+            let mut best = now;
+            for rival in rivals {
+                let mut set = others.clone();
+                set.insert(i, rival);
+                if self.try_in(&table, set.clone()).squares > CLOSE * best.squares {
+                    continue;
+                }
+                let tuned = self.retune(set);
+                let tuned = self.refine(tuned, finer);
+                let trial = self.trial(tuned);
+                if trial.wrong_sign.is_empty() && trial.squares < best.squares {
+                    best = trial;
+                }
+            }
+            picks = best.picks;
+        }
+        picks
     }
 
     /// Of the sets that are as good as the best as far as the blocks can tell, the one with the fewest freedoms; of several
