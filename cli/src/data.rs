@@ -29,6 +29,8 @@ pub(crate) struct Data {
     /// What each equation counts beside the estimator's weights, interleaved per kept sample; all the same if there are
     /// none.
     pub(crate) weights: Option<Vec<f64>>,
+    /// What the drives carry, `[drive][sample]`, for effects that depend on it; the measured forces if there are none.
+    pub(crate) load: Option<Vec<Vec<f64>>>,
 }
 
 /// Reads and prepares recordings; their warnings go to standard error.
@@ -77,6 +79,7 @@ pub(crate) fn read_text(model: &Model, name: &str, text: &str) -> Outcome<Data> 
         run,
         variance: None,
         weights: None,
+        load: None,
     })
 }
 
@@ -101,6 +104,7 @@ fn prepare(model: &Model, recording: &Recording, args: &PreparationArgs) -> Outc
             run,
             variance,
             weights: None,
+            load: None,
         })
     });
     with_variance.collect()
@@ -160,6 +164,7 @@ impl From<Run> for Data {
             run,
             variance: None,
             weights: None,
+            load: None,
         }
     }
 }
@@ -230,8 +235,13 @@ impl Data {
             q: slices(&self.run.q, start, end),
             qd: slices(&self.run.qd, start, end),
             qdd: slices(&self.run.qdd, start, end),
-            load: slices(self.run.force.as_deref().unwrap_or(&[]), start, end),
+            load: slices(self.loads(), start, end),
         }
+    }
+
+    fn loads(&self) -> &[Vec<f64>] {
+        let loads = self.load.as_deref().or(self.run.force.as_deref());
+        loads.unwrap_or(&[])
     }
 
     fn check_load(&self, model: &Model) -> Outcome {

@@ -233,6 +233,15 @@ impl Model {
         self.products_of(k).iter().all(|(p, _)| p.0.is_empty())
     }
 
+    /// Whether a base parameter belongs to an effect rather than to the bodies.
+    pub(crate) fn is_effect(&self, k: usize) -> bool {
+        let reduction = &self.derivation.reduction;
+        let powers = &reduction.products[reduction.retained[k]].0;
+        let effects = self.derivation.mechanism.effects.iter();
+        let mut terms = effects.flat_map(|effect| &effect.terms);
+        terms.any(|term| powers.iter().any(|(p, _)| *p == term.parameter.0))
+    }
+
     /// The sign that a base parameter must have, where all of its summands must have the same.
     pub(crate) fn sign(&self, k: usize) -> Sign {
         let sign_of = |(product, factor): &(&Monomial, f64)| {

@@ -26,7 +26,7 @@ pub mod review;
 mod tree;
 mod vector;
 
-use modelmill_spec::Mechanism;
+use modelmill_spec::{Mechanism, ParameterIdx};
 
 pub use base::BaseParameter;
 pub use emit::{Emitted, emit};
@@ -40,15 +40,16 @@ pub use reduce::{Dependency, Method, Polynomial, Powers, RationalFunction, Reduc
 use expr::Graph;
 use regressor::Equations;
 
-/// Derives the inverse dynamics of a mechanism without reducing it: every product that has an effect stands for itself, so
-/// that the regressor holds all columns of eq. (4), effects included.
-///
-/// For looking at many effects at once, most of which the model will never have.
-pub fn derive_unreduced(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
+/// Derives the columns of H for some parameters alone, each by itself and without reduction: what effects add that a model
+/// may never have.
+pub fn derive_columns(
+    mechanism: &Mechanism,
+    parameters: &[ParameterIdx],
+) -> Result<Derivation, DeriveError> {
     finite::check_values(mechanism)?;
     let mut graph = Graph::new();
     let equations = regressor::equations(&mut graph, mechanism)?;
-    let reduction = reduce::unreduced(&equations.products, &equations.columns);
+    let reduction = reduce::unreduced(&equations.products, &equations.columns, parameters);
     let programs = programs::programs(&mut graph, mechanism, &equations, &reduction)?;
     Ok(Derivation {
         mechanism: mechanism.clone(),

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use modelmill_codegen::Derivation;
-use modelmill_spec::{Carries, EffectKind, Loaded, Mechanism, Sign};
+use modelmill_spec::{Carries, EffectKind, Loaded, Mechanism, ParameterIdx, Sign};
 
 use crate::failure::{Failure, Outcome};
 
@@ -116,6 +116,7 @@ pub(crate) fn candidates(path: &Path, loaded: &Loaded) -> Outcome<Candidates> {
 struct Variant {
     text: String,
     constants: String,
+    parameters: Vec<String>,
 }
 
 impl Variant {
@@ -123,6 +124,7 @@ impl Variant {
         Ok(Self {
             text: header(path)?,
             constants: String::new(),
+            parameters: Vec::new(),
         })
     }
 
@@ -134,12 +136,23 @@ impl Variant {
         let mut read = |path: &Path| std::fs::read_to_string(path);
         let variant = modelmill_spec::load(&name.to_string_lossy(), &self.text, &mut read)
             .map_err(|failure| Failure::Rendered(failure.render(false)))?;
-        modelmill_codegen::derive_unreduced(&variant.mechanism)
+        let mechanism = &variant.mechanism;
+        let own = mechanism.parameters.iter().enumerate();
+        let own: Vec<ParameterIdx> = own
+            .filter(|(_, p)| self.parameters.contains(&p.name))
+            .map(|(i, _)| ParameterIdx(i))
+            .collect();
+        modelmill_codegen::derive_columns(mechanism, &own)
             .map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
     }
 
     fn write(&mut self, kind: &EffectKind, single: &Single) {
-        let Self { text, constants } = self;
+        let Self {
+            text,
+            constants,
+            parameters: own,
+        } = self;
+        own.extend(single.parameters.iter().cloned());
         let list = |pairs: Vec<String>| pairs.join(", ");
         let parameters = kind.parameters.iter().zip(&single.parameters);
         let parameters =

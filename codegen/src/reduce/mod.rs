@@ -18,7 +18,7 @@ mod univariate;
 
 use std::collections::BTreeSet;
 
-use modelmill_spec::Mechanism;
+use modelmill_spec::{Mechanism, ParameterIdx};
 
 pub(crate) use branches::closed_form;
 pub(crate) use plan::Plan;
@@ -70,7 +70,7 @@ pub enum Method {
         /// At how many points of motion `H p_g = H_min p_min` was shown, with fresh constants.
         confirmed_at: usize,
     },
-    /// Not at all: every product with an effect is retained.
+    /// Not at all: every product that was asked for is retained.
     Unreduced,
     /// On the model file's values, in floating point: the factors are rounded numbers.
     Numeric {
@@ -188,12 +188,18 @@ pub(crate) fn reduce(
     }
 }
 
-/// Every product that has an effect is retained.
-pub(crate) fn unreduced(candidates: &[Monomial], columns: &[Vec<ExprId>]) -> Reduction {
+/// The products that are one of some parameters and have an effect, all retained.
+pub(crate) fn unreduced(
+    candidates: &[Monomial],
+    columns: &[Vec<ExprId>],
+    parameters: &[ParameterIdx],
+) -> Reduction {
+    let is_wanted = |product: &Monomial| matches!(product.0.as_slice(), [(p, 1)] if parameters.contains(&ParameterIdx(*p)));
     let is_zero = |column: &Vec<ExprId>| column.iter().all(|x| *x == Graph::ZERO);
     let pick = |zero: bool| -> Vec<Monomial> {
         let pairs = candidates.iter().zip(columns);
-        let wanted = pairs.filter(|(_, column)| is_zero(column) == zero);
+        let wanted =
+            pairs.filter(|(product, column)| is_wanted(product) && is_zero(column) == zero);
         wanted.map(|(product, _)| product.clone()).collect()
     };
     let products = pick(false);

@@ -21,6 +21,7 @@ use serde::Serialize;
 pub use bench::Finer;
 pub use evidence::Evidence;
 pub use noise::{effective_samples, white_noise};
+pub use pool::factors;
 pub use problem::{
     Candidate, Choice, Column, Effect, EffectParameter, Layout, Problem, Sign, Source, Stretch,
 };

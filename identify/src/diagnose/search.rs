@@ -10,6 +10,8 @@ const BEAM: usize = 6;
 const TESTED: usize = 8;
 /// A rival whose squares are within this factor is tried with finer constants.
 const CLOSE: f64 = 1.5;
+/// A simpler kind that brings this share of what one that holds it brings comes first.
+const MOST_OF: f64 = 0.7;
 /// Most effects that are looked for.
 const MOST: usize = 40;
 
@@ -229,6 +231,36 @@ impl Bench<'_> {
         trials: &[Trial],
     ) -> (Vec<Pick>, Evidence) {
         let mut chosen = (best, evidence);
+        // A kind that holds a simpler one, such as friction that differs by direction, comes after it.
+        // So does what refines a member, after other simple kinds.
+        let refines = !self.replaced(accepted, &chosen.0.picks).is_empty();
+        let nested = trials.iter().filter(|trial| {
+            let news = difference(&trial.picks, accepted);
+            let bests = difference(&chosen.0.picks, accepted);
+            let [simple] = news.as_slice() else {
+                return false;
+            };
+            let [own] = bests.as_slice() else {
+                return false;
+            };
+            trial.wrong_sign.is_empty()
+                && self.replaced(accepted, &trial.picks).is_empty()
+                && simple.columns.len() < own.columns.len()
+                && self.candidate(simple).searched <= self.candidate(own).searched
+                && (refines || self.is_within(simple, own, accepted))
+        });
+        let mut simpler: Vec<(Trial, Evidence)> = Vec::new();
+        for trial in nested {
+            let channels = self.acted_on(&difference(&trial.picks, accepted));
+            let own = self.evidence(accepted, &trial.picks, &channels);
+            if own.holds() && own.gain > MOST_OF * chosen.1.gain {
+                simpler.push((trial.clone(), own));
+            }
+        }
+        simpler.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
+        if let Some(simple) = simpler.into_iter().next() {
+            chosen = simple;
+        }
         for trial in trials.iter().take(40) {
             if trial.freedoms >= chosen.0.freedoms || !trial.wrong_sign.is_empty() {
                 continue;
@@ -247,9 +279,47 @@ impl Bench<'_> {
         (chosen.0.picks, chosen.1)
     }
 
+    /// Members of a set that are no longer in another.
+    fn replaced(&self, accepted: &[Pick], picks: &[Pick]) -> Vec<Pick> {
+        let gone = |pick: &&Pick| picks.iter().all(|p| p.candidate != pick.candidate);
+        accepted.iter().filter(gone).cloned().collect()
+    }
+
+    /// Takes simpler kinds where nothing speaks for what they lack.
+    fn simplify(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
+        for i in 0..picks.len() {
+            if picks[i].columns.len() < 2 {
+                continue;
+            }
+            let mut others = picks.clone();
+            let own = others.remove(i);
+            self.look(&others);
+            let nested: Vec<Pick> = (self.present.iter().flatten())
+                .filter(|one| one.columns.len() < own.columns.len())
+                .filter(|one| self.candidate(one).searched <= self.candidate(&own).searched)
+                .filter(|one| self.is_within(one, &own, &others))
+                .cloned()
+                .collect();
+            let channels = self.acted_on(std::slice::from_ref(&own));
+            for simple in nested {
+                let mut set = picks.clone();
+                set[i] = simple;
+                let trial = self.trial(set);
+                if trial.wrong_sign.is_empty()
+                    && !self.evidence(&trial.picks, &picks, &channels).holds()
+                {
+                    picks = trial.picks;
+                    break;
+                }
+            }
+        }
+        picks
+    }
+
     /// Takes out, one by one, what is no longer needed.
-    fn prune(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
+    fn prune(&mut self, picks: Vec<Pick>) -> Vec<Pick> {
         self.weigh(&picks);
+        let mut picks = self.simplify(picks);
         loop {
             let without = |i: usize| {
                 let mut rest = picks.clone();
