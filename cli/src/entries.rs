@@ -1,8 +1,8 @@
 //! The entries of a model as pairs of a name and a text, so that two models can be compared.
 
 use modelmill_spec::{
-    Action, Angle, Axis, Convention, DriveKind, Effect, Exact, Inertial, Length, Mechanism, Motion, Place,
-    PlaceQuantity, Step, Symbol,
+    Action, Angle, Axis, Convention, DriveKind, Effect, Exact, Inertial, Length, Mechanism, Motion,
+    Place, PlaceQuantity, Step, Symbol,
 };
 
 /// Entries as they are collected.

@@ -2,10 +2,11 @@
 
 use std::f64::consts::PI;
 
-use modelmill_codegen::{Evaluator, States};
+use modelmill_codegen::{Evaluator, Method, States};
 use modelmill_rig::{Rig, State, Tracker, forces};
 use modelmill_spec::Mechanism;
-use modelmill_tests::{derive, fixtures, model_file};
+use modelmill_tests::fixtures::{derive, fixtures, model_file};
+use modelmill_tests::laws::Case;
 
 fn spidermill_rig() -> Rig {
     let path = fixtures().join("../../model-spec/rigs/spidermill-full.toml");
@@ -91,7 +92,9 @@ fn model_forces(mechanism: &Mechanism, states: &[State], load: &[Vec<f64>]) -> V
         load: slices(load),
     };
     let values = derivation.nominal_base_values();
-    let inverse = evaluator.inverse_dynamics(&states, &values).expect("forces");
+    let inverse = evaluator
+        .inverse_dynamics(&states, &values)
+        .expect("forces");
     // tau = H p with the exact reduction says the same.
     let regressor = evaluator.regressor(&states).expect("a regressor");
     let product = regressor * nalgebra::DVector::from_vec(values);
@@ -245,7 +248,8 @@ fn a_tilt_about_several_axes() {
     let states = motion(20);
     let tilt = |rig: &mut Rig, values: &[(&str, f64)]| {
         let effect = rig.effect("gravity_tilt", &["base"], values);
-        rig.effects.push(effect.unwrap_or_else(|faults| panic!("{}", faults[0])));
+        rig.effects
+            .push(effect.unwrap_or_else(|faults| panic!("{}", faults[0])));
     };
     // As the model does: the base is turned by Rz Ry Rx, so that gravity turns back about z first.
     let angles = [("tx", 0.1), ("ty", -0.2), ("tz", 0.15)];
@@ -254,8 +258,15 @@ fn a_tilt_about_several_axes() {
         tilt(&mut rig, &[(symbol, *angle)]);
     }
     let expected = rig_forces(&rig, &states);
-    let mechanism = with("spidermill", &effect("gravity_tilt", &["base"], &[], &angles));
-    agree(&model_forces(&mechanism, &states, &[]), &expected, "three tilts");
+    let mechanism = with(
+        "spidermill",
+        &effect("gravity_tilt", &["base"], &[], &angles),
+    );
+    agree(
+        &model_forces(&mechanism, &states, &[]),
+        &expected,
+        "three tilts",
+    );
 }
 
 /// One crank differs from the other, with which it shares its parameters.
@@ -264,24 +275,27 @@ fn an_untied_part() {
     let states = motion(40);
     let mut rig = spidermill_rig();
     let plain = rig_forces(&rig, &states);
-    let (_, crank) = rig
-        .bodies
-        .iter_mut()
-        .find(|(name, _)| name.as_str() == "G8")
-        .map(|(name, body)| (name.clone(), body))
-        .expect("a crank");
+    let crank = rig.bodies.iter_mut().find(|body| body.name == "G8");
+    let crank = crank.expect("a crank");
     // A further mass of 3 kg at 0.4 m along the crank, with an inertia of its own: about the new centre of mass.
     let (m, c, own) = (3.0, 0.4, 0.2);
-    let mass = crank.mass + m;
-    let centre = (crank.mass * crank.centre.x + m * c) / mass;
-    let shift = |mass: f64, at: f64| mass * (at - centre).powi(2);
-    crank.inertia[(2, 2)] += shift(crank.mass, crank.centre.x) + own + shift(m, c);
+    let (mass, at) = (crank.mass + m, nalgebra::Vector3::new(c, 0.0, 0.0));
+    let centre = (crank.mass * crank.centre + m * at) / mass;
+    let shift = |mass: f64, at: nalgebra::Vector3<f64>| mass * (at - centre).norm_squared();
+    crank.inertia[(2, 2)] += shift(crank.mass, crank.centre) + own + shift(m, at);
     crank.mass = mass;
-    crank.centre.x = centre;
+    crank.centre = centre;
     let expected = rig_forces(&rig, &states);
     let values = [("dm", m), ("dmx", m * c), ("dJzz", own + m * c * c)];
-    let mechanism = with("spidermill", &effect("untied_part", &["crank_left"], &values, &[]));
-    agree(&model_forces(&mechanism, &states, &[]), &expected, "untied_part");
+    let mechanism = with(
+        "spidermill",
+        &effect("untied_part", &["crank_left"], &values, &[]),
+    );
+    agree(
+        &model_forces(&mechanism, &states, &[]),
+        &expected,
+        "untied_part",
+    );
     assert!((plain[0][3] - expected[0][3]).abs() > 1.0);
 }
 
@@ -296,7 +310,11 @@ fn the_placement_of_m4_mends_the_paper() {
     let mended = with("spidermill-paper", placed);
     agree(&model_forces(&mended, &states, &[]), &consistent, "m4");
     assert!((paper[0][3] - consistent[0][3]).abs() > 1.0);
-    assert_eq!(mended.parameters.len(), 8, "the effect has no parameter of its own");
+    assert_eq!(
+        mended.parameters.len(),
+        8,
+        "the effect has no parameter of its own"
+    );
 }
 
 /// The same correction with a mass of its own, against a rig whose lumped mass is misplaced as much.
@@ -312,4 +330,23 @@ fn a_placement_with_a_mass_of_its_own() {
     let consistent = model_forces(&with("spidermill", ""), &states, &[]);
     let mended = model_forces(&with("spidermill-paper", &more), &states, &[]);
     agree(&mended, &consistent, "a mass of its own");
+}
+
+/// A rod in space whose pivot moves has three moments that count; coupled drives and a tilted base besides.
+/// The rod of the independent mechanics consists of three particles.
+#[test]
+fn a_rod_in_space_obeys_dalembert() {
+    let mechanism = modelmill_tests::fixtures::model("swinging_cylinder");
+    let case = Case::new(&mechanism, 120, 0.6).expect("a case");
+    for figure in [
+        case.exact_rank_is_numeric_rank(),
+        case.reduction_keeps_the_forces(),
+        case.forces_satisfy_dalembert(40),
+    ] {
+        figure.expect("a law");
+    }
+    let reduction = &case.derivation.reduction;
+    // Roots do not stand in the way.
+    assert!(matches!(reduction.method, Method::Exact { .. }));
+    assert!(reduction.without_effect.is_empty());
 }

@@ -6,7 +6,7 @@ use crate::diagnostic::{Diagnostic, Log};
 use crate::exact::CoordinateIdx;
 use crate::kind_terms::lacking_units;
 use crate::kinds::{Carries, acts_on, n_places};
-use crate::mechanism::{Drive, DriveIdx, DriveKind, LumpedMass, Motion, PartIdx, Part, Place};
+use crate::mechanism::{Drive, DriveIdx, DriveKind, LumpedMass, Motion, Part, PartIdx, Place};
 use crate::record::OneOrMany;
 use crate::schema::EffectKindEntry;
 use crate::suggest;
@@ -46,7 +46,11 @@ pub(super) fn place(
     {
         return Some(place);
     }
-    if let Some(idx) = scene.drives.iter().position(|drive| drive.name == name.text) {
+    if let Some(idx) = scene
+        .drives
+        .iter()
+        .position(|drive| drive.name == name.text)
+    {
         return Some(Place::Drive(DriveIdx(idx)));
     }
     let coordinate = symbols
@@ -175,7 +179,10 @@ pub(super) fn common_load(
     if let Some(n) = n_places(kind).filter(|n| *n != names.len()) {
         let (word, why) = match n {
             1 => ("one place", "it acts on one place at a time"),
-            _ => ("two places", "at each of two places it acts with the motion of the other"),
+            _ => (
+                "two places",
+                "at each of two places it acts with the motion of the other",
+            ),
         };
         log.push(
             Diagnostic::error(at.span, format!("`{kind_name}` takes {word}"))

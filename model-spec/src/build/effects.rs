@@ -473,4 +473,3 @@ fn check_parameter_names(entry: &EffectEntry, kind: &EffectKindEntry, log: &mut 
         }
     }
 }
-

@@ -7,10 +7,10 @@ pub use planar_loop::{planar_loop, regularity_at};
 pub use tree::tree;
 
 use modelmill_spec::{
-    Axis, Constant, ConstantIdx, Convention, Coordinate, CoordinateIdx, Drive, DriveIdx, DriveKind,
-    Action, Effect, EffectTerm, Exact, Frame, FrameIdx, Function, Inertial, Length, Limits, LumpedMass,
-    Mechanism, Motion, Parameter, ParameterIdx, Part, Place, PlaceQuantity, Point, PointIdx,
-    Recording, Step, Symbol,
+    Action, Axis, Constant, ConstantIdx, Convention, Coordinate, CoordinateIdx, Drive, DriveIdx,
+    DriveKind, Effect, EffectTerm, Exact, Frame, FrameIdx, Function, Inertial, Length, Limits,
+    LumpedMass, Mechanism, Motion, Parameter, ParameterIdx, Part, Place, PlaceQuantity, Point,
+    PointIdx, Recording, Step, Symbol,
 };
 use nalgebra::{Matrix3, Vector3};
 use num_rational::BigRational;

@@ -58,11 +58,7 @@ pub fn length(mechanism: &Mechanism, length: &Length) -> Formula {
     Formula::sum([exact(mechanism, &length.offset)].into_iter().chain(slides))
 }
 
-fn name(
-    mechanism: &Mechanism,
-    symbol: modelmill_spec::Symbol,
-    [x, other]: [&str; 2],
-) -> Symbol {
+fn name(mechanism: &Mechanism, symbol: modelmill_spec::Symbol, [x, other]: [&str; 2]) -> Symbol {
     use modelmill_spec::Symbol as Named;
     match symbol {
         Named::Constant(i) => Symbol::new(&*mechanism.constants[i.0].name),
