@@ -229,19 +229,8 @@ fn join(terms: &[String]) -> String {
 }
 
 fn places(m: &Mechanism, effect: &Effect) -> String {
-    let names: Vec<&str> = effect
-        .places
-        .iter()
-        .map(|place| match place {
-            Place::Drive(d) => m.drives[d.0].name.as_str(),
-            Place::Coordinate(i) => m.coordinates[i.0].name.as_str(),
-            Place::Point(p) => m.points[p.0].name.as_str(),
-            Place::Part(p) => m.parts[p.0].name.as_str(),
-            Place::Base => "base",
-            Place::Force => "force",
-        })
-        .collect();
-    names.join(", ")
+    let names = effect.places.iter().map(|place| m.place_name(*place));
+    names.collect::<Vec<_>>().join(", ")
 }
 
 /// The name of a symbol of an effect. Where there is only one place, its quantities are called as the columns of a

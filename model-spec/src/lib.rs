@@ -8,6 +8,7 @@ mod build;
 mod column;
 mod diagnostic;
 mod document;
+pub mod edit;
 mod editor;
 mod exact;
 #[cfg(test)]

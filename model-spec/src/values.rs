@@ -54,13 +54,18 @@ impl Read for Name {
     }
 }
 
-/// Reports a name that is no identifier.
-pub(crate) fn check_name(text: &str, span: Span, log: &mut Log) -> bool {
-    let fine = text.len() <= 60
+/// Whether a text is an identifier.
+pub(crate) fn is_name(text: &str) -> bool {
+    text.len() <= 60
         && text.starts_with(|first: char| first.is_ascii_alphabetic())
         && text
             .chars()
-            .all(|found| found.is_ascii_alphanumeric() || found == '_');
+            .all(|found| found.is_ascii_alphanumeric() || found == '_')
+}
+
+/// Reports a name that is no identifier.
+pub(crate) fn check_name(text: &str, span: Span, log: &mut Log) -> bool {
+    let fine = is_name(text);
     if !fine {
         log.push(
             Diagnostic::error(span, format!("`{}` cannot be a name", quote(text)))

@@ -56,7 +56,7 @@ pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
                 if i > 0 {
                     places.push(text(", "));
                 }
-                places.push(code(place_name(mechanism, *place)));
+                places.push(code(mechanism.place_name(*place)));
             }
             vec![
                 cell(text(effect.kind.replace('_', " "))),
@@ -67,17 +67,6 @@ pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
         .collect();
     let head = vec!["effect", "at", "adds"];
     page.table("effects", Table { head, rows });
-}
-
-fn place_name(mechanism: &Mechanism, place: Place) -> &str {
-    match place {
-        Place::Drive(d) => &mechanism.drives[d.0].name,
-        Place::Coordinate(c) => &mechanism.coordinates[c.0].name,
-        Place::Point(p) => &mechanism.points[p.0].name,
-        Place::Part(p) => &mechanism.parts[p.0].name,
-        Place::Base => "base",
-        Place::Force => "force",
-    }
 }
 
 /// What an effect adds, as a formula where it is one.
