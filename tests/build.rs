@@ -25,11 +25,12 @@ const EACH: usize = 8;
 /// Fixtures whose modules are tested, and units of length in which they are emitted besides.
 ///
 /// Where a length is the independent coordinate, the numeric reduction needs lengths of a metre or more.
-const FIXTURES: [(&str, &[(&str, f64)]); 4] = [
+const FIXTURES: [(&str, &[(&str, f64)]); 5] = [
     ("names", &[]),
     ("spatial_slider", &[MM, LARGE, KM, SMALL]),
     ("spatial_press", &[MM, LARGE]),
     ("undefined_effects", &[]),
+    ("swinging_cylinder", &[]),
 ];
 const MM: (&str, f64) = ("mm", 1e3);
 const KM: (&str, f64) = ("km", 1e-3);

@@ -46,8 +46,27 @@ pub(crate) fn read_all(
     Ok(all)
 }
 
-/// Reads and prepares one recording: one or, where it is cut at gaps in time, several stretches.
+/// Reads and prepares one recording: one or, where it is cut at gaps in time, several stretches. Where the model says
+/// that forces are read late, each has the states of the moment at which it acted.
 pub(crate) fn read(model: &Model, path: &Path, args: &PreparationArgs) -> Outcome<Vec<Data>> {
+    read_paired(model, path, args, model.derivation.mechanism.force_delay)
+}
+
+/// As [`read`], with states and forces as the recording has them side by side.
+pub(crate) fn read_as_recorded(
+    model: &Model,
+    path: &Path,
+    args: &PreparationArgs,
+) -> Outcome<Vec<Data>> {
+    read_paired(model, path, args, 0.0)
+}
+
+fn read_paired(
+    model: &Model,
+    path: &Path,
+    args: &PreparationArgs,
+    delay: f64,
+) -> Outcome<Vec<Data>> {
     let name = path.display().to_string();
     let piped = piped(path)?;
     let header = match &piped {
@@ -59,7 +78,7 @@ pub(crate) fn read(model: &Model, path: &Path, args: &PreparationArgs) -> Outcom
         Some(bytes) => Recording::from_bytes(bytes, &name, &options),
         None => Recording::read_with(path, &options),
     })?;
-    let mut data = prepare(model, &recording, args)?;
+    let mut data = prepare(model, &recording, args, delay)?;
     note_idle_options(&mut data, args);
     for note in data.iter().flat_map(Data::notes) {
         match note.severity {
@@ -74,7 +93,8 @@ pub(crate) fn read(model: &Model, path: &Path, args: &PreparationArgs) -> Outcom
 pub(crate) fn read_text(model: &Model, name: &str, text: &str) -> Outcome<Data> {
     let recording = Recording::from_reader(text.as_bytes(), name, &ReadOptions::default())?;
     let preparation = PreparationArgs::none().preparation();
-    let run = recording.states_with(&model.active(), &model.drives(), &preparation)?;
+    let mut run = recording.states_with(&model.active(), &model.drives(), &preparation)?;
+    pair(&mut run, model.derivation.mechanism.force_delay)?;
     Ok(Data {
         run,
         variance: None,
@@ -83,7 +103,46 @@ pub(crate) fn read_text(model: &Model, name: &str, text: &str) -> Outcome<Data> 
     })
 }
 
-fn prepare(model: &Model, recording: &Recording, args: &PreparationArgs) -> Outcome<Vec<Data>> {
+/// Gives every force the states of the moment at which it acted, by the model's delay.
+fn pair(run: &mut Run, delay: f64) -> Outcome {
+    if delay == 0.0 {
+        return Ok(());
+    }
+    let ms = 1e3 * delay;
+    let Some((start, end)) = run.pair_with_earlier_states(delay) else {
+        return Err(Failure::Input(format!(
+            "{}: the model's `time_delay` of {ms} ms leaves fewer than four of {} samples with states to go with; check T, \
+             which is in seconds",
+            run.file,
+            run.time.len()
+        )));
+    };
+    let (side, lost) = if start > 0 {
+        ("first", start)
+    } else {
+        ("last", end)
+    };
+    let lost = match lost {
+        0 => String::new(),
+        1 => format!("; the {side} sample has no states to go with and is left out"),
+        n => format!("; the {side} {n} samples have no states to go with and are left out"),
+    };
+    run.notes.push(Note {
+        severity: Severity::Info,
+        says: format!(
+            "Forces of {} are held against the states of {ms} ms before, as the model's `time_delay` says{lost}.",
+            run.file
+        ),
+    });
+    Ok(())
+}
+
+fn prepare(
+    model: &Model,
+    recording: &Recording,
+    args: &PreparationArgs,
+    delay: f64,
+) -> Outcome<Vec<Data>> {
     let preparation = args.preparation();
     let mut runs = watched(&format!("preparing {}", recording.file()), 0, |_| {
         recording.runs_with(&model.active(), &model.drives(), &preparation)
@@ -97,6 +156,7 @@ fn prepare(model: &Model, recording: &Recording, args: &PreparationArgs) -> Outc
     for run in &mut runs {
         let idle = run.suspicious_forces(&model.drives());
         run.notes.extend(idle);
+        pair(run, delay)?;
     }
     let with_variance = runs.into_iter().map(|run| {
         let variance = variances::of(recording, &run, &model.drives())?;

@@ -1,8 +1,8 @@
 //! The entries of a model as pairs of a name and a text, so that two models can be compared.
 
 use modelmill_spec::{
-    Angle, Axis, Convention, DriveKind, Effect, Exact, Inertial, Length, Mechanism, Motion, Place,
-    PlaceQuantity, Step, Symbol,
+    Action, Angle, Axis, Convention, DriveKind, Effect, Exact, Inertial, Length, Mechanism, Motion,
+    Place, PlaceQuantity, Step, Symbol,
 };
 
 /// Entries as they are collected.
@@ -229,16 +229,8 @@ fn join(terms: &[String]) -> String {
 }
 
 fn places(m: &Mechanism, effect: &Effect) -> String {
-    let names: Vec<&str> = effect
-        .places
-        .iter()
-        .map(|place| match place {
-            Place::Drive(d) => m.drives[d.0].name.as_str(),
-            Place::Coordinate(i) => m.coordinates[i.0].name.as_str(),
-            Place::Point(p) => m.points[p.0].name.as_str(),
-        })
-        .collect();
-    names.join(", ")
+    let names = effect.places.iter().map(|place| m.place_name(*place));
+    names.collect::<Vec<_>>().join(", ")
 }
 
 /// The name of a symbol of an effect. Where there is only one place, its quantities are called as the columns of a
@@ -253,17 +245,28 @@ fn at_place(m: &Mechanism, effect: &Effect, symbol: Symbol) -> String {
             DriveKind::Joint(i) => (&m.coordinates[i.0].name, ""),
             DriveKind::Linear { .. } => (&m.drives[d.0].name, "_length"),
         },
-        Place::Point(_) => return m.symbol_name(symbol).to_owned(),
+        Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => {
+            return m.symbol_name(symbol).to_owned();
+        }
     };
     match quantity {
         PlaceQuantity::Coordinate => format!("{name}{position}"),
         PlaceQuantity::Rate => format!("{name}_d"),
         PlaceQuantity::Acceleration => format!("{name}_dd"),
-        PlaceQuantity::Load => m.symbol_name(symbol).to_owned(),
+        _ => m.symbol_name(symbol).to_owned(),
     }
 }
 
 fn terms(m: &Mechanism, effect: &Effect) -> String {
+    if !matches!(effect.action, Action::Local) {
+        let names = effect.terms.iter().map(|term| {
+            let parameter = &m.parameters[term.parameter.0];
+            format!("{} {}", term.symbol, parameter.name)
+        });
+        let constants = effect.constants.iter();
+        let values = constants.map(|(symbol, value)| format!("{symbol} = {}", text(m, value)));
+        return names.chain(values).collect::<Vec<_>>().join(", ");
+    }
     let terms: Vec<String> = effect
         .terms
         .iter()

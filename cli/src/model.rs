@@ -149,8 +149,9 @@ fn signs(mechanism: &Mechanism, kinds: &[EffectKind]) -> Vec<Sign> {
         let Some(kind) = kinds.iter().find(|kind| kind.name == effect.kind) else {
             continue;
         };
-        for (term, parameter) in effect.terms.iter().zip(&kind.parameters) {
-            if parameter.sign != Sign::Any {
+        for term in &effect.terms {
+            let known = kind.parameters.iter().find(|one| one.symbol == term.symbol);
+            if let Some(parameter) = known.filter(|one| one.sign != Sign::Any) {
                 signs[term.parameter.0] = parameter.sign;
             }
         }

@@ -281,17 +281,21 @@ fn polynomial_at(
     })
 }
 
-/// The expression with a place's coordinate named.
-pub(crate) fn with_coordinate(exact: &Exact, coordinate: CoordinateIdx) -> Exact {
-    let inner = |a: &Exact| Box::new(with_coordinate(a, coordinate));
+/// The expression with a place's coordinate, or that of the other place, named.
+pub(crate) fn with_coordinate(
+    exact: &Exact,
+    quantity: PlaceQuantity,
+    coordinate: CoordinateIdx,
+) -> Exact {
+    let inner = |a: &Exact| Box::new(with_coordinate(a, quantity, coordinate));
     let all = |operands: &[Exact]| {
         operands
             .iter()
-            .map(|a| with_coordinate(a, coordinate))
+            .map(|a| with_coordinate(a, quantity, coordinate))
             .collect()
     };
     match exact {
-        Exact::Symbol(Symbol::Place(PlaceQuantity::Coordinate)) => {
+        Exact::Symbol(Symbol::Place(found)) if *found == quantity => {
             Exact::Symbol(Symbol::Coordinate(coordinate))
         }
         Exact::Rational(_) | Exact::Pi | Exact::Symbol(_) => exact.clone(),

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modelmill_spec::{Exact, Inertial, LumpedMass, Mechanism, Place};
+use modelmill_spec::{Action, EffectTerm, Exact, Inertial, LumpedMass, Mechanism, Place, Point};
 
 use crate::DeriveError;
 use crate::exact::{self, Monomial, Polynomial};
@@ -30,19 +30,26 @@ impl InertiaByProduct {
             by_product.add(graph, tree.link_of(lump.frame), elements);
         }
         for effect in &mechanism.effects {
+            if let Action::Bodies {
+                parts,
+                lumped_masses,
+            } = &effect.action
+            {
+                for part in parts {
+                    let elements = part_elements(graph, &part.inertial)?;
+                    by_product.add(graph, tree.link_of(part.frame), elements);
+                }
+                for lump in lumped_masses {
+                    let elements = lump_elements(graph, lump)?;
+                    by_product.add(graph, tree.link_of(lump.frame), elements);
+                }
+                continue;
+            }
             for place in &effect.places {
                 let Place::Point(point) = place else { continue };
                 let point = &mechanism.points[point.0];
                 for term in &effect.terms {
-                    let parameter =
-                        Exact::Symbol(modelmill_spec::Symbol::Parameter(term.parameter));
-                    let lump = LumpedMass {
-                        mass: Exact::Product(vec![parameter, term.expression.clone()]),
-                        share: num_rational::BigRational::from_integer(1.into()),
-                        frame: point.frame,
-                        force_at: point.at.clone(),
-                        moment_at: point.at.clone(),
-                    };
+                    let lump = mass_at(point, term);
                     let elements = lump_elements(graph, &lump)?;
                     by_product.add(graph, tree.link_of(point.frame), elements);
                 }
@@ -98,6 +105,18 @@ impl InertiaByProduct {
                 }
             }
         }
+    }
+}
+
+/// The mass that a term of an effect adds at a point.
+fn mass_at(point: &Point, term: &EffectTerm) -> LumpedMass {
+    let parameter = Exact::Symbol(modelmill_spec::Symbol::Parameter(term.parameter));
+    LumpedMass {
+        mass: Exact::Product(vec![parameter, term.expression.clone()]),
+        share: num_rational::BigRational::from_integer(1.into()),
+        frame: point.frame,
+        force_at: point.at.clone(),
+        moment_at: point.at.clone(),
     }
 }
 

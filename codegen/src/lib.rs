@@ -23,6 +23,7 @@ mod projection;
 mod reduce;
 mod regressor;
 pub mod review;
+mod rod;
 mod tree;
 mod vector;
 

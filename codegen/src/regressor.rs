@@ -1,9 +1,10 @@
 //! The regressor H of eq. (4): one column per product of dynamic parameters, one row per drive.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use modelmill_spec::{
-    DriveKind, EffectTerm, Mechanism, Motion as JointMotion, Place, PlaceQuantity,
+    Action, CoordinateIdx, DriveKind, Effect, EffectTerm, Mechanism, Motion as JointMotion, Place,
+    PlaceQuantity,
 };
 
 use crate::DeriveError;
@@ -12,6 +13,7 @@ use crate::expr::{Atom, ExprId, Graph};
 use crate::inertia::InertiaByProduct;
 use crate::newton_euler::{self, Motion, Style};
 use crate::projection::Projection;
+use crate::rod;
 use crate::tree::Tree;
 
 /// The mechanism's equations before reduction.
@@ -21,6 +23,8 @@ pub(crate) struct Equations {
     motions: Vec<(Style, Motion)>,
     pub(crate) inertia: InertiaByProduct,
     pub(crate) projection: Projection,
+    /// For every effect that is a rod, and each of its places: generalised forces of its three terms.
+    rods: BTreeMap<(usize, usize), [Vec<ExprId>; 3]>,
     /// Products of parameters that occur anywhere, in the order of eq. (5).
     pub(crate) products: Vec<Monomial>,
     /// `columns[k][d]`: force of drive `d` for product `k`.
@@ -51,8 +55,20 @@ pub(crate) fn equations(
         .collect();
     let inertia = InertiaByProduct::new(graph, mechanism, &tree)?;
     let projection = Projection::new(graph, mechanism, &tree)?;
+    let mut rods = BTreeMap::new();
+    for (e, effect) in mechanism.effects.iter().enumerate() {
+        for (p, place) in effect.places.iter().enumerate() {
+            if let (Action::Rod, Place::Drive(d)) = (&effect.action, place) {
+                let forces =
+                    rod::generalised_forces(graph, mechanism, &tree, &projection, &gravity, d.0)?;
+                rods.insert((e, p), forces);
+            }
+        }
+    }
     let mut products: BTreeSet<Monomial> = inertia.products();
-    for effect in &mechanism.effects {
+    // Bodies of effects are among the inertia already.
+    let forces = |effect: &&Effect| matches!(effect.action, Action::Local | Action::Rod);
+    for effect in mechanism.effects.iter().filter(forces) {
         products.extend(
             effect
                 .terms
@@ -66,6 +82,7 @@ pub(crate) fn equations(
         motions,
         inertia,
         projection,
+        rods,
         products,
         columns: Vec::new(),
     };
@@ -153,24 +170,30 @@ impl Equations {
         value: &dyn Fn(&Monomial) -> ExprId,
     ) -> Result<Vec<ExprId>, DeriveError> {
         let mut on_drives = vec![Graph::ZERO; mechanism.drives.len()];
-        for effect in &mechanism.effects {
-            for (place, term) in effect
-                .places
-                .iter()
-                .flat_map(|p| effect.terms.iter().map(move |t| (p, t)))
-            {
-                let value = value(&Monomial(vec![(term.parameter.0, 1)]));
-                if value == Graph::ZERO {
-                    continue;
+        for (e, effect) in mechanism.effects.iter().enumerate() {
+            for (p, place) in effect.places.iter().enumerate() {
+                for (t, term) in effect.terms.iter().enumerate() {
+                    let value = value(&Monomial(vec![(term.parameter.0, 1)]));
+                    if value == Graph::ZERO {
+                        continue;
+                    }
+                    if let Some(rod) = self.rods.get(&(e, p)) {
+                        for (slot, factor) in on_tree.iter_mut().zip(&rod[t]) {
+                            let force = graph.mul(*factor, value);
+                            *slot = graph.add(*slot, force);
+                        }
+                        continue;
+                    }
+                    let slot = match place {
+                        Place::Coordinate(i) => &mut on_tree[i.0],
+                        Place::Drive(d) => &mut on_drives[d.0],
+                        // Masses are in the inertia, and the rest has no parameters.
+                        Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => continue,
+                    };
+                    let factor = self.effect_factor(graph, mechanism, effect, p, term)?;
+                    let force = graph.mul(factor, value);
+                    *slot = graph.add(*slot, force);
                 }
-                let slot = match place {
-                    Place::Coordinate(i) => &mut on_tree[i.0],
-                    Place::Drive(d) => &mut on_drives[d.0],
-                    Place::Point(_) => continue,
-                };
-                let factor = self.effect_factor(graph, mechanism, place, term)?;
-                let force = graph.mul(factor, value);
-                *slot = graph.add(*slot, force);
             }
         }
         let forces = self.projection.drive_forces(graph, &on_tree)?;
@@ -181,15 +204,48 @@ impl Equations {
             .collect())
     }
 
-    /// What an effect's parameter multiplies at a place.
+    /// What an effect's parameter multiplies at one of its places.
     fn effect_factor(
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
-        place: &Place,
+        effect: &Effect,
+        at: usize,
         term: &EffectTerm,
     ) -> Result<ExprId, DeriveError> {
-        let quantities = match place {
+        // With two places each is the other's other one.
+        let place = effect.places[at];
+        let other = match effect.places.as_slice() {
+            [_, _] => Some(effect.places[1 - at]),
+            _ => None,
+        };
+        let here = self.quantities(graph, place);
+        let there = other.map_or([None; 4], |other| self.quantities(graph, other));
+        // An angle stands as itself, so that its sine is that of a joint.
+        let mut expression = term.expression.clone();
+        let named = [
+            (Some(place), PlaceQuantity::Coordinate),
+            (other, PlaceQuantity::OtherCoordinate),
+        ];
+        for (place, quantity) in named {
+            if let Some(i) = place.and_then(|place| turning(mechanism, place)) {
+                expression = exact::with_coordinate(&expression, quantity, i);
+            }
+        }
+        exact::expression_at(graph, &expression, &|quantity| match quantity {
+            PlaceQuantity::Coordinate => here[0],
+            PlaceQuantity::Rate => here[1],
+            PlaceQuantity::Acceleration => here[2],
+            PlaceQuantity::Load => here[3],
+            PlaceQuantity::OtherCoordinate => there[0],
+            PlaceQuantity::OtherRate => there[1],
+            PlaceQuantity::OtherAcceleration => there[2],
+        })
+    }
+
+    /// Coordinate, rate, acceleration and load of a place.
+    fn quantities(&self, graph: &mut Graph, place: Place) -> [Option<ExprId>; 4] {
+        match place {
             Place::Drive(d) => {
                 let drive = &self.projection.drives[d.0];
                 [
@@ -208,28 +264,20 @@ impl Equations {
                 let [q, qd, qdd] = atoms.map(|a| Some(graph.atom(a)));
                 [q, qd, qdd, None]
             }
-            Place::Point(_) => [None; 4],
-        };
-        // An angle stands as itself, so that its sine is that of a joint.
-        let turning = match place {
-            Place::Coordinate(i) => Some(*i),
-            Place::Drive(d) => match mechanism.drives[d.0].kind {
-                DriveKind::Joint(i) => Some(i),
-                DriveKind::Linear { .. } => None,
-            },
-            Place::Point(_) => None,
-        };
-        let turning =
-            turning.filter(|i| mechanism.coordinates[i.0].motion == JointMotion::Revolute);
-        let expression = match turning {
-            Some(i) => exact::with_coordinate(&term.expression, i),
-            None => term.expression.clone(),
-        };
-        exact::expression_at(graph, &expression, &|quantity| match quantity {
-            PlaceQuantity::Coordinate => quantities[0],
-            PlaceQuantity::Rate => quantities[1],
-            PlaceQuantity::Acceleration => quantities[2],
-            PlaceQuantity::Load => quantities[3],
-        })
+            Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => [None; 4],
+        }
     }
+}
+
+/// The angle by which a place turns, if it does.
+fn turning(mechanism: &Mechanism, place: Place) -> Option<CoordinateIdx> {
+    let coordinate = match place {
+        Place::Coordinate(i) => i,
+        Place::Drive(d) => match mechanism.drives[d.0].kind {
+            DriveKind::Joint(i) => i,
+            DriveKind::Linear { .. } => return None,
+        },
+        Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => return None,
+    };
+    (mechanism.coordinates[coordinate.0].motion == JointMotion::Revolute).then_some(coordinate)
 }

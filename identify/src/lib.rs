@@ -22,6 +22,7 @@
 
 pub mod base_fit;
 mod csv_text;
+mod delay;
 pub mod derivatives;
 pub mod deviations;
 pub mod diagnose;

@@ -25,6 +25,46 @@ pub enum PlaceQuantity {
     Acceleration,
     /// The force or torque that the place carries, effects aside.
     Load,
+    /// The coordinate of the other of two places.
+    OtherCoordinate,
+    /// The rate of the other of two places.
+    OtherRate,
+    /// The acceleration of the other of two places.
+    OtherAcceleration,
+}
+
+impl PlaceQuantity {
+    /// Every quantity.
+    pub const ALL: [Self; 7] = [
+        Self::Coordinate,
+        Self::Rate,
+        Self::Acceleration,
+        Self::Load,
+        Self::OtherCoordinate,
+        Self::OtherRate,
+        Self::OtherAcceleration,
+    ];
+
+    /// The word for it in expressions.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Coordinate => "coordinate",
+            Self::Rate => "rate",
+            Self::Acceleration => "acceleration",
+            Self::Load => "load",
+            Self::OtherCoordinate => "other_coordinate",
+            Self::OtherRate => "other_rate",
+            Self::OtherAcceleration => "other_acceleration",
+        }
+    }
+
+    /// Whether it belongs to the other of two places.
+    pub fn is_other(self) -> bool {
+        matches!(
+            self,
+            Self::OtherCoordinate | Self::OtherRate | Self::OtherAcceleration
+        )
+    }
 }
 
 /// A name of the model file, resolved.

@@ -153,7 +153,7 @@ fn scope(
         );
     }
     let places = match carries {
-        Carries::Mass => return scope,
+        Carries::Mass | Carries::Elsewhere => return scope,
         Carries::Force => [
             Dimension::LENGTH,
             Dimension::VELOCITY,
@@ -167,22 +167,18 @@ fn scope(
             Dimension::TORQUE,
         ],
     };
-    let quantities = [
-        PlaceQuantity::Coordinate,
-        PlaceQuantity::Rate,
-        PlaceQuantity::Acceleration,
-        PlaceQuantity::Load,
-    ];
-    for (quantity, dimension) in quantities.into_iter().zip(places) {
+    let [length, rate, acceleration, force] = places;
+    for quantity in PlaceQuantity::ALL {
+        let dimension = match quantity {
+            PlaceQuantity::Coordinate | PlaceQuantity::OtherCoordinate => length,
+            PlaceQuantity::Rate | PlaceQuantity::OtherRate => rate,
+            PlaceQuantity::Acceleration | PlaceQuantity::OtherAcceleration => acceleration,
+            PlaceQuantity::Load => force,
+        };
+        let symbol = Symbol::Place(quantity);
         scope.declare(
-            crate::print::place_name(quantity),
-            meaning(
-                Sort::Place,
-                Symbol::Place(quantity),
-                Some(dimension),
-                "",
-                None,
-            ),
+            quantity.name(),
+            meaning(Sort::Place, symbol, Some(dimension), "", None),
             log,
         );
     }

@@ -7,12 +7,13 @@ use std::sync::OnceLock;
 
 use crate::diagnostic::{Diagnostic, Log};
 use crate::document;
-use crate::exact::{ConstantIdx, Exact, Symbol};
+use crate::exact::{ConstantIdx, Exact, PlaceQuantity, Symbol};
+use crate::finite;
 use crate::kind_terms::{factors, lacking_units};
-use crate::schema::{EffectKindEntry, ModelEntry};
+use crate::schema::{EffectKindEntry, LibraryEntry, ModelEntry};
 use crate::scope::Scope;
 use crate::unit::{Dimension, Unit};
-use crate::values::{PlaceKind, SignName, UnitByPlace};
+use crate::values::{self, MechanicsName, PlaceKind, ScaleName, SignName, Text, UnitByPlace};
 
 /// The library of kinds as the program brings it along.
 pub const LIBRARY: &str = include_str!("../library/effects.toml");
@@ -26,15 +27,21 @@ pub enum Carries {
     Torque,
     /// A mass, at a point.
     Mass,
+    /// Anything else: a part, the base, the measured forces.
+    Elsewhere,
 }
 
 impl Carries {
+    /// Whatever a place may carry.
+    pub const ALL: [Self; 4] = [Self::Force, Self::Torque, Self::Mass, Self::Elsewhere];
+
     /// The dimension of what the place carries.
     pub(crate) fn dimension(self) -> Dimension {
         match self {
             Self::Force => Dimension::FORCE,
             Self::Torque => Dimension::TORQUE,
             Self::Mass => Dimension::MASS,
+            Self::Elsewhere => Dimension::ONE,
         }
     }
 
@@ -44,6 +51,7 @@ impl Carries {
             Self::Force => "force",
             Self::Torque => "torque",
             Self::Mass => "point",
+            Self::Elsewhere => "elsewhere",
         }
     }
 
@@ -53,6 +61,7 @@ impl Carries {
             Self::Force => units.force.as_ref(),
             Self::Torque => units.torque.as_ref(),
             Self::Mass => units.point.as_ref(),
+            Self::Elsewhere => units.elsewhere.as_ref(),
         }
     }
 }
@@ -77,6 +86,68 @@ pub enum ActsOn {
     Coordinate,
     /// A point.
     Point,
+    /// A part.
+    Part,
+    /// The base as a whole, named `base`.
+    Base,
+    /// The measured forces as a whole, named `force`.
+    Force,
+}
+
+impl ActsOn {
+    /// What it is, for people.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Drive => "a drive",
+            Self::Coordinate => "a coordinate",
+            Self::Point => "a point",
+            Self::Part => "a part",
+            Self::Base => "`base`",
+            Self::Force => "`force`",
+        }
+    }
+}
+
+/// What a kind does that no expression at its place can say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Mechanics {
+    /// A slender rod along a linear drive, see [`crate::Action::Rod`].
+    Rod,
+    /// The moments of lumped masses are taken where their forces are.
+    Placement,
+    /// Differences of one part from what the model file says of it.
+    Part,
+    /// A turn of the base against gravity.
+    Tilt,
+    /// A delay of the measured forces.
+    Delay,
+}
+
+/// What the values of a search are relative to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Scale {
+    /// The largest rate of the place.
+    Rate,
+    /// The travel of the place's coordinate: the largest value less the smallest.
+    Travel,
+    /// Nothing: they are in SI units.
+    One,
+}
+
+/// How a constant's value is found where it is not known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Search {
+    /// The expression is affine in it, so that its product with the parameter is a parameter itself.
+    Linear,
+    /// Values from `from` to `to`, times the scale, are tried.
+    Range {
+        /// The least.
+        from: f64,
+        /// The largest.
+        to: f64,
+        /// What both are multiples of.
+        of: Scale,
+    },
 }
 
 /// A kind of effect, for people and programs that choose among them.
@@ -88,13 +159,21 @@ pub struct EffectKind {
     pub says: String,
     /// Where it may act.
     pub on: Vec<ActsOn>,
-    /// What it adds, as text.
+    /// What it adds, as text; empty where `mechanics` says it.
     pub expression: String,
+    /// What it does, if that is no expression.
+    pub mechanics: Option<Mechanics>,
     /// Its parameters.
     pub parameters: Vec<KindParameter>,
     /// Quantities that give its shape.
     pub constants: Vec<KindConstant>,
-    /// True if the model file defines it, false if the library does.
+    /// How many places it must have; any number if `None`.
+    pub places: Option<usize>,
+    /// One paragraph: what it is, where it comes from, how the error looks that it leaves. May be empty.
+    pub explains: String,
+    /// What it is easily taken for, and which experiment tells them apart. May be empty.
+    pub doubles: String,
+    /// True if the model file or a library of its own defines it, false if the program's library does.
     pub is_own: bool,
 }
 
@@ -107,6 +186,8 @@ pub struct KindParameter {
     pub sign: Sign,
     /// Units by what the place carries; only where the kind may act.
     pub units: Vec<(Carries, String)>,
+    /// Remark; may be empty.
+    pub note: String,
 }
 
 /// A known quantity of a kind.
@@ -118,6 +199,10 @@ pub struct KindConstant {
     pub value: Option<String>,
     /// Units by what the place carries.
     pub units: Vec<(Carries, String)>,
+    /// How it is found where it is not known; `None` if it must be known.
+    pub search: Option<Search>,
+    /// Remark; may be empty.
+    pub note: String,
 }
 
 /// The kinds of the library that comes with the program.
@@ -153,10 +238,23 @@ pub(crate) fn library_entries() -> &'static [EffectKindEntry] {
     })
 }
 
+/// The tables of a library that a file names.
+pub(crate) fn own_library(text: &str, file: usize, log: &mut Log) -> Vec<EffectKindEntry> {
+    let table = document::parse(text, file, log);
+    let span = crate::Span {
+        file,
+        start: 0,
+        end: 0,
+    };
+    LibraryEntry::from_table(&table, span, log)
+        .effect_kind
+        .map_or_else(Vec::new, |list| list.entries)
+}
+
 /// A kind as other crates see it.
 pub(crate) fn describe(entry: &EffectKindEntry, is_own: bool) -> EffectKind {
     let units = |units: &Option<UnitByPlace>| {
-        [Carries::Force, Carries::Torque, Carries::Mass]
+        Carries::ALL
             .into_iter()
             .filter(|carries| may_carry(entry, *carries))
             .filter_map(|carries| {
@@ -165,33 +263,28 @@ pub(crate) fn describe(entry: &EffectKindEntry, is_own: bool) -> EffectKind {
             })
             .collect()
     };
+    let words = |text: &Option<Text>| text.as_ref().map_or_else(String::new, |t| t.text.clone());
+    let parameters = entry.parameters.iter().flat_map(|table| &table.entries);
+    let constants = entry.constants.iter().flat_map(|table| &table.entries);
     EffectKind {
         name: entry
             .name
             .as_ref()
             .map_or_else(String::new, |name| name.text.clone()),
-        says: entry
-            .says
-            .as_ref()
-            .map_or_else(String::new, |says| says.text.clone()),
+        says: words(&entry.says),
         on: entry
             .on
             .iter()
             .flat_map(|on| &on.entries)
-            .map(|on| match on {
-                PlaceKind::Drive => ActsOn::Drive,
-                PlaceKind::Coordinate => ActsOn::Coordinate,
-                PlaceKind::Point => ActsOn::Point,
-            })
+            .map(|on| acts_on(*on))
             .collect(),
         expression: entry
             .expression
             .as_ref()
             .map_or_else(String::new, |expression| expression.text.clone()),
-        parameters: entry
-            .parameters
-            .iter()
-            .flat_map(|parameters| &parameters.entries)
+        mechanics: entry.mechanics.map(mechanics),
+        places: n_places(entry),
+        parameters: parameters
             .map(|(key, parameter)| KindParameter {
                 symbol: key.name.clone(),
                 sign: match parameter.sign {
@@ -200,37 +293,96 @@ pub(crate) fn describe(entry: &EffectKindEntry, is_own: bool) -> EffectKind {
                     Some(SignName::Any) | None => Sign::Any,
                 },
                 units: units(&parameter.unit),
+                note: words(&parameter.note),
             })
             .collect(),
-        constants: entry
-            .constants
-            .iter()
-            .flat_map(|constants| &constants.entries)
+        constants: constants
             .map(|(key, constant)| KindConstant {
                 symbol: key.name.clone(),
                 value: constant.value.as_ref().map(|value| value.text.clone()),
                 units: units(&constant.unit),
+                search: constant.search.as_ref().map(search),
+                note: words(&constant.note),
             })
             .collect(),
+        explains: words(&entry.explains),
+        doubles: words(&entry.doubles),
         is_own,
     }
 }
 
+/// A place of the schema as other crates see it.
+pub(crate) fn acts_on(on: PlaceKind) -> ActsOn {
+    match on {
+        PlaceKind::Drive => ActsOn::Drive,
+        PlaceKind::Coordinate => ActsOn::Coordinate,
+        PlaceKind::Point => ActsOn::Point,
+        PlaceKind::Part => ActsOn::Part,
+        PlaceKind::Base => ActsOn::Base,
+        PlaceKind::Force => ActsOn::Force,
+    }
+}
+
+fn mechanics(name: MechanicsName) -> Mechanics {
+    match name {
+        MechanicsName::Rod => Mechanics::Rod,
+        MechanicsName::Placement => Mechanics::Placement,
+        MechanicsName::Part => Mechanics::Part,
+        MechanicsName::Tilt => Mechanics::Tilt,
+        MechanicsName::Delay => Mechanics::Delay,
+    }
+}
+
+fn search(entry: &values::Search) -> Search {
+    match entry {
+        values::Search::Linear => Search::Linear,
+        values::Search::Range(range) => Search::Range {
+            // What is missing is reported where it is read.
+            from: range.from.map_or(0.0, |number| number.value),
+            to: range.to.map_or(0.0, |number| number.value),
+            of: match range.of {
+                Some(ScaleName::Rate) => Scale::Rate,
+                Some(ScaleName::Travel) => Scale::Travel,
+                Some(ScaleName::One) | None => Scale::One,
+            },
+        },
+    }
+}
+
+/// How many places a kind must have; any number if `None`.
+pub(crate) fn n_places(entry: &EffectKindEntry) -> Option<usize> {
+    match entry.mechanics {
+        Some(MechanicsName::Part | MechanicsName::Tilt | MechanicsName::Delay) => Some(1),
+        Some(MechanicsName::Rod | MechanicsName::Placement) => None,
+        None => {
+            let expression = entry.expression.as_ref()?;
+            PlaceQuantity::ALL
+                .iter()
+                .any(|one| one.is_other() && finite::mentions(&expression.ast, one.name()))
+                .then_some(2)
+        }
+    }
+}
+
 fn may_carry(entry: &EffectKindEntry, carries: Carries) -> bool {
-    entry
-        .on
-        .iter()
-        .flat_map(|on| &on.entries)
-        .any(|on| match on {
-            PlaceKind::Drive | PlaceKind::Coordinate => carries != Carries::Mass,
-            PlaceKind::Point => carries == Carries::Mass,
-        })
+    let mut places = entry.on.iter().flat_map(|on| &on.entries);
+    places.any(|on| match on {
+        PlaceKind::Drive | PlaceKind::Coordinate => {
+            matches!(carries, Carries::Force | Carries::Torque)
+        }
+        PlaceKind::Point => carries == Carries::Mass,
+        PlaceKind::Part | PlaceKind::Base | PlaceKind::Force => carries == Carries::Elsewhere,
+    })
 }
 
 /// Checks a kind by itself: names, units at every place where it may act, linearity in its parameters.
 pub(crate) fn check(entry: &EffectKindEntry, log: &mut Log) {
+    check_constant_values(entry, log);
+    if !check_way(entry, log) {
+        return;
+    }
     let mut acts = false;
-    for carries in [Carries::Force, Carries::Torque, Carries::Mass] {
+    for carries in Carries::ALL {
         if !may_carry(entry, carries) {
             continue;
         }
@@ -256,7 +408,7 @@ pub(crate) fn check(entry: &EffectKindEntry, log: &mut Log) {
             return; // One report is enough; the other places have the same fault.
         }
     }
-    let nowhere = [Carries::Force, Carries::Torque, Carries::Mass]
+    let nowhere = Carries::ALL
         .into_iter()
         .filter(|carries| may_carry(entry, *carries))
         .all(|carries| !lacking_units(entry, carries).is_empty());
@@ -277,7 +429,156 @@ pub(crate) fn check(entry: &EffectKindEntry, log: &mut Log) {
             .help("for example `unit = { force = \"N s/m\", torque = \"N m s/rad\" }`"),
         );
     }
-    check_constant_values(entry, log);
+}
+
+/// Checks what a kind adds: an expression at places that have one, or mechanics with their own symbols and places.
+/// False if it has mechanics or is faulty, so that there is no expression to check.
+fn check_way(entry: &EffectKindEntry, log: &mut Log) -> bool {
+    let name_span = entry.name.as_ref().map_or(entry.span, |name| name.span);
+    let mut places = entry.on.iter().flat_map(|on| &on.entries);
+    let Some(way) = entry.mechanics else {
+        let Some(expression) = &entry.expression else {
+            if !entry.faulty && !log.syntax_broken {
+                log.push(
+                    Diagnostic::error(name_span, "a kind of effect lacks `expression`")
+                        .label("expected what it adds")
+                        .help("for example `expression = \"Fv*rate\"`"),
+                );
+            }
+            return false;
+        };
+        let elsewhere = places
+            .find(|on| matches!(on, PlaceKind::Part | PlaceKind::Base | PlaceKind::Force))
+            .map(|on| acts_on(*on));
+        if let (Some(found), Some(on)) = (elsewhere, &entry.on) {
+            log.push(
+                Diagnostic::error(on.span, "an expression cannot act here")
+                    .label(format!("on {} there is nothing to add to", found.words()))
+                    .help("expressions act on a drive, a coordinate or a point"),
+            );
+            return false;
+        }
+        if entry.parameters.is_none() && !entry.faulty && !log.syntax_broken {
+            log.push(
+                Diagnostic::error(expression.ast.span, "this expression has no parameters")
+                    .label("expected `parameters` that identification can find")
+                    .help("for example `parameters = { Fv = { unit = \"N s/m\" } }`"),
+            );
+        }
+        return true;
+    };
+    if let Some(expression) = &entry.expression {
+        log.push(
+            Diagnostic::error(expression.ast.span, "this kind says twice what it does")
+                .label("expected either `expression` or `mechanics`"),
+        );
+    }
+    let (on, parameters, constants) = symbols_of(way);
+    if let Some(found) = &entry.on
+        && places.any(|place| *place != on)
+    {
+        log.push(
+            Diagnostic::error(found.span, "these mechanics act elsewhere")
+                .label(format!("expected only {}", acts_on(on).words())),
+        );
+    }
+    check_symbols(entry, "parameters", parameters, name_span, log);
+    check_symbols(entry, "constants", constants, name_span, log);
+    false
+}
+
+/// A symbol with its dimension.
+type Symbols = &'static [(&'static str, Dimension)];
+
+/// Where mechanics act, and the symbols of their parameters and constants.
+fn symbols_of(way: MechanicsName) -> (PlaceKind, Symbols, Symbols) {
+    const TILT: Symbols = &[
+        ("tx", Dimension::ONE),
+        ("ty", Dimension::ONE),
+        ("tz", Dimension::ONE),
+    ];
+    match way {
+        MechanicsName::Rod => (PlaceKind::Drive, ROD, &[]),
+        MechanicsName::Placement => (PlaceKind::Point, &[("m", Dimension::MASS)], &[]),
+        MechanicsName::Part => (PlaceKind::Part, PART, &[]),
+        MechanicsName::Tilt => (PlaceKind::Base, &[], TILT),
+        MechanicsName::Delay => (PlaceKind::Force, &[], &[("T", Dimension::TIME)]),
+    }
+}
+
+/// Moments of a rod's mass along itself, of second, first and no order.
+const ROD: Symbols = &[
+    ("Jr", Dimension::INERTIA),
+    ("Sr", Dimension::FIRST_MOMENT),
+    ("mr", Dimension::MASS),
+];
+
+/// Differences of a part: mass, first moment and inertia about its frame's origin.
+pub(crate) const PART: Symbols = &[
+    ("dm", Dimension::MASS),
+    ("dmx", Dimension::FIRST_MOMENT),
+    ("dmy", Dimension::FIRST_MOMENT),
+    ("dmz", Dimension::FIRST_MOMENT),
+    ("dJxx", Dimension::INERTIA),
+    ("dJxy", Dimension::INERTIA),
+    ("dJxz", Dimension::INERTIA),
+    ("dJyy", Dimension::INERTIA),
+    ("dJyz", Dimension::INERTIA),
+    ("dJzz", Dimension::INERTIA),
+];
+
+/// Holds the symbols of a kind with mechanics against those that the mechanics have.
+fn check_symbols(
+    entry: &EffectKindEntry,
+    what: &str,
+    expected: Symbols,
+    name_span: crate::Span,
+    log: &mut Log,
+) {
+    let found: Vec<(&document::Key, Option<&UnitByPlace>)> = if what == "parameters" {
+        let entries = entry.parameters.iter().flat_map(|table| &table.entries);
+        entries.map(|(key, one)| (key, one.unit.as_ref())).collect()
+    } else {
+        let entries = entry.constants.iter().flat_map(|table| &table.entries);
+        entries.map(|(key, one)| (key, one.unit.as_ref())).collect()
+    };
+    let names: Vec<&str> = expected.iter().map(|(name, _)| *name).collect();
+    for (key, units) in &found {
+        let Some((_, dimension)) = expected.iter().find(|(name, _)| *name == key.name) else {
+            log.push(
+                Diagnostic::error(key.span, format!("these mechanics know no `{}`", key.name))
+                    .label(if names.is_empty() {
+                        format!("they have no {what}")
+                    } else {
+                        format!("expected {}", names.join(", "))
+                    }),
+            );
+            continue;
+        };
+        let unit = units.and_then(|units| {
+            Carries::ALL
+                .into_iter()
+                .filter(|carries| may_carry(entry, *carries))
+                .find_map(|carries| carries.unit(units))
+        });
+        if unit.is_none_or(|unit| unit.dimension != *dimension) {
+            log.push(
+                Diagnostic::error(key.span, format!("the unit of `{}` does not fit", key.name))
+                    .label(format!("expected {}", dimension.describe()))
+                    .help(format!("write `unit = \"{dimension}\"`")),
+            );
+        }
+    }
+    let lacking: Vec<&str> = names
+        .into_iter()
+        .filter(|name| !found.iter().any(|(key, _)| key.name == *name))
+        .collect();
+    if !lacking.is_empty() && !entry.faulty {
+        log.push(
+            Diagnostic::error(name_span, format!("these mechanics lack {what}"))
+                .label(format!("expected {}", lacking.join(", "))),
+        );
+    }
 }
 
 fn check_constant_values(entry: &EffectKindEntry, log: &mut Log) {

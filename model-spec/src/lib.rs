@@ -8,6 +8,7 @@ mod build;
 mod column;
 mod diagnostic;
 mod document;
+pub mod edit;
 mod editor;
 mod exact;
 #[cfg(test)]
@@ -39,8 +40,11 @@ mod values;
 pub use column::{ColumnFault, ColumnSum, Quantity, read_column};
 pub use diagnostic::{Diagnostic, Severity, SourceFile, Sources, Span};
 pub use exact::*;
-pub use kinds::{ActsOn, Carries, EffectKind, KindConstant, KindParameter, LIBRARY, Sign, library};
-pub use load::{Failure, Loaded, load, load_file};
+pub use kinds::{
+    ActsOn, Carries, EffectKind, KindConstant, KindParameter, LIBRARY, Mechanics, Scale, Search,
+    Sign, library,
+};
+pub use load::{Failure, Loaded, load, load_file, load_file_with, load_with};
 pub use mechanism::*;
 pub use motion::{Kinematics, Poses};
 pub use unit::unit_product;

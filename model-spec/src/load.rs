@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use crate::build::build;
 use crate::diagnostic::{self, Diagnostic, Log, Severity, SourceFile, Sources, Span};
 use crate::document::{self, LARGEST_FILE, Table, Value, get, quote};
-use crate::kinds::EffectKind;
+use crate::kinds::{self, EffectKind};
 use crate::mechanism::Mechanism;
 use crate::merge::merge;
-use crate::schema::ModelEntry;
+use crate::schema::{EffectKindEntry, ModelEntry};
 
 /// Longest chain of variants.
 const LONGEST_CHAIN: usize = 8;
@@ -67,9 +67,14 @@ impl std::error::Error for Failure {}
 ///
 /// Fails with every finding about the files, each with its place.
 pub fn load_file(path: &Path) -> Result<Loaded, Failure> {
+    load_file_with(path, &[])
+}
+
+/// Reads a model file from disk as [`load_file`] does, with further libraries of kinds of effects.
+pub fn load_file_with(path: &Path, libraries: &[PathBuf]) -> Result<Loaded, Failure> {
     let mut read = read_limited;
     match read(path) {
-        Ok(text) => load(&path.to_string_lossy(), &text, &mut read),
+        Ok(text) => load_with(&path.to_string_lossy(), &text, libraries, &mut read),
         Err(error) if error.kind() == std::io::ErrorKind::InvalidData => Err(no_text(path)),
         Err(error) => Err(Failure {
             diagnostics: vec![Diagnostic {
@@ -157,9 +162,23 @@ pub fn load(
     text: &str,
     read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
 ) -> Result<Loaded, Failure> {
+    load_with(path_name, text, &[], read)
+}
+
+/// Reads a model from its text as [`load`] does, with further libraries of kinds of effects, whose paths are taken as
+/// they are.
+pub fn load_with(
+    path_name: &str,
+    text: &str,
+    libraries: &[PathBuf],
+    read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
+) -> Result<Loaded, Failure> {
     let mut log = Log::default();
     let mut sources = Sources::default();
-    let table = read_chain(path_name, text, read, &mut sources, &mut log);
+    let (table, named) = read_chain(path_name, text, read, &mut sources, &mut log);
+    let given = libraries.iter().map(|path| (path.clone(), None));
+    let libraries: Vec<_> = given.chain(named).collect();
+    let kinds = read_libraries(&libraries, read, &mut sources, &mut log);
     let whole = Span {
         file: 0,
         start: 0,
@@ -170,7 +189,7 @@ pub fn load(
         // Names that a broken line would define would all be reported as unknown.
         (None, Vec::new())
     } else {
-        build(&model, &mut log)
+        build(&model, &kinds, &mut log)
     };
     let mut diagnostics = log.finish();
     let Some(mechanism) = mechanism else {
@@ -201,8 +220,9 @@ fn read_chain(
     read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
     sources: &mut Sources,
     log: &mut Log,
-) -> Table {
+) -> (Table, Vec<NamedPath>) {
     let mut tables = Vec::new();
+    let mut libraries = Vec::new();
     let mut path = PathBuf::from(path_name);
     let mut text = text.to_owned();
     loop {
@@ -212,6 +232,7 @@ fn read_chain(
             path: path.clone(),
             text,
         });
+        libraries.extend(named_libraries(&table, &path));
         let next = extended(&table, &path, sources, read, log);
         tables.push(table);
         match next {
@@ -226,7 +247,79 @@ fn read_chain(
     while let Some(variant) = tables.pop() {
         merged = merge(merged, variant, log);
     }
-    merged
+    (merged, libraries)
+}
+
+/// A path, and where a file names it.
+type NamedPath = (PathBuf, Option<Span>);
+
+/// The libraries that a file names, relative to itself.
+fn named_libraries(table: &Table, path: &Path) -> Vec<NamedPath> {
+    let Some((_, node)) = get(table, "library") else {
+        return Vec::new();
+    };
+    let entries = match &node.value {
+        Value::Array(entries) => entries.as_slice(),
+        _ => std::slice::from_ref(node),
+    };
+    // What is no text is reported by the reader of the merged file.
+    let texts = entries.iter().filter_map(|entry| match &entry.value {
+        Value::Text { text, .. } => Some((text, entry.span)),
+        _ => None,
+    });
+    let folder = path.parent().unwrap_or(Path::new(""));
+    texts
+        .map(|(text, span)| (tidy(&folder.join(text)), Some(span)))
+        .collect()
+}
+
+/// Reads libraries of kinds of effects, each once.
+fn read_libraries(
+    libraries: &[NamedPath],
+    read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
+    sources: &mut Sources,
+    log: &mut Log,
+) -> Vec<EffectKindEntry> {
+    let mut kinds = Vec::new();
+    for (i, (path, named)) in libraries.iter().enumerate() {
+        let same = |(other, _): &NamedPath| tidy(other) == tidy(path);
+        if libraries[..i].iter().any(same) {
+            continue;
+        }
+        let file = sources.files.len();
+        let path_name = quote(&path.to_string_lossy());
+        match read(path) {
+            Ok(text) => {
+                let entries = kinds::own_library(&text, file, log);
+                sources.files.push(SourceFile {
+                    path: path.clone(),
+                    text,
+                });
+                kinds.extend(entries);
+            }
+            Err(error) => {
+                let diagnostic = Diagnostic {
+                    span: *named,
+                    ..Diagnostic::error(
+                        Span {
+                            file: 0,
+                            start: 0,
+                            end: 0,
+                        },
+                        format!("cannot read `{path_name}`: {error}"),
+                    )
+                };
+                log.push(
+                    diagnostic
+                        .label("expected the path of a library of effects")
+                        .help("a library is a TOML file of `[[effect_kind]]` tables; a path in a model file starts from the folder of that file"),
+                );
+                // The kinds that it would define are not reported as unknown.
+                log.syntax_broken = true;
+            }
+        }
+    }
+    kinds
 }
 
 /// The file that this one extends, if any.

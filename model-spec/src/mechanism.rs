@@ -15,6 +15,9 @@ pub struct PointIdx(pub usize);
 /// Index of a drive in [`Mechanism::drives`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DriveIdx(pub usize);
+/// Index of a part in [`Mechanism::parts`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PartIdx(pub usize);
 
 /// A mechanism whose names are resolved and whose consistency is checked.
 #[derive(Clone, Debug)]
@@ -23,7 +26,7 @@ pub struct Mechanism {
     pub name: String,
     /// One line for people.
     pub title: Option<String>,
-    /// Gravity in the base frame, m/s^2; expressions over constants.
+    /// Gravity in the base frame, m/s^2; expressions over constants. A tilt among the effects has turned it already.
     pub gravity: [Exact; 3],
     /// Known geometry and the like.
     pub constants: Vec<Constant>,
@@ -45,6 +48,9 @@ pub struct Mechanism {
     pub drives: Vec<Drive>,
     /// Friction, drive inertia and the like.
     pub effects: Vec<Effect>,
+    /// How much later than they act the forces of recordings are read, s; zero unless an effect says otherwise.
+    /// Equations and code know nothing of it: only where a model is held against a recording does it matter.
+    pub force_delay: f64,
     /// Products of dynamic parameters whose columns should be retained, most wanted first;
     /// each is a product of powers of parameters.
     pub retain: Vec<Vec<(ParameterIdx, u32)>>,
@@ -250,6 +256,12 @@ pub enum Place {
     Coordinate(CoordinateIdx),
     /// At a point: adds a mass there.
     Point(PointIdx),
+    /// On a part: adds to its inertia.
+    Part(PartIdx),
+    /// On the base as a whole.
+    Base,
+    /// On the measured forces as a whole.
+    Force,
 }
 
 /// An effect of the file, with its kind's expressions put in place.
@@ -259,19 +271,48 @@ pub struct Effect {
     pub kind: String,
     /// Where it acts; its parameters are shared by all places.
     pub places: Vec<Place>,
-    /// The effect is `sum of parameter * expression`, the same at every place.
-    /// On drives and coordinates the sum is a force or torque;
-    /// at points the parameter is a mass and the expression its factor.
+    /// How its parameters act.
+    pub action: Action,
+    /// Its parameters; none where the effect only has constants.
     pub terms: Vec<EffectTerm>,
+    /// The values of its kind's constants by their symbols; expressions over constants.
+    pub constants: Vec<(String, Exact)>,
 }
 
 /// One parameter of an effect with what it multiplies.
 #[derive(Clone, Debug)]
 pub struct EffectTerm {
+    /// Its symbol in the kind.
+    pub symbol: String,
     /// The parameter, listed in [`Mechanism::parameters`] after those that the file declares.
     pub parameter: ParameterIdx,
-    /// Expression over constants and [`crate::PlaceQuantity`].
+    /// Expression over constants and [`crate::PlaceQuantity`]; 1 where the action is not local.
     pub expression: Exact,
+}
+
+/// How the parameters of an effect act.
+#[derive(Clone, Debug)]
+pub enum Action {
+    /// The effect is `sum of parameter * expression`, the same at every place.
+    /// On drives and coordinates the sum is a force or torque;
+    /// at points the parameter is a mass and the expression its factor.
+    Local,
+    /// A slender rod along each of the linear drives that turns about the drive's first point and slides through its
+    /// second. The terms are moments of its mass along itself about the first point: of second order (kg m^2), of
+    /// first order (kg m), and the mass (kg). With `a` the first point and `u` the unit vector along the drive, the
+    /// generalised force is `du'(Jr u'' + Sr (a'' - g)) + da'(Sr u'' + mr (a'' - g))` (d'Alembert).
+    Rod,
+    /// Bodies that join those of the mechanism; the terms say which parameters they have.
+    Bodies {
+        /// Parts.
+        parts: Vec<Part>,
+        /// Lumped masses.
+        lumped_masses: Vec<LumpedMass>,
+    },
+    /// Gravity is turned; [`Mechanism::gravity`] holds the result.
+    Tilt,
+    /// Forces are read later than they act; [`Mechanism::force_delay`] holds the time.
+    Delay,
 }
 
 /// What planned motion must keep; ranges are `[low, high]`, and what is not named is not limited.

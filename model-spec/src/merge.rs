@@ -21,7 +21,7 @@ const NEEDED: [(&str, &str); 8] = [
     ("lumped_mass", "mass"),
     ("loop", "joins"),
     ("effect", "kind"),
-    ("effect_kind", "expression"),
+    ("effect_kind", "on"),
     ("drive", "name"),
 ];
 /// Keys that are a file's own and are not taken over.

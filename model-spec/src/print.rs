@@ -3,7 +3,7 @@
 use num_rational::BigRational;
 use num_traits::{One, Signed, ToPrimitive, Zero};
 
-use crate::exact::{Angle, Exact, Function, Length, PlaceQuantity, Symbol};
+use crate::exact::{Angle, Exact, Function, Length, Symbol};
 use crate::mechanism::Mechanism;
 
 impl Exact {
@@ -137,7 +137,7 @@ impl Mechanism {
             Symbol::Constant(idx) => &self.constants[idx.0].name,
             Symbol::Parameter(idx) => &self.parameters[idx.0].name,
             Symbol::Coordinate(idx) => &self.coordinates[idx.0].name,
-            Symbol::Place(quantity) => place_name(quantity),
+            Symbol::Place(quantity) => quantity.name(),
         }
     }
 
@@ -154,16 +154,6 @@ impl Mechanism {
     /// An expression as the model file would write it.
     pub fn text_of(&self, exact: &Exact) -> String {
         exact.to_text(&|symbol| self.symbol_name(symbol).to_owned())
-    }
-}
-
-/// The word for a quantity of a place.
-pub(crate) fn place_name(quantity: PlaceQuantity) -> &'static str {
-    match quantity {
-        PlaceQuantity::Coordinate => "coordinate",
-        PlaceQuantity::Rate => "rate",
-        PlaceQuantity::Acceleration => "acceleration",
-        PlaceQuantity::Load => "load",
     }
 }
 

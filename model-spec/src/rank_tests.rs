@@ -216,7 +216,7 @@ fn energies(mechanism: &Mechanism, rates: &[f64]) -> Vec<f64> {
                     crate::DriveKind::Linear { .. } => panic!("these models drive joints"),
                 },
                 Place::Coordinate(coordinate) => coordinate,
-                Place::Point(_) => panic!("no point carries an inertia here"),
+                _ => panic!("only drives and coordinates have an inertia here"),
             };
             row[term.parameter.0] += 0.5 * rates[coordinate.0].powi(2);
         }

@@ -5,8 +5,8 @@ use crate::range::Range;
 use crate::record::{List, Named, OneOrMany, record};
 use crate::unit::Unit;
 use crate::values::{
-    AxisName, Flag, Name, Number, PlaceKind, SignName, Spot, Suffix, Text, UnitByPlace, Vector,
-    Version,
+    AxisName, Flag, MechanicsName, Name, Number, PlaceKind, ScaleName, Search, SignName, Spot,
+    Suffix, Text, UnitByPlace, Vector, Version,
 };
 
 record! {
@@ -46,6 +46,8 @@ record! {
         "drive" drive: optional List<DriveEntry>,
         /// Friction, drive inertia and the like.
         "effect" effect: optional List<EffectEntry>,
+        /// Libraries of further kinds of effects: TOML files of `[[effect_kind]]` tables, relative to this one.
+        "library" library: optional OneOrMany<Text>,
         /// Kinds of effects that this file adds to the library.
         "effect_kind" effect_kind: optional List<EffectKindEntry>,
         /// Products of parameters that should stay in the base parameters, most wanted first, such as `m1*dc1^2`.
@@ -327,7 +329,8 @@ record! {
         "name" name: optional Name,
         /// Name of the kind.
         "kind" kind: required Name,
-        /// Where it acts: a drive, a coordinate or a point, or a list whose members share the parameters.
+        /// Where it acts: a drive, a coordinate, a point or a part, `base` or `force`, as its kind has it, or a list
+        /// whose members share the parameters.
         "at" at: required OneOrMany<Name>,
         /// Names and nominal values of its parameters, by the kind's symbols.
         /// A parameter is called `symbol_place` if nothing is said.
@@ -357,14 +360,30 @@ record! {
         /// The places that it may act on.
         "on" on: required OneOrMany<PlaceKind>,
         /// The force, torque or, at a point, mass that it adds: an expression in the kind's parameters,
-        /// linear in them, and in `coordinate`, `rate`, `acceleration` and `load` of the place.
-        "expression" expression: required Formula,
+        /// linear in them, and in `coordinate`, `rate`, `acceleration` and `load` of the place. A kind that uses
+        /// `other_coordinate`, `other_rate` or `other_acceleration` acts on two places, at each with the other's.
+        "expression" expression: optional Formula,
+        /// What it does in place of an expression: a swinging `rod` along a linear drive, another `placement` of
+        /// lumped masses, differences of a `part`, a `tilt` of gravity, a `delay` of the measured forces.
+        "mechanics" mechanics: optional MechanicsName,
         /// Its parameters.
-        "parameters" parameters: required Named<KindParameterEntry>,
+        "parameters" parameters: optional Named<KindParameterEntry>,
         /// Quantities that give its shape and are known.
         "constants" constants: optional Named<KindConstantEntry>,
         /// One sentence that explains it.
         "says" says: required Text,
+        /// One paragraph: what it is, where it comes from, and how an error that it leaves looks.
+        "explains" explains: optional Text,
+        /// What it is easily taken for, and which experiment tells them apart.
+        "doubles" doubles: optional Text,
+    }
+}
+
+record! {
+    /// A library of kinds of effects.
+    LibraryEntry = "the library" {
+        /// Kinds of effects.
+        "effect_kind" effect_kind: required List<EffectKindEntry>,
     }
 }
 
@@ -387,8 +406,23 @@ record! {
         "unit" unit: required UnitByPlace,
         /// Its value where the effect gives none; an effect must give one if this is left away.
         "value" value: optional Formula,
+        /// How its value is found where it is not known: `linear` where the expression is affine in it, or a range.
+        "search" search: optional Search,
         /// Remark.
         "note" note: optional Text,
+    }
+}
+
+record! {
+    /// A range in which the value of a constant is searched.
+    SearchRangeEntry = "a range to search" {
+        /// The least value.
+        "from" from: required Number,
+        /// The largest value.
+        "to" to: required Number,
+        /// What both are multiples of: the largest `rate` of the place, the `travel` of its coordinate, or `one`,
+        /// for values in SI units; `one` if left away.
+        "of" of: optional ScaleName,
     }
 }
 

@@ -76,6 +76,7 @@ const PRINTED: [(&str, [i32; 4], &str); 18] = [
 
 impl Dimension {
     pub(crate) const ONE: Self = Self::new([0, 0, 0, 0]);
+    pub(crate) const TIME: Self = Self::new([0, 0, 1, 0]);
     pub(crate) const LENGTH: Self = Self::new([0, 1, 0, 0]);
     pub(crate) const MASS: Self = Self::new([1, 0, 0, 0]);
     pub(crate) const FIRST_MOMENT: Self = Self::new([1, 1, 0, 0]);

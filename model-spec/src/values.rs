@@ -8,11 +8,11 @@ use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::document::{Node, Value, quote};
 use crate::formula::Formula;
 use crate::record::{Read, wrong_type};
-use crate::schema::UnitTable;
+use crate::schema::{SearchRangeEntry, UnitTable};
 use crate::unit::Unit;
 
 /// Words that mean something in expressions and so name nothing else.
-const RESERVED: [&str; 14] = [
+const RESERVED: [&str; 17] = [
     "pi",
     "sin",
     "cos",
@@ -26,6 +26,9 @@ const RESERVED: [&str; 14] = [
     "rate",
     "acceleration",
     "load",
+    "other_coordinate",
+    "other_rate",
+    "other_acceleration",
     "t",
 ];
 
@@ -51,13 +54,18 @@ impl Read for Name {
     }
 }
 
-/// Reports a name that is no identifier.
-pub(crate) fn check_name(text: &str, span: Span, log: &mut Log) -> bool {
-    let fine = text.len() <= 60
+/// Whether a text is an identifier.
+pub(crate) fn is_name(text: &str) -> bool {
+    text.len() <= 60
         && text.starts_with(|first: char| first.is_ascii_alphabetic())
         && text
             .chars()
-            .all(|found| found.is_ascii_alphanumeric() || found == '_');
+            .all(|found| found.is_ascii_alphanumeric() || found == '_')
+}
+
+/// Reports a name that is no identifier.
+pub(crate) fn check_name(text: &str, span: Span, log: &mut Log) -> bool {
+    let fine = is_name(text);
     if !fine {
         log.push(
             Diagnostic::error(span, format!("`{}` cannot be a name", quote(text)))
@@ -220,6 +228,8 @@ pub(crate) struct UnitByPlace {
     pub(crate) force: Option<Unit>,
     pub(crate) torque: Option<Unit>,
     pub(crate) point: Option<Unit>,
+    /// Elsewhere: one unit for all places serves there.
+    pub(crate) elsewhere: Option<Unit>,
 }
 
 impl Read for UnitByPlace {
@@ -233,7 +243,8 @@ impl Read for UnitByPlace {
                 Some(Self {
                     force: Some(unit.clone()),
                     torque: Some(unit.clone()),
-                    point: Some(unit),
+                    point: Some(unit.clone()),
+                    elsewhere: Some(unit),
                 })
             }
             Value::Table(table) => {
@@ -242,6 +253,7 @@ impl Read for UnitByPlace {
                     force: table.force,
                     torque: table.torque,
                     point: table.point,
+                    elsewhere: None,
                 })
             }
             _ => wrong_type::<Self>(node, log),
@@ -515,7 +527,68 @@ words! {
 words! {
     /// What a kind of effect may act on.
     PlaceKind: "a place",
-    "drive" => Drive, "coordinate" => Coordinate, "point" => Point
+    "drive" => Drive, "coordinate" => Coordinate, "point" => Point, "part" => Part, "base" => Base,
+    "force" => Force
+}
+
+words! {
+    /// Mechanics of a kind that no expression at its place can say.
+    MechanicsName: "mechanics",
+    "rod" => Rod, "placement" => Placement, "part" => Part, "tilt" => Tilt, "delay" => Delay
+}
+
+words! {
+    /// What a range of search is relative to.
+    ScaleName: "what a range is relative to",
+    "rate" => Rate, "travel" => Travel, "one" => One
+}
+
+/// How a constant's value is found where it is not known.
+#[derive(Clone, Debug)]
+pub(crate) enum Search {
+    /// The expression is affine in it.
+    Linear,
+    /// Values of a range are tried.
+    Range(SearchRangeEntry),
+}
+
+impl Read for Search {
+    const EXPECTED: &'static str = "a range to search, or `linear`";
+    const EXAMPLE: &'static str = "{ from = 0.01, to = 1, of = \"rate\" }";
+
+    fn read(node: &Node, log: &mut Log) -> Option<Self> {
+        match &node.value {
+            Value::Text { text, .. } if text == "linear" => Some(Self::Linear),
+            Value::Table(table) => {
+                let range = SearchRangeEntry::from_table(table, node.span, log);
+                if let (Some(from), Some(to)) = (range.from, range.to)
+                    && from.value >= to.value
+                {
+                    log.push(
+                        Diagnostic::error(to.span, "this range is empty")
+                            .label(format!("expected more than {}", from.value)),
+                    );
+                }
+                Some(Self::Range(range))
+            }
+            _ => wrong_type::<Self>(node, log),
+        }
+    }
+}
+
+impl JsonSchema for Search {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Search".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let range = generator.subschema_for::<SearchRangeEntry>();
+        json_schema!({ "anyOf": [{ "const": "linear" }, range] })
+    }
 }
 
 words! {

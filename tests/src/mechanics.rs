@@ -7,7 +7,7 @@
 use std::ops::{Add, Mul, Neg, Sub};
 
 use modelmill_spec::{
-    Axis, DriveKind, Exact, Function, Inertial, LumpedMass, Mechanism, Motion, Place,
+    Action, Axis, DriveKind, Exact, Function, Inertial, LumpedMass, Mechanism, Motion, Place,
     PlaceQuantity, PointIdx, Step, Symbol,
 };
 use nalgebra::{DMatrix, Matrix3, Matrix4, Vector3};
@@ -35,6 +35,11 @@ impl Jet {
     fn sin(self) -> Self {
         let (s, c) = self.0[0].sin_cos();
         self.function(s, c, -s)
+    }
+
+    fn recip(self) -> Self {
+        let one = self.0[0].recip();
+        self.function(one, -one * one, 2.0 * one * one * one)
     }
 
     fn sqrt(self) -> Self {
@@ -319,7 +324,39 @@ impl<'a> Numbers<'a> {
         }
         let (drives, drive_rates) = (self.drives(coordinates), self.drives(&moved));
         for effect in &self.mechanism.effects {
-            for place in &effect.places {
+            if let Action::Bodies {
+                parts,
+                lumped_masses,
+            } = &effect.action
+            {
+                for part in parts {
+                    let inertia = self.pseudo_inertia(&part.inertial);
+                    let (pose, change) = (&poses[part.frame.0], &displaced[part.frame.0]);
+                    add_body(&mut balance, pose, change, &inertia, &gravity);
+                }
+                for lump in lumped_masses {
+                    let (pose, change) = (&poses[lump.frame.0], &displaced[lump.frame.0]);
+                    self.add_lump(&mut balance, pose, change, lump, &gravity);
+                }
+                continue;
+            }
+            let motions: Vec<Option<Jet>> = (effect.places.iter())
+                .map(|place| match place {
+                    Place::Drive(d) => Some(drives[d.0]),
+                    Place::Coordinate(i) => Some(coordinates[i.0]),
+                    _ => None,
+                })
+                .collect();
+            for (p, place) in effect.places.iter().enumerate() {
+                let other = motions[(p + 1) % motions.len()];
+                let other = other.unwrap_or(Jet::constant(f64::NAN));
+                if let (Action::Rod, Place::Drive(d)) = (&effect.action, place) {
+                    let [second, first, mass] =
+                        [0, 1, 2].map(|i| self.parameters[effect.terms[i].parameter.0]);
+                    let ends = self.ends(d.0, [&poses, &displaced]);
+                    add_rod(&mut balance, ends, [second, first, mass], &gravity);
+                    continue;
+                }
                 for term in &effect.terms {
                     let parameter = self.parameters[term.parameter.0];
                     match place {
@@ -332,15 +369,16 @@ impl<'a> Numbers<'a> {
                             add_body(&mut balance, pose, change, &inertia, &gravity);
                         }
                         Place::Drive(d) => {
-                            let quantity = quantity(drives[d.0], load[d.0]);
+                            let quantity = quantity(drives[d.0], load[d.0], other);
                             let force = parameter * self.value_at(&term.expression, &quantity);
                             balance.add(force * drive_rates[d.0].0[1]);
                         }
                         Place::Coordinate(i) => {
-                            let quantity = quantity(coordinates[i.0], f64::NAN);
+                            let quantity = quantity(coordinates[i.0], f64::NAN, other);
                             let force = parameter * self.value_at(&term.expression, &quantity);
                             balance.add(force * direction[i.0]);
                         }
+                        Place::Part(_) | Place::Base | Place::Force => {}
                     }
                 }
             }
@@ -384,6 +422,19 @@ impl<'a> Numbers<'a> {
                 kinetic - gravity.dot(&moment)
             })
             .sum()
+    }
+
+    /// Positions of a linear drive's points in several motions.
+    fn ends(&self, drive: usize, motions: [&[Pose]; 2]) -> [[[Jet; 3]; 2]; 2] {
+        let DriveKind::Linear { from, to } = self.mechanism.drives[drive].kind else {
+            panic!("a rod lies along a linear drive");
+        };
+        motions.map(|poses| {
+            [from, to].map(|point| {
+                let point = &self.mechanism.points[point.0];
+                poses[point.frame.0].point(self.vector(&point.at))
+            })
+        })
     }
 
     fn add_lump(
@@ -454,8 +505,34 @@ pub fn is_angle(mechanism: &Mechanism, coordinate: usize) -> bool {
     mechanism.coordinates[coordinate].motion == Motion::Revolute
 }
 
-fn quantity(motion: Jet, load: f64) -> impl Fn(PlaceQuantity) -> f64 {
+/// A rod as three particles along it that have its moments: jets do the rest.
+fn add_rod(
+    balance: &mut Balance,
+    [moving, displaced]: [[[Jet; 3]; 2]; 2],
+    [second, first, mass]: [f64; 3],
+    gravity: &Vector3<f64>,
+) {
+    // Particles at -1, 0 and 1 m have the moments m0 + m1 + m2, m2 - m0 and m2 + m0.
+    let outer = [(second - first) / 2.0, (second + first) / 2.0];
+    for (at, particle) in [(-1.0, outer[0]), (0.0, mass - second), (1.0, outer[1])] {
+        let place = |[a, b]: [[Jet; 3]; 2]| -> [Jet; 3] {
+            let d: [Jet; 3] = std::array::from_fn(|i| b[i] - a[i]);
+            let square = (0..3).fold(Jet::constant(0.0), |sum, i| sum + d[i] * d[i]);
+            let scale = Jet::constant(at) * square.sqrt().recip();
+            std::array::from_fn(|i| a[i] + scale * d[i])
+        };
+        let (moves, change) = (place(moving), place(displaced));
+        for i in 0..3 {
+            balance.add(particle * change[i].0[1] * (moves[i].0[2] - gravity[i]));
+        }
+    }
+}
+
+fn quantity(motion: Jet, load: f64, other: Jet) -> impl Fn(PlaceQuantity) -> f64 {
     move |quantity| match quantity {
+        PlaceQuantity::OtherCoordinate => other.0[0],
+        PlaceQuantity::OtherRate => other.0[1],
+        PlaceQuantity::OtherAcceleration => other.0[2],
         PlaceQuantity::Coordinate => motion.0[0],
         PlaceQuantity::Rate => motion.0[1],
         PlaceQuantity::Acceleration => motion.0[2],

@@ -24,7 +24,8 @@ pub(crate) fn run(args: &EvaluateArgs) -> Outcome {
         .map(|path| Target::new(path, inputs))
         .transpose()?;
     let values = model.values(&args.parameters)?;
-    let data = data::read(&model, &args.data, &args.preparation)?;
+    // The model's own force, when it acts: without a delay of its reading.
+    let data = data::read_as_recorded(&model, &args.data, &args.preparation)?;
     let mut text = format!("t,{}\n", model.drives().join(","));
     let mut samples = 0;
     for stretch in &data {

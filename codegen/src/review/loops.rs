@@ -1,9 +1,9 @@
-//! Loops, drives and effects: closure equations, how they are solved, and what the drives see.
+//! Loops and drives: closure equations, how they are solved, and what the drives see.
 
-use modelmill_spec::{DriveKind, Mechanism, Motion, Place};
+use modelmill_spec::{DriveKind, Mechanism, Motion};
 
 use super::document::{Block, Document, Equation, Inline, Line, Table, cell, code, text};
-use crate::expr::print::{Formula, angle_sum, exact_at, formula, tree_size};
+use crate::expr::print::{Formula, angle_sum, formula, tree_size};
 use crate::expr::{ExprId, Graph, Rational};
 use crate::programs::nominal_value;
 use crate::reduce::closed_form;
@@ -248,67 +248,4 @@ pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
         )]);
         page.blocks.push(Block::Equations(lines));
     }
-}
-
-/// Stands for the coordinate of each of several places.
-const EACH: [&str; 4] = ["x", "xi", "chi", "place"];
-
-/// Effects with their expressions.
-pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
-    if mechanism.effects.is_empty() {
-        return;
-    }
-    // A coordinate or constant of the model may have that name.
-    let taken = super::names::reserved(mechanism);
-    let each = EACH
-        .iter()
-        .find(|name| !taken.contains(**name))
-        .map_or_else(|| "x_of_the_place".to_owned(), |name| (*name).to_owned());
-    page.heading("Effects");
-    page.paragraph([
-        text("Each adds to the force of its place; a linear drive's name stands for its length, "),
-        code("load"),
-        text(" for the force that the place carries. Where an effect acts at several places, "),
-        Inline::Math(Formula::name(&*each)),
-        text(" stands for the coordinate of each of them. At a point the parameter is a mass."),
-    ]);
-    let rows = mechanism
-        .effects
-        .iter()
-        .map(|effect| {
-            let mut places = Line::new();
-            for (i, place) in effect.places.iter().enumerate() {
-                if i > 0 {
-                    places.push(text(", "));
-                }
-                places.push(code(match place {
-                    Place::Drive(d) => &*mechanism.drives[d.0].name,
-                    Place::Coordinate(c) => &*mechanism.coordinates[c.0].name,
-                    Place::Point(p) => &*mechanism.points[p.0].name,
-                }));
-            }
-            let x = match effect.places.as_slice() {
-                [Place::Drive(d)] => match mechanism.drives[d.0].kind {
-                    DriveKind::Joint(c) => &*mechanism.coordinates[c.0].name,
-                    DriveKind::Linear { .. } => &*mechanism.drives[d.0].name,
-                },
-                [Place::Coordinate(c)] => &*mechanism.coordinates[c.0].name,
-                _ => &*each,
-            };
-            let sum = Formula::sum(effect.terms.iter().map(|term| {
-                let parameter = Formula::name(&*mechanism.parameters[term.parameter.0].name);
-                Formula::product(
-                    Rational::ONE,
-                    [parameter, exact_at(mechanism, &term.expression, x)],
-                )
-            }));
-            vec![
-                cell(text(effect.kind.replace('_', " "))),
-                places,
-                cell(Inline::Math(sum)),
-            ]
-        })
-        .collect();
-    let head = vec!["effect", "at", "adds"];
-    page.table("effects", Table { head, rows });
 }

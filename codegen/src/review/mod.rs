@@ -5,6 +5,7 @@
 
 mod base;
 mod document;
+mod effects;
 mod equations;
 mod frames;
 mod listing;
@@ -69,7 +70,7 @@ fn write(derivation: &Derivation, numeric: Option<&NumericRank>) -> Document {
     frames::bodies(&mut page, mechanism);
     loops::loops(&mut page, derivation);
     loops::drives(&mut page, derivation);
-    loops::effects(&mut page, mechanism);
+    effects::effects(&mut page, mechanism);
     base::products(&mut page, derivation);
     base::dependencies(&mut page, derivation);
     base::base_parameters(&mut page, derivation, numeric);

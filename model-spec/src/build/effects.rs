@@ -1,32 +1,32 @@
-//! Effects of a file, by the kinds of the library and its own, and the products of parameters to retain.
+//! Effects of a file, by the kinds of the library and its own.
 
 use std::collections::BTreeMap;
 
 use crate::build::bodies::check_unique;
-use crate::build::frames::{Points, twice};
+use crate::build::effect_places::{Scene, common_load, place};
+use crate::build::frames::twice;
+use crate::build::mechanics;
 use crate::build::symbols::{Shared, Symbols};
 use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::document::Key;
-use crate::exact::{CoordinateIdx, Exact, ParameterIdx, Symbol};
+use crate::exact::{Exact, ParameterIdx};
 use crate::finite::{self, Why};
-use crate::formula::{Ast, AstKind};
-use crate::kind_terms::{factors, lacking_units, unit_at};
+use crate::formula::AstKind;
+use crate::kind_terms::{factors, unit_at};
 use crate::kinds::{Carries, check, library_entries};
-use crate::mechanism::{Drive, DriveIdx, DriveKind, Effect, EffectTerm, Motion, Parameter, Place};
+use crate::mechanism::{Action, Effect, EffectTerm, Parameter, Place};
 use crate::schema::{EffectEntry, EffectKindEntry, KindParameterEntry, ModelEntry};
 use crate::scope::{Sort, Wanted};
 use crate::suggest;
 use crate::unit::{Dimension, Unit};
-use crate::values::Name;
-use crate::values::{PlaceKind, SignName};
+use crate::values::{MechanicsName, Name, PlaceKind, SignName};
 
 /// Reads the effects; their parameters join those of the file.
 pub(super) fn effects(
     model: &ModelEntry,
-    own_kinds: &[EffectKindEntry],
+    own_kinds: &[&EffectKindEntry],
     symbols: &mut Symbols,
-    drives: &[Drive],
-    points: &Points,
+    scene: &Scene<'_>,
     log: &mut Log,
 ) -> Vec<Effect> {
     let kinds = kinds(own_kinds, log);
@@ -37,9 +37,36 @@ pub(super) fn effects(
         log,
     );
     warn_of_twins(entries.clone(), log);
+    check_single(entries.clone(), &kinds, log);
     entries
-        .filter_map(|entry| effect(entry, &kinds, symbols, drives, points, log))
+        .filter_map(|entry| effect(entry, &kinds, symbols, scene, log))
         .collect()
+}
+
+/// Reports a second tilt or delay: each is one property of the whole.
+fn check_single<'a>(
+    entries: impl Iterator<Item = &'a EffectEntry>,
+    kinds: &Kinds<'_>,
+    log: &mut Log,
+) {
+    let mut seen: Vec<(MechanicsName, Span)> = Vec::new();
+    for name in entries.filter_map(|entry| entry.kind.as_ref()) {
+        let Some(way @ (MechanicsName::Tilt | MechanicsName::Delay)) = kinds
+            .get(name.text.as_str())
+            .and_then(|(kind, _)| kind.mechanics)
+        else {
+            continue;
+        };
+        match seen.iter().find(|(known, _)| *known == way) {
+            Some((_, first)) => log.push(
+                Diagnostic::error(name.span, format!("`{}` acts twice", name.text))
+                    .label("expected only one")
+                    .related(*first, "the first one")
+                    .help("put both into one effect, by its constants"),
+            ),
+            None => seen.push((way, name.span)),
+        }
+    }
 }
 
 /// Warns of a kind that acts twice at one place with the same constants: the columns are equal, and a variant that means
@@ -77,7 +104,7 @@ fn warn_of_twins<'a>(entries: impl Iterator<Item = &'a EffectEntry>, log: &mut L
 /// A kind and whether it is sound.
 type Kinds<'a> = BTreeMap<&'a str, (&'a EffectKindEntry, bool)>;
 
-fn kinds<'a>(own: &'a [EffectKindEntry], log: &mut Log) -> Kinds<'a> {
+fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut Log) -> Kinds<'a> {
     let mut kinds: Kinds<'a> = BTreeMap::new();
     for entry in library_entries() {
         if let Some(name) = &entry.name {
@@ -103,8 +130,9 @@ fn kinds<'a>(own: &'a [EffectKindEntry], log: &mut Log) -> Kinds<'a> {
             continue;
         }
         check(entry, log);
-        let complete =
-            entry.parameters.is_some() && entry.expression.is_some() && entry.on.is_some();
+        let complete = (entry.mechanics.is_some()
+            || entry.parameters.is_some() && entry.expression.is_some())
+            && entry.on.is_some();
         kinds.insert(&name.text, (entry, complete && log.n_errors() == before));
     }
     kinds
@@ -114,18 +142,24 @@ fn effect(
     entry: &EffectEntry,
     kinds: &Kinds<'_>,
     symbols: &mut Symbols,
-    drives: &[Drive],
-    points: &Points,
+    scene: &Scene<'_>,
     log: &mut Log,
 ) -> Option<Effect> {
     let at = entry.at.as_ref();
+    let known = entry
+        .kind
+        .as_ref()
+        .and_then(|name| kinds.get(name.text.as_str()));
+    let allowed: &[PlaceKind] = known
+        .and_then(|(kind, _)| kind.on.as_ref())
+        .map_or(&[], |on| on.entries.as_slice());
     let places: Vec<Place> = at
         .iter()
         .flat_map(|at| &at.entries)
-        .filter_map(|name| place(name, symbols, drives, points, log))
+        .filter_map(|name| place(name, allowed, symbols, scene, log))
         .collect();
     let kind_name = entry.kind.as_ref()?;
-    let Some(&(kind, is_sound)) = kinds.get(kind_name.text.as_str()) else {
+    let Some(&(kind, is_sound)) = known else {
         log.push(
             Diagnostic::error(
                 kind_name.span,
@@ -152,30 +186,53 @@ fn effect(
     if !is_sound || places.len() != at.entries.len() {
         return None;
     }
-    let carries = common_load(kind, &at.entries, &places, symbols, drives, log)?;
+    let carries = common_load(kind, at, &places, symbols, scene.drives, log)?;
     let before = log.n_errors();
-    let constants = constants(entry, kind, kind_name, symbols, carries, log);
+    let mut constants = constants(entry, kind, kind_name, symbols, carries, log);
     check_values(entry, kind, kind_name, symbols, log);
-    let factors = factors(kind, carries, &constants, log)?;
+    let shapes = match kind.mechanics {
+        None => factors(kind, carries, &constants, log)?,
+        Some(way) => {
+            mechanics::check_places(way, &at.entries, &places, scene, log)?;
+            if way == MechanicsName::Tilt {
+                constants = mechanics::named_tilt(constants, kind_name, symbols, log)?;
+            }
+            Vec::new()
+        }
+    };
     let places_name = at
         .entries
         .iter()
         .map(|name| name.text.as_str())
         .collect::<Vec<_>>()
         .join("_");
+    let parts_own = mechanics::declared(kind.mechanics, &places, scene);
     let mut terms = Vec::new();
     let parameters = kind.parameters.iter().flat_map(|table| &table.entries);
-    for ((key, parameter), expression) in parameters.zip(factors) {
+    for (i, (key, parameter)) in parameters.enumerate() {
+        if let Some(declared) = &parts_own
+            && !declared.contains(&key.name.as_str())
+        {
+            mechanics::refuse_undeclared(entry, &key.name, declared, log);
+            continue;
+        }
         let unit = unit_at(parameter.unit.as_ref(), carries)?;
         terms.push(EffectTerm {
+            symbol: key.name.clone(),
             parameter: term_parameter(entry, key, parameter, unit, &places_name, symbols, log)?,
-            expression,
+            expression: shapes.get(i).cloned().unwrap_or_else(Exact::one),
         });
     }
+    let action = match kind.mechanics {
+        None => Action::Local,
+        Some(way) => mechanics::action(way, &mut terms, &places, scene),
+    };
     (log.n_errors() == before).then(|| Effect {
         kind: kind_name.text.clone(),
         places,
+        action,
         terms,
+        constants,
     })
 }
 
@@ -259,124 +316,6 @@ fn warn_of_sign(parameter: &Parameter, sign: Option<SignName>, span: Span, log: 
         .label(format!("expected a {expected} value"))
         .help("check its sign, and whether the kind is the one that is meant"),
     );
-}
-
-fn place(
-    name: &Name,
-    symbols: &Symbols,
-    drives: &[Drive],
-    points: &Points,
-    log: &mut Log,
-) -> Option<Place> {
-    if let Some(idx) = drives.iter().position(|drive| drive.name == name.text) {
-        return Some(Place::Drive(DriveIdx(idx)));
-    }
-    let coordinate = symbols
-        .coordinates
-        .iter()
-        .position(|coordinate| coordinate.name == name.text);
-    if let Some(idx) = coordinate {
-        return Some(Place::Coordinate(CoordinateIdx(idx)));
-    }
-    if let Some(idx) = points.get(&name.text) {
-        return Some(Place::Point(idx));
-    }
-    let known: Vec<&str> = drives
-        .iter()
-        .map(|drive| drive.name.as_str())
-        .chain(symbols.coordinates.iter().map(|one| one.name.as_str()))
-        .chain(points.names())
-        .collect();
-    if !log.is_full() {
-        let removal = log.removal(&["drive", "coordinates", "point"], &name.text);
-        log.push(
-            Diagnostic::error(name.span, format!("unknown place `{}`", name.text))
-                .label("expected the name of a drive, a coordinate or a point")
-                .removed_or(removal, || {
-                    suggest::advice(&name.text, "places", known.iter().copied())
-                }),
-        );
-    }
-    None
-}
-
-/// What the places of an effect carry; they must all carry the same, and the kind must be allowed there.
-fn common_load(
-    kind: &EffectKindEntry,
-    names: &[Name],
-    places: &[Place],
-    symbols: &Symbols,
-    drives: &[Drive],
-    log: &mut Log,
-) -> Option<Carries> {
-    let motion = |idx: CoordinateIdx| match symbols.coordinates.get(idx.0).map(|one| one.motion) {
-        Some(Motion::Prismatic) => Carries::Force,
-        Some(Motion::Revolute) | None => Carries::Torque,
-    };
-    let kind_name = kind.name.as_ref().map_or("", |name| name.text.as_str());
-    let mut common: Option<Carries> = None;
-    let mut fine = true;
-    for (i, (name, place)) in names.iter().zip(places).enumerate() {
-        let (sort, carries) = match place {
-            Place::Drive(idx) => match drives[idx.0].kind {
-                DriveKind::Joint(joint) => (PlaceKind::Drive, motion(joint)),
-                DriveKind::Linear { .. } => (PlaceKind::Drive, Carries::Force),
-            },
-            Place::Coordinate(idx) => (PlaceKind::Coordinate, motion(*idx)),
-            Place::Point(_) => (PlaceKind::Point, Carries::Mass),
-        };
-        let word = |sort: PlaceKind| match sort {
-            PlaceKind::Drive => "a drive",
-            PlaceKind::Coordinate => "a coordinate",
-            PlaceKind::Point => "a point",
-        };
-        let allowed: Vec<PlaceKind> = kind.on.iter().flat_map(|on| on.entries.clone()).collect();
-        if !allowed.contains(&sort) {
-            let list: Vec<&str> = allowed.iter().map(|sort| word(*sort)).collect();
-            log.push(
-                Diagnostic::error(name.span, format!("`{kind_name}` cannot act here"))
-                    .label(format!("this is {}", word(sort)))
-                    .help(format!("`{kind_name}` acts on {}", list.join(" or "))),
-            );
-            fine = false;
-            continue;
-        }
-        if !lacking_units(kind, carries).is_empty() {
-            log.push(
-                Diagnostic::error(name.span, format!("`{kind_name}` cannot act here"))
-                    .label(if carries == Carries::Force {
-                        "this place carries a force, for which the kind has no units"
-                    } else {
-                        "this place carries a torque, for which the kind has no units"
-                    })
-                    .help("give the kind's parameters and constants units for both, `{ force = ..., torque = ... }`"),
-            );
-            fine = false;
-            continue;
-        }
-        if names[..i].iter().any(|other| other.text == name.text) {
-            log.push(
-                Diagnostic::error(name.span, format!("`{}` is listed twice", name.text))
-                    .label("each place once"),
-            );
-            fine = false;
-        }
-        match common {
-            Some(first) if first != carries => {
-                log.push(
-                    Diagnostic::error(
-                        name.span,
-                        "places that carry forces and torques cannot share a parameter",
-                    )
-                    .label("differs from the first place")
-                    .help("write an `[[effect]]` for each"),
-                );
-                fine = false;
-            }
-            _ => common = Some(carries),
-        }
-    }
-    common.filter(|_| fine)
 }
 
 /// The values of the kind's constants in this effect.
@@ -531,72 +470,6 @@ fn check_parameter_names(entry: &EffectEntry, kind: &EffectKindEntry, log: &mut 
                         names.iter().copied(),
                     )),
             );
-        }
-    }
-}
-
-/// Reads the products of parameters to retain.
-pub(super) fn retain(
-    model: &ModelEntry,
-    symbols: &Symbols,
-    log: &mut Log,
-) -> Vec<Vec<(ParameterIdx, u32)>> {
-    let mut products = Vec::new();
-    for formula in model.retain.iter().flat_map(|list| &list.entries) {
-        let mut powers: BTreeMap<ParameterIdx, u32> = BTreeMap::new();
-        if product(&formula.ast, 1, symbols, &mut powers, log) {
-            products.push(powers.into_iter().collect());
-        }
-    }
-    products
-}
-
-fn product(
-    ast: &Ast,
-    exponent: u32,
-    symbols: &Symbols,
-    powers: &mut BTreeMap<ParameterIdx, u32>,
-    log: &mut Log,
-) -> bool {
-    match &ast.kind {
-        AstKind::Name(name) => {
-            // Naming a parameter here uses nothing: it only orders what the mechanism holds.
-            let was_used = symbols
-                .scope
-                .get(name)
-                .is_some_and(|meaning| meaning.used.get());
-            let Some(meaning) = symbols
-                .scope
-                .look_up(name, ast.span, &[Sort::Parameter], log)
-            else {
-                return false;
-            };
-            meaning.used.set(was_used);
-            if let Exact::Symbol(Symbol::Parameter(idx)) = meaning.exact {
-                *powers.entry(idx).or_default() += exponent;
-            }
-            true
-        }
-        AstKind::Product(factors) => {
-            let mut fine = true;
-            for factor in factors {
-                fine &= product(factor, exponent, symbols, powers, log);
-            }
-            fine
-        }
-        AstKind::Power(base, power) if *power > 0 => product(
-            base,
-            exponent.saturating_mul(power.unsigned_abs()),
-            symbols,
-            powers,
-            log,
-        ),
-        _ => {
-            log.push(
-                Diagnostic::error(ast.span, "only a product of parameters can be retained")
-                    .label("expected for example `m1*dc1^2`"),
-            );
-            false
         }
     }
 }

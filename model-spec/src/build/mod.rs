@@ -5,16 +5,20 @@
 
 mod actuation;
 mod bodies;
+mod effect_places;
 mod effects;
 mod frames;
 mod limits;
+mod mechanics;
+mod retain;
 mod symbols;
 
+use crate::build::effect_places::Scene;
 use crate::diagnostic::{Log, Span};
 use crate::kinds::{EffectKind, describe, library_entries};
 use crate::mechanism::{Mechanism, Recording};
 use crate::pose;
-use crate::schema::ModelEntry;
+use crate::schema::{EffectKindEntry, ModelEntry};
 
 /// The places of what a mechanism holds, by index, for findings about its pose.
 #[derive(Debug, Default)]
@@ -28,7 +32,13 @@ pub(crate) struct Places {
 }
 
 /// Builds the mechanism, if there are no errors, and the kinds of effects that its file may use.
-pub(crate) fn build(model: &ModelEntry, log: &mut Log) -> (Option<Mechanism>, Vec<EffectKind>) {
+///
+/// `libraries` are kinds of libraries of its own.
+pub(crate) fn build(
+    model: &ModelEntry,
+    libraries: &[EffectKindEntry],
+    log: &mut Log,
+) -> (Option<Mechanism>, Vec<EffectKind>) {
     let mut places = Places {
         whole: Some(model.span),
         ..Places::default()
@@ -45,12 +55,17 @@ pub(crate) fn build(model: &ModelEntry, log: &mut Log) -> (Option<Mechanism>, Ve
     let lumped_masses = bodies::lumped_masses(model, &symbols, &tree, &points, log);
     let loops = actuation::loops(model, &points, &mut places, log);
     let drives = actuation::drives(model, &symbols, &points, &mut places, log);
-    let own_kinds = model
-        .effect_kind
-        .as_ref()
-        .map_or(&[][..], |list| list.entries.as_slice());
-    let effects = effects::effects(model, own_kinds, &mut symbols, &drives, &points, log);
-    let retain = effects::retain(model, &symbols, log);
+    let own_kinds = model.effect_kind.iter().flat_map(|list| &list.entries);
+    let own_kinds: Vec<&EffectKindEntry> = libraries.iter().chain(own_kinds).collect();
+    let scene = Scene {
+        drives: &drives,
+        points: &points,
+        parts: &parts,
+        lumped_masses: &lumped_masses,
+    };
+    let effects = effects::effects(model, &own_kinds, &mut symbols, &scene, log);
+    let (gravity, force_delay) = mechanics::whole(&effects, gravity, &symbols.constants);
+    let retain = retain::retain(model, &symbols, log);
     let limits = limits::limits(model, &symbols.coordinates, &drives, &points.points, log);
     let columns = actuation::recording(model, &symbols, &drives, log);
     actuation::check_place_names(model, log);
@@ -60,7 +75,7 @@ pub(crate) fn build(model: &ModelEntry, log: &mut Log) -> (Option<Mechanism>, Ve
     let kinds = library_entries()
         .iter()
         .map(|entry| describe(entry, false))
-        .chain(own_kinds.iter().map(|entry| describe(entry, true)))
+        .chain(own_kinds.into_iter().map(|entry| describe(entry, true)))
         .collect();
     let Some(name) = model.name.as_ref().filter(|_| log.n_errors() == 0) else {
         return (None, kinds);
@@ -79,6 +94,7 @@ pub(crate) fn build(model: &ModelEntry, log: &mut Log) -> (Option<Mechanism>, Ve
         loops,
         drives,
         effects,
+        force_delay,
         retain,
         limits,
         recording: Recording { columns },

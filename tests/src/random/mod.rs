@@ -7,10 +7,10 @@ pub use planar_loop::{planar_loop, regularity_at};
 pub use tree::tree;
 
 use modelmill_spec::{
-    Axis, Constant, ConstantIdx, Convention, Coordinate, CoordinateIdx, Drive, DriveIdx, DriveKind,
-    Effect, EffectTerm, Exact, Frame, FrameIdx, Function, Inertial, Length, Limits, LumpedMass,
-    Mechanism, Motion, Parameter, ParameterIdx, Part, Place, PlaceQuantity, Point, PointIdx,
-    Recording, Step, Symbol,
+    Action, Axis, Constant, ConstantIdx, Convention, Coordinate, CoordinateIdx, Drive, DriveIdx,
+    DriveKind, Effect, EffectTerm, Exact, Frame, FrameIdx, Function, Inertial, Length, Limits,
+    LumpedMass, Mechanism, Motion, Parameter, ParameterIdx, Part, Place, PlaceQuantity, Point,
+    PointIdx, Recording, Step, Symbol,
 };
 use nalgebra::{Matrix3, Vector3};
 use num_rational::BigRational;
@@ -72,6 +72,7 @@ impl Draft {
                 loops: Vec::new(),
                 drives: Vec::new(),
                 effects: Vec::new(),
+                force_delay: 0.0,
                 retain: Vec::new(),
                 limits: Limits::default(),
                 recording: Recording::default(),
@@ -420,10 +421,13 @@ impl Draft {
         self.mechanism.effects.push(Effect {
             kind: kind.to_owned(),
             places,
+            action: Action::Local,
             terms: vec![EffectTerm {
+                symbol: "p".to_owned(),
                 parameter,
                 expression,
             }],
+            constants: Vec::new(),
         });
     }
 }

@@ -8,16 +8,17 @@ use crate::expr::Rational;
 
 /// The formula of an exact expression.
 pub fn exact(mechanism: &Mechanism, expression: &Exact) -> Formula {
-    exact_at(mechanism, expression, "x")
+    exact_at(mechanism, expression, ["x", "other"])
 }
 
-/// The formula of an exact expression that acts at the place `x`: `x`, `x_d`, `x_dd` and `load` are its quantities.
-pub fn exact_at(mechanism: &Mechanism, expression: &Exact, x: &str) -> Formula {
-    let of = |inner: &Exact| exact_at(mechanism, inner, x);
+/// The formula of an exact expression that acts at the first of two places: `x`, `x_d`, `x_dd` and `load` are the
+/// quantities of a place `x`.
+pub fn exact_at(mechanism: &Mechanism, expression: &Exact, places: [&str; 2]) -> Formula {
+    let of = |inner: &Exact| exact_at(mechanism, inner, places);
     match expression {
         Exact::Rational(value) => Formula::Number(Rational::from(value.clone())),
         Exact::Pi => Formula::name("pi"),
-        Exact::Symbol(symbol) => Formula::Symbol(name(mechanism, *symbol, x)),
+        Exact::Symbol(symbol) => Formula::Symbol(name(mechanism, *symbol, places)),
         Exact::Sum(terms) => Formula::sum(terms.iter().map(of)),
         Exact::Product(factors) => Formula::product(Rational::ONE, factors.iter().map(of)),
         Exact::Quotient(above, below) => Formula::quotient(of(above), of(below)),
@@ -42,7 +43,7 @@ pub fn exact_at(mechanism: &Mechanism, expression: &Exact, x: &str) -> Formula {
 pub fn angle(mechanism: &Mechanism, angle: &Angle) -> Formula {
     let turns = Formula::product(Rational::from(angle.pi.clone()), [Formula::name("pi")]);
     let terms = angle.terms.iter().map(|(symbol, n)| {
-        let symbol = Formula::Symbol(name(mechanism, *symbol, "x"));
+        let symbol = Formula::Symbol(name(mechanism, *symbol, ["x", "other"]));
         Formula::product(Rational::integer(i64::from(*n)), [symbol])
     });
     Formula::sum(terms.chain([turns]))
@@ -57,7 +58,7 @@ pub fn length(mechanism: &Mechanism, length: &Length) -> Formula {
     Formula::sum([exact(mechanism, &length.offset)].into_iter().chain(slides))
 }
 
-fn name(mechanism: &Mechanism, symbol: modelmill_spec::Symbol, x: &str) -> Symbol {
+fn name(mechanism: &Mechanism, symbol: modelmill_spec::Symbol, [x, other]: [&str; 2]) -> Symbol {
     use modelmill_spec::Symbol as Named;
     match symbol {
         Named::Constant(i) => Symbol::new(&*mechanism.constants[i.0].name),
@@ -67,5 +68,8 @@ fn name(mechanism: &Mechanism, symbol: modelmill_spec::Symbol, x: &str) -> Symbo
         Named::Place(PlaceQuantity::Rate) => Symbol::derived(x, 1),
         Named::Place(PlaceQuantity::Acceleration) => Symbol::derived(x, 2),
         Named::Place(PlaceQuantity::Load) => Symbol::new("load"),
+        Named::Place(PlaceQuantity::OtherCoordinate) => Symbol::new(other),
+        Named::Place(PlaceQuantity::OtherRate) => Symbol::derived(other, 1),
+        Named::Place(PlaceQuantity::OtherAcceleration) => Symbol::derived(other, 2),
     }
 }

@@ -1,0 +1,130 @@
+//! Effects with what they add.
+
+use modelmill_spec::{Action, DriveKind, Effect, Mechanism, Place};
+
+use super::document::{Document, Inline, Line, Table, cell, code, text};
+use crate::expr::Rational;
+use crate::expr::print::{Formula, exact_at};
+
+/// Stands for the coordinate of each of several places.
+const EACH: [&str; 4] = ["x", "xi", "chi", "place"];
+/// Stands for the coordinate of the other of two places.
+const OTHER: [&str; 4] = ["y", "eta", "psi", "other"];
+
+/// Effects with their expressions.
+pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
+    if mechanism.effects.is_empty() {
+        return;
+    }
+    // A coordinate or constant of the model may have that name.
+    let taken = super::names::reserved(mechanism);
+    let free = |names: [&str; 4], last: &str| {
+        let found = names.into_iter().find(|name| !taken.contains(*name));
+        found.unwrap_or(last).to_owned()
+    };
+    let each = free(EACH, "x_of_the_place");
+    let other = free(OTHER, "x_of_the_other_place");
+    page.heading("Effects");
+    page.paragraph([
+        text("Each adds to the force of its place; a linear drive's name stands for its length, "),
+        code("load"),
+        text(" for the force that the place carries. Where an effect acts at several places, "),
+        Inline::Math(Formula::name(&*each)),
+        text(" stands for the coordinate of each of them. At a point the parameter is a mass."),
+    ]);
+    let is_coupled = |effect: &Effect| {
+        let mut terms = effect.terms.iter();
+        terms.any(|term| {
+            term.expression.mentions(
+                &|symbol| matches!(symbol, modelmill_spec::Symbol::Place(q) if q.is_other()),
+            )
+        })
+    };
+    if mechanism.effects.iter().any(is_coupled) {
+        page.paragraph([
+            text("Where an effect couples two places, "),
+            Inline::Math(Formula::name(&*other)),
+            text(" stands for the coordinate of the other one."),
+        ]);
+    }
+    let rows = mechanism
+        .effects
+        .iter()
+        .map(|effect| {
+            let mut places = Line::new();
+            for (i, place) in effect.places.iter().enumerate() {
+                if i > 0 {
+                    places.push(text(", "));
+                }
+                places.push(code(mechanism.place_name(*place)));
+            }
+            vec![
+                cell(text(effect.kind.replace('_', " "))),
+                places,
+                adds(mechanism, effect, &each, &other),
+            ]
+        })
+        .collect();
+    let head = vec!["effect", "at", "adds"];
+    page.table("effects", Table { head, rows });
+}
+
+/// What an effect adds, as a formula where it is one.
+fn adds(mechanism: &Mechanism, effect: &Effect, each: &str, other: &str) -> Line {
+    let names: Vec<Formula> = (effect.terms.iter())
+        .map(|term| Formula::name(&*mechanism.parameters[term.parameter.0].name))
+        .collect();
+    let listed = |lead: &str| -> Line {
+        let mut line = vec![text(lead)];
+        for (i, name) in names.iter().enumerate() {
+            if i > 0 {
+                line.push(text(", "));
+            }
+            line.push(Inline::Math(name.clone()));
+        }
+        line
+    };
+    match &effect.action {
+        Action::Local => {
+            let x = match effect.places.as_slice() {
+                [Place::Drive(d)] => match mechanism.drives[d.0].kind {
+                    DriveKind::Joint(c) => &*mechanism.coordinates[c.0].name,
+                    DriveKind::Linear { .. } => &*mechanism.drives[d.0].name,
+                },
+                [Place::Coordinate(c)] => &*mechanism.coordinates[c.0].name,
+                _ => each,
+            };
+            let terms = effect.terms.iter().zip(&names);
+            let sum = Formula::sum(terms.map(|(term, parameter)| {
+                let factor = exact_at(mechanism, &term.expression, [x, other]);
+                Formula::product(Rational::ONE, [parameter.clone(), factor])
+            }));
+            cell(Inline::Math(sum))
+        }
+        Action::Rod => listed(
+            "a rod that turns about the first point and slides through the second; its second and first moment about \
+             the first point, and its mass: ",
+        ),
+        Action::Bodies { parts, .. } if parts.is_empty() => {
+            listed("the moments of lumped masses at the point where their forces act; the mass: ")
+        }
+        Action::Bodies { .. } => listed("differences of this part: "),
+        Action::Tilt => {
+            let mut line = vec![text("turns the base by ")];
+            for (i, (symbol, angle)) in effect.constants.iter().enumerate() {
+                let about = symbol.trim_start_matches('t');
+                let lead = if i == 0 { "" } else { ", " };
+                line.push(text(format!("{lead}{about}: ")));
+                line.push(Inline::Math(exact_at(mechanism, angle, [each, other])));
+            }
+            line
+        }
+        Action::Delay => {
+            let mut line = vec![text("lets forces be read later than they act, s: ")];
+            for (_, time) in &effect.constants {
+                line.push(Inline::Math(exact_at(mechanism, time, [each, other])));
+            }
+            line
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! The places of an effect: what their names mean, and what they carry.
+
+use crate::build::frames::Points;
+use crate::build::symbols::Symbols;
+use crate::diagnostic::{Diagnostic, Log};
+use crate::exact::CoordinateIdx;
+use crate::kind_terms::lacking_units;
+use crate::kinds::{Carries, acts_on, n_places};
+use crate::mechanism::{Drive, DriveIdx, DriveKind, LumpedMass, Motion, Part, PartIdx, Place};
+use crate::record::OneOrMany;
+use crate::schema::EffectKindEntry;
+use crate::suggest;
+use crate::values::{Name, PlaceKind};
+
+/// What an effect may act on, beside the coordinates.
+pub(super) struct Scene<'a> {
+    pub(super) drives: &'a [Drive],
+    pub(super) points: &'a Points,
+    pub(super) parts: &'a [Part],
+    pub(super) lumped_masses: &'a [LumpedMass],
+}
+
+/// Finds a place by its name; where several things bear it, the one that the kind may act on.
+pub(super) fn place(
+    name: &Name,
+    allowed: &[PlaceKind],
+    symbols: &Symbols,
+    scene: &Scene<'_>,
+    log: &mut Log,
+) -> Option<Place> {
+    let part = || {
+        let at = scene.parts.iter().position(|part| part.name == name.text)?;
+        Some(Place::Part(PartIdx(at)))
+    };
+    let whole = match name.text.as_str() {
+        "base" => Some((PlaceKind::Base, Place::Base)),
+        "force" => Some((PlaceKind::Force, Place::Force)),
+        _ => None,
+    };
+    // Parts and the whole have names of their own, which a drive or a point may bear as well: the kind tells.
+    if let Some((_, place)) = whole.filter(|(sort, _)| allowed.contains(sort)) {
+        return Some(place);
+    }
+    if allowed.contains(&PlaceKind::Part)
+        && let Some(place) = part()
+    {
+        return Some(place);
+    }
+    if let Some(idx) = scene
+        .drives
+        .iter()
+        .position(|drive| drive.name == name.text)
+    {
+        return Some(Place::Drive(DriveIdx(idx)));
+    }
+    let coordinate = symbols
+        .coordinates
+        .iter()
+        .position(|coordinate| coordinate.name == name.text);
+    if let Some(idx) = coordinate {
+        return Some(Place::Coordinate(CoordinateIdx(idx)));
+    }
+    if let Some(idx) = scene.points.get(&name.text) {
+        return Some(Place::Point(idx));
+    }
+    if let Some(place) = part().or(whole.map(|(_, place)| place)) {
+        return Some(place);
+    }
+    let mut known: Vec<&str> = Vec::new();
+    let expected = match allowed {
+        [PlaceKind::Part] => {
+            known.extend(scene.parts.iter().map(|part| part.name.as_str()));
+            "the name of a part"
+        }
+        [PlaceKind::Base] => {
+            known.push("base");
+            "`base`"
+        }
+        [PlaceKind::Force] => {
+            known.push("force");
+            "`force`"
+        }
+        _ => {
+            known.extend(scene.drives.iter().map(|drive| drive.name.as_str()));
+            known.extend(symbols.coordinates.iter().map(|one| one.name.as_str()));
+            known.extend(scene.points.names());
+            "the name of a drive, a coordinate or a point"
+        }
+    };
+    if !log.is_full() {
+        let removal = log.removal(&["drive", "coordinates", "point", "part"], &name.text);
+        log.push(
+            Diagnostic::error(name.span, format!("unknown place `{}`", name.text))
+                .label(format!("expected {expected}"))
+                .removed_or(removal, || {
+                    suggest::advice(&name.text, "places", known.iter().copied())
+                }),
+        );
+    }
+    None
+}
+
+/// What the places of an effect carry; they must all carry the same, and the kind must be allowed there.
+pub(super) fn common_load(
+    kind: &EffectKindEntry,
+    at: &OneOrMany<Name>,
+    places: &[Place],
+    symbols: &Symbols,
+    drives: &[Drive],
+    log: &mut Log,
+) -> Option<Carries> {
+    let motion = |idx: CoordinateIdx| match symbols.coordinates.get(idx.0).map(|one| one.motion) {
+        Some(Motion::Prismatic) => Carries::Force,
+        Some(Motion::Revolute) | None => Carries::Torque,
+    };
+    let names = &at.entries;
+    let kind_name = kind.name.as_ref().map_or("", |name| name.text.as_str());
+    let mut common: Option<Carries> = None;
+    let mut fine = true;
+    for (i, (name, place)) in names.iter().zip(places).enumerate() {
+        let (sort, carries) = match place {
+            Place::Drive(idx) => match drives[idx.0].kind {
+                DriveKind::Joint(joint) => (PlaceKind::Drive, motion(joint)),
+                DriveKind::Linear { .. } => (PlaceKind::Drive, Carries::Force),
+            },
+            Place::Coordinate(idx) => (PlaceKind::Coordinate, motion(*idx)),
+            Place::Point(_) => (PlaceKind::Point, Carries::Mass),
+            Place::Part(_) => (PlaceKind::Part, Carries::Elsewhere),
+            Place::Base => (PlaceKind::Base, Carries::Elsewhere),
+            Place::Force => (PlaceKind::Force, Carries::Elsewhere),
+        };
+        let word = |sort: PlaceKind| acts_on(sort).words();
+        let allowed: Vec<PlaceKind> = kind.on.iter().flat_map(|on| on.entries.clone()).collect();
+        if !allowed.contains(&sort) {
+            let list: Vec<&str> = allowed.iter().map(|sort| word(*sort)).collect();
+            log.push(
+                Diagnostic::error(name.span, format!("`{kind_name}` cannot act here"))
+                    .label(format!("this is {}", word(sort)))
+                    .help(format!("`{kind_name}` acts on {}", list.join(" or "))),
+            );
+            fine = false;
+            continue;
+        }
+        if !lacking_units(kind, carries).is_empty() {
+            log.push(
+                Diagnostic::error(name.span, format!("`{kind_name}` cannot act here"))
+                    .label(match carries {
+                        Carries::Force => "this place carries a force, for which the kind has no units",
+                        Carries::Torque => "this place carries a torque, for which the kind has no units",
+                        Carries::Mass | Carries::Elsewhere => "the kind has no units for this place",
+                    })
+                    .help("give the kind's parameters and constants units for both, `{ force = ..., torque = ... }`"),
+            );
+            fine = false;
+            continue;
+        }
+        if names[..i].iter().any(|other| other.text == name.text) {
+            log.push(
+                Diagnostic::error(name.span, format!("`{}` is listed twice", name.text))
+                    .label("each place once"),
+            );
+            fine = false;
+        }
+        match common {
+            Some(first) if first != carries => {
+                log.push(
+                    Diagnostic::error(
+                        name.span,
+                        "places that carry forces and torques cannot share a parameter",
+                    )
+                    .label("differs from the first place")
+                    .help("write an `[[effect]]` for each"),
+                );
+                fine = false;
+            }
+            _ => common = Some(carries),
+        }
+    }
+    if let Some(n) = n_places(kind).filter(|n| *n != names.len()) {
+        let (word, why) = match n {
+            1 => ("one place", "it acts on one place at a time"),
+            _ => (
+                "two places",
+                "at each of two places it acts with the motion of the other",
+            ),
+        };
+        log.push(
+            Diagnostic::error(at.span, format!("`{kind_name}` takes {word}"))
+                .label(format!("expected {n}, found {}", names.len()))
+                .help(why),
+        );
+        fine = false;
+    }
+    common.filter(|_| fine)
+}

@@ -1,0 +1,76 @@
+//! The products of parameters that should stay in the base parameters.
+
+use std::collections::BTreeMap;
+
+use crate::build::symbols::Symbols;
+use crate::diagnostic::{Diagnostic, Log};
+use crate::exact::{Exact, ParameterIdx, Symbol};
+use crate::formula::{Ast, AstKind};
+use crate::schema::ModelEntry;
+use crate::scope::Sort;
+
+/// Reads the products of parameters to retain.
+pub(super) fn retain(
+    model: &ModelEntry,
+    symbols: &Symbols,
+    log: &mut Log,
+) -> Vec<Vec<(ParameterIdx, u32)>> {
+    let mut products = Vec::new();
+    for formula in model.retain.iter().flat_map(|list| &list.entries) {
+        let mut powers: BTreeMap<ParameterIdx, u32> = BTreeMap::new();
+        if product(&formula.ast, 1, symbols, &mut powers, log) {
+            products.push(powers.into_iter().collect());
+        }
+    }
+    products
+}
+
+fn product(
+    ast: &Ast,
+    exponent: u32,
+    symbols: &Symbols,
+    powers: &mut BTreeMap<ParameterIdx, u32>,
+    log: &mut Log,
+) -> bool {
+    match &ast.kind {
+        AstKind::Name(name) => {
+            // Naming a parameter here uses nothing: it only orders what the mechanism holds.
+            let was_used = symbols
+                .scope
+                .get(name)
+                .is_some_and(|meaning| meaning.used.get());
+            let Some(meaning) = symbols
+                .scope
+                .look_up(name, ast.span, &[Sort::Parameter], log)
+            else {
+                return false;
+            };
+            meaning.used.set(was_used);
+            if let Exact::Symbol(Symbol::Parameter(idx)) = meaning.exact {
+                *powers.entry(idx).or_default() += exponent;
+            }
+            true
+        }
+        AstKind::Product(factors) => {
+            let mut fine = true;
+            for factor in factors {
+                fine &= product(factor, exponent, symbols, powers, log);
+            }
+            fine
+        }
+        AstKind::Power(base, power) if *power > 0 => product(
+            base,
+            exponent.saturating_mul(power.unsigned_abs()),
+            symbols,
+            powers,
+            log,
+        ),
+        _ => {
+            log.push(
+                Diagnostic::error(ast.span, "only a product of parameters can be retained")
+                    .label("expected for example `m1*dc1^2`"),
+            );
+            false
+        }
+    }
+}

@@ -1,0 +1,463 @@
+//! Edits of a model file: an effect is added to its text, and everything else stays as it is, byte for byte.
+//!
+//! A text and a [`NewEffect`] go in, the new text comes out. The table goes behind the last effect, or to the end of a
+//! file without any; an inline list of effects gets one more entry.
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use crate::diagnostic::Log;
+use crate::document::{self, Node, Value, get, quote};
+use crate::exact::Exact;
+use crate::kinds::EffectKind;
+use crate::load::{Failure, Loaded, load_with};
+use crate::mechanism::{Effect, Mechanism, Place};
+use crate::suggest;
+use crate::values::is_name;
+
+/// An effect that a model file shall have.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct NewEffect {
+    /// Name of the kind.
+    pub kind: String,
+    /// Where it acts.
+    pub at: Vec<String>,
+    /// What is said of its parameters.
+    pub parameters: Vec<NewParameter>,
+    /// Values of its constants by their symbols, in SI units.
+    pub constants: Vec<(String, f64)>,
+    /// A remark; its lines become comments above the effect.
+    pub comment: Option<String>,
+}
+
+/// What is said of a parameter of a new effect.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct NewParameter {
+    /// Its symbol in the kind.
+    pub symbol: String,
+    /// Its name, if it is not to be called `symbol_place`; the name of a parameter that is there shares it.
+    pub name: Option<String>,
+    /// Nominal value in SI units.
+    pub nominal: Option<f64>,
+}
+
+/// Why an effect cannot be added.
+#[derive(Clone, Debug)]
+pub enum EditFailure {
+    /// The effect is at fault: what is wrong, and what to do.
+    Effect(String),
+    /// The model file is faulty, or would be with the effect.
+    Model(Box<Failure>),
+}
+
+impl fmt::Display for EditFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Effect(says) => f.write_str(says),
+            Self::Model(failure) => failure.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for EditFailure {}
+
+/// A model file with an effect added.
+#[derive(Clone, Debug)]
+pub struct Edited {
+    /// Its text.
+    pub text: String,
+    /// What it means now.
+    pub loaded: Loaded,
+    /// The effect as it was added: with names for parameters whose usual names are taken.
+    pub effect: NewEffect,
+}
+
+/// Adds an effect to a model that is read from its text, as [`crate::load_with`] does, and reads the result.
+///
+/// Fails if the model file is faulty before or after, if the kind or one of its symbols is unknown, and if the same
+/// effect acts at one of the places already.
+pub fn add_to_model(
+    path_name: &str,
+    text: &str,
+    effect: &NewEffect,
+    libraries: &[PathBuf],
+    read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
+) -> Result<Edited, EditFailure> {
+    let model = |failure| EditFailure::Model(Box::new(failure));
+    let before = load_with(path_name, text, libraries, read).map_err(model)?;
+    let kind = kind_of(effect, &before.kinds)?;
+    refuse_twin(effect, kind, &before.mechanism)?;
+    let effect = with_free_names(effect, kind, &before.mechanism);
+    let text = add_effect(text, &effect)?;
+    let loaded = load_with(path_name, &text, libraries, read).map_err(model)?;
+    Ok(Edited {
+        text,
+        loaded,
+        effect,
+    })
+}
+
+/// Adds an effect to the text of a model file; whether it means anything there is not looked at.
+///
+/// Fails if the text is not TOML, its `effect` is no list of tables, or the effect cannot be written.
+///
+/// ```
+/// use modelmill_spec::edit::{NewEffect, NewParameter, add_effect};
+/// let effect = NewEffect {
+///     kind: "coulomb_friction".to_owned(),
+///     at: vec!["motor".to_owned()],
+///     parameters: vec![NewParameter { symbol: "Fc".to_owned(), nominal: Some(25.9), ..NewParameter::default() }],
+///     ..NewEffect::default()
+/// };
+/// let text = add_effect("name = \"arm\" # mine\n", &effect).unwrap();
+/// assert_eq!(text, "name = \"arm\" # mine\n\n[[effect]]\nkind = \"coulomb_friction\"\nat = [\"motor\"]\n\
+///                   parameters = { Fc = { nominal = 25.9 } }\n");
+/// ```
+pub fn add_effect(text: &str, effect: &NewEffect) -> Result<String, EditFailure> {
+    check_writable(effect)?;
+    let mut log = Log::default();
+    let table = document::parse(text, 0, &mut log);
+    if log.n_errors() > 0 {
+        let says = log.finish().into_iter().next().map(|found| found.message);
+        return Err(EditFailure::Effect(format!(
+            "{}; mend the file first",
+            says.unwrap_or_else(|| "this is not TOML".to_owned())
+        )));
+    }
+    let line_end = if text.contains("\r\n") { "\r\n" } else { "\n" };
+    match get(&table, "effect") {
+        None => Ok(append(text, effect, line_end)),
+        Some((key, node)) => {
+            let Value::Array(entries) = &node.value else {
+                return Err(EditFailure::Effect(
+                    "`effect` of this file is no list of tables; write effects as `[[effect]]`"
+                        .to_owned(),
+                ));
+            };
+            // Behind the key of an inline list stands `=`, behind that of a header `]]`.
+            let is_inline = text[key.span.end..].trim_start().starts_with('=');
+            if is_inline {
+                Ok(extend_inline(text, node, entries, effect, line_end))
+            } else {
+                Ok(insert_behind(text, node, effect, line_end))
+            }
+        }
+    }
+}
+
+/// The last byte that belongs to a value or anything in it.
+fn end_of(node: &Node) -> usize {
+    let inner = match &node.value {
+        Value::Array(entries) => entries.iter().map(end_of).max(),
+        Value::Table(table) => table
+            .iter()
+            .map(|(key, node)| key.span.end.max(end_of(node)))
+            .max(),
+        _ => None,
+    };
+    inner.unwrap_or(0).max(node.span.end)
+}
+
+/// Puts a table behind the last effect.
+fn insert_behind(text: &str, list: &Node, effect: &NewEffect, line_end: &str) -> String {
+    let end = end_of(list).min(text.len());
+    let Some(rest) = text[end..].find('\n') else {
+        return append(text, effect, line_end);
+    };
+    let at = end + rest + 1;
+    let block = block(effect, line_end);
+    format!("{}{line_end}{block}{}", &text[..at], &text[at..])
+}
+
+/// Puts a table at the end of a file.
+fn append(text: &str, effect: &NewEffect, line_end: &str) -> String {
+    let mut new = text.to_owned();
+    if !text.is_empty() {
+        if !text.ends_with('\n') {
+            new.push_str(line_end);
+        }
+        new.push_str(line_end);
+    }
+    new.push_str(&block(effect, line_end));
+    new
+}
+
+/// Puts an entry behind the last one of an inline list.
+fn extend_inline(
+    text: &str,
+    list: &Node,
+    entries: &[Node],
+    effect: &NewEffect,
+    line_end: &str,
+) -> String {
+    let entry = inline(effect);
+    let Some(last) = entries.last() else {
+        let at = list.span.start + 1; // Behind the bracket.
+        return format!("{}{entry}{}", &text[..at], &text[at..]);
+    };
+    let end = last.span.end;
+    // A list with an entry per line goes on like that.
+    let line = text[..last.span.start].rfind('\n').map_or(0, |at| at + 1);
+    let indent = &text[line..last.span.start];
+    let lead = if line > list.span.start && indent.trim().is_empty() {
+        format!("{line_end}{indent}")
+    } else {
+        " ".to_owned()
+    };
+    let (comma, behind) = match comma_behind(text, end) {
+        Some(comma) => (None, comma + 1),
+        None => (Some(end), end),
+    };
+    // A remark on the same line belongs to the last entry.
+    let rest_of_line = text[behind..]
+        .split_inclusive('\n')
+        .next()
+        .unwrap_or_default();
+    let remark = rest_of_line.trim_start().starts_with('#');
+    let (at, lead) = if remark {
+        let length = rest_of_line.trim_end_matches(['\r', '\n']).len();
+        let own_line = if lead == " " { line_end } else { &lead };
+        (behind + length, own_line.to_owned())
+    } else {
+        (behind, lead)
+    };
+    let (comma, close) = match comma {
+        Some(_) => (",", ""),
+        None => ("", ","),
+    };
+    format!(
+        "{}{comma}{}{lead}{entry}{close}{}",
+        &text[..end],
+        &text[end..at],
+        &text[at..]
+    )
+}
+
+/// The comma behind an entry of a list, past blanks and remarks.
+fn comma_behind(text: &str, end: usize) -> Option<usize> {
+    let mut at = end;
+    loop {
+        let rest = &text[at..];
+        let blank = rest.len() - rest.trim_start().len();
+        at += blank;
+        match text[at..].chars().next()? {
+            ',' => return Some(at),
+            '#' => at += text[at..].find('\n')?,
+            _ => return None,
+        }
+    }
+}
+
+/// The effect as a table with a header.
+fn block(effect: &NewEffect, line_end: &str) -> String {
+    let mut lines: Vec<String> = remarks(effect).map(|line| format!("# {line}")).collect();
+    lines.push("[[effect]]".to_owned());
+    lines.extend(fields(effect));
+    lines.push(String::new());
+    lines.join(line_end)
+}
+
+/// The effect as an inline table.
+fn inline(effect: &NewEffect) -> String {
+    let mut fields = fields(effect);
+    let remark: Vec<String> = remarks(effect).collect();
+    if !remark.is_empty() {
+        let text = remark.join(" ").replace('\\', "\\\\").replace('"', "\\\"");
+        fields.push(format!("note = \"{text}\""));
+    }
+    format!("{{ {} }}", fields.join(", "))
+}
+
+/// The lines of the remark, without what a line cannot hold.
+fn remarks(effect: &NewEffect) -> impl Iterator<Item = String> {
+    let lines = effect.comment.iter().flat_map(|comment| comment.lines());
+    lines.map(|line| {
+        line.trim()
+            .chars()
+            .filter(|char| !char.is_control())
+            .collect()
+    })
+}
+
+fn fields(effect: &NewEffect) -> Vec<String> {
+    let places: Vec<String> = effect.at.iter().map(|name| format!("\"{name}\"")).collect();
+    let mut fields = vec![
+        format!("kind = \"{}\"", effect.kind),
+        format!("at = [{}]", places.join(", ")),
+    ];
+    let said = effect
+        .parameters
+        .iter()
+        .filter(|one| one.name.is_some() || one.nominal.is_some());
+    let parameters: Vec<String> = said
+        .map(|one| {
+            let name = one.name.iter().map(|name| format!("name = \"{name}\""));
+            let nominal = one.nominal.map(|value| format!("nominal = {value:?}"));
+            let both: Vec<String> = name.chain(nominal).collect();
+            format!("{} = {{ {} }}", one.symbol, both.join(", "))
+        })
+        .collect();
+    if !parameters.is_empty() {
+        fields.push(format!("parameters = {{ {} }}", parameters.join(", ")));
+    }
+    let constants: Vec<String> = (effect.constants.iter())
+        .map(|(symbol, value)| format!("{symbol} = {value:?}"))
+        .collect();
+    if !constants.is_empty() {
+        fields.push(format!("constants = {{ {} }}", constants.join(", ")));
+    }
+    fields
+}
+
+/// Refuses names and numbers that a model file cannot hold.
+fn check_writable(effect: &NewEffect) -> Result<(), EditFailure> {
+    let parameters = effect.parameters.iter();
+    let names = std::iter::once(&effect.kind)
+        .chain(&effect.at)
+        .chain(parameters.clone().map(|one| &one.symbol))
+        .chain(parameters.clone().filter_map(|one| one.name.as_ref()))
+        .chain(effect.constants.iter().map(|(symbol, _)| symbol));
+    for name in names {
+        if !is_name(name) {
+            return Err(EditFailure::Effect(format!(
+                "`{}` cannot be a name; a letter, then letters, digits and `_`, at most 60",
+                quote(name)
+            )));
+        }
+    }
+    let values = parameters
+        .filter_map(|one| Some((&one.symbol, one.nominal?)))
+        .chain(
+            effect
+                .constants
+                .iter()
+                .map(|(symbol, value)| (symbol, *value)),
+        );
+    for (symbol, value) in values {
+        if !value.is_finite() {
+            return Err(EditFailure::Effect(format!(
+                "`{symbol}` is {value}; a finite number is expected"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// The kind of a new effect, if it has all symbols that the effect names.
+fn kind_of<'a>(effect: &NewEffect, kinds: &'a [EffectKind]) -> Result<&'a EffectKind, EditFailure> {
+    let unknown = |what: &str, name: &str, known: Vec<&str>, of: &str| {
+        let advice = suggest::advice(name, &format!("{what}s"), known.iter().copied());
+        EditFailure::Effect(format!("unknown {what} `{}`{of}; {advice}", quote(name)))
+    };
+    let Some(kind) = kinds.iter().find(|kind| kind.name == effect.kind) else {
+        let known = kinds.iter().map(|kind| kind.name.as_str()).collect();
+        return Err(unknown("kind", &effect.kind, known, ""));
+    };
+    let of = format!(" of `{}`", kind.name);
+    let symbols: Vec<&str> = (kind.parameters.iter())
+        .map(|one| one.symbol.as_str())
+        .collect();
+    for one in &effect.parameters {
+        if !symbols.contains(&one.symbol.as_str()) {
+            return Err(unknown("parameter", &one.symbol, symbols, &of));
+        }
+    }
+    let symbols: Vec<&str> = (kind.constants.iter())
+        .map(|one| one.symbol.as_str())
+        .collect();
+    for (symbol, _) in &effect.constants {
+        if !symbols.contains(&symbol.as_str()) {
+            return Err(unknown("constant", symbol, symbols, &of));
+        }
+    }
+    Ok(kind)
+}
+
+/// Refuses an effect that acts at one of its places already, with the same constants.
+fn refuse_twin(
+    effect: &NewEffect,
+    kind: &EffectKind,
+    mechanism: &Mechanism,
+) -> Result<(), EditFailure> {
+    let wanted = |symbol: &str| {
+        let given = effect.constants.iter().find(|(name, _)| name == symbol);
+        given.map(|(_, value)| *value).or_else(|| {
+            let constant = kind.constants.iter().find(|one| one.symbol == symbol)?;
+            constant.value.as_ref()?.parse().ok()
+        })
+    };
+    for known in mechanism.effects.iter().filter(|e| e.kind == effect.kind) {
+        let alike = kind
+            .constants
+            .iter()
+            .all(|one| known.constant(&one.symbol, mechanism) == wanted(&one.symbol));
+        let whole = matches!(known.places[..], [Place::Base | Place::Force]);
+        let place = (known.places.iter())
+            .map(|place| mechanism.place_name(*place))
+            .find(|name| effect.at.iter().any(|at| at == name));
+        if let Some(place) = place.filter(|_| alike || whole) {
+            return Err(EditFailure::Effect(format!(
+                "`{}` acts at `{place}` already; change that effect in the model file instead, or remove it there",
+                effect.kind
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// The effect with names for those parameters whose usual names mean something else already.
+fn with_free_names(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism) -> NewEffect {
+    let parameters = mechanism.parameters.iter().map(|one| one.name.as_str());
+    let constants = mechanism.constants.iter().map(|one| one.name.as_str());
+    let coordinates = mechanism.coordinates.iter().map(|one| one.name.as_str());
+    let taken: BTreeSet<&str> = parameters.chain(constants).chain(coordinates).collect();
+    let mut named = effect.clone();
+    for symbol in kind.parameters.iter().map(|one| &one.symbol) {
+        let usual = format!("{symbol}_{}", effect.at.join("_"));
+        let said = named
+            .parameters
+            .iter()
+            .position(|one| one.symbol == *symbol);
+        if !taken.contains(usual.as_str())
+            || said.is_some_and(|i| named.parameters[i].name.is_some())
+        {
+            continue;
+        }
+        let free = (2..)
+            .map(|n| format!("{usual}_{n}"))
+            .find(|name| !taken.contains(name.as_str()));
+        match said {
+            Some(i) => named.parameters[i].name = free,
+            None => named.parameters.push(NewParameter {
+                symbol: symbol.clone(),
+                name: free,
+                nominal: None,
+            }),
+        }
+    }
+    named
+}
+
+impl Mechanism {
+    /// The name of a place, as the model file calls it.
+    pub fn place_name(&self, place: Place) -> &str {
+        match place {
+            Place::Drive(idx) => &self.drives[idx.0].name,
+            Place::Coordinate(idx) => &self.coordinates[idx.0].name,
+            Place::Point(idx) => &self.points[idx.0].name,
+            Place::Part(idx) => &self.parts[idx.0].name,
+            Place::Base => "base",
+            Place::Force => "force",
+        }
+    }
+}
+
+impl Effect {
+    /// The value of a constant of its kind, in SI units; `None` if the kind has none of this symbol or it is left away.
+    pub fn constant(&self, symbol: &str, mechanism: &Mechanism) -> Option<f64> {
+        let found = self.constants.iter().find(|(name, _)| name == symbol);
+        let value = |exact: &Exact| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
+        found.map(|(_, exact)| value(exact))
+    }
+}
