@@ -22,6 +22,7 @@
 
 pub mod base_fit;
 mod csv_text;
+pub mod cutoff;
 pub mod derivatives;
 pub mod deviations;
 pub mod essential;
@@ -49,6 +50,7 @@ mod recording_error;
 mod reflections;
 mod run;
 mod run_checks;
+pub mod series;
 mod signal_checks;
 mod smoothing;
 mod solution;
