@@ -191,7 +191,7 @@ pub fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<Periodic> {
     let moving: Vec<&[f64]> = signals
         .iter()
         .copied()
-        .filter(|values| values.iter().any(|v| *v != values[0]))
+        .filter(|values| values.iter().any(|v| v.total_cmp(&values[0]).is_ne()))
         .collect();
     if moving.is_empty() || time.len() < 64 {
         return None;
