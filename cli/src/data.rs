@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use modelmill_codegen::{PoseFault, PoseReason, States};
 use modelmill_identify::filters::decimate_time;
-use modelmill_identify::{Note, ReadOptions, Recording, Run, Severity, place_word};
+use modelmill_identify::{Note, ReadOptions, Recording, Run, Severity, name_of_bytes, place_word};
 
 use crate::columns::read_options;
 use crate::failure::{Failure, Outcome};
@@ -46,8 +46,11 @@ pub(crate) fn read_all(
 
 /// Reads and prepares one recording: one or, where it is cut at gaps in time, several stretches.
 pub(crate) fn read(model: &Model, path: &Path, args: &PreparationArgs) -> Outcome<Vec<Data>> {
-    let name = path.display().to_string();
     let piped = piped(path)?;
+    let name = path.display().to_string();
+    let name = piped
+        .as_ref()
+        .map_or(name.clone(), |bytes| name_of_bytes(&name, bytes));
     let header = match &piped {
         Some(bytes) => Recording::names_in_bytes(bytes, &name)?,
         None => Recording::names_in(path)?,

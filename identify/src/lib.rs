@@ -71,7 +71,7 @@ pub use locate::{LocateOptions, Region};
 pub use notes::{Note, Severity};
 pub use periods::Repeats;
 pub use recording::{Computed, NotFinite, ReadOptions, Recording};
-pub use recording_error::{Fault, RecordingError, place_word};
+pub use recording_error::{Fault, RecordingError, name_of_bytes, place_word};
 pub use run::{PreparedAs, Run};
 pub use solution::{RANK_TOLERANCE, Solution};
 pub use triangle::Triangle;
