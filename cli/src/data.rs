@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use modelmill_codegen::{PoseFault, PoseReason, States};
 use modelmill_identify::filters::decimate_time;
-use modelmill_identify::{Note, ReadOptions, Recording, Run, Severity, place_word};
+use modelmill_identify::{Note, ReadOptions, Recording, Run, Severity, name_of_bytes, place_word};
 
 use crate::columns::read_options;
 use crate::failure::{Failure, Outcome};
@@ -67,8 +67,11 @@ fn read_paired(
     args: &PreparationArgs,
     delay: f64,
 ) -> Outcome<Vec<Data>> {
-    let name = path.display().to_string();
     let piped = piped(path)?;
+    let name = path.display().to_string();
+    let name = piped
+        .as_ref()
+        .map_or(name.clone(), |bytes| name_of_bytes(&name, bytes));
     let header = match &piped {
         Some(bytes) => Recording::names_in_bytes(bytes, &name)?,
         None => Recording::names_in(path)?,

@@ -35,7 +35,7 @@ pub(crate) struct PreparationArgs {
     #[arg(long, value_enum, default_value = "recorded")]
     pub(crate) derivatives: DerivativesArg,
     /// How positions are smoothed and differentiated
-    #[arg(long, value_enum, default_value = "butterworth")]
+    #[arg(long, value_enum, default_value = "auto")]
     pub(crate) smoothing: SmoothingArg,
     /// Period of the motion for `--smoothing fourier`, s; found from the positions if not given
     #[arg(long, value_name = "S", value_parser = parse_period)]
@@ -60,6 +60,9 @@ pub(crate) enum DerivativesArg {
 /// How positions are smoothed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum SmoothingArg {
+    /// A Fourier series where the run is periodic and the series leaves nothing but noise, unless --cutoff is given;
+    /// otherwise Butterworth's low-pass
+    Auto,
     /// Butterworth's low-pass run both ways, then central differences
     Butterworth,
     /// Polynomials of degree 4 over windows that suit the cut-off
@@ -78,7 +81,7 @@ impl PreparationArgs {
             trim: None,
             decimate: 1,
             derivatives: DerivativesArg::Recorded,
-            smoothing: SmoothingArg::Butterworth,
+            smoothing: SmoothingArg::Auto,
             period: None,
             skip_bad_samples: false,
             between: None,
@@ -97,6 +100,7 @@ impl PreparationArgs {
                 DerivativesArg::Positions => Source::Positions,
             },
             smoothing: match self.smoothing {
+                SmoothingArg::Auto => Smoothing::Automatic,
                 SmoothingArg::Butterworth => Smoothing::Butterworth,
                 SmoothingArg::SavitzkyGolay => Smoothing::SavitzkyGolay,
                 SmoothingArg::Fourier => Smoothing::Fourier {

@@ -5,14 +5,11 @@
 //! Source: the field's standard procedure, e.g. M. Gautier, "Numerical calculation of the base
 //! inertial parameters of robots", and A. Janot, M. Gautier and M. Brunot, "Data set and
 //! reference models of EMPS" (2019), whose recipe is [`Preparation::emps`].
-//! The choice of the cut-off is our own: see [`choose_cutoff`].
-
-use std::f64::consts::PI;
+//! Which cut-off: [`crate::cutoff`]. Periodic motions have a better way: [`crate::series`].
 
 use serde::{Deserialize, Serialize};
 
 use crate::filters::{FilterError, LowPass};
-use crate::spectrum::hann_power;
 
 /// Where derivatives come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -29,8 +26,11 @@ pub enum Source {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Smoothing {
-    /// Butterworth's low-pass run both ways, then central differences: the field's standard.
+    /// A Fourier series where the run is periodic and the series leaves nothing but noise ([`crate::series`]), unless a
+    /// cut-off is given; Butterworth's low-pass otherwise.
     #[default]
+    Automatic,
+    /// Butterworth's low-pass run both ways, then central differences: the field's standard.
     Butterworth,
     /// Local polynomials (Savitzky-Golay) of the width that suits the cut-off.
     SavitzkyGolay,
@@ -70,7 +70,7 @@ impl Default for Preparation {
             trim: None,
             decimate: 1,
             source: Source::RecordedFirst,
-            smoothing: Smoothing::Butterworth,
+            smoothing: Smoothing::Automatic,
         }
     }
 }
@@ -154,83 +154,9 @@ pub fn mean_rate(time: &[f64]) -> f64 {
     }
 }
 
-/// The cut-off, Hz, that promises nearly the smallest mean square error of the acceleration, for
-/// positions sampled at `rate_hz`; `None` when the positions hold no motion above their noise.
-///
-/// The spectrum of the raw second differences is signal plus noise. White noise of the position
-/// has the known shape `(2 sin(pi f/rate) rate)^4` there; its level is the median over the upper
-/// quarter of the band. A cut-off then costs the signal it takes, `(1 - H)^2 (P - N)`, and the
-/// noise it leaves, `H^2 N`, where `H` is the gain of the filter run both ways (the trade-off of a
-/// Wiener filter, restricted to Butterworth's shape). A low cut-off loses more samples at the
-/// ends, so the highest one is returned whose expected error is within a quarter of the smallest,
-/// or below 0.1 % of the acceleration; never above a fifth of the sampling rate.
-pub fn choose_cutoff(positions: &[f64], rate_hz: f64, order: usize) -> Option<f64> {
-    if positions.len() < 32 {
-        return None;
-    }
-    let difference: Vec<f64> = positions
-        .windows(3)
-        .map(|w| (w[2] - 2.0 * w[1] + w[0]) * rate_hz * rate_hz)
-        .collect();
-    let power = hann_power(&difference);
-    let n = power.len();
-    let frequency = |k: usize| 0.5 * rate_hz * k as f64 / (n - 1) as f64;
-    let shape = |k: usize| (2.0 * (PI * frequency(k) / rate_hz).sin()).powi(4);
-    let mut upper: Vec<f64> = (n * 3 / 4..n - 1).map(|k| power[k] / shape(k)).collect();
-    if upper.is_empty() {
-        return None;
-    }
-    upper.sort_by(f64::total_cmp);
-    // The median of an exponentially distributed periodogram is ln 2 of its mean.
-    let level = upper[upper.len() / 2] / std::f64::consts::LN_2;
-    // Chance lifts one bin in three million above fifteen times the noise. A lower bar would let
-    // bins of noise through, whose share in the acceleration is huge at high frequencies.
-    let signal: Vec<f64> = (0..n)
-        .map(|k| {
-            let noise = level * shape(k);
-            if power[k] > 15.0 * noise {
-                power[k] - noise
-            } else {
-                0.0
-            }
-        })
-        .collect();
-    if signal.iter().all(|s| *s == 0.0) {
-        return None;
-    }
-    let lowest = 4.0 * rate_hz / positions.len() as f64;
-    // Beyond a fifth of the rate, central differences take more than the filter leaves.
-    let highest = 0.2 * rate_hz;
-    let steps = 96;
-    let costs: Vec<(f64, f64)> = (0..=steps)
-        .map(|i| lowest * (highest / lowest).powf(f64::from(i) / f64::from(steps)))
-        .filter_map(|cutoff| {
-            let filter = LowPass::butterworth(order, cutoff, rate_hz).ok()?;
-            let cost: f64 = (1..n)
-                .map(|k| {
-                    let gain = filter.gain(frequency(k), rate_hz).powi(2);
-                    (1.0 - gain).powi(2) * signal[k] + gain * gain * level * shape(k)
-                })
-                .sum();
-            Some((cutoff, cost))
-        })
-        .collect();
-    let smallest = costs
-        .iter()
-        .map(|(_, cost)| *cost)
-        .fold(f64::INFINITY, f64::min);
-    let bearable = (1.25_f64.powi(2) * smallest).max(1e-6 * signal.iter().sum::<f64>());
-    costs
-        .into_iter()
-        .filter(|(_, cost)| *cost <= bearable)
-        .map(|(cutoff, _)| cutoff)
-        .reduce(f64::max)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::Noise;
 
     #[test]
     fn parabolas_are_differentiated_exactly_on_uneven_times() {
@@ -239,70 +165,5 @@ mod tests {
         for (t, d) in time.iter().zip(differentiate(&time, &values)) {
             assert!((d - (5.0 * t - 3.0)).abs() < 1e-12);
         }
-    }
-
-    /// The chosen cut-off gives nearly the smallest error that any cut-off could give.
-    #[test]
-    fn the_chosen_cutoff_is_nearly_the_best_there_is() {
-        let rate = 250.0;
-        let time: Vec<f64> = (0..3645).map(|k| f64::from(k) / rate).collect();
-        let harmonics: Vec<(f64, f64, f64)> = (1..=7)
-            .map(|h| {
-                (
-                    f64::from(h) * 2.0 * PI / 7.29,
-                    0.2 / f64::from(h),
-                    0.7 * f64::from(h * h),
-                )
-            })
-            .collect();
-        for sigma in [1e-3, 4e-6, 1e-8] {
-            let mut noise = Noise::new(5);
-            let truth = |t: f64| -> f64 {
-                harmonics
-                    .iter()
-                    .map(|(w, a, phase)| -a * w * w * (w * t + phase).sin())
-                    .sum()
-            };
-            let positions: Vec<f64> = time
-                .iter()
-                .map(|t| {
-                    harmonics
-                        .iter()
-                        .map(|(w, a, phase)| a * (w * t + phase).sin())
-                        .sum::<f64>()
-                        + sigma * noise.normal()
-                })
-                .collect();
-            let error = |cutoff: f64| {
-                let qdd = prepare(&time, &positions, cutoff, 4).unwrap().qdd;
-                let inner = 400..3245;
-                (inner
-                    .clone()
-                    .map(|i| (qdd[i] - truth(time[i])).powi(2))
-                    .sum::<f64>()
-                    / inner.len() as f64)
-                    .sqrt()
-            };
-            let size =
-                (time.iter().map(|t| truth(*t).powi(2)).sum::<f64>() / time.len() as f64).sqrt();
-            let chosen = choose_cutoff(&positions, rate, 4).unwrap();
-            let best = (0..60)
-                .map(|i| error(0.6 * 1.09_f64.powi(i)))
-                .fold(f64::INFINITY, f64::min);
-            assert!(
-                error(chosen) < (1.6 * best).max(1.5e-3 * size),
-                "sigma {sigma}: {chosen} Hz gives {} not {best}",
-                error(chosen)
-            );
-        }
-    }
-
-    #[test]
-    fn a_coordinate_at_rest_has_no_cutoff() {
-        assert_eq!(choose_cutoff(&[1.0; 500], 250.0, 4), None);
-        let mut noise = Noise::new(2);
-        let still: Vec<f64> = (0..500).map(|_| 1.0 + 1e-6 * noise.normal()).collect();
-        // Chance peaks may pass for motion; nothing below may panic on them.
-        let _ = choose_cutoff(&still, 250.0, 4);
     }
 }

@@ -46,7 +46,7 @@ pub struct Deviations {
     pub residual_lag1: Vec<f64>,
     /// Bandwidth of Bartlett's kernel, samples.
     pub bandwidth: usize,
-    /// Samples, each of all channels.
+    /// Samples, each of all channels; rows of zeros do not count.
     pub samples: usize,
     /// True where there are fewer than [`FEWEST_ROWS`] equations for each parameter: the deviations are then no smaller
     /// than the classical ones, and still too small if neighbouring residuals resemble each other.
@@ -99,8 +99,10 @@ pub(crate) fn from_influences<E>(
 ) -> Result<Deviations, E> {
     let n = solution.values.len();
     let channels = channels.max(1);
-    let samples = solution.rows / channels;
-    let lags = lags_for_bandwidth(samples);
+    // Lags are counted in time, which goes on where rows are left out; what the rows are worth is not.
+    let samples = solution.rows.div_ceil(channels);
+    let steps = solution.shown / channels;
+    let lags = lags_for_bandwidth(steps);
     let mut memory = LagProducts::new(n, lags + 1);
     let mut residuals = LagProducts::new(channels, 1);
     run(&mut |influence, errors| {
@@ -111,7 +113,7 @@ pub(crate) fn from_influences<E>(
     let whitening: Vec<f64> = (0..n)
         .map(|j| memory.correlation(1, j).clamp(-0.97, 0.97))
         .collect();
-    let bandwidth = bandwidth(&memory, &whitening, lags, samples);
+    let bandwidth = bandwidth(&memory, &whitening, lags, steps);
 
     let mut windows = Windows::new(n, bandwidth);
     let mut previous = vec![0.0; n];
@@ -288,11 +290,11 @@ impl<'a> Scores<'a> {
             }
             Ok(())
         })?;
-        if rows == self.solution.rows {
+        if rows == self.solution.shown {
             Ok(())
         } else {
             Err(LeastSquaresError::PassesDiffer {
-                first: self.solution.rows,
+                first: self.solution.shown,
                 now: rows,
             }
             .into())

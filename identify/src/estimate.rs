@@ -10,7 +10,7 @@
 //! Statistics" (1981), section 7.6.
 
 use crate::deviations::{Deviations, Visit, autocorrelated};
-use crate::least_squares::{LeastSquares, LeastSquaresError};
+use crate::least_squares::{LeastSquares, LeastSquaresError, is_left_out};
 use crate::magnitudes::Magnitudes;
 use crate::solution::Solution;
 use crate::triangle::Triangle;
@@ -310,11 +310,6 @@ fn show_weighted<E: From<LeastSquaresError>>(
     })
 }
 
-/// Whether a row was given the weight 0, or says nothing for another reason: its residual is no sample of any noise.
-fn is_left_out(row: &[f64], measured: f64) -> bool {
-    measured == 0.0 && row.iter().all(|w| *w == 0.0)
-}
-
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
@@ -446,6 +441,17 @@ mod tests {
                 assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
             }
             assert!((found.weighting.outliers - expected.weighting.outliers).abs() < 1e-12);
+            assert_eq!(found.solution.rows, expected.solution.rows);
+            assert_eq!(found.solution.shown, 3200);
+            assert_eq!(found.deviations.samples, 1200);
+            for (found, expected) in found
+                .solution
+                .classical_std
+                .iter()
+                .zip(&expected.solution.classical_std)
+            {
+                assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
+            }
             for j in 0..3 {
                 let moved = found.solution.values[j] - expected.solution.values[j];
                 assert!(moved.abs() < 1e-6, "{moved}");

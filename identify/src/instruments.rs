@@ -120,7 +120,7 @@ fn solve(regression: &LeastSquares, n: usize) -> Result<Solved, LeastSquaresErro
         plain.add_rows(&row[n..2 * n], &row[2 * n..])?;
     }
     let mut least_squares = crate::Triangle::of(&plain);
-    least_squares.count_rows(regression.rows());
+    least_squares.count_rows(regression.row_count());
     let least_squares = least_squares.solve_near(&vec![0.0; n])?;
     let weak = |correlation| LeastSquaresError::WeakInstruments { correlation };
     if least_squares.rank < n {

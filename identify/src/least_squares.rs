@@ -15,7 +15,7 @@ use std::fmt;
 use nalgebra::DMatrix;
 
 use crate::reflections::{Block, LANES, fold};
-use crate::solution::{Solution, solve_triangle};
+use crate::solution::{RowCount, Solution, solve_triangle};
 
 /// Why a regression cannot be set up or solved.
 #[derive(Debug, Clone, PartialEq)]
@@ -136,6 +136,8 @@ fn block_rows(width: usize) -> usize {
 pub struct LeastSquares {
     n_parameters: usize,
     rows: usize,
+    /// Rows of zeros among them.
+    idle: usize,
     /// `(n + 1) x (n + 1)`, row-major upper triangle `[R, Q'y; 0, +-|residual|]`.
     triangle: Vec<f64>,
     /// Rows per block.
@@ -169,6 +171,7 @@ impl LeastSquares {
         Self {
             n_parameters,
             rows: 0,
+            idle: 0,
             triangle: vec![0.0; width * width],
             block_rows,
             channels: vec![pending; channels.max(1)],
@@ -183,6 +186,13 @@ impl LeastSquares {
     /// Rows taken so far.
     pub fn rows(&self) -> usize {
         self.rows
+    }
+
+    pub(crate) fn row_count(&self) -> RowCount {
+        RowCount {
+            shown: self.rows,
+            telling: self.rows - self.idle,
+        }
     }
 
     /// Takes rows: `regressor[row * n_parameters + column]` and `measured[row]`.
@@ -204,6 +214,7 @@ impl LeastSquares {
             }
             pending.block[n * stride + pending.rows] = *y;
             pending.rows += 1;
+            self.idle += usize::from(is_left_out(row, *y));
             if pending.rows == stride {
                 self.reduce_block(channel);
             }
@@ -254,6 +265,11 @@ impl LeastSquares {
                 });
             }
         }
+        // Few measured values are zero, so that this costs next to nothing.
+        let silent = measured.iter().enumerate().filter(|(_, y)| **y == 0.0);
+        self.idle += silent
+            .filter(|(i, _)| columns.iter().all(|column| column[*i] == 0.0))
+            .count();
         let channel = channel % self.channels.len();
         let stride = self.block_rows;
         let mut done = 0;
@@ -285,11 +301,11 @@ impl LeastSquares {
             });
         }
         other.reduce();
-        let rows = self.rows + other.rows;
+        let (rows, idle) = (self.rows + other.rows, self.idle + other.idle);
         for row in other.triangle.chunks_exact(n + 1) {
             self.add_rows(&row[..n], &row[n..])?;
         }
-        self.rows = rows;
+        (self.rows, self.idle) = (rows, idle);
         Ok(())
     }
 
@@ -354,8 +370,13 @@ impl LeastSquares {
         if self.rows == 0 {
             return Err(LeastSquaresError::NoRows);
         }
-        solve_triangle(&self.reduced(), self.rows, nominal)
+        solve_triangle(&self.reduced(), self.row_count(), nominal)
     }
+}
+
+/// Whether a row was given the weight 0, or says nothing for another reason: its residual is no sample of any noise.
+pub(crate) fn is_left_out(row: &[f64], measured: f64) -> bool {
+    measured == 0.0 && row.iter().all(|w| *w == 0.0)
 }
 
 /// Checks one block of rows; `before` rows came earlier.

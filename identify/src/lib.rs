@@ -22,6 +22,7 @@
 
 pub mod base_fit;
 mod csv_text;
+pub mod cutoff;
 mod delay;
 pub mod derivatives;
 pub mod deviations;
@@ -51,6 +52,7 @@ mod recording_error;
 mod reflections;
 mod run;
 mod run_checks;
+pub mod series;
 mod signal_checks;
 mod smoothing;
 mod solution;
@@ -71,7 +73,7 @@ pub use locate::{LocateOptions, Region};
 pub use notes::{Note, Severity};
 pub use periods::Repeats;
 pub use recording::{Computed, NotFinite, ReadOptions, Recording};
-pub use recording_error::{Fault, RecordingError, place_word};
+pub use recording_error::{Fault, RecordingError, name_of_bytes, place_word};
 pub use run::{PreparedAs, Run};
 pub use solution::{RANK_TOLERANCE, Solution};
 pub use triangle::Triangle;

@@ -1,17 +1,11 @@
-//! Periodic runs: positions go in; the period, a Fourier series with its exact derivatives, and what the forces repeat
-//! themselves by come out.
+//! Periodic runs: positions go in; the period, and what the forces repeat themselves by, come out.
 //!
 //! Sources: J. Swevers, C. Ganseman, D. B. Tuekel, J. de Schutter, H. Van Brussel, "Optimal robot excitation and
-//! identification", IEEE Trans. Robotics and Automation 13 (1997): a periodic motion is a finite Fourier series, so that
-//! its derivatives follow without differences, and the spread over its periods is the noise.
-
-use std::f64::consts::TAU;
+//! identification", IEEE Trans. Robotics and Automation 13 (1997): the spread over the periods is the noise.
+//! The motion itself is a finite Fourier series: see [`crate::series`].
 
 use indexmap::IndexMap;
-use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
-
-use crate::derivatives::Prepared;
 
 /// Points of the coarse search for a period.
 const GRID: usize = 2048;
@@ -33,22 +27,25 @@ pub struct Repeats {
 }
 
 /// The shortest period after which all positions are where they were, s; `None` if there is none of which the run holds
-/// two. Positions that do not move say nothing.
+/// two, the last of which ends a step after the last sample. Positions that do not move say nothing.
 pub fn find_period(time: &[f64], positions: &[&[f64]]) -> Option<f64> {
     let moving: Vec<(&[f64], f64)> = positions
         .iter()
         .map(|q| (*q, variance(q)))
-        .filter(|(_, variance)| *variance > 0.0)
+        .filter(|(q, variance)| *variance > 0.0 && !is_noise(q, *variance))
         .collect();
     if moving.is_empty() || time.len() < 16 {
         return None;
     }
+    let (start, end) = (time[0], time[time.len() - 1]);
+    // Half a step more, since the period is not known better yet.
+    let longest = 0.5 * (end - start) * (1.0 + 1.5 / (time.len() - 1) as f64);
     // Ever longer beginnings of the run, on ever coarser grids, so that many short periods are found as such.
     let mut samples = time.len().min(GRID);
     loop {
         let found = coarse_period(&time[..samples], &moving)
             .map(|(period, step)| refine(time, &moving, period, step))
-            .filter(|(_, apart)| *apart < SAME);
+            .filter(|(period, apart)| *apart < SAME && *period <= longest);
         if let Some((period, _)) = found {
             return Some(period);
         }
@@ -57,6 +54,13 @@ pub fn find_period(time: &[f64], positions: &[&[f64]]) -> Option<f64> {
         }
         samples = (4 * samples).min(time.len());
     }
+}
+
+/// Whether neighbours are hardly more alike than any two samples, as in a coordinate that is held still (the ratio of
+/// J. von Neumann, 1941, twice as large for noise as the bar here).
+fn is_noise(values: &[f64], variance: f64) -> bool {
+    let steps: f64 = values.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum();
+    steps > variance * (values.len() - 1) as f64
 }
 
 /// A period by the first return of a motion to itself on an even grid, with the grid's step.
@@ -84,7 +88,8 @@ fn coarse_period(time: &[f64], moving: &[(&[f64], f64)]) -> Option<(f64, f64)> {
             .sum();
         sum / (m - lag) as f64
     };
-    let far: Vec<f64> = (0..=m / 2).map(apart).collect();
+    // Two lags beyond half the run, so that half of it can be told to be the nearest.
+    let far: Vec<f64> = (0..=m / 2 + 2).map(apart).collect();
     let left = far.iter().position(|d| *d > 0.3)?;
     let candidate = (left + 1..far.len() - 1)
         .find(|i| far[*i] < 0.1 && far[*i] <= far[i - 1] && far[*i] <= far[i + 1])?;
@@ -124,7 +129,8 @@ pub fn repeats(
     let (start, end) = (*time.first()?, *time.last()?);
     let step = (end - start) / (time.len() - 1) as f64;
     // The last sample of the last period lies one step before the next one would begin.
-    let periods = count((end + step - start) / period + 1e-6);
+    // The period is known to a part of a step.
+    let periods = count((end + 1.5 * step - start) / period);
     let phases = count((period / step).round());
     if periods < 2 || phases < 2 {
         return None;
@@ -160,56 +166,6 @@ pub fn repeats(
             .filter_map(|(name, sums)| Some((name, ratio(sums)?)))
             .collect(),
     })
-}
-
-/// The least squares projection of positions on a Fourier series of `harmonics` of the period, and its exact
-/// derivatives; `None` if there are too few samples for so many harmonics.
-pub fn project(time: &[f64], positions: &[f64], period: f64, harmonics: usize) -> Option<Prepared> {
-    let columns = 2 * harmonics + 1;
-    if time.len() < 2 * columns {
-        return None;
-    }
-    let basis = |t: f64, row: &mut [f64]| {
-        row[0] = 1.0;
-        for k in 1..=harmonics {
-            let (sin, cos) = (TAU * k as f64 * (t - time[0]) / period).sin_cos();
-            row[2 * k - 1] = cos;
-            row[2 * k] = sin;
-        }
-    };
-    // Normal equations: the columns are all but orthogonal, so nothing is lost by them.
-    let mut normal = DMatrix::zeros(columns, columns);
-    let mut right = DVector::zeros(columns);
-    let mut row = vec![0.0; columns];
-    for (t, q) in time.iter().zip(positions) {
-        basis(*t, &mut row);
-        let row = DVector::from_column_slice(&row);
-        normal.ger(1.0, &row, &row, 1.0);
-        right.axpy(*q, &row, 1.0);
-    }
-    let series = normal.cholesky()?.solve(&right);
-    let mut prepared = Prepared {
-        q: Vec::with_capacity(time.len()),
-        qd: Vec::with_capacity(time.len()),
-        qdd: Vec::with_capacity(time.len()),
-    };
-    for t in time {
-        basis(*t, &mut row);
-        let (mut q, mut qd, mut qdd) = (series[0], 0.0, 0.0);
-        for k in 1..=harmonics {
-            let w = TAU * k as f64 / period;
-            let (cos, sin) = (row[2 * k - 1], row[2 * k]);
-            let (a, b) = (series[2 * k - 1], series[2 * k]);
-            let value = a * cos + b * sin;
-            q += value;
-            qd += w * (b * cos - a * sin);
-            qdd -= w * w * value;
-        }
-        prepared.q.push(q);
-        prepared.qd.push(qd);
-        prepared.qdd.push(qdd);
-    }
-    Some(prepared)
 }
 
 /// A count that was computed as a float, rounded down; what is negative counts as none.
@@ -262,23 +218,16 @@ fn smallest(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
     use crate::test_noise::Noise;
 
     const PERIOD: f64 = 2.37;
 
-    fn motion(t: f64) -> [f64; 3] {
+    fn motion(t: f64) -> f64 {
         let w = TAU / PERIOD;
-        let term = |k: f64, a: f64, phase: f64| {
-            let angle = k * w * t + phase;
-            [
-                a * angle.sin(),
-                a * k * w * angle.cos(),
-                -a * (k * w).powi(2) * angle.sin(),
-            ]
-        };
-        let (a, b) = (term(1.0, 0.8, 0.3), term(3.0, 0.3, 1.1));
-        [0, 1, 2].map(|i| a[i] + b[i])
+        0.8 * (w * t + 0.3).sin() + 0.3 * (3.0 * w * t + 1.1).sin()
     }
 
     /// Uneven times, as a clock that drifts gives them.
@@ -294,7 +243,7 @@ mod tests {
         let mut noise = Noise::new(4);
         let q: Vec<f64> = time
             .iter()
-            .map(|t| motion(*t)[0] + 1e-4 * noise.normal())
+            .map(|t| motion(*t) + 1e-4 * noise.normal())
             .collect();
         let period = find_period(&time, &[&q, &vec![1.0; q.len()]]).expect("a period");
         assert!((period - PERIOD).abs() < 1e-3, "{period}");
@@ -308,23 +257,9 @@ mod tests {
     #[test]
     fn many_short_periods_are_not_taken_for_few_long_ones() {
         let time = times(200_000);
-        let q: Vec<f64> = time.iter().map(|t| motion(*t)[0]).collect();
+        let q: Vec<f64> = time.iter().map(|t| motion(*t)).collect();
         let period = find_period(&time, &[&q]).expect("a period");
         assert!((period - PERIOD).abs() < 1e-3, "{period}");
-    }
-
-    #[test]
-    fn a_series_gives_exact_derivatives() {
-        let time = times(2500);
-        let q: Vec<f64> = time.iter().map(|t| motion(*t)[0]).collect();
-        let prepared = project(&time, &q, PERIOD, 5).expect("enough samples");
-        for (i, t) in time.iter().enumerate() {
-            let truth = motion(*t);
-            assert!((prepared.q[i] - truth[0]).abs() < 1e-9);
-            assert!((prepared.qd[i] - truth[1]).abs() < 1e-8);
-            assert!((prepared.qdd[i] - truth[2]).abs() < 1e-7);
-        }
-        assert_eq!(project(&time[..10], &q[..10], PERIOD, 5), None);
     }
 
     #[test]
@@ -333,7 +268,7 @@ mod tests {
         let mut noise = Noise::new(9);
         let force: Vec<f64> = time
             .iter()
-            .map(|t| 100.0 * motion(*t)[0] + 3.0 * noise.normal())
+            .map(|t| 100.0 * motion(*t) + 3.0 * noise.normal())
             .collect();
         let size = (force.iter().map(|f| f * f).sum::<f64>() / force.len() as f64).sqrt();
         let found = repeats(&time, PERIOD, &["a".to_owned()], &[force]).expect("ten periods");

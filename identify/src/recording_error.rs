@@ -186,14 +186,28 @@ impl fmt::Display for RecordingError {
 
 impl std::error::Error for RecordingError {}
 
-/// What a sample of a file stands in: text has lines, tables have rows.
+/// What messages call a recording whose bytes came without a file: its name, and what they are unless they are text.
+pub fn name_of_bytes(name: &str, bytes: &[u8]) -> String {
+    let kind = match bytes {
+        [b'P', b'A', b'R', b'1', ..] => PARQUET,
+        _ if bytes.starts_with(b"MATLAB 5") => MATLAB,
+        _ => "",
+    };
+    format!("{name}{kind}")
+}
+
+const PARQUET: &str = " (Parquet)";
+const MATLAB: &str = " (MATLAB)";
+
+/// What a sample of a file, or of bytes that [`name_of_bytes`] names, stands in: text has lines, tables have rows.
 pub fn place_word(file: &str) -> &'static str {
     let ends = |end: &str| {
         std::path::Path::new(file)
             .extension()
             .is_some_and(|extension| extension.eq_ignore_ascii_case(end))
     };
-    if ends("parquet") || ends("pq") || ends("mat") {
+    let is_table = file.ends_with(PARQUET) || file.ends_with(MATLAB);
+    if is_table || ends("parquet") || ends("pq") || ends("mat") {
         "row"
     } else {
         "line"

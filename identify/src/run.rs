@@ -7,7 +7,8 @@ use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 
-use crate::derivatives::{Preparation, Smoothing, Source, choose_cutoff, mean_rate};
+use crate::cutoff::{Signal, choose_cutoff};
+use crate::derivatives::{Preparation, Smoothing, Source, mean_rate};
 use crate::filters::LowPass;
 use crate::local_polynomials;
 use crate::notes::{Note, Severity, count_of};
@@ -15,6 +16,7 @@ use crate::periods::{self, Repeats};
 use crate::recording::Recording;
 use crate::recording_checks::{GAP, median};
 use crate::recording_error::{Fault, RecordingError, list};
+use crate::series::{self, Periodic};
 use crate::smoothing::{Recorded, Way};
 
 /// States along a run, ready for the regressor. All columns have the length of `time`.
@@ -87,15 +89,27 @@ impl Recording {
             .iter()
             .map(|name| self.recorded(name, preparation.source, &wanted))
             .collect();
-        let is_filtered = preparation.decimate > 1 || columns?.iter().any(|c| !c.is_complete());
+        let columns = columns?;
+        let is_filtered = preparation.decimate > 1 || columns.iter().any(|c| !c.is_complete());
         let stretches = if is_filtered {
             self.stretches()
         } else {
             Vec::new()
         };
-        if stretches.len() < 2 {
+        // A series is fitted on the true times, so gaps do it no harm; only decimation would reach across them.
+        let is_whole = stretches.len() < 2
+            || preparation.decimate <= 1
+                && series_of(self.column("t")?, &columns, preparation).is_some();
+        if is_whole {
             return Ok(vec![self.states_with(coordinates, drives, preparation)?]);
         }
+        let preparation = &Preparation {
+            smoothing: match preparation.smoothing {
+                Smoothing::Automatic => Smoothing::Butterworth,
+                chosen => chosen,
+            },
+            ..preparation.clone()
+        };
         let longest = (0..stretches.len()).max_by_key(|i| stretches[*i].samples());
         let longest = longest.unwrap_or(0);
         let first = stretches[longest].states_with(coordinates, drives, preparation)?;
@@ -324,50 +338,59 @@ impl Recording {
                 purpose: "preparing derivatives from positions",
             }));
         }
-        // One cut-off for all coordinates keeps loops consistent: the highest that any one needs.
+        let found = series_of(time, columns, preparation);
+        // One cut-off for all coordinates keeps loops consistent.
         let chosen = || {
-            let cutoffs = incomplete
-                .iter()
-                .filter_map(|c| choose_cutoff(c.q, rate, order));
-            cutoffs.fold(None, |highest: Option<f64>, c| {
-                Some(highest.map_or(c, |h| h.max(c)))
-            })
+            let sources: Vec<Signal<'_>> = incomplete.iter().map(|c| c.source()).collect();
+            choose_cutoff(&sources, rate, order)
         };
-        let cutoff = preparation.cutoff_hz.or_else(chosen).unwrap_or(0.1 * rate);
+        let cutoff = match &found {
+            Some(found) => found.harmonics as f64 / found.period,
+            None => preparation.cutoff_hz.or_else(chosen).unwrap_or(0.1 * rate),
+        };
         design(cutoff)?;
         // A cut-off whose period is longer than the recording leaves nothing of it but a trend.
         let lowest = rate / time.len() as f64;
-        if cutoff < lowest {
+        if cutoff < lowest && found.is_none() {
             return Err(self.fault(Fault::CutoffTooLow {
                 cutoff_hz: cutoff,
                 lowest_hz: lowest,
                 duration: time.len() as f64 / rate,
             }));
         }
-        prepared.cutoff_hz = Some(cutoff);
-        prepared.cutoff_chosen = preparation.cutoff_hz.is_none();
-        prepared.trimmed = self.transients(rate / cutoff, time.len(), preparation, notes);
-        let positions: Vec<&[f64]> = columns.iter().map(|c| c.q).collect();
-        let way = match preparation.smoothing {
-            Smoothing::Butterworth => Way::Butterworth { order },
-            Smoothing::SavitzkyGolay => Way::Polynomials {
+        let way = match (preparation.smoothing, &found) {
+            (_, Some(found)) => Way::Series {
+                period: found.period,
+                harmonics: found.harmonics,
+            },
+            (Smoothing::Automatic | Smoothing::Butterworth, None) => Way::Butterworth { order },
+            (Smoothing::SavitzkyGolay, None) => Way::Polynomials {
                 half_width: local_polynomials::half_width(cutoff, rate),
             },
-            Smoothing::Fourier { period } => {
+            (Smoothing::Fourier { period }, None) => {
+                let positions: Vec<&[f64]> = columns.iter().map(|c| c.q).collect();
                 let period = period.or_else(|| periods::find_period(time, &positions));
                 let period = period.ok_or_else(|| self.fault(Fault::NoPeriod))?;
                 let harmonics = periods::count(cutoff * period).max(1);
-                // A series has no transients at its ends.
-                prepared.trimmed = (0, 0);
                 Way::Series { period, harmonics }
             }
         };
-        notes.push(Note::info(format!(
-            "Derivatives of {} in {} are prepared: {}.",
-            list(&prepared.coordinates),
-            self.file(),
-            way.says(cutoff, prepared.cutoff_chosen),
-        )));
+        prepared.cutoff_hz = Some(cutoff);
+        prepared.cutoff_chosen = preparation.cutoff_hz.is_none();
+        // A series has no transients at its ends.
+        if !matches!(way, Way::Series { .. }) {
+            prepared.trimmed = self.transients(rate / cutoff, time.len(), preparation, notes);
+        }
+        if let Some(found) = &found {
+            notes.push(Note::info(self.says_series(found, &incomplete)));
+        } else {
+            notes.push(Note::info(format!(
+                "Derivatives of {} in {} are prepared: {}.",
+                list(&prepared.coordinates),
+                self.file(),
+                way.says(cutoff, prepared.cutoff_chosen),
+            )));
+        }
         columns
             .iter()
             .map(|column| {
@@ -481,6 +504,24 @@ impl Run {
             .flat_map(|sample| force.iter().map(move |channel| channel[sample]))
             .collect())
     }
+}
+
+/// The series of which what is to be differentiated is samples, where the preparation leaves that open.
+fn series_of(
+    time: &[f64],
+    columns: &[Recorded<'_>],
+    preparation: &Preparation,
+) -> Option<Periodic> {
+    let is_open = matches!(
+        preparation.smoothing,
+        Smoothing::Automatic | Smoothing::Fourier { period: None }
+    );
+    if !is_open || preparation.cutoff_hz.is_some() {
+        return None;
+    }
+    let incomplete = columns.iter().filter(|column| !column.is_complete());
+    let signals: Vec<&[f64]> = incomplete.map(|column| column.source().values).collect();
+    series::find_series(time, &signals)
 }
 
 /// All names that a model has for columns.

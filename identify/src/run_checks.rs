@@ -1,9 +1,11 @@
 //! What a prepared run tells of itself: periods and the spread of its forces over them, and standstill.
 
-use crate::notes::Note;
+use crate::notes::{Note, count_of};
 use crate::periods;
 use crate::recording::Recording;
+use crate::recording_error::list;
 use crate::run::Run;
+use crate::series::Periodic;
 use crate::smoothing::Recorded;
 
 impl Recording {
@@ -24,6 +26,24 @@ impl Recording {
                 100.0 * repeats.noise_floor
             )));
         }
+    }
+
+    /// Says that the motion is taken for a series, and what that leaves of it.
+    pub(crate) fn says_series(&self, found: &Periodic, columns: &[&Recorded<'_>]) -> String {
+        let names: Vec<String> = columns.iter().map(|column| column.name.clone()).collect();
+        let left = columns.iter().zip(&found.noise).map(|(column, noise)| {
+            let derivative = if column.qd.is_some() { "_d" } else { "" };
+            format!("{noise:.2e} of `{}{derivative}`", column.name)
+        });
+        format!(
+            "Derivatives of {} in {} are those of a Fourier series of period {:.6} s with {}, since it leaves nothing but \
+             white noise: {} (RMS). `--smoothing butterworth` filters instead.",
+            list(&names),
+            self.file(),
+            found.period,
+            count_of(found.harmonics, "harmonic", "harmonics"),
+            left.collect::<Vec<_>>().join(", ")
+        )
     }
 
     /// Says which coordinates stand still, for how much of the time.

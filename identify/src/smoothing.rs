@@ -1,10 +1,11 @@
 //! From what a file holds of a coordinate to its position, rate and acceleration, by one of the ways of smoothing.
 
+use crate::cutoff::Signal;
 use crate::derivatives::{differentiate, mean_rate, prepare};
 use crate::filters::LowPass;
 use crate::local_polynomials;
 use crate::notes::count_of;
-use crate::periods;
+use crate::series;
 
 /// What the file holds of a coordinate.
 pub(crate) struct Recorded<'a> {
@@ -21,6 +22,17 @@ impl Recorded<'_> {
 
     pub(crate) fn complete(&self) -> Option<[Vec<f64>; 3]> {
         Some([self.q.to_vec(), self.qd?.to_vec(), self.qdd?.to_vec()])
+    }
+
+    /// What is differentiated where something is missing: the rates if they are recorded, else the positions.
+    pub(crate) fn source(&self) -> Signal<'_> {
+        match self.qd {
+            Some(values) => Signal { values, times: 1 },
+            None => Signal {
+                values: self.q,
+                times: 2,
+            },
+        }
     }
 
     /// What is recorded is kept; what is missing is derived from the nearest that is there.
@@ -40,7 +52,7 @@ impl Recorded<'_> {
                 Ok(local_polynomials::smooth(time, values, half_width))
             }
             Way::Series { period, harmonics } => {
-                Ok(periods::project(time, values, period, harmonics))
+                Ok(series::project(time, values, period, harmonics))
             }
         };
         if let Some(qd) = self.qd {

@@ -12,6 +12,15 @@ use crate::undetermined::{Direction, null_directions};
 /// standard deviations say how weak.
 pub const RANK_TOLERANCE: f64 = 1e-11;
 
+/// How many rows a regression has seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct RowCount {
+    /// All of them.
+    pub(crate) shown: usize,
+    /// Those that are not zero throughout: `0 = 0` is no equation, whatever the parameters.
+    pub(crate) telling: usize,
+}
+
 /// What a regression found. Lists are in the order of the regressor's columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
@@ -30,8 +39,10 @@ pub struct Solution {
     pub residual_norm: f64,
     /// `|y|`, 2-norm.
     pub measured_norm: f64,
-    /// Rows of the regressor.
+    /// Rows of the regressor that say something: those of zeros alone, as a weight of 0 leaves them, do not count.
     pub rows: usize,
+    /// All rows that were shown.
+    pub shown: usize,
     /// Numeric rank of the column-scaled regressor.
     pub rank: usize,
     /// Which parameters the rows determine.
@@ -86,11 +97,11 @@ impl Solution {
     }
 }
 
-/// Solves the upper triangle `[R, Q'y; 0, +-|residual|]`, row-major, that `rows` rows left; where
+/// Solves the upper triangle `[R, Q'y; 0, +-|residual|]`, row-major, that so many rows left; where
 /// it does not determine the parameters they stay at `nominal`, whose length gives their number.
 pub(crate) fn solve_triangle(
     triangle: &[f64],
-    rows: usize,
+    rows: RowCount,
     nominal: &[f64],
 ) -> Result<Solution, LeastSquaresError> {
     let n = nominal.len();
@@ -167,7 +178,8 @@ pub(crate) fn solve_triangle(
         scaled_condition_number: ratio(s),
         residual_norm,
         measured_norm: qty.norm().hypot(corner),
-        rows,
+        rows: rows.telling,
+        shown: rows.shown,
         rank,
         determined,
         undetermined,

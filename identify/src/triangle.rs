@@ -3,13 +3,13 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::least_squares::{LeastSquares, LeastSquaresError};
-use crate::solution::{Solution, solve_triangle};
+use crate::solution::{RowCount, Solution, solve_triangle};
 
 /// The upper triangle `[R, Q'y; 0, +-|residual|]` of some rows: all that they say about the parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Triangle {
     n: usize,
-    rows: usize,
+    rows: RowCount,
     /// `(n + 1) x (n + 1)` by rows.
     entries: Vec<f64>,
 }
@@ -19,7 +19,7 @@ impl Triangle {
     pub fn of(regression: &LeastSquares) -> Self {
         Self {
             n: regression.n_parameters(),
-            rows: regression.rows(),
+            rows: regression.row_count(),
             entries: regression.reduced(),
         }
     }
@@ -29,13 +29,13 @@ impl Triangle {
         self.n
     }
 
-    /// Rows that were reduced.
+    /// Rows that were reduced, those of zeros left out.
     pub fn rows(&self) -> usize {
-        self.rows
+        self.rows.telling
     }
 
     /// Says from how many rows the reduced ones came.
-    pub(crate) fn count_rows(&mut self, rows: usize) {
+    pub(crate) fn count_rows(&mut self, rows: RowCount) {
         self.rows = rows;
     }
 

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use modelmill_identify::{Computed, Fault, NotFinite, ReadOptions, Recording};
+use modelmill_identify::{Computed, Fault, NotFinite, ReadOptions, Recording, name_of_bytes};
 use parquet::basic::Compression;
 use parquet::data_type::{DoubleType, FloatType, Int64Type};
 use parquet::file::properties::WriterProperties;
@@ -165,7 +165,17 @@ fn every_format_is_read_from_memory_too() {
         assert_eq!(from_bytes.column("t").unwrap(), column);
         assert_eq!(from_bytes.notes(), from_file.notes());
     }
-    let broken = std::fs::read(&parquet).unwrap();
+    // A pipe has no ending that tells what it carries; what is in the bytes does.
+    let bytes = std::fs::read(&parquet).unwrap();
+    let name = name_of_bytes("/dev/stdin", &bytes);
+    let missing = Recording::from_bytes(&bytes, &name, &options()).unwrap();
+    let missing = missing.column("motor").unwrap_err().to_string();
+    assert!(
+        missing.contains("/dev/stdin (Parquet), row 8: column `motor`"),
+        "{missing}"
+    );
+    assert_eq!(name_of_bytes("/dev/stdin", b"t,q\n"), "/dev/stdin");
+    let broken = bytes;
     let broken = &broken[..broken.len() / 2];
     for says in [
         Recording::names_in_bytes(broken, "-")

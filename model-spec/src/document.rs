@@ -6,7 +6,7 @@ use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::unclosed::unclosed;
 
 /// Files larger than this are refused unread.
-pub(crate) const LARGEST_FILE: usize = 4 << 20;
+pub const LARGEST_FILE: usize = 4 << 20;
 /// A text with more broken lines than this, and without a schema, is something else than a model file.
 const MOST_BROKEN_LINES: usize = 20;
 /// Names, paths and texts are cut to this length in messages.

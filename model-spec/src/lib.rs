@@ -39,12 +39,13 @@ mod values;
 
 pub use column::{ColumnFault, ColumnSum, Quantity, read_column};
 pub use diagnostic::{Diagnostic, Severity, SourceFile, Sources, Span};
+pub use document::LARGEST_FILE;
 pub use exact::*;
 pub use kinds::{
     ActsOn, Carries, EffectKind, KindConstant, KindParameter, LIBRARY, Mechanics, Scale, Search,
     Sign, library,
 };
-pub use load::{Failure, Loaded, load, load_file, load_file_with, load_with};
+pub use load::{Failure, Loaded, load, load_file, load_file_with, load_with, read_limited};
 pub use mechanism::*;
 pub use motion::{Kinematics, Poses};
 pub use unit::unit_product;

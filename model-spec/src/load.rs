@@ -126,8 +126,11 @@ fn no_text(path: &Path) -> Failure {
     }
 }
 
-/// Reads a file, but no more than a model file may hold: what the path leads to may never end.
-fn read_limited(path: &Path) -> std::io::Result<String> {
+/// Reads a text file, but no more than a model file may hold and a byte, by which it shows that it is too large: what
+/// the path leads to may never end.
+///
+/// Fails when the file cannot be read, or what is read of it is no UTF-8.
+pub fn read_limited(path: &Path) -> std::io::Result<String> {
     let mut text = String::new();
     std::fs::File::open(path)?
         .take(LARGEST_FILE as u64 + 1)

@@ -5,7 +5,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use modelmill_rig::{Failure, Log, Rig, fault, parse, read_limited, span};
+use modelmill_rig::{Failure, Log, Rig, fault, parse, span};
+use modelmill_spec::read_limited;
 use modelmill_spec::{Diagnostic, SourceFile, Sources};
 use serde::Deserialize;
 use toml::Spanned;

@@ -1,16 +1,15 @@
 //! Reads a rig file and those that it extends, and makes the rig that they describe.
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use modelmill_spec::{Diagnostic, Failure, Severity, SourceFile, Sources, Span};
+use modelmill_spec::{
+    Diagnostic, Failure, LARGEST_FILE, Severity, SourceFile, Sources, Span, read_limited,
+};
 
 use crate::assemble::assemble;
 use crate::file::RigEntry;
 use crate::rig::Rig;
 
-/// Larger files are no rig files.
-const LARGEST_FILE: usize = 4 << 20;
 /// Longest chain of variants.
 const LONGEST_CHAIN: usize = 8;
 
@@ -40,15 +39,6 @@ pub fn load_file(path: &Path) -> Result<Loaded, Failure> {
             },
         )),
     }
-}
-
-/// Reads a file, but not much more than a rig file can be long.
-pub fn read_limited(path: &Path) -> std::io::Result<String> {
-    let mut text = String::new();
-    std::fs::File::open(path)?
-        .take(LARGEST_FILE as u64 + 1)
-        .read_to_string(&mut text)?;
-    Ok(text)
 }
 
 /// Reads a rig from its text; `read` fetches the files that it extends.

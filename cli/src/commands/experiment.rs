@@ -4,9 +4,12 @@
 mod figures;
 mod lengths;
 mod page;
+mod page_forces;
+mod page_parameters;
 mod printed;
 mod runs;
 mod study;
+mod wording;
 
 use modelmill_identify::excite::Options;
 use serde_json::json;
