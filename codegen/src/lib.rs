@@ -27,7 +27,7 @@ mod rod;
 mod tree;
 mod vector;
 
-use modelmill_spec::{Mechanism, ParameterIdx};
+use modelmill_spec::Mechanism;
 
 pub use base::BaseParameter;
 pub use emit::{Emitted, emit};
@@ -41,16 +41,16 @@ pub use reduce::{Dependency, Method, Polynomial, Powers, RationalFunction, Reduc
 use expr::Graph;
 use regressor::Equations;
 
-/// Derives the columns of H for some parameters alone, each by itself and without reduction: what effects add that a model
-/// may never have.
+/// Derives the columns of H for some products of parameters alone, each by itself and without reduction: what effects add
+/// that a model may never have.
 pub fn derive_columns(
     mechanism: &Mechanism,
-    parameters: &[ParameterIdx],
+    wanted: &dyn Fn(&Monomial) -> bool,
 ) -> Result<Derivation, DeriveError> {
     finite::check_values(mechanism)?;
     let mut graph = Graph::new();
     let equations = regressor::equations(&mut graph, mechanism)?;
-    let reduction = reduce::unreduced(&equations.products, &equations.columns, parameters);
+    let reduction = reduce::unreduced(&equations.products, &equations.columns, wanted);
     let programs = programs::programs(&mut graph, mechanism, &equations, &reduction)?;
     Ok(Derivation {
         mechanism: mechanism.clone(),

@@ -1,43 +1,43 @@
-//! Every effect that may be missing, written down as `add` would write it, in one variant of the model: a single derivation
-//! gives the columns of all.
+//! Every effect that may be missing, written down as `add` would write it, in variants of the model: their derivation gives
+//! the columns of all.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use modelmill_codegen::Derivation;
-use modelmill_spec::{Carries, EffectKind, Loaded, Mechanism, ParameterIdx, Sign};
+use modelmill_codegen::{Derivation, Monomial};
+use modelmill_spec::{EffectKind, Loaded, Mechanics, Mechanism, Scale, Search, Sign};
 
 use crate::failure::{Failure, Outcome};
+use crate::model::Model;
 
-use super::places::{Spot, sets, spots};
+use super::places::{Spot, fits, sets, spots};
 
-/// How a constant of a kind is searched for.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Search {
-    /// Not at all: the value of the library.
-    Given,
-    /// The expression is linear in it, so that it becomes a column of its own.
-    Linear,
-    /// Values between two shares of the largest rate of the place, evenly in the logarithm.
-    OfRate([f64; 2], usize),
-    /// Lengths that fit into the travel of the place between these many times, evenly in their number.
-    OfTravel([f64; 2], usize),
-}
+/// Values of a constant that are tried where the search has no scale of its own.
+const TRIED: usize = 15;
+/// Values of a rate that are tried.
+const RATES: usize = 14;
+/// Wavelengths that are tried at most.
+const WAVES: usize = 120;
 
-/// An effect at one place.
+/// An effect as one entry of a model file.
 pub(crate) struct Single {
     pub(crate) kind: usize,
-    pub(crate) spot: Spot,
-    /// Names of its parameters in the variant.
-    pub(crate) parameters: Vec<String>,
-    /// Names of its constants in the variant, with how each is searched for.
+    pub(crate) spots: Vec<Spot>,
+    /// Symbols of its parameters with their positions among those of its variant.
+    pub(crate) parameters: Vec<(String, usize)>,
+    /// Symbols of constants that are searched for, with their names in the variant and how.
     pub(crate) constants: Vec<(String, String, Search)>,
 }
 
-/// A candidate: a kind at places that share its parameters.
+/// A candidate: entries whose columns add up, since they share their parameters.
 pub(crate) struct Entry {
-    /// Effects at single places, whose columns add up.
     pub(crate) singles: Vec<usize>,
+}
+
+/// A kind that is a change of the model rather than columns of its own.
+pub(crate) struct Change {
+    pub(crate) kind: usize,
+    pub(crate) spot: Spot,
 }
 
 /// All candidates of a model, derived.
@@ -49,74 +49,116 @@ pub(crate) struct Candidates {
     pub(crate) known: Derivation,
     /// Effects with constants that are searched for, whose columns are evaluated again and again.
     pub(crate) searched: Derivation,
+    /// The base columns as functions of a tilt about x, y and z, whose constants are the last three; with its kind.
+    pub(crate) tilt: Option<(Change, Derivation)>,
+    /// A delay of the forces.
+    pub(crate) delay: Option<Change>,
 }
 
 impl Single {
-    /// Whether a constant of it is searched for.
+    /// Whether a constant of it is searched for by trial.
     pub(crate) fn is_searched(&self) -> bool {
-        (self.constants.iter())
-            .any(|(_, _, search)| !matches!(search, Search::Given | Search::Linear))
-    }
-}
-
-/// How a kind's constant is searched for.
-fn search(kind: &EffectKind, symbol: &str) -> Search {
-    match (kind.name.as_str(), symbol) {
-        (_, "rest") => Search::Linear,
-        (_, "vs") => Search::OfRate([0.005, 0.5], 14),
-        (_, "pitch") => Search::OfTravel([0.5, 24.0], 72),
-        _ => Search::Given,
+        let mut searches = self.constants.iter();
+        searches.any(|(_, _, search)| *search != Search::Linear)
     }
 }
 
 /// Writes down and derives all candidates of a model read from `path`.
-pub(crate) fn candidates(path: &Path, loaded: &Loaded) -> Outcome<Candidates> {
+pub(crate) fn candidates(
+    path: &Path,
+    loaded: &Loaded,
+    libraries: &[PathBuf],
+    model: &Model,
+) -> Outcome<Candidates> {
     let mechanism = &loaded.mechanism;
     let all = spots(mechanism);
     let mut singles: Vec<Single> = Vec::new();
     let mut entries = Vec::new();
     let mut variants = [Variant::new(path)?, Variant::new(path)?];
+    let (mut tilt, mut delay) = (None, None);
     for (k, kind) in loaded.kinds.iter().enumerate() {
         let fitting: Vec<&Spot> = all
             .iter()
-            .filter(|spot| fits(kind, spot) && !has(mechanism, kind, spot))
+            .filter(|spot| fits(mechanism, kind, spot) && !has(mechanism, kind, spot))
             .collect();
+        if let Some(mechanics @ (Mechanics::Tilt | Mechanics::Delay)) = kind.mechanics {
+            if let Some(spot) = fitting.first() {
+                let change = Change {
+                    kind: k,
+                    spot: (*spot).clone(),
+                };
+                match mechanics {
+                    Mechanics::Tilt => tilt = Some(change),
+                    _ => delay = Some(change),
+                }
+            }
+            continue;
+        }
+        // What must be known and is not cannot be tried.
+        if kind
+            .constants
+            .iter()
+            .any(|c| c.search.is_none() && c.value.is_none())
+        {
+            continue;
+        }
         let first = singles.len();
-        for spot in &fitting {
-            let single = single(k, kind, spot, singles.len());
-            variants[usize::from(single.is_searched())].write(kind, &single);
+        let (places, sums) = sets(mechanism, kind, &fitting);
+        for spots in places {
+            let single = single(k, kind, &spots, singles.len());
+            variants[usize::from(single.is_searched())].write(kind, &single, singles.len());
             singles.push(single);
         }
-        // Waves along the travel differ in their phase, even at places that are alike otherwise.
-        let is_wave = |c: &(String, String, Search)| matches!(c.2, Search::OfTravel(..));
-        let waves = singles[first..]
-            .iter()
-            .any(|s| s.constants.iter().any(is_wave));
-        for set in sets(mechanism, &fitting) {
-            if waves && set.len() > 1 {
-                continue;
-            }
-            let place = |spot: &&Spot| fitting.iter().position(|other| other == spot);
+        for sum in sums {
             entries.push(Entry {
-                singles: set.iter().filter_map(place).map(|i| first + i).collect(),
+                singles: sum.iter().map(|i| first + i).collect(),
             });
         }
     }
+    let own = mechanism.effects.len();
     let [known, searched] = variants;
+    let known = known.derive(path, libraries, own, &mut singles)?;
+    let searched = searched.derive(path, libraries, own, &mut singles)?;
+    let tilt = match tilt {
+        Some(change) => Some((change, tilted(path, libraries, model)?)),
+        None => None,
+    };
     Ok(Candidates {
         kinds: loaded.kinds.clone(),
         singles,
         entries,
-        known: known.derive(path)?,
-        searched: searched.derive(path)?,
+        known,
+        searched,
+        tilt,
+        delay,
     })
+}
+
+/// Whether the model has the effect already.
+fn has(mechanism: &Mechanism, kind: &EffectKind, spot: &Spot) -> bool {
+    let mut effects = mechanism.effects.iter();
+    effects.any(|effect| effect.kind == kind.name && effect.places.contains(&spot.place))
+}
+
+fn single(k: usize, kind: &EffectKind, spots: &[&Spot], number: usize) -> Single {
+    let searched = kind.constants.iter().filter_map(|c| {
+        let name = format!("candidate{number}_{}", c.symbol);
+        Some((c.symbol.clone(), name, c.search?))
+    });
+    Single {
+        kind: k,
+        spots: spots.iter().copied().cloned().collect(),
+        parameters: Vec::new(),
+        constants: searched.collect(),
+    }
 }
 
 /// A variant of the model that has effects besides, as text.
 struct Variant {
     text: String,
     constants: String,
-    parameters: Vec<String>,
+    /// Which candidates it holds, in order.
+    singles: Vec<usize>,
 }
 
 impl Variant {
@@ -124,66 +166,111 @@ impl Variant {
         Ok(Self {
             text: header(path)?,
             constants: String::new(),
-            parameters: Vec::new(),
+            singles: Vec::new(),
         })
     }
 
-    fn derive(mut self, path: &Path) -> Outcome<Derivation> {
+    fn write(&mut self, kind: &EffectKind, single: &Single, number: usize) {
+        self.singles.push(number);
+        let places: Vec<String> = single
+            .spots
+            .iter()
+            .map(|s| format!("\"{}\"", s.name))
+            .collect();
+        let _ = writeln!(
+            self.text,
+            "[[effect]]\nkind = \"{}\"\nat = [{}]",
+            kind.name,
+            places.join(", ")
+        );
+        // Which differences a part has depends on the part.
+        if kind.mechanics != Some(Mechanics::Part) {
+            let named: Vec<String> = (kind.parameters.iter())
+                .map(|p| format!("{0} = {{ name = \"candidate{number}_{0}\" }}", p.symbol))
+                .collect();
+            let _ = writeln!(self.text, "parameters = {{ {} }}", named.join(", "));
+        }
+        if single.constants.is_empty() {
+            return;
+        }
+        let given: Vec<String> = (single.constants.iter())
+            .map(|(symbol, name, _)| format!("{symbol} = \"{name}\""))
+            .collect();
+        let _ = writeln!(self.text, "constants = {{ {} }}", given.join(", "));
+        for (symbol, name, _) in &single.constants {
+            let constant = kind.constants.iter().find(|c| c.symbol == *symbol);
+            let carries = single.spots[0].carries;
+            let unit = constant
+                .and_then(|c| c.units.iter().find(|(c, _)| *c == carries))
+                .map_or("1", |(_, unit)| unit.as_str());
+            let _ = writeln!(
+                self.constants,
+                "{name} = {{ value = 1, unit = \"{unit}\" }}"
+            );
+        }
+    }
+
+    /// Derives the columns of its effects alone; `own` effects of the model come before them.
+    fn derive(
+        mut self,
+        path: &Path,
+        libraries: &[PathBuf],
+        own: usize,
+        singles: &mut [Single],
+    ) -> Outcome<Derivation> {
         if !self.constants.is_empty() {
             let _ = write!(self.text, "[constants]\n{}", self.constants);
         }
-        let name = path.with_file_name("candidates.toml");
-        let mut read = |path: &Path| std::fs::read_to_string(path);
-        let variant = modelmill_spec::load(&name.to_string_lossy(), &self.text, &mut read)
-            .map_err(|failure| Failure::Rendered(failure.render(false)))?;
+        let variant = load(path, libraries, &self.text)?;
         let mechanism = &variant.mechanism;
-        let own = mechanism.parameters.iter().enumerate();
-        let own: Vec<ParameterIdx> = own
-            .filter(|(_, p)| self.parameters.contains(&p.name))
-            .map(|(i, _)| ParameterIdx(i))
-            .collect();
-        modelmill_codegen::derive_columns(mechanism, &own)
+        let mut wanted = Vec::new();
+        for (number, effect) in self.singles.iter().zip(&mechanism.effects[own..]) {
+            let terms = effect.terms.iter();
+            singles[*number].parameters = terms
+                .map(|term| (term.symbol.clone(), term.parameter.0))
+                .collect();
+            wanted.extend(effect.terms.iter().map(|term| term.parameter.0));
+        }
+        let is_wanted =
+            |product: &Monomial| matches!(product.0.as_slice(), [(p, 1)] if wanted.contains(p));
+        modelmill_codegen::derive_columns(mechanism, &is_wanted)
             .map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
     }
+}
 
-    fn write(&mut self, kind: &EffectKind, single: &Single) {
-        let Self {
-            text,
-            constants,
-            parameters: own,
-        } = self;
-        own.extend(single.parameters.iter().cloned());
-        let list = |pairs: Vec<String>| pairs.join(", ");
-        let parameters = kind.parameters.iter().zip(&single.parameters);
-        let parameters =
-            parameters.map(|(p, name)| format!("{} = {{ name = \"{name}\" }}", p.symbol));
-        let _ = writeln!(
-            text,
-            "[[effect]]\nkind = \"{}\"\nat = \"{}\"\nparameters = {{ {} }}",
-            kind.name,
-            single.spot.name,
-            list(parameters.collect())
-        );
-        let searched = single
-            .constants
-            .iter()
-            .filter(|(_, _, s)| *s != Search::Given);
-        let given: Vec<String> = searched
-            .clone()
-            .map(|(symbol, name, _)| format!("{symbol} = \"{name}\""))
-            .collect();
-        if given.is_empty() {
-            return;
-        }
-        let _ = writeln!(text, "constants = {{ {} }}", list(given));
-        for (symbol, name, _) in searched {
-            let constant = kind.constants.iter().find(|c| c.symbol == *symbol);
-            let unit = constant
-                .and_then(|c| c.units.iter().find(|(c, _)| *c == single.spot.carries))
-                .map_or("1", |(_, unit)| unit.as_str());
-            let _ = writeln!(constants, "{name} = {{ value = 1, unit = \"{unit}\" }}");
-        }
+/// The base columns of a model as functions of a tilt of its base.
+fn tilted(path: &Path, libraries: &[PathBuf], model: &Model) -> Outcome<Derivation> {
+    let mut text = header(path)?;
+    let names = ["tx", "ty", "tz"].map(|t| (t, format!("candidate_{t}")));
+    let given: Vec<String> = names
+        .iter()
+        .map(|(t, name)| format!("{t} = \"{name}\""))
+        .collect();
+    let _ = write!(
+        text,
+        "[[effect]]\nkind = \"gravity_tilt\"\nat = \"base\"\nconstants = {{ {} }}\n[constants]\n",
+        given.join(", ")
+    );
+    for (_, name) in &names {
+        let _ = writeln!(text, "{name} = {{ value = 0, unit = \"rad\" }}");
     }
+    let variant = load(path, libraries, &text)?;
+    let reduction = &model.derivation.reduction;
+    let base: Vec<&Monomial> = reduction
+        .retained
+        .iter()
+        .map(|k| &reduction.products[*k])
+        .collect();
+    let is_base = |product: &Monomial| base.contains(&product);
+    modelmill_codegen::derive_columns(&variant.mechanism, &is_base)
+        .map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
+}
+
+fn load(path: &Path, libraries: &[PathBuf], text: &str) -> Outcome<Loaded> {
+    let name = path.with_file_name("candidates.toml");
+    let mut read = modelmill_spec::read_limited;
+    modelmill_spec::load_with(&name.to_string_lossy(), text, libraries, &mut read)
+        .map_err(|failure| Failure::Rendered(failure.render(false)))
 }
 
 fn header(path: &Path) -> Outcome<String> {
@@ -200,32 +287,40 @@ fn header(path: &Path) -> Outcome<String> {
     ))
 }
 
-/// Whether a kind may act at a place.
-fn fits(kind: &EffectKind, spot: &Spot) -> bool {
-    let has_unit = |units: &[(Carries, String)]| units.iter().any(|(c, _)| *c == spot.carries);
-    // Only drives carry a load that is measured.
-    let has_load = spot.sort == modelmill_spec::ActsOn::Drive || !kind.expression.contains("load");
-    has_load && kind.on.contains(&spot.sort) && kind.parameters.iter().all(|p| has_unit(&p.units))
-}
-
-/// Whether the model has the effect already.
-fn has(mechanism: &Mechanism, kind: &EffectKind, spot: &Spot) -> bool {
-    let mut effects = mechanism.effects.iter();
-    effects.any(|effect| effect.kind == kind.name && effect.places.contains(&spot.place))
-}
-
-fn single(k: usize, kind: &EffectKind, spot: &Spot, number: usize) -> Single {
-    let name = |symbol: &str| format!("candidate{number}_{symbol}");
-    Single {
-        kind: k,
-        spot: spot.clone(),
-        parameters: kind.parameters.iter().map(|p| name(&p.symbol)).collect(),
-        constants: kind
-            .constants
-            .iter()
-            .map(|c| (c.symbol.clone(), name(&c.symbol), search(kind, &c.symbol)))
-            .collect(),
+/// Values that are tried for the constant that a candidate searches for, given the largest rate and the travel of its place;
+/// one where there is none.
+pub(crate) fn grid(single: &Single, [rate, travel]: [f64; 2]) -> Vec<f64> {
+    for (_, _, search) in &single.constants {
+        let Search::Range { from, to, of } = *search else {
+            continue;
+        };
+        let evenly = |count: usize, low: f64, high: f64| -> Vec<f64> {
+            let at = |k: usize| low + (high - low) * k as f64 / (count - 1) as f64;
+            (0..count).map(at).collect()
+        };
+        let scale = match of {
+            Scale::Rate => rate,
+            Scale::Travel => travel,
+            Scale::One => 1.0,
+        };
+        if scale <= 0.0 {
+            continue;
+        }
+        return match of {
+            // Waves differ by how often they fit into the travel.
+            Scale::Travel if from > 0.0 => {
+                let times = ((1.0 / from - 1.0 / to) / 0.4).ceil() as usize;
+                let waves = evenly(times.clamp(2, WAVES), 1.0 / to, 1.0 / from);
+                waves.into_iter().map(|times| scale / times).collect()
+            }
+            _ if from > 0.0 => {
+                let logs = evenly(RATES, (scale * from).ln(), (scale * to).ln());
+                logs.into_iter().map(f64::exp).collect()
+            }
+            _ => evenly(TRIED, scale * from, scale * to),
+        };
     }
+    vec![1.0]
 }
 
 /// The sign of a kind's parameter, as the search knows it.

@@ -18,7 +18,7 @@ mod univariate;
 
 use std::collections::BTreeSet;
 
-use modelmill_spec::{Mechanism, ParameterIdx};
+use modelmill_spec::Mechanism;
 
 pub(crate) use branches::closed_form;
 pub(crate) use plan::Plan;
@@ -188,19 +188,17 @@ pub(crate) fn reduce(
     }
 }
 
-/// The products that are one of some parameters and have an effect, all retained.
+/// The products that are wanted and have an effect, all retained.
 pub(crate) fn unreduced(
     candidates: &[Monomial],
     columns: &[Vec<ExprId>],
-    parameters: &[ParameterIdx],
+    wanted: &dyn Fn(&Monomial) -> bool,
 ) -> Reduction {
-    let is_wanted = |product: &Monomial| matches!(product.0.as_slice(), [(p, 1)] if parameters.contains(&ParameterIdx(*p)));
     let is_zero = |column: &Vec<ExprId>| column.iter().all(|x| *x == Graph::ZERO);
     let pick = |zero: bool| -> Vec<Monomial> {
         let pairs = candidates.iter().zip(columns);
-        let wanted =
-            pairs.filter(|(product, column)| is_wanted(product) && is_zero(column) == zero);
-        wanted.map(|(product, _)| product.clone()).collect()
+        let found = pairs.filter(|(product, column)| wanted(product) && is_zero(column) == zero);
+        found.map(|(product, _)| product.clone()).collect()
     };
     let products = pick(false);
     Reduction {

@@ -37,8 +37,16 @@ impl Bench<'_> {
                 if picks.iter().any(|p| p.candidate == candidate.candidate) {
                     continue;
                 }
+                // The same kind at more or fewer places is another way to write the set down.
+                let (one, two) = (
+                    &self.candidate(&pick).effect,
+                    &self.candidate(candidate).effect,
+                );
+                if one.kind == two.kind && one.at.iter().any(|place| two.at.contains(place)) {
+                    continue;
+                }
                 let more = self.is_within(&pick, candidate, &others);
-                if more && candidate.columns.len() > pick.columns.len() {
+                if more && candidate.rank > pick.rank {
                     continue; // It holds the found one and more, so that nothing speaks for it.
                 }
                 // A curve that is bent by a constant of its own comes near to any that is not.

@@ -21,6 +21,8 @@ pub(crate) struct Pick {
     pub(crate) constants: Vec<(String, f64)>,
     /// Its columns in the pool.
     pub(crate) columns: Vec<usize>,
+    /// How many of them say something that others do not say already.
+    pub(crate) rank: usize,
 }
 
 /// A set of effects, fitted to all samples with the base parameters.
@@ -147,7 +149,10 @@ impl<'a> Bench<'a> {
                 }
                 Source::Tangent(_) | Source::Delay => Some(self.tangent(k, picks, &factors)),
             };
-            present.push(pick.filter(|pick| self.says_something(pick, &which, &factor)));
+            present.push(pick.and_then(|mut pick| {
+                pick.rank = self.rank(&pick, &which, &factor);
+                (pick.rank > 0).then_some(pick)
+            }));
         }
         self.present = present;
     }
@@ -170,6 +175,7 @@ impl<'a> Bench<'a> {
         Pick {
             candidate,
             constants: chosen.constants.clone(),
+            rank: columns.len(),
             columns,
         }
     }
@@ -262,6 +268,7 @@ impl<'a> Bench<'a> {
                 picks[i] = Pick {
                     candidate,
                     constants: vec![(name, log.exp())],
+                    rank: picks[i].rank,
                     columns: columns.into_iter().map(|c| self.pool.add(c)).collect(),
                 };
             }
@@ -308,6 +315,7 @@ impl<'a> Bench<'a> {
         Pick {
             candidate,
             constants: Vec::new(),
+            rank: columns.len(),
             columns: columns.into_iter().map(|c| self.pool.add(c)).collect(),
         }
     }
@@ -332,13 +340,25 @@ impl<'a> Bench<'a> {
         Column(force.0.iter().map(|v| v.as_ref().map(lagged)).collect())
     }
 
-    /// Whether a candidate has any column that others do not say already.
-    fn says_something(&self, pick: &Pick, which: &[usize], factor: &Factored) -> bool {
-        pick.columns.iter().any(|k| {
-            let own = self.pool.gram(&[*k], &self.weights, On::All)[(0, 0)];
-            let gram = self.products(self.pool.column(*k), which);
-            own > 0.0 && own - factor.explained(&gram) > SAID * own
-        })
+    /// How many columns of a candidate say something that others do not say already.
+    fn rank(&self, pick: &Pick, which: &[usize], factor: &Factored) -> usize {
+        let columns: Vec<&Column> = pick.columns.iter().map(|k| self.pool.column(*k)).collect();
+        let halves: Vec<DVector<f64>> = columns
+            .iter()
+            .map(|c| factor.half(&self.products(c, which)))
+            .collect();
+        let n = columns.len();
+        let own = |i: usize, j: usize| self.product(columns[i], columns[j]);
+        let left = DMatrix::from_fn(n, n, |i, j| {
+            let scale = (own(i, i) * own(j, j)).sqrt();
+            if scale > 0.0 {
+                (own(i, j) - halves[i].dot(&halves[j])) / scale
+            } else {
+                0.0
+            }
+        });
+        let values = left.symmetric_eigenvalues();
+        values.iter().filter(|value| **value > SAID).count()
     }
 
     /// Weighted inner products of a column that need not be in the pool with some that are.
@@ -408,10 +428,15 @@ impl<'a> Bench<'a> {
         self.judged(picks, factors.as_slice(), squares)
     }
 
+    /// Numbers that are free in an effect.
+    pub(crate) fn freedoms(&self, pick: &Pick) -> usize {
+        pick.rank + self.candidate(pick).searched
+    }
+
     /// A trial from factors of base and effects.
     fn judged(&self, picks: Vec<Pick>, factors: &[f64], squares: f64) -> Trial {
         let wrong_sign = self.wrong_signs(&picks, &factors[factors.len() - n_columns(&picks)..]);
-        let freedoms = picks.iter().map(|p| self.candidate(p).freedoms()).sum();
+        let freedoms = picks.iter().map(|p| self.freedoms(p)).sum();
         Trial {
             picks,
             squares,
@@ -589,9 +614,5 @@ impl Factored {
             .map(|column| self.half(&column.into_owned()))
             .collect();
         DMatrix::from_columns(&columns)
-    }
-
-    fn explained(&self, products: &DVector<f64>) -> f64 {
-        self.half(products).norm_squared()
     }
 }

@@ -75,7 +75,7 @@ impl Bench<'_> {
             (sum, self.worth(&rest, channels))
         });
         let count = |picks: &[Pick]| -> f64 {
-            let freedoms = picks.iter().map(|p| self.candidate(p).freedoms());
+            let freedoms = picks.iter().map(|p| self.freedoms(p));
             freedoms.sum::<usize>() as f64
         };
         let worth = old_fit.1;

@@ -160,13 +160,6 @@ pub struct Candidate {
     pub source: Source,
 }
 
-impl Candidate {
-    /// Numbers that are free in it.
-    pub fn freedoms(&self) -> usize {
-        self.parameters.len() + self.searched
-    }
-}
-
 /// Everything that a diagnosis needs to know.
 #[derive(Clone, Debug, Default)]
 pub struct Problem {

@@ -3,6 +3,7 @@
 
 use super::bench::{Bench, Finer, Pick, Trial};
 use super::evidence::Evidence;
+use super::problem::Problem;
 
 /// Sets that are followed at once.
 const BEAM: usize = 6;
@@ -11,6 +12,8 @@ const TESTED: usize = 8;
 /// A rival whose squares are within this factor is tried with finer constants.
 const CLOSE: f64 = 1.5;
 /// A simpler kind that brings this share of what one that holds it brings comes first.
+const NEARLY_ALL_OF: f64 = 0.97;
+/// Another simple kind that brings this share of what a refinement of a member brings comes first.
 const MOST_OF: f64 = 0.7;
 /// Most effects that are looked for.
 const MOST: usize = 40;
@@ -111,6 +114,7 @@ impl Bench<'_> {
         let rest = self.rest(accepted, &factors);
         let channels: Vec<usize> = (0..rest.len()).collect();
         let worth = self.worth(&rest, &channels);
+        let problem = self.problem;
         let score = |trial: &Trial| {
             let wrong = if trial.wrong_sign.is_empty() {
                 0.0
@@ -119,6 +123,7 @@ impl Bench<'_> {
             };
             worth * trial.squares.max(f64::MIN_POSITIVE).ln()
                 + trial.freedoms as f64 * worth.ln().max(1.0)
+                + overlap(problem, &trial.picks)
                 + wrong
         };
         let mut trials: Vec<Trial> = Vec::new();
@@ -199,7 +204,7 @@ impl Bench<'_> {
                     let is_new = picks.iter().all(|p| p.candidate != rival.candidate);
                     is_new && (is_searched(self, rival) || is_searched(self, &own))
                 })
-                .filter(|rival| self.candidate(rival).freedoms() <= self.candidate(&own).freedoms())
+                .filter(|rival| self.freedoms(rival) <= self.freedoms(&own))
                 .cloned()
                 .collect();
             let mut best = now;
@@ -234,6 +239,7 @@ impl Bench<'_> {
         // A kind that holds a simpler one, such as friction that differs by direction, comes after it.
         // So does what refines a member, after other simple kinds.
         let refines = !self.replaced(accepted, &chosen.0.picks).is_empty();
+        let most_of = if refines { MOST_OF } else { NEARLY_ALL_OF };
         let nested = trials.iter().filter(|trial| {
             let news = difference(&trial.picks, accepted);
             let bests = difference(&chosen.0.picks, accepted);
@@ -245,7 +251,7 @@ impl Bench<'_> {
             };
             trial.wrong_sign.is_empty()
                 && self.replaced(accepted, &trial.picks).is_empty()
-                && simple.columns.len() < own.columns.len()
+                && simple.rank < own.rank
                 && self.candidate(simple).searched <= self.candidate(own).searched
                 && (refines || self.is_within(simple, own, accepted))
         });
@@ -253,7 +259,7 @@ impl Bench<'_> {
         for trial in nested {
             let channels = self.acted_on(&difference(&trial.picks, accepted));
             let own = self.evidence(accepted, &trial.picks, &channels);
-            if own.holds() && own.gain > MOST_OF * chosen.1.gain {
+            if own.holds() && own.gain > most_of * chosen.1.gain {
                 simpler.push((trial.clone(), own));
             }
         }
@@ -295,7 +301,7 @@ impl Bench<'_> {
             let own = others.remove(i);
             self.look(&others);
             let nested: Vec<Pick> = (self.present.iter().flatten())
-                .filter(|one| one.columns.len() < own.columns.len())
+                .filter(|one| one.rank < own.rank)
                 .filter(|one| self.candidate(one).searched <= self.candidate(&own).searched)
                 .filter(|one| self.is_within(one, &own, &others))
                 .cloned()
@@ -340,6 +346,22 @@ impl Bench<'_> {
             }
         }
     }
+}
+
+/// A little against sets in which one kind acts twice at a place, which say what others say more plainly.
+fn overlap(problem: &Problem, picks: &[Pick]) -> f64 {
+    let effect = |pick: &Pick| &problem.candidates[pick.candidate].effect;
+    let twice = |(i, one): (usize, &Pick)| {
+        let others = picks[i + 1..].iter().filter(|other| {
+            effect(one).kind == effect(other).kind
+                && effect(one)
+                    .at
+                    .iter()
+                    .any(|place| effect(other).at.contains(place))
+        });
+        others.count() as f64
+    };
+    picks.iter().enumerate().map(twice).sum()
 }
 
 /// Picks of a set whose candidate is not in another.

@@ -1,0 +1,190 @@
+//! Numbers along all recordings of a diagnosis: regressors, motions of places, each channel stacked and decimated alike.
+
+use modelmill_codegen::Evaluator;
+use modelmill_identify::diagnose::{Column, Layout, Stretch};
+use modelmill_identify::filters::decimate_table;
+use modelmill_spec::Place;
+
+use crate::data::Data;
+use crate::failure::{Failure, Outcome};
+use crate::model::Model;
+
+/// Recordings of the fit, then those of the check.
+pub(crate) type Runs<'a> = [(&'a Data, bool)];
+
+/// Names of the channels and lengths of the stretches.
+pub(super) fn layout(model: &Model, all: &Runs<'_>) -> Layout {
+    let stretch = |(one, is_check): &(&Data, bool)| {
+        let time = one.time();
+        let last = time.len().saturating_sub(1);
+        Stretch {
+            name: one.run.file.clone(),
+            samples: time.len(),
+            step: if last > 0 {
+                (time[last] - time[0]) / last as f64
+            } else {
+                1.0
+            },
+            is_check: *is_check,
+        }
+    };
+    Layout {
+        channels: model.drives(),
+        stretches: all.iter().map(stretch).collect(),
+    }
+}
+
+/// Channels of all recordings one after the other, decimated like the forces.
+pub(super) fn stack(
+    all: &Runs<'_>,
+    mut of: impl FnMut(&Data) -> Outcome<Vec<Vec<f64>>>,
+) -> Outcome<Vec<Vec<f64>>> {
+    let mut stacked: Vec<Vec<f64>> = Vec::new();
+    for (one, _) in all {
+        let columns = of(one)?;
+        stacked.resize(columns.len().max(stacked.len()), Vec::new());
+        for (whole, column) in stacked.iter_mut().zip(columns) {
+            whole.extend(decimated(column, one)?);
+        }
+    }
+    Ok(stacked)
+}
+
+fn decimated(column: Vec<f64>, data: &Data) -> Outcome<Vec<f64>> {
+    let factor = data.decimation();
+    if factor == 1 || column.iter().all(|x| *x == 0.0) {
+        return Ok(column.into_iter().step_by(factor).collect());
+    }
+    decimate_table(&column, 1, factor)
+        .map_err(|error| Failure::Input(format!("{}: {error}", data.run.file)))
+}
+
+/// Columns of a regressor along all recordings.
+pub(super) fn regressor(
+    all: &Runs<'_>,
+    evaluator: &Evaluator<'_>,
+    model: &Model,
+) -> Outcome<Vec<Column>> {
+    let drives = model.drives().len();
+    let stacked = stack(all, |one| {
+        let mut columns: Vec<Vec<f64>> = Vec::new();
+        one.for_each_block(model, |states| {
+            Ok::<_, Failure>(evaluator.regressor_blocks(states, |_, block| {
+                columns.resize(block.len(), Vec::new());
+                for (column, values) in columns.iter_mut().zip(block) {
+                    column.extend_from_slice(values);
+                }
+                Ok(())
+            }))
+        })?;
+        Ok(columns)
+    })?;
+    let n = stacked.len() / drives.max(1);
+    // Drives are outermost.
+    let mut by_column: Vec<Vec<Vec<f64>>> = vec![Vec::new(); n];
+    for (k, values) in stacked.into_iter().enumerate() {
+        by_column[k % n].push(values);
+    }
+    Ok(by_column.into_iter().map(Column::new).collect())
+}
+
+/// Variables on which an unknown force may depend.
+pub(super) fn variables(model: &Model, all: &Runs<'_>) -> Vec<(String, Vec<f64>)> {
+    let mut variables = Vec::new();
+    for (i, name) in model.active().into_iter().enumerate() {
+        for (suffix, order) in [("", 0), ("_d", 1), ("_dd", 2)] {
+            let of = |one: &Data| -> Vec<f64> {
+                let run = &one.run;
+                let values = [&run.q, &run.qd, &run.qdd][order];
+                values[i]
+                    .iter()
+                    .copied()
+                    .step_by(one.decimation())
+                    .collect()
+            };
+            let values = all.iter().flat_map(|(one, _)| of(one)).collect();
+            variables.push((format!("{name}{suffix}"), values));
+        }
+    }
+    variables
+}
+
+/// Largest rate and travel of a place; zero where it has none.
+pub(super) struct Motions {
+    drives: Vec<Vec<f64>>,
+    active: Vec<usize>,
+    active_motion: Vec<[Vec<f64>; 2]>,
+    passive: Vec<usize>,
+    passive_motion: Vec<Vec<f64>>,
+}
+
+impl Motions {
+    pub(super) fn new(model: &Model, all: &Runs<'_>) -> Outcome<Self> {
+        let evaluator = Evaluator::new(&model.derivation);
+        let (active, passive) = model.derivation.coordinates();
+        let drives = states(all, model, |states| evaluator.drives(states))?;
+        let passive_motion = if passive.is_empty() {
+            Vec::new()
+        } else {
+            states(all, model, |states| evaluator.passive(states))?
+        };
+        let motion = |order: usize, i: usize| -> Vec<f64> {
+            let one = |(data, _): &(&Data, bool)| [&data.run.q, &data.run.qd][order][i].clone();
+            all.iter().flat_map(one).collect()
+        };
+        Ok(Self {
+            drives,
+            active_motion: (0..active.len())
+                .map(|i| [motion(0, i), motion(1, i)])
+                .collect(),
+            active,
+            passive,
+            passive_motion,
+        })
+    }
+
+    /// Largest rate and travel.
+    pub(super) fn scale(&self, place: Place) -> [f64; 2] {
+        let n = self.drives.len() / (2 + self.active.len()).max(1);
+        let found = match place {
+            Place::Drive(d) => Some((&self.drives[n + d.0], &self.drives[d.0])),
+            Place::Coordinate(i) => {
+                let at = |list: &[usize]| list.iter().position(|k| *k == i.0);
+                let passive = at(&self.passive).map(|k| {
+                    (
+                        &self.passive_motion[self.passive.len() + k],
+                        &self.passive_motion[k],
+                    )
+                });
+                let active = at(&self.active).map(|k| &self.active_motion[k]);
+                active.map(|[q, qd]| (qd, q)).or(passive)
+            }
+            _ => None,
+        };
+        let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let travel = |values: &[f64]| {
+            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            high - low
+        };
+        found.map_or([0.0; 2], |(rate, value)| [largest(rate), travel(value)])
+    }
+}
+
+fn states(
+    all: &Runs<'_>,
+    model: &Model,
+    mut evaluate: impl FnMut(
+        &modelmill_codegen::States<'_>,
+    ) -> Result<Vec<Vec<f64>>, modelmill_codegen::PoseFault>,
+) -> Outcome<Vec<Vec<f64>>> {
+    let mut stacked: Vec<Vec<f64>> = Vec::new();
+    for (one, _) in all {
+        let columns = crate::along::columns(model, one, &mut evaluate)?;
+        stacked.resize(columns.len(), Vec::new());
+        for (whole, column) in stacked.iter_mut().zip(columns) {
+            whole.extend(column);
+        }
+    }
+    Ok(stacked)
+}
