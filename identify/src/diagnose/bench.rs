@@ -308,7 +308,12 @@ impl<'a> Bench<'a> {
                         force.add(*factor, self.pool.column(*k));
                     }
                 }
-                vec![self.lag(&force)]
+                // The delay that was found so far, where it is not new.
+                let found = picks.iter().position(|pick| is_delay(pick)).map(|i| {
+                    let before: usize = picks[..i].iter().map(|p| p.columns.len()).sum();
+                    factors[self.base.len() + before]
+                });
+                vec![self.late(&force, found.unwrap_or(0.0))]
             }
             Source::Columns(_) => unreachable!("known columns are no tangents"),
         };
@@ -320,24 +325,55 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Minus the rate of change of a force in time, by central differences.
-    fn lag(&self, force: &Column) -> Column {
+    /// What a force changes by when it is read later by `delay`, for each second of it; for delays below a tenth of a
+    /// sample minus its rate of change.
+    fn late(&self, force: &Column, delay: f64) -> Column {
         let stretches = &self.problem.layout.stretches;
-        let lagged = |values: &Vec<f64>| {
-            let mut rates = Vec::with_capacity(values.len());
+        let changes = |values: &Vec<f64>| {
+            let mut changes = Vec::with_capacity(values.len());
             let mut start = 0;
             for stretch in stretches {
                 let part = &values[start..start + stretch.samples];
+                let last = part.len() - 1;
+                let samples = delay / stretch.step;
                 for i in 0..part.len() {
-                    let (before, after) = (i.saturating_sub(1), (i + 1).min(part.len() - 1));
-                    let time = stretch.step * (after - before).max(1) as f64;
-                    rates.push((part[before] - part[after]) / time);
+                    if samples.abs() < 0.1 {
+                        let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
+                        let time = stretch.step * (after - before).max(1) as f64;
+                        changes.push((part[before] - part[after]) / time);
+                        continue;
+                    }
+                    let at = (i as f64 - samples).clamp(0.0, last as f64);
+                    let low = at.floor();
+                    let (k, share) = (low as usize, at - low);
+                    let then = part[k] + share * (part[(k + 1).min(last)] - part[k]);
+                    changes.push((then - part[i]) / delay);
                 }
                 start += stretch.samples;
             }
-            rates
+            changes
         };
-        Column(force.0.iter().map(|v| v.as_ref().map(lagged)).collect())
+        Column(force.0.iter().map(|v| v.as_ref().map(changes)).collect())
+    }
+
+    /// Makes the columns of effects that depend on the fit anew.
+    pub(crate) fn refresh(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
+        for _ in 0..3 {
+            for i in 0..picks.len() {
+                let candidate = picks[i].candidate;
+                if matches!(
+                    self.problem.candidates[candidate].source,
+                    Source::Columns(_)
+                ) {
+                    continue;
+                }
+                let (factors, _) = self.fit(&picks, On::All);
+                let rank = picks[i].rank;
+                picks[i] = self.tangent(candidate, &picks.clone(), &factors);
+                picks[i].rank = rank;
+            }
+        }
+        picks
     }
 
     /// How many columns of a candidate say something that others do not say already.

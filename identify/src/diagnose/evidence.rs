@@ -25,7 +25,8 @@ const LEAST_T: f64 = 2.5;
 pub struct Evidence {
     /// Share of the squared error that leaves, on the channels where the change acts, where the sets were not fitted.
     pub gain: f64,
-    /// The gain in units of its standard deviation over contiguous blocks.
+    /// The gain, or the gain of each block relative to itself, in units of its standard deviation over contiguous blocks;
+    /// the larger of both.
     pub blocks_t: f64,
     /// By how much the information criterion falls, with the effective number of samples.
     pub bic: f64,
@@ -66,6 +67,15 @@ impl Bench<'_> {
         let mean = differences.iter().sum::<f64>() / n;
         let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>();
         let error = (variance / (n * (n - 1.0).max(1.0))).sqrt();
+        let t = if error > 0.0 { mean / error } else { 0.0 };
+        // Where the error sits in few blocks their sizes differ more than a mean can bear: shares do not.
+        let shares: Vec<f64> = (old.iter().zip(&new))
+            .map(|(a, b)| if a + b > 0.0 { (a - b) / (a + b) } else { 0.0 })
+            .collect();
+        let mean_share = shares.iter().sum::<f64>() / n;
+        let spread = shares.iter().map(|s| (s - mean_share).powi(2)).sum::<f64>();
+        let error_share = (spread / (n * (n - 1.0).max(1.0))).sqrt().max(1e-3);
+        let t = t.max(mean_share / error_share);
         let total: f64 = old.iter().sum();
         let [old_fit, new_fit] = [before, after].map(|picks| {
             let (factors, _) = self.fit(picks, On::All);
@@ -81,7 +91,7 @@ impl Bench<'_> {
         let worth = old_fit.1;
         Evidence {
             gain: if total > 0.0 { n * mean / total } else { 0.0 },
-            blocks_t: if error > 0.0 { mean / error } else { 0.0 },
+            blocks_t: t,
             bic: worth * (old_fit.0 / new_fit.0.max(f64::MIN_POSITIVE)).ln()
                 - (count(after) - count(before)) * worth.ln(),
             effective_samples: worth,

@@ -35,6 +35,11 @@ const UNEXPLAINED: f64 = 0.1;
 /// The same, in squares of the channel's white noise.
 const ABOVE_NOISE: f64 = 0.05;
 
+/// How many times the squares of the white noise a rest must have that does not come again with the state.
+const MUCH: f64 = 2.0;
+/// How few independent samples it is worth then, relative to all.
+const RESEMBLE: f64 = 0.3;
+
 /// The answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -135,10 +140,7 @@ pub fn diagnose(
     let rest = bench.rest(&picks, &factors);
     let again = reproducible(&problem.layout, &problem.variables, &rest);
     let unexplained: Vec<usize> = (0..rest.len())
-        .filter(|d| {
-            let squares = dot(&rest[*d], &rest[*d]) / rest[*d].len().max(1) as f64;
-            again[*d] > UNEXPLAINED && again[*d] * squares > ABOVE_NOISE * problem.noise[*d].powi(2)
-        })
+        .filter(|d| bench.is_unexplained(*d, &rest[*d], again[*d]))
         .collect();
     let verdict = match (unexplained.is_empty(), picks.is_empty()) {
         (false, _) => Verdict::Unexplained,
@@ -193,6 +195,16 @@ fn total_force(problem: &Problem) -> f64 {
 }
 
 impl Bench<'_> {
+    /// Whether what is left of a channel is more than noise: it comes again with the state, or it is well above the white
+    /// noise and its neighbours resemble each other.
+    fn is_unexplained(&self, channel: usize, rest: &[f64], again: f64) -> bool {
+        let squares = dot(rest, rest) / rest.len().max(1) as f64;
+        let noise = self.problem.noise[channel].powi(2);
+        let worth = effective_samples(rest) / rest.len().max(1) as f64;
+        let comes_again = again > UNEXPLAINED && again * squares > ABOVE_NOISE * noise;
+        comes_again || squares > MUCH * noise && worth < RESEMBLE
+    }
+
     /// Share of the squared error of the model as it is that each candidate explains alone.
     fn explained_alone(&self) -> Vec<f64> {
         let table = self.table(&[]);

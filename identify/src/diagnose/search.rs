@@ -83,7 +83,8 @@ impl Bench<'_> {
                 .collect();
             let (picks, evidence) = self.simplest(&accepted, trial, evidence, &trials);
             let refined = self.refine(picks, finer);
-            accepted = self.polish(refined, finer);
+            let polished = self.polish(refined, finer);
+            accepted = self.refresh(polished);
             if !beam.contains(&accepted) {
                 beam.insert(0, accepted.clone());
             }
@@ -134,10 +135,17 @@ impl Bench<'_> {
                 }
                 let mut picks = set.clone();
                 // What holds more than a member takes its place.
+                let mut pick = pick.clone();
                 if pick.columns.len() > 1 {
-                    picks.retain(|p| !self.is_within(p, pick, &[]));
+                    let (within, rest): (Vec<Pick>, Vec<Pick>) = picks
+                        .into_iter()
+                        .partition(|p| self.is_within(p, &pick, &[]));
+                    // Its rank beside the accepted set does not count what it replaces.
+                    let more: usize = within.iter().map(|p| p.rank).sum();
+                    pick.rank = (pick.rank + more).min(pick.columns.len());
+                    picks = rest;
                 }
-                picks.push(pick.clone());
+                picks.push(pick);
                 if trials.iter().all(|known| !same(&known.picks, &picks)) {
                     trials.push(self.try_in(&table, picks));
                 }
@@ -300,8 +308,9 @@ impl Bench<'_> {
             let mut others = picks.clone();
             let own = others.remove(i);
             self.look(&others);
+            let rank = self.present[own.candidate].as_ref().map_or(0, |p| p.rank);
             let nested: Vec<Pick> = (self.present.iter().flatten())
-                .filter(|one| one.rank < own.rank)
+                .filter(|one| one.rank < rank)
                 .filter(|one| self.candidate(one).searched <= self.candidate(&own).searched)
                 .filter(|one| self.is_within(one, &own, &others))
                 .cloned()
