@@ -3,7 +3,7 @@
 use modelmill_rig::Rig;
 use serde_json::{Value, json};
 
-use crate::columns::{columns, constants, delay_column, library};
+use crate::columns::{columns, delay_column, library};
 use crate::course::{Course, Repeats};
 use crate::hidden::{Choice, Hidden, choices, largest};
 use crate::judge::Class;
@@ -14,7 +14,7 @@ use crate::random::{Random, three_digits};
 use crate::span::{Span, rms};
 
 /// Samples per second at which sizes are worked out and alternatives are compared.
-const COARSE: f64 = 50.0;
+pub(crate) const COARSE: f64 = 50.0;
 /// Samples per second of the recordings.
 pub(crate) const RATE: f64 = 250.0;
 /// Classes in their order, over and over: half one effect, a fifth two, the rest none and outside.
@@ -69,7 +69,8 @@ pub(crate) struct Case {
     pub(crate) rig: Rig,
     /// Fit and check.
     pub(crate) courses: [Course; 2],
-    coarse: [Along; 2],
+    /// Both at fewer samples, for sizes and comparisons.
+    pub(crate) coarse: [Along; 2],
 }
 
 /// The class of a case and how many of the class come before it.
@@ -163,8 +164,12 @@ impl Case {
         }
     }
 
-    /// What is hidden, for `truth.json`; `floor` is that of fit and check.
-    pub(crate) fn json(&self, seed: u64, floor: [f64; 2]) -> Value {
+    /// What is hidden, for `truth.json`; `floor` is that of fit and check, `doubles` those of [`Self::doubles`].
+    pub(crate) fn json(&self, seed: u64, floor: [f64; 2], doubles: &[Placed]) -> Value {
+        let doubles: Vec<Value> = doubles
+            .iter()
+            .map(|one| json!({ "kind": one.kind, "at": one.at }))
+            .collect();
         let hidden = self.hidden.iter().map(|one| {
             let values: serde_json::Map<String, Value> = one
                 .values
@@ -178,6 +183,7 @@ impl Case {
             "class": self.class.name(),
             "hidden": if self.outside.is_some() { json!("unexplained") } else { json!(hidden) },
             "says": self.truth(),
+            "indistinguishable_alone": doubles,
             "columns": if self.full { "full" } else { "positions only" },
             "repeats": self.repeats.word(),
             "force_noise": self.noise,
@@ -362,11 +368,7 @@ impl Case {
         if hidden.placed.kind == "time_delay" {
             return Ok(vec![self.delay_column(0)?]);
         }
-        let bent = hidden
-            .values
-            .iter()
-            .find(|(symbol, _)| ["vs", "pitch"].contains(symbol));
-        let constant = bent.map_or(1.0, |(_, value)| *value);
+        let constant = hidden.constant().unwrap_or(1.0);
         columns(&self.coarse[0], &hidden.placed, constant)
             .ok_or_else(|| format!("no columns of {}", hidden.placed))
     }
@@ -375,11 +377,8 @@ impl Case {
         let along = &self.coarse[0];
         let unit = Outside::draw(law, random);
         let error = random.log_between(ERRORS[0], ERRORS[1]);
-        let library = {
-            let mut library = spans[0].clone();
-            library.extend(library_columns(along));
-            library
-        };
+        let mut all = spans[0].clone();
+        all.extend(library(along));
         let shows = |outside: &Outside, k: usize| {
             let added = outside.added(&self.coarse[k]);
             let force = rms(&sum(&self.coarse[k].plain, &added));
@@ -387,7 +386,7 @@ impl Case {
         };
         let wanted = |outside: &Outside| {
             let (share, added) = shows(outside, 0);
-            (share, rms(&library.rest(&added)) / self.noise)
+            (share, rms(&all.rest(&added)) / self.noise)
         };
         // Sizes from small to large; cutting works the other way round.
         let peak = along
@@ -445,7 +444,7 @@ impl Case {
     }
 
     /// True forces at their own time.
-    fn prompt_forces(&self, along: &Along) -> Result<Vec<f64>, String> {
+    pub(crate) fn prompt_forces(&self, along: &Along) -> Result<Vec<f64>, String> {
         let effects = self
             .hidden
             .iter()
@@ -458,59 +457,11 @@ impl Case {
         })
     }
 
-    fn delay_column(&self, which: usize) -> Result<Vec<f64>, String> {
+    /// How the forces change when they are read later: fit 0, check 1.
+    pub(crate) fn delay_column(&self, which: usize) -> Result<Vec<f64>, String> {
         delay_column(&self.coarse[which], &self.courses[which], &|along| {
             self.prompt_forces(along)
         })
-    }
-
-    /// The squared error, in units of the noise's variance, that claimed effects leave of the true forces on both
-    /// runs; infinite where a claim is of a kind that cannot be worked out.
-    pub(crate) fn excess(&self, plant: &Plant, claims: &[Placed]) -> Result<f64, String> {
-        let both = |of: &dyn Fn(usize) -> Result<Vec<f64>, String>| -> Result<Vec<f64>, String> {
-            Ok([of(0)?, of(1)?].concat())
-        };
-        let base = [
-            self.coarse[0].base(&plant.derivation)?,
-            self.coarse[1].base(&plant.derivation)?,
-        ];
-        let mut span = Span::of(
-            base[0]
-                .iter()
-                .zip(&base[1])
-                .map(|(a, b)| [a.as_slice(), b].concat()),
-        );
-        let total = both(&|k| self.forces(&self.coarse[k], &self.courses[k]))?;
-        for claim in claims {
-            if claim.kind == "time_delay" {
-                span.extend([both(&|k| self.delay_column(k))?]);
-                continue;
-            }
-            let mut best: Option<(f64, Span)> = None;
-            for constant in constants(&claim.kind) {
-                let [Some(fit), Some(check)] =
-                    [0, 1].map(|k| columns(&self.coarse[k], claim, constant))
-                else {
-                    return Ok(f64::INFINITY);
-                };
-                let mut with = span.clone();
-                with.extend(
-                    fit.iter()
-                        .zip(&check)
-                        .map(|(a, b)| [a.as_slice(), b].concat()),
-                );
-                let rest = rms(&with.rest(&total));
-                if best.as_ref().is_none_or(|(least, _)| rest < *least) {
-                    best = Some((rest, with));
-                }
-            }
-            if let Some((_, with)) = best {
-                span = with;
-            }
-        }
-        let rest = rms(&span.rest(&total)) / self.noise;
-        let rows = total.len() as f64 * RATE / COARSE;
-        Ok(rest * rest * rows)
     }
 }
 
@@ -529,10 +480,6 @@ fn alike(one: &Choice, other: &Choice) -> bool {
     let same =
         one.kind == other.kind || (family(one.kind) > 0 && family(one.kind) == family(other.kind));
     shared && (same || offsets(one, other) || offsets(other, one))
-}
-
-fn library_columns(along: &Along) -> Vec<Vec<f64>> {
-    library(along)
 }
 
 fn with_masses(rig: &Rig, masses: Option<Masses>) -> Rig {

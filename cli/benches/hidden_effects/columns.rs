@@ -43,7 +43,13 @@ pub(crate) fn columns(along: &Along, placed: &Placed, constant: f64) -> Option<V
         }
         "drive_inertia" => with(&[&[("Ia", 1.0)]]),
         "force_offset" => with(&[&[("F0", 1.0)]]),
-        "spring" => with(&[&[("k", 1.0)], &[("k", 1.0), ("rest", 1.0)]]),
+        "spring" => Some(
+            [
+                with(&[&[("k", 1.0)]])?,
+                of("force_offset", at, &[("F0", 1.0)]).into_iter().collect(),
+            ]
+            .concat(),
+        ),
         "force_ripple" => with(&[
             &[("As", 1.0), ("pitch", constant)],
             &[("Ac", 1.0), ("pitch", constant)],
@@ -76,6 +82,18 @@ pub(crate) fn columns(along: &Along, placed: &Placed, constant: f64) -> Option<V
             _ => None,
         },
         _ => None,
+    }
+}
+
+/// Which of a kind's [`columns`] have values that physics wants positive, as far as they come first; the others may be
+/// anything.
+pub(crate) fn must_be_positive(kind: &str) -> &'static [bool] {
+    match kind {
+        "directional_viscous_friction" | "directional_coulomb_friction" => &[true, true],
+        "force_offset" | "force_ripple" | "counterbalance" | "coupled_drive" | "rod_inertia"
+        | "gravity_tilt" | "untied_part" => &[],
+        // Of a spring the stiffness only, its rest being anywhere.
+        _ => &[true],
     }
 }
 

@@ -49,6 +49,13 @@ impl Hidden {
         effect(rig, &self.placed, &self.values)
     }
 
+    /// What bends its curve: a speed or a wavelength.
+    pub(crate) fn constant(&self) -> Option<f64> {
+        let mut values = self.values.iter();
+        let bent = values.find(|(symbol, _)| ["vs", "pitch"].contains(symbol));
+        bent.map(|(_, value)| *value)
+    }
+
     /// The delay of the forces, s.
     pub(crate) fn delay(&self) -> f64 {
         let of = self
@@ -137,6 +144,23 @@ pub(crate) fn choices() -> Vec<Choice> {
 }
 
 impl Choice {
+    /// Kinds and places, without values.
+    pub(crate) fn claims(&self) -> Vec<Placed> {
+        if self.kind == "stribeck" {
+            return ["coulomb_friction", "stribeck_friction"]
+                .map(|kind| Placed::new(kind, self.at))
+                .to_vec();
+        }
+        if self.kind == "coupled_drive" {
+            return vec![Placed::new(self.kind, self.at)];
+        }
+        // Sizes of several places may differ.
+        self.at
+            .iter()
+            .map(|place| Placed::new(self.kind, &[*place]))
+            .collect()
+    }
+
     /// Draws values; all that grows with the effect is of unit size, and sizes of several places differ half of the
     /// time.
     pub(crate) fn draw(&self, random: &mut Random) -> Vec<Hidden> {

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::answer::Answer;
-use crate::placed::{Atom, Placed, atoms};
+use crate::placed::{Atom, HOLDS, Placed, atoms};
 
 /// Two explanations whose squared errors differ by less, in units of the noise's variance, cannot be told apart: three
 /// standard deviations.
@@ -167,7 +167,13 @@ fn found(hidden: &[Placed], answer: &Answer, excess: &mut dyn FnMut(&[Placed]) -
             .iter()
             .any(|alias| atoms([alias]).iter().any(|a| lacking.contains(a)))
     });
-    if lacking.iter().all(|atom| named.contains(*atom))
+    // What holds the truth among other things is the less simple answer, and no stand-in.
+    let holds = others.iter().any(|(kind, place)| {
+        let less = HOLDS.iter().find(|(more, _)| more == kind);
+        less.is_some_and(|(_, less)| lacking.contains(&((*less).to_owned(), place.clone())))
+    });
+    if !holds
+        && lacking.iter().all(|atom| named.contains(*atom))
         && each_names
         && stand_ins.count() <= hidden.len()
         && excess(&claims) < SAME

@@ -2,9 +2,11 @@
 //! the score says how often it was right.
 //!
 //! `cargo bench -p modelmill --bench hidden_effects -- [--count 240] [--seed 1] [--only one|two|none|outside]
-//! [--keep DIR] [--list]`. Figures go to standard output, progress to standard error; the same seed gives the same
+//! [--keep DIR] [--list] [--no-diagnosis]`. `--keep` leaves the recordings in a folder, with `truth.json`; `--list` says
+//! what is hidden and makes no recordings; `--no-diagnosis` makes them and asks nobody. Figures go to standard output, progress to standard error; the same seed gives the same
 //! cases on every machine.
 
+mod alternatives;
 mod answer;
 mod ask;
 mod case;
@@ -37,7 +39,7 @@ use table::Score;
 /// Cases that run at the same time.
 const WORKERS: usize = 2;
 const USAGE: &str = "cargo bench -p modelmill --bench hidden_effects -- [--count 240] [--seed 1] \
-                     [--only one|two|none|outside] [--keep DIR] [--list]";
+                     [--only one|two|none|outside] [--keep DIR] [--list] [--no-diagnosis]";
 
 /// What the command line asks for.
 struct Options {
@@ -217,7 +219,12 @@ fn one(options: &Options, plant: &Plant, folder: &Path, number: u64) -> Result<D
         floor[which] = recorded.floor;
         write(file, &recorded.csv)?;
     }
-    let truth = case.json(options.seed, floor);
+    let doubles = if options.keep.is_some() {
+        case.doubles(plant)?
+    } else {
+        Vec::new()
+    };
+    let truth = case.json(options.seed, floor, &doubles);
     if options.no_diagnosis {
         return Ok(Done {
             name,

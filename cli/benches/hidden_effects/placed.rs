@@ -26,6 +26,12 @@ impl std::fmt::Display for Placed {
     }
 }
 
+/// Kinds that hold another one at the same place: with one of their values at zero they are it.
+pub(crate) const HOLDS: [(&str, &str); 2] = [
+    ("directional_viscous_friction", "viscous_friction"),
+    ("spring", "force_offset"),
+];
+
 /// A kind at one place.
 pub(crate) type Atom = (String, String);
 
@@ -47,10 +53,7 @@ pub(crate) fn atoms<'a>(effects: impl IntoIterator<Item = &'a Placed>) -> BTreeS
             }
         }
     }
-    for (more, less) in [
-        ("directional_viscous_friction", "viscous_friction"),
-        ("spring", "force_offset"),
-    ] {
+    for (more, less) in HOLDS {
         let places: Vec<String> = atoms
             .iter()
             .filter(|(kind, _)| kind == more)
