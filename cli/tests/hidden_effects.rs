@@ -43,7 +43,7 @@ fn said(verdict: &str, effects: &[(&str, &[&str], &[Placed])]) -> Value {
         "candidates": [],
         "parameters_off_nominal": [],
         "data": [],
-        "where": [],
+        "where": [{ "channel": LEFT, "in": "t", "range": [0, 1], "share": 0.6, "says": "" }],
     })
 }
 
@@ -219,6 +219,7 @@ fn the_report_counts_what_is_right_and_lists_what_is_not() {
             label: "viscous_friction".to_owned(),
             truth: format!("truth {number}"),
             recording: "two periods".to_owned(),
+            drive: (class == Class::Outside).then_some(LEFT),
             errors: [0.1, 0.1],
             floor,
             answer: Some(Answer::read(&answer.to_string()).expect("the form of cli.md")),
@@ -241,12 +242,14 @@ fn the_report_counts_what_is_right_and_lists_what_is_not() {
         score(3, Class::One, Mark::WrongPlace, 0.01, 0.01),
         failed,
         score(5, Class::Outside, Mark::Guess, 0.01, 0.01),
+        score(6, Class::Outside, Mark::Right, 0.01, 0.01),
     ];
     let text = table::report(&scores, 7);
     for line in [
         "one       66.7 % right, 2 of 3; target 95 %",
         "none       0.0 % right, 0 of 1; target 98 %",
-        "outside    0.0 % right, 0 of 1; target 90 %",
+        "outside   50.0 % right, 1 of 2; target 90 %",
+        "located  1 of 1 unexplained ones first of all in the drive that feels them",
         "fall      50.0 % of 2 found within 1.3 of the noise floor on the check run; target 100 %",
         "- seed 7 case 2 (one): the check error stays 1.31 times the noise floor",
         "- seed 7 case 3 (one): wrong place",

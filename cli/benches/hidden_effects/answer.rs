@@ -13,6 +13,8 @@ pub(crate) struct Answer {
     pub(crate) steps: Vec<Step>,
     /// What the program would add.
     pub(crate) effects: Vec<Claim>,
+    /// The drive in which it says most of the error sits.
+    pub(crate) channel: Option<String>,
 }
 
 /// A step of the ladder.
@@ -72,6 +74,7 @@ impl Answer {
             verdict: verdict.to_owned(),
             steps: steps.collect::<Result<_, String>>()?,
             effects: effects.collect::<Result<_, String>>()?,
+            channel: value["where"][0]["channel"].as_str().map(str::to_owned),
         })
     }
 }

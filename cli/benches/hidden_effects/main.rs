@@ -2,9 +2,10 @@
 //! the score says how often it was right.
 //!
 //! `cargo bench -p modelmill --bench hidden_effects -- [--count 240] [--seed 1] [--only one|two|none|outside]
-//! [--keep DIR] [--list] [--no-diagnosis]`. `--keep` leaves the recordings in a folder, with `truth.json`; `--list` says
-//! what is hidden and makes no recordings; `--no-diagnosis` makes them and asks nobody. Figures go to standard output, progress to standard error; the same seed gives the same
-//! cases on every machine.
+//! [--keep DIR] [--list] [--program PATH] [--no-diagnosis]`. Figures go to standard output, progress to standard error;
+//! the same seed gives the same cases on every machine. `--keep` leaves the recordings in a folder, with `truth.json`;
+//! `--list` says what is hidden and makes no recordings; `--program` asks another build of modelmill, `--no-diagnosis`
+//! nobody.
 
 mod alternatives;
 mod answer;
@@ -22,7 +23,6 @@ mod record;
 mod span;
 mod table;
 
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Mutex;
@@ -39,7 +39,7 @@ use table::Score;
 /// Cases that run at the same time.
 const WORKERS: usize = 2;
 const USAGE: &str = "cargo bench -p modelmill --bench hidden_effects -- [--count 240] [--seed 1] \
-                     [--only one|two|none|outside] [--keep DIR] [--list] [--no-diagnosis]";
+                     [--only one|two|none|outside] [--keep DIR] [--list] [--program PATH] [--no-diagnosis]";
 
 /// What the command line asks for.
 struct Options {
@@ -50,6 +50,8 @@ struct Options {
     keep: Option<PathBuf>,
     /// Says what is hidden and asks nobody.
     list: bool,
+    /// Who is asked.
+    program: PathBuf,
     /// Makes the recordings and asks nobody.
     no_diagnosis: bool,
 }
@@ -88,6 +90,7 @@ impl Options {
             only: None,
             keep: None,
             list: false,
+            program: PathBuf::from(env!("CARGO_BIN_EXE_modelmill")),
             no_diagnosis: false,
         };
         while let Some(arg) = args.next() {
@@ -111,6 +114,7 @@ impl Options {
                         Some(class.ok_or_else(|| format!("there is no class `{name}`"))?);
                 }
                 "--keep" => options.keep = Some(PathBuf::from(value()?)),
+                "--program" => options.program = PathBuf::from(value()?),
                 "--list" => options.list = true,
                 "--no-diagnosis" => options.no_diagnosis = true,
                 _ => return Err(format!("unknown argument `{arg}`")),
@@ -233,7 +237,7 @@ fn one(options: &Options, plant: &Plant, folder: &Path, number: u64) -> Result<D
             score: None,
         });
     }
-    let program = OsStr::new(env!("CARGO_BIN_EXE_modelmill"));
+    let program = options.program.as_os_str();
     let (answer, took) = ask::diagnose(program, &plant.model, &files[0], &files[1]);
     if options.keep.is_none() {
         std::fs::remove_dir_all(&place).map_err(|error| format!("{}: {error}", place.display()))?;
@@ -254,6 +258,10 @@ fn one(options: &Options, plant: &Plant, folder: &Path, number: u64) -> Result<D
         label: case.label.clone(),
         truth: case.truth(),
         recording,
+        drive: case
+            .outside
+            .as_ref()
+            .map(|outside| plant::DRIVES[outside.at]),
         errors: case.errors,
         floor: floor[1],
         answer,

@@ -161,9 +161,6 @@ impl Along {
             (0..DRIVES.len()).map(|k| column(of, k)).collect()
         };
         let [q, qd, qdd] = [all(|s| &s.q), all(|s| &s.qd), all(|s| &s.qdd)];
-        fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
-            columns.iter().map(Vec::as_slice).collect()
-        }
         let states = States {
             q: slices(&q),
             qd: slices(&qd),
@@ -177,4 +174,8 @@ impl Along {
             .map(|k| matrix.column(k).iter().copied().collect())
             .collect())
     }
+}
+
+fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
+    columns.iter().map(Vec::as_slice).collect()
 }

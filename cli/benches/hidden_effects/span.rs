@@ -24,7 +24,9 @@ impl Span {
             let mut rest = self.rest(&self.rest(&column));
             let after = norm(&rest);
             if after > NOTHING * before {
-                rest.iter_mut().for_each(|x| *x /= after);
+                for x in &mut rest {
+                    *x /= after;
+                }
                 self.basis.push(rest);
             }
         }

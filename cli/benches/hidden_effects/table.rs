@@ -17,6 +17,8 @@ pub(crate) struct Score {
     pub(crate) truth: String,
     /// Motion, columns and noise, in words.
     pub(crate) recording: String,
+    /// The drive that feels what is outside the library.
+    pub(crate) drive: Option<&'static str>,
     /// Errors without the effects, of fit and check.
     pub(crate) errors: [f64; 2],
     /// True noise floor of the check run.
@@ -87,6 +89,17 @@ pub(crate) fn report(scores: &[Score], seed: u64) -> String {
             "fall     {:>5.1} % of {} found within {FALL} of the noise floor on the check run; target 100 %",
             percent(fallen, falls.len()),
             falls.len()
+        );
+    }
+    let unexplained = |s: &&Score| s.class == Class::Outside && s.mark.is_right();
+    let outside: Vec<&Score> = scores.iter().filter(unexplained).collect();
+    if !outside.is_empty() {
+        let located = |s: &&&Score| s.answer.as_ref().and_then(|a| a.channel.as_deref()) == s.drive;
+        let _ = writeln!(
+            text,
+            "located  {} of {} unexplained ones first of all in the drive that feels them",
+            outside.iter().filter(located).count(),
+            outside.len()
         );
     }
     let [named, honest] = [0, 1].map(|k| scores.iter().map(|s| s.aliases[k]).sum::<usize>());
