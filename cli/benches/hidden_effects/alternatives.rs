@@ -23,12 +23,16 @@ impl Case {
         let [fit, check] = &self.coarse;
         let base = [fit.base(&plant.derivation)?, check.base(&plant.derivation)?];
         let base = joined(&base[0], &base[1]);
-        let mut span = Span::of(base.clone());
-        // Columns of all claims, with whether their values must be positive.
-        let mut claimed: Vec<(Vec<f64>, bool)> = Vec::new();
         let total = both(&|k| self.forces(&self.coarse[k], &self.courses[k]))?;
+        let beside = self.masses_hidden()?;
+        let of = |claim: &Placed, constant: f64| {
+            let fit = columns(fit, claim, constant, &beside)?;
+            Some(joined(&fit, &columns(check, claim, constant, &beside)?))
+        };
+        // All columns of each claim, with the first value of what bends its curve.
+        let mut all: Vec<Vec<Vec<f64>>> = Vec::new();
         for claim in claims {
-            if claim.kind == "time_delay" {
+            all.push(if claim.kind == "time_delay" {
                 let delayed = self.hidden.iter().any(|one| one.delay() > 0.0);
                 let column = if delayed {
                     let prompt = both(&|k| self.prompt_forces(&self.coarse[k]))?;
@@ -36,38 +40,47 @@ impl Case {
                 } else {
                     both(&|k| self.delay_column(k))?
                 };
-                span.extend([column.clone()]);
-                claimed.push((column, true));
+                vec![column]
+            } else {
+                match of(claim, constants(&claim.kind)[0]) {
+                    Some(columns) => columns,
+                    None => return Ok(f64::INFINITY),
+                }
+            });
+        }
+        // Curves are bent one after the other to what leaves least beside all other claims, and once more.
+        for (k, claim) in [claims, claims].concat().iter().enumerate() {
+            let k = k % claims.len();
+            let mut tried = constants(&claim.kind);
+            if tried.len() == 1 {
                 continue;
             }
-            let mut tried = constants(&claim.kind);
             let same = self.hidden.iter().filter(|h| h.placed.kind == claim.kind);
             tried.extend(same.filter_map(Hidden::constant));
-            let mut best: Option<(f64, Span, Vec<Vec<f64>>)> = None;
+            let mut others = Span::of(base.clone());
+            let rest = all.iter().enumerate().filter(|(j, _)| *j != k);
+            others.extend(rest.flat_map(|(_, columns)| columns.clone()));
+            let mut least = f64::INFINITY;
             for constant in tried {
-                let (Some(of_fit), Some(of_check)) = (
-                    columns(fit, claim, constant),
-                    columns(check, claim, constant),
-                ) else {
+                let Some(columns) = of(claim, constant) else {
                     return Ok(f64::INFINITY);
                 };
-                let new = joined(&of_fit, &of_check);
-                let mut with = span.clone();
-                with.extend(new.clone());
-                let rest = rms(&with.rest(&total));
-                if best.as_ref().is_none_or(|(least, ..)| rest < *least) {
-                    best = Some((rest, with, new));
+                let mut with = others.clone();
+                with.extend(columns.clone());
+                let left = rms(&with.rest(&total));
+                if left < least {
+                    least = left;
+                    all[k] = columns;
                 }
             }
-            if let Some((_, with, new)) = best {
-                span = with;
-                let signs = must_be_positive(&claim.kind);
-                claimed.extend(
-                    new.into_iter()
-                        .zip(signs.iter().copied().chain(repeat(false))),
-                );
-            }
         }
+        let mut claimed: Vec<(Vec<f64>, bool)> = Vec::new();
+        for (claim, columns) in claims.iter().zip(all) {
+            let signs = must_be_positive(&claim.kind).iter().copied();
+            claimed.extend(columns.into_iter().zip(signs.chain(repeat(false))));
+        }
+        let mut span = Span::of(base.clone());
+        span.extend(claimed.iter().map(|(column, _)| column.clone()));
         if self.has_wrong_sign(&base, &claimed, &total) {
             return Ok(f64::INFINITY);
         }

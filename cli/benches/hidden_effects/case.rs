@@ -1,6 +1,6 @@
 //! Cases: seed and number go in; motion, noise and what is hidden come out, with sizes that show.
 
-use modelmill_rig::Rig;
+use modelmill_rig::{Effect, Rig};
 use serde_json::{Value, json};
 
 use crate::columns::{columns, delay_column, library};
@@ -354,7 +354,7 @@ impl Case {
             for less in simpler {
                 let mut others = others.clone();
                 for placed in &less {
-                    others.extend(columns(along, placed, 1.0).unwrap_or_default());
+                    others.extend(columns(along, placed, 1.0, &[]).unwrap_or_default());
                 }
                 if !enough(rms(&others.rest(&total))) {
                     return Ok(false);
@@ -369,8 +369,22 @@ impl Case {
             return Ok(vec![self.delay_column(0)?]);
         }
         let constant = hidden.constant().unwrap_or(1.0);
-        columns(&self.coarse[0], &hidden.placed, constant)
-            .ok_or_else(|| format!("no columns of {}", hidden.placed))
+        columns(
+            &self.coarse[0],
+            &hidden.placed,
+            constant,
+            &self.masses_hidden()?,
+        )
+        .ok_or_else(|| format!("no columns of {}", hidden.placed))
+    }
+
+    /// Hidden effects with mass, which friction by load feels.
+    pub(crate) fn masses_hidden(&self) -> Result<Vec<Effect>, String> {
+        let massive = |one: &&Hidden| {
+            ["point_mass", "rod_inertia", "gravity_tilt"].contains(&one.placed.kind.as_str())
+        };
+        let effects = self.hidden.iter().filter(massive);
+        effects.map(|one| one.effect(&self.rig)).collect()
     }
 
     fn hide_outside(&mut self, law: Law, random: &mut Random, spans: &[Span; 2]) -> bool {

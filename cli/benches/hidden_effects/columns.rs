@@ -1,5 +1,7 @@
 //! Columns of the library along a motion: what each kind could say at a place, whatever its values.
 
+use modelmill_rig::Effect;
+
 use crate::course::Course;
 use crate::hidden::effect;
 use crate::placed::Placed;
@@ -8,17 +10,24 @@ use crate::plant::{Along, DRIVES};
 /// A delay of this size stands for small ones, s.
 const DELAY: f64 = 0.005;
 
-/// Columns of a kind at its places; what bends its curve takes the value `constant`. `None` for kinds that the rig
-/// does not know, or cannot have there.
-pub(crate) fn columns(along: &Along, placed: &Placed, constant: f64) -> Option<Vec<Vec<f64>>> {
+/// Columns of a kind at its places; what bends its curve takes the value `constant`, and friction by load feels the
+/// masses `beside` it. `None` for kinds that the rig does not know, or cannot have there.
+pub(crate) fn columns(
+    along: &Along,
+    placed: &Placed,
+    constant: f64,
+    beside: &[Effect],
+) -> Option<Vec<Vec<f64>>> {
     let of = |kind: &str, at: &[String], values: &[(&str, f64)]| {
         let placed = Placed {
             kind: kind.to_owned(),
             at: at.to_vec(),
         };
-        along
-            .added(&[effect(along.rig(), &placed, values).ok()?])
-            .ok()
+        let unit = effect(along.rig(), &placed, values).ok()?;
+        if kind == "load_friction" {
+            return along.added_beside(beside, unit).ok();
+        }
+        along.added(&[unit]).ok()
     };
     let at = placed.at.as_slice();
     let kind = placed.kind.as_str();
@@ -130,7 +139,7 @@ pub(crate) fn delay_column(
 pub(crate) fn library(along: &Along) -> Vec<Vec<f64>> {
     let mut all = Vec::new();
     let mut put = |kind: &str, at: &[&str], constant: f64| {
-        all.extend(columns(along, &Placed::new(kind, at), constant).unwrap_or_default());
+        all.extend(columns(along, &Placed::new(kind, at), constant, &[]).unwrap_or_default());
     };
     for drive in DRIVES {
         for kind in [

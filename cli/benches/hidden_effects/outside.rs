@@ -1,4 +1,6 @@
 //! Forces that no library of effects holds, made from the true motion of the drives.
+//!
+//! A spring of third order is none of them: over the travel of a spindle a ripple beside a spring says as much.
 
 use std::f64::consts::PI;
 
@@ -29,8 +31,6 @@ pub(crate) enum Law {
     Hysteresis,
     /// `size * sin(2 pi l shape) * l'`: viscous friction that differs from place to place, beside `size * l'`.
     FrictionByPlace,
-    /// `size * (l - shape)^3`
-    CubicSpring,
     /// `size * (l - shape)` beyond a length, nothing before.
     Stop,
     /// The whole force is cut where it is beyond `size`.
@@ -42,12 +42,11 @@ pub(crate) enum Law {
 }
 
 impl Law {
-    pub(crate) const ALL: [Self; 9] = [
+    pub(crate) const ALL: [Self; 8] = [
         Self::OtherRate,
         Self::ProductOfRates,
         Self::Hysteresis,
         Self::FrictionByPlace,
-        Self::CubicSpring,
         Self::Stop,
         Self::Saturation,
         Self::Drift,
@@ -61,7 +60,6 @@ impl Law {
             Self::ProductOfRates => "product of both rates",
             Self::Hysteresis => "hysteresis",
             Self::FrictionByPlace => "friction that differs by place",
-            Self::CubicSpring => "cubic spring",
             Self::Stop => "elastic stop",
             Self::Saturation => "saturation",
             Self::Drift => "drift in time",
@@ -93,7 +91,6 @@ impl Outside {
         let shape = match law {
             Law::Hysteresis => random.between(0.02, 0.06),
             Law::FrictionByPlace => random.between(4.0, 20.0),
-            Law::CubicSpring => random.between(0.72, 0.78),
             Law::Stop => random.between(0.76, 0.82),
             Law::Hum => random.log_between(2.0, 20.0),
             _ => 0.0,
@@ -134,7 +131,6 @@ impl Outside {
                     (l.value - block) / self.shape
                 }
                 Law::FrictionByPlace => (1.0 + libm::sin(2.0 * PI * self.shape * l.value)) * l.rate,
-                Law::CubicSpring => (l.value - self.shape).powi(3),
                 Law::Stop => (l.value - self.shape).max(0.0),
                 Law::Saturation => {
                     let force = along.plain[row];

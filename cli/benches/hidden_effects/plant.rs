@@ -143,6 +143,17 @@ impl Along {
         Ok(with.iter().zip(&self.plain).map(|(a, b)| a - b).collect())
     }
 
+    /// What an effect adds to the forces that others need already, N.
+    pub(crate) fn added_beside(
+        &self,
+        others: &[Effect],
+        effect: Effect,
+    ) -> Result<Vec<f64>, String> {
+        let without = self.forces(others)?;
+        let with = self.forces(&[others, &[effect]].concat())?;
+        Ok(with.iter().zip(&without).map(|(a, b)| a - b).collect())
+    }
+
     /// Length, rate and acceleration of a drive at each time.
     pub(crate) fn of_drive(&self, drive: usize) -> Vec<Measured> {
         let at = |motion| modelmill_rig::measured(&self.rig, Place::Drive(drive), motion);
