@@ -276,7 +276,7 @@ impl Case {
             let added = self.added(k)?;
             self.errors[k] = rms(&span.rest(&added)) / rms(&sum(&self.coarse[k].plain, &added));
         }
-        self.all_show(&spans[0])
+        Ok(self.errors[1] >= LEAST_SHOWN && self.all_show(&spans[0])?)
     }
 
     /// The effects at a size that causes a given error on the fit; `None` if a machine cannot have that much.
@@ -418,8 +418,9 @@ impl Case {
             if share > 1.2 * ERRORS[1] {
                 return false;
             }
-            if share >= error && left >= LEAST_OUTSIDE {
-                self.errors = [shows(&outside, 0).0, shows(&outside, 1).0];
+            let of_check = shows(&outside, 1).0;
+            if share >= error && left >= LEAST_OUTSIDE && of_check >= LEAST_SHOWN {
+                self.errors = [share, of_check];
                 self.outside = Some(outside);
                 return true;
             }
