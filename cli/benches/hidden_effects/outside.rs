@@ -1,0 +1,147 @@
+//! Forces that no library of effects holds, made from the true motion of the drives.
+//!
+//! A spring of third order is none of them: over the travel of a spindle a ripple beside a spring says as much.
+
+use std::f64::consts::PI;
+
+use crate::plant::{Along, DRIVES};
+use crate::random::{Random, three_digits};
+
+/// A law of one drive, the other being number `1 - at`.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Outside {
+    /// Which law.
+    pub(crate) law: Law,
+    /// Which drive feels it.
+    pub(crate) at: usize,
+    /// Its size: N, or what makes N of the law's function.
+    pub(crate) size: f64,
+    /// What shapes it: a length in m, a frequency in Hz or 1/m, or nothing.
+    shape: f64,
+}
+
+/// The laws. `l` is the length of the drive, `m` that of the other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Law {
+    /// `size * m'`: this drive alone feels the other's rate.
+    OtherRate,
+    /// `size * l' * m'`
+    ProductOfRates,
+    /// A spring that drags a block along: the stretch is at most `shape`, and what it is depends on the way there.
+    Hysteresis,
+    /// `size * sin(2 pi l shape) * l'`: viscous friction that differs from place to place, beside `size * l'`.
+    FrictionByPlace,
+    /// `size * (l - shape)` beyond a length, nothing before.
+    Stop,
+    /// The whole force is cut where it is beyond `size`.
+    Saturation,
+    /// `size * t`
+    Drift,
+    /// `size * sin(2 pi shape t)`
+    Hum,
+}
+
+impl Law {
+    pub(crate) const ALL: [Self; 8] = [
+        Self::OtherRate,
+        Self::ProductOfRates,
+        Self::Hysteresis,
+        Self::FrictionByPlace,
+        Self::Stop,
+        Self::Saturation,
+        Self::Drift,
+        Self::Hum,
+    ];
+
+    /// Its name in tables and files.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::OtherRate => "rate of the other drive",
+            Self::ProductOfRates => "product of both rates",
+            Self::Hysteresis => "hysteresis",
+            Self::FrictionByPlace => "friction that differs by place",
+            Self::Stop => "elastic stop",
+            Self::Saturation => "saturation",
+            Self::Drift => "drift in time",
+            Self::Hum => "hum in time",
+        }
+    }
+}
+
+impl std::fmt::Display for Outside {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            law,
+            at,
+            size,
+            shape,
+        } = self;
+        write!(
+            f,
+            "{} at {} (size {size}, shape {shape})",
+            law.name(),
+            DRIVES[*at]
+        )
+    }
+}
+
+impl Outside {
+    /// Draws a drive and a shape; the size is one.
+    pub(crate) fn draw(law: Law, random: &mut Random) -> Self {
+        let shape = match law {
+            Law::Hysteresis => random.between(0.02, 0.06),
+            Law::FrictionByPlace => random.between(4.0, 20.0),
+            Law::Stop => random.between(0.76, 0.82),
+            Law::Hum => random.log_between(2.0, 20.0),
+            _ => 0.0,
+        };
+        Self {
+            law,
+            at: random.below(2),
+            size: if matches!(law, Law::OtherRate | Law::ProductOfRates | Law::Drift) {
+                random.sign()
+            } else {
+                1.0
+            },
+            shape: three_digits(shape),
+        }
+    }
+
+    /// The same, larger or smaller.
+    pub(crate) fn times(&self, factor: f64) -> Self {
+        Self {
+            size: three_digits(self.size * factor),
+            ..self.clone()
+        }
+    }
+
+    /// What it adds to the forces along a motion: samples times drives.
+    pub(crate) fn added(&self, along: &Along) -> Vec<f64> {
+        let own = along.of_drive(self.at);
+        let other = along.of_drive(1 - self.at);
+        let mut rows = vec![0.0; along.plain.len()];
+        let mut block = own.first().map_or(0.0, |m| m.value);
+        for (i, (l, m)) in own.iter().zip(&other).enumerate() {
+            let row = DRIVES.len() * i + self.at;
+            let unit = match self.law {
+                Law::OtherRate => m.rate,
+                Law::ProductOfRates => l.rate * m.rate,
+                Law::Hysteresis => {
+                    block = block.clamp(l.value - self.shape, l.value + self.shape);
+                    (l.value - block) / self.shape
+                }
+                Law::FrictionByPlace => (1.0 + libm::sin(2.0 * PI * self.shape * l.value)) * l.rate,
+                Law::Stop => (l.value - self.shape).max(0.0),
+                Law::Saturation => {
+                    let force = along.plain[row];
+                    rows[row] = force.clamp(-self.size, self.size) - force;
+                    continue;
+                }
+                Law::Drift => along.times[i],
+                Law::Hum => libm::sin(2.0 * PI * self.shape * along.times[i]),
+            };
+            rows[row] = self.size * unit;
+        }
+        rows
+    }
+}

@@ -1,0 +1,134 @@
+//! The benchmark of hidden effects makes what it says it makes: recordings that repeat, effects of the size that is
+//! asked for, and a truth that leaves nothing but noise.
+#![allow(
+    dead_code,
+    reason = "modules of the benchmark, of which the score is tested elsewhere"
+)]
+
+#[path = "../benches/hidden_effects/alternatives.rs"]
+mod alternatives;
+#[path = "../benches/hidden_effects/answer.rs"]
+mod answer;
+#[path = "../benches/hidden_effects/case.rs"]
+mod case;
+#[path = "../benches/hidden_effects/columns.rs"]
+mod columns;
+#[path = "../benches/hidden_effects/course.rs"]
+mod course;
+#[path = "../benches/hidden_effects/hidden.rs"]
+mod hidden;
+#[path = "../benches/hidden_effects/judge.rs"]
+mod judge;
+#[path = "../benches/hidden_effects/outside.rs"]
+mod outside;
+#[path = "../benches/hidden_effects/placed.rs"]
+mod placed;
+#[path = "../benches/hidden_effects/plant.rs"]
+mod plant;
+#[path = "../benches/hidden_effects/random.rs"]
+mod random;
+#[path = "../benches/hidden_effects/record.rs"]
+mod record;
+#[path = "../benches/hidden_effects/span.rs"]
+mod span;
+
+use std::path::Path;
+
+use case::{Case, class_of};
+use judge::{Class, SAME};
+use plant::Plant;
+use span::{Span, norm};
+
+const SEED: u64 = 3;
+
+fn plant() -> Plant {
+    Plant::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec"))
+        .expect("rig and model")
+}
+
+fn column(csv: &str, name: &str) -> Vec<f64> {
+    let mut lines = csv.lines();
+    let header = lines.next().expect("a header");
+    let at = header
+        .split(',')
+        .position(|n| n == name)
+        .expect("the column");
+    let field = |line: &str| {
+        line.split(',')
+            .nth(at)
+            .expect("a field")
+            .parse()
+            .expect("a number")
+    };
+    lines.map(field).collect()
+}
+
+#[test]
+fn classes_come_in_the_shares_that_are_promised() {
+    let of = |class| (1..=240).filter(|n| class_of(*n).0 == class).count();
+    assert_eq!(Class::ALL.map(of), [120, 48, 36, 36]);
+    assert_eq!(class_of(1), (Class::One, 0));
+    assert_eq!(class_of(21), (Class::One, 10));
+}
+
+/// The one effect of each of the first cases explains its own forces, and nothing does not.
+#[test]
+fn the_truth_explains_its_recording() {
+    let plant = plant();
+    for number in [1, 2, 3, 5] {
+        let case = Case::draw(&plant, SEED, number).expect("a case");
+        let truth = case.placed();
+        assert!(!truth.is_empty());
+        let left = case.excess(&plant, &truth).expect("columns of the library");
+        assert!(left < SAME, "{}: {left}", case.truth());
+        let nothing = case.excess(&plant, &[]).expect("no columns");
+        assert!(nothing > 100.0 * SAME, "{}: {nothing}", case.truth());
+        let [fit, _] = case.errors;
+        assert!((0.01..0.35).contains(&fit), "{}: {fit}", case.truth());
+    }
+}
+
+/// The recorded forces, minus what the model can say, are the noise that the floor is made of.
+#[test]
+fn a_recording_with_nothing_hidden_is_the_model_and_noise() {
+    let plant = plant();
+    let number = (1..100)
+        .find(|n| class_of(*n).0 == Class::None)
+        .expect("such a class");
+    let case = Case::draw(&plant, SEED, number).expect("a case");
+    let recorded = record::record(&case, SEED, 0).expect("a recording");
+    let again = record::record(&case, SEED, 0).expect("a recording");
+    assert_eq!(recorded.csv, again.csv);
+    let times = column(&recorded.csv, "t");
+    let along = plant::Along::new(&case.rig, &case.courses[0], times).expect("the same motion");
+    let [left, right] = plant::DRIVES.map(|drive| column(&recorded.csv, drive));
+    let measured: Vec<f64> = left
+        .into_iter()
+        .zip(right)
+        .flat_map(|(l, r)| [l, r])
+        .collect();
+    let span = Span::of(along.base(&plant.derivation).expect("columns"));
+    let left = norm(&span.rest(&measured));
+    let share = left / norm(&measured) / recorded.floor;
+    assert!((share - 1.0).abs() < 2e-3, "{share}");
+    let deviation = left / (measured.len() as f64).sqrt() / case.noise;
+    assert!((deviation - 1.0).abs() < 0.05, "{deviation}");
+}
+
+/// What is outside stays outside if every column of the library is taken together.
+#[test]
+fn no_library_says_what_is_outside() {
+    let plant = plant();
+    for number in (1..100)
+        .filter(|n| class_of(*n).0 == Class::Outside)
+        .take(2)
+    {
+        let case = Case::draw(&plant, SEED, number).expect("a case");
+        let along = &case.coarse[0];
+        let forces = case.forces(along, &case.courses[0]).expect("forces");
+        let mut all = Span::of(along.base(&plant.derivation).expect("columns"));
+        all.extend(columns::library(along));
+        let rest = span::rms(&all.rest(&forces));
+        assert!(rest > 1.9 * case.noise, "{}: {rest}", case.truth());
+    }
+}
