@@ -27,9 +27,7 @@ impl Run {
             .iter()
             .map(|t| stencil(&self.time, t - delay))
             .collect();
-        let states = (self.q.iter_mut())
-            .chain(&mut self.qd)
-            .chain(&mut self.qdd);
+        let states = (self.q.iter_mut()).chain(&mut self.qd).chain(&mut self.qdd);
         for column in states {
             *column = stencils
                 .iter()
@@ -92,7 +90,9 @@ mod tests {
     fn cubics_are_met_exactly_and_lost_samples_are_counted() {
         for delay in [0.0, 0.0042, -0.0042, 0.013, 0.25] {
             let mut moved = run(60);
-            let lost = moved.pair_with_earlier_states(delay).expect("samples are left");
+            let lost = moved
+                .pair_with_earlier_states(delay)
+                .expect("samples are left");
             let n = moved.time.len();
             assert_eq!(n + lost.0 + lost.1, 60);
             assert_eq!(lost.0 > 0, delay > 0.0);

@@ -123,6 +123,19 @@ pub enum Mechanics {
     Delay,
 }
 
+impl Mechanics {
+    /// What it does, for people, where other kinds have an expression.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Rod => "a rod along the drive, about its first point",
+            Self::Placement => "m times the moments at the point, less those at `moment_at`",
+            Self::Part => "mass, first moments and inertia of this part alone",
+            Self::Tilt => "gravity turned back by Rz(tz) Ry(ty) Rx(tx)",
+            Self::Delay => "forces of recordings are those of T before",
+        }
+    }
+}
+
 /// What the values of a search are relative to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Scale {

@@ -44,7 +44,7 @@ pub use kinds::{
     ActsOn, Carries, EffectKind, KindConstant, KindParameter, LIBRARY, Mechanics, Scale, Search,
     Sign, library,
 };
-pub use load::{Failure, Loaded, load, load_file, load_file_with, load_with};
+pub use load::{Failure, Loaded, kinds_with, load, load_file, load_file_with, load_with};
 pub use mechanism::*;
 pub use motion::{Kinematics, Poses};
 pub use unit::unit_product;

@@ -1,9 +1,11 @@
 //! One file per command.
 
+pub(crate) mod add;
 pub(crate) mod check;
 pub(crate) mod compare;
 pub(crate) mod completions;
 pub(crate) mod diff;
+pub(crate) mod effects;
 pub(crate) mod equations;
 pub(crate) mod evaluate;
 pub(crate) mod excite;
