@@ -15,6 +15,7 @@ mod exact;
 mod exact_tests;
 mod finite;
 mod formula;
+mod kind_mechanics;
 mod kind_terms;
 mod kinds;
 mod kinematics;

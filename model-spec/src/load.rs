@@ -224,7 +224,9 @@ pub fn kinds_with(
     let mut sources = Sources::default();
     let named: Vec<NamedPath> = libraries.iter().map(|path| (path.clone(), None)).collect();
     let own = read_libraries(&named, read, &mut sources, &mut log);
-    own.iter().for_each(|entry| kinds::check(entry, &mut log));
+    for entry in &own {
+        kinds::check(entry, &mut log);
+    }
     if log.n_errors() > 0 {
         return Err(Failure {
             diagnostics: log.finish(),
