@@ -101,7 +101,7 @@ fn adding_what_cannot_be_is_refused() {
         (
             &["coulomb_friction", "--at", "spindle"][..],
             1,
-            "did you mean",
+            "known places: `spindle_left`",
         ),
         (&["magic", "--at", "spindle_left"][..], 1, "unknown kind"),
         (
