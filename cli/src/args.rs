@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::effect_args::{AddArgs, EffectsArgs};
 use crate::estimators::EstimatorArgs;
 use crate::limits::Limit;
 use crate::preparation::PreparationArgs;
@@ -24,6 +25,9 @@ pub(crate) struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub(crate) command: Command,
+    /// A library of further kinds of effects (TOML), for every model that is read; may be repeated
+    #[arg(long, global = true, value_name = "FILE")]
+    pub(crate) library: Vec<PathBuf>,
 }
 
 /// The commands.
@@ -39,6 +43,20 @@ pub(crate) enum Command {
     #[command(after_help = "Examples (from the project's root):\n  \
         modelmill diff model-spec/models/spidermill.toml model-spec/models/spidermill-paper.toml")]
     Diff(DiffArgs),
+    /// List the effects that a model may have, or explain one of them
+    #[command(after_help = "Examples (from the project's root):\n  \
+        modelmill effects\n  \
+        modelmill effects rod_inertia\n  \
+        modelmill effects --library my_effects.toml --json")]
+    Effects(EffectsArgs),
+    /// Add an effect to a model file, keeping its comments and layout, and print the difference
+    #[command(after_help = "Examples (from the project's root):\n  \
+        modelmill add model-spec/models/spidermill.toml coulomb_friction --at spindle_left --set Fc=25.9\n  \
+        modelmill add model-spec/models/spidermill.toml rod_inertia --at spindle_left,spindle_right --out rods.toml\n  \
+        modelmill add model-spec/models/spidermill-paper.toml lumped_mass_placement \\\n      \
+        --at R3m,R3m_right --set m.name=m4\n\n\
+        Places in one --at share the effect's parameters. Without --in-place or --out nothing is written.")]
+    Add(AddArgs),
     /// Print the reduced model as equations: p_g, dependencies, p_min, intermediate variables, counts
     #[command(
         after_help = "Examples (from the project's root):\n  modelmill equations model-spec/models/spidermill-paper.toml\n  \

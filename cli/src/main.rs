@@ -9,6 +9,7 @@ mod commands;
 mod consistent;
 mod data;
 mod diagnosis;
+mod effect_args;
 mod entries;
 mod estimation;
 mod estimators;
@@ -49,6 +50,7 @@ fn main() -> ExitCode {
             return ExitCode::from(status);
         }
     };
+    model::use_libraries(&cli.library);
     match run(&cli.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
@@ -66,6 +68,8 @@ fn run(command: &Command) -> Outcome {
     match command {
         Command::Check(args) => commands::check::run(args),
         Command::Diff(args) => commands::diff::run(args),
+        Command::Effects(args) => commands::effects::run(args),
+        Command::Add(args) => commands::add::run(args),
         Command::Equations(args) => commands::equations::run(args),
         Command::Generate(args) => commands::generate::run(args),
         Command::Evaluate(args) => commands::evaluate::run(args),

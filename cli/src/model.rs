@@ -1,6 +1,7 @@
 //! Model files as commands see them: read, derived, with names for people and messages for faults.
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use modelmill_codegen::review::base_expression;
 use modelmill_codegen::{BaseParameter, Derivation, Monomial};
@@ -34,8 +35,30 @@ pub(crate) struct Model {
     signs: Vec<Sign>,
 }
 
+/// Libraries of kinds of effects that the command line names, for every model that is read.
+static LIBRARIES: OnceLock<Vec<PathBuf>> = OnceLock::new();
+
+/// Sets the libraries that every model may use; once, before any is read.
+pub(crate) fn use_libraries(paths: &[PathBuf]) {
+    let _ = LIBRARIES.set(paths.to_vec());
+}
+
+/// The libraries that every model may use.
+pub(crate) fn libraries() -> &'static [PathBuf] {
+    LIBRARIES.get().map_or(&[], Vec::as_slice)
+}
+
 /// Reads a model file; warnings go to standard error.
 pub(crate) fn load(path: &Path) -> Outcome<Loaded> {
+    let loaded = load_quietly(path)?;
+    if !loaded.warnings.is_empty() {
+        terminal::say(loaded.render(terminal::errors_in_colour()).trim_end());
+    }
+    Ok(loaded)
+}
+
+/// Reads a model file and keeps its warnings.
+pub(crate) fn load_quietly(path: &Path) -> Outcome<Loaded> {
     if path.is_dir() {
         return Err(Failure::Input(format!(
             "{} is a folder; a model file is expected{}",
@@ -50,12 +73,8 @@ pub(crate) fn load(path: &Path) -> Outcome<Loaded> {
             nearby(path)
         )));
     }
-    let loaded = modelmill_spec::load_file(path)
-        .map_err(|failure| Failure::Rendered(failure.render(terminal::errors_in_colour())))?;
-    if !loaded.warnings.is_empty() {
-        terminal::say(loaded.render(terminal::errors_in_colour()).trim_end());
-    }
-    Ok(loaded)
+    modelmill_spec::load_file_with(path, libraries())
+        .map_err(|failure| Failure::Rendered(failure.render(terminal::errors_in_colour())))
 }
 
 /// Reads and derives a model file.

@@ -424,7 +424,8 @@ fn with_free_names(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism)
         {
             continue;
         }
-        let free = (2..)
+        // More names are not taken than there are names.
+        let free = (2..taken.len() + 3)
             .map(|n| format!("{usual}_{n}"))
             .find(|name| !taken.contains(name.as_str()));
         match said {

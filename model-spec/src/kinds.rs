@@ -9,6 +9,7 @@ use crate::diagnostic::{Diagnostic, Log};
 use crate::document;
 use crate::exact::{ConstantIdx, Exact, PlaceQuantity, Symbol};
 use crate::finite;
+use crate::kind_mechanics::check_way;
 use crate::kind_terms::{factors, lacking_units};
 use crate::schema::{EffectKindEntry, LibraryEntry, ModelEntry};
 use crate::scope::Scope;
@@ -121,6 +122,19 @@ pub enum Mechanics {
     Tilt,
     /// A delay of the measured forces.
     Delay,
+}
+
+impl Mechanics {
+    /// What it does, for people, where other kinds have an expression.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Rod => "a rod along the drive, about its first point",
+            Self::Placement => "m times the moments at the point, less those at `moment_at`",
+            Self::Part => "mass, first moments and inertia of this part alone",
+            Self::Tilt => "gravity turned back by Rz(tz) Ry(ty) Rx(tx)",
+            Self::Delay => "forces of recordings are those of T before",
+        }
+    }
 }
 
 /// What the values of a search are relative to.
@@ -364,7 +378,7 @@ pub(crate) fn n_places(entry: &EffectKindEntry) -> Option<usize> {
     }
 }
 
-fn may_carry(entry: &EffectKindEntry, carries: Carries) -> bool {
+pub(crate) fn may_carry(entry: &EffectKindEntry, carries: Carries) -> bool {
     let mut places = entry.on.iter().flat_map(|on| &on.entries);
     places.any(|on| match on {
         PlaceKind::Drive | PlaceKind::Coordinate => {
@@ -427,156 +441,6 @@ pub(crate) fn check(entry: &EffectKindEntry, log: &mut Log) {
             )
             .label("expected units for `force`, `torque` or `point`, as `on` asks for")
             .help("for example `unit = { force = \"N s/m\", torque = \"N m s/rad\" }`"),
-        );
-    }
-}
-
-/// Checks what a kind adds: an expression at places that have one, or mechanics with their own symbols and places.
-/// False if it has mechanics or is faulty, so that there is no expression to check.
-fn check_way(entry: &EffectKindEntry, log: &mut Log) -> bool {
-    let name_span = entry.name.as_ref().map_or(entry.span, |name| name.span);
-    let mut places = entry.on.iter().flat_map(|on| &on.entries);
-    let Some(way) = entry.mechanics else {
-        let Some(expression) = &entry.expression else {
-            if !entry.faulty && !log.syntax_broken {
-                log.push(
-                    Diagnostic::error(name_span, "a kind of effect lacks `expression`")
-                        .label("expected what it adds")
-                        .help("for example `expression = \"Fv*rate\"`"),
-                );
-            }
-            return false;
-        };
-        let elsewhere = places
-            .find(|on| matches!(on, PlaceKind::Part | PlaceKind::Base | PlaceKind::Force))
-            .map(|on| acts_on(*on));
-        if let (Some(found), Some(on)) = (elsewhere, &entry.on) {
-            log.push(
-                Diagnostic::error(on.span, "an expression cannot act here")
-                    .label(format!("on {} there is nothing to add to", found.words()))
-                    .help("expressions act on a drive, a coordinate or a point"),
-            );
-            return false;
-        }
-        if entry.parameters.is_none() && !entry.faulty && !log.syntax_broken {
-            log.push(
-                Diagnostic::error(expression.ast.span, "this expression has no parameters")
-                    .label("expected `parameters` that identification can find")
-                    .help("for example `parameters = { Fv = { unit = \"N s/m\" } }`"),
-            );
-        }
-        return true;
-    };
-    if let Some(expression) = &entry.expression {
-        log.push(
-            Diagnostic::error(expression.ast.span, "this kind says twice what it does")
-                .label("expected either `expression` or `mechanics`"),
-        );
-    }
-    let (on, parameters, constants) = symbols_of(way);
-    if let Some(found) = &entry.on
-        && places.any(|place| *place != on)
-    {
-        log.push(
-            Diagnostic::error(found.span, "these mechanics act elsewhere")
-                .label(format!("expected only {}", acts_on(on).words())),
-        );
-    }
-    check_symbols(entry, "parameters", parameters, name_span, log);
-    check_symbols(entry, "constants", constants, name_span, log);
-    false
-}
-
-/// A symbol with its dimension.
-type Symbols = &'static [(&'static str, Dimension)];
-
-/// Where mechanics act, and the symbols of their parameters and constants.
-fn symbols_of(way: MechanicsName) -> (PlaceKind, Symbols, Symbols) {
-    const TILT: Symbols = &[
-        ("tx", Dimension::ONE),
-        ("ty", Dimension::ONE),
-        ("tz", Dimension::ONE),
-    ];
-    match way {
-        MechanicsName::Rod => (PlaceKind::Drive, ROD, &[]),
-        MechanicsName::Placement => (PlaceKind::Point, &[("m", Dimension::MASS)], &[]),
-        MechanicsName::Part => (PlaceKind::Part, PART, &[]),
-        MechanicsName::Tilt => (PlaceKind::Base, &[], TILT),
-        MechanicsName::Delay => (PlaceKind::Force, &[], &[("T", Dimension::TIME)]),
-    }
-}
-
-/// Moments of a rod's mass along itself, of second, first and no order.
-const ROD: Symbols = &[
-    ("Jr", Dimension::INERTIA),
-    ("Sr", Dimension::FIRST_MOMENT),
-    ("mr", Dimension::MASS),
-];
-
-/// Differences of a part: mass, first moment and inertia about its frame's origin.
-pub(crate) const PART: Symbols = &[
-    ("dm", Dimension::MASS),
-    ("dmx", Dimension::FIRST_MOMENT),
-    ("dmy", Dimension::FIRST_MOMENT),
-    ("dmz", Dimension::FIRST_MOMENT),
-    ("dJxx", Dimension::INERTIA),
-    ("dJxy", Dimension::INERTIA),
-    ("dJxz", Dimension::INERTIA),
-    ("dJyy", Dimension::INERTIA),
-    ("dJyz", Dimension::INERTIA),
-    ("dJzz", Dimension::INERTIA),
-];
-
-/// Holds the symbols of a kind with mechanics against those that the mechanics have.
-fn check_symbols(
-    entry: &EffectKindEntry,
-    what: &str,
-    expected: Symbols,
-    name_span: crate::Span,
-    log: &mut Log,
-) {
-    let found: Vec<(&document::Key, Option<&UnitByPlace>)> = if what == "parameters" {
-        let entries = entry.parameters.iter().flat_map(|table| &table.entries);
-        entries.map(|(key, one)| (key, one.unit.as_ref())).collect()
-    } else {
-        let entries = entry.constants.iter().flat_map(|table| &table.entries);
-        entries.map(|(key, one)| (key, one.unit.as_ref())).collect()
-    };
-    let names: Vec<&str> = expected.iter().map(|(name, _)| *name).collect();
-    for (key, units) in &found {
-        let Some((_, dimension)) = expected.iter().find(|(name, _)| *name == key.name) else {
-            log.push(
-                Diagnostic::error(key.span, format!("these mechanics know no `{}`", key.name))
-                    .label(if names.is_empty() {
-                        format!("they have no {what}")
-                    } else {
-                        format!("expected {}", names.join(", "))
-                    }),
-            );
-            continue;
-        };
-        let unit = units.and_then(|units| {
-            Carries::ALL
-                .into_iter()
-                .filter(|carries| may_carry(entry, *carries))
-                .find_map(|carries| carries.unit(units))
-        });
-        if unit.is_none_or(|unit| unit.dimension != *dimension) {
-            log.push(
-                Diagnostic::error(key.span, format!("the unit of `{}` does not fit", key.name))
-                    .label(format!("expected {}", dimension.describe()))
-                    .help(format!("write `unit = \"{dimension}\"`")),
-            );
-        }
-    }
-    let lacking: Vec<&str> = names
-        .into_iter()
-        .filter(|name| !found.iter().any(|(key, _)| key.name == *name))
-        .collect();
-    if !lacking.is_empty() && !entry.faulty {
-        log.push(
-            Diagnostic::error(name_span, format!("these mechanics lack {what}"))
-                .label(format!("expected {}", lacking.join(", "))),
         );
     }
 }

@@ -15,6 +15,7 @@ mod exact;
 mod exact_tests;
 mod finite;
 mod formula;
+mod kind_mechanics;
 mod kind_terms;
 mod kinds;
 mod kinematics;
@@ -45,7 +46,9 @@ pub use kinds::{
     ActsOn, Carries, EffectKind, KindConstant, KindParameter, LIBRARY, Mechanics, Scale, Search,
     Sign, library,
 };
-pub use load::{Failure, Loaded, load, load_file, load_file_with, load_with, read_limited};
+pub use load::{
+    Failure, Loaded, kinds_with, load, load_file, load_file_with, load_with, read_limited,
+};
 pub use mechanism::*;
 pub use motion::{Kinematics, Poses};
 pub use unit::unit_product;

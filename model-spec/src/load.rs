@@ -216,6 +216,30 @@ pub fn load_with(
     })
 }
 
+/// The kinds of effects of the program's library and of further ones.
+///
+/// Fails with every finding about those, each with its place.
+pub fn kinds_with(
+    libraries: &[PathBuf],
+    read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
+) -> Result<Vec<EffectKind>, Failure> {
+    let mut log = Log::default();
+    let mut sources = Sources::default();
+    let named: Vec<NamedPath> = libraries.iter().map(|path| (path.clone(), None)).collect();
+    let own = read_libraries(&named, read, &mut sources, &mut log);
+    for entry in &own {
+        kinds::check(entry, &mut log);
+    }
+    if log.n_errors() > 0 {
+        return Err(Failure {
+            diagnostics: log.finish(),
+            sources,
+        });
+    }
+    let own = own.iter().map(|entry| kinds::describe(entry, true));
+    Ok(kinds::library().into_iter().chain(own).collect())
+}
+
 /// Reads a file and those that it extends, and merges them, the variant over its base.
 fn read_chain(
     path_name: &str,

@@ -160,6 +160,13 @@ impl Work<'_> {
                 continue;
             };
             let is_parameter = |symbol: &str| known.parameters.iter().any(|p| p.symbol == symbol);
+            // A model's parameters are linear: moments of the rod's mass about its pivot.
+            let values = match effect.law {
+                modelmill_rig::Law::RodInertia { m, c, I } => {
+                    vec![("Jr", I + m * c * c), ("Sr", m * c), ("mr", m)]
+                }
+                _ => values,
+            };
             let (parameters, constants) = values
                 .into_iter()
                 .map(|(symbol, value)| (symbol.to_owned(), value))

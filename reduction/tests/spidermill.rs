@@ -84,9 +84,32 @@ fn the_base_parameters_are_those_of_the_bundled_model() {
 /// Forces of the reduced model beside those of the full robot: nothing is lost but rounding.
 #[test]
 fn the_forces_are_those_of_the_whole_robot() {
-    let rig = rig();
-    let derivation = derived(&reduced().model);
-    let mut tracker = Tracker::new(&rig).expect("a pose");
+    let reduced = reduced();
+    holds_the_forces(&rig(), &reduced);
+}
+
+/// Rods of a rig are moments of their mass in a model; coupled drives go over as they are.
+#[test]
+fn rods_and_coupled_drives_go_over() {
+    let mut rig = rig();
+    let drives = ["spindle_left", "spindle_right"];
+    for (kind, values) in [
+        ("rod_inertia", [("m", 8.0), ("c", 0.45), ("I", 0.54)]),
+        ("coupled_drive", [("Ia", 2.0), ("Fv", 20.0), ("Fs", 15.0)]),
+    ] {
+        let effect = rig.effect(kind, &drives, &values);
+        rig.effects
+            .push(effect.unwrap_or_else(|faults| panic!("{}", faults[0])));
+    }
+    let plan = plan_file(&workspace("model-spec/rigs/spidermill-plan.toml"))
+        .unwrap_or_else(|f| panic!("{f}"));
+    let reduced = reduce(&rig, &plan).unwrap_or_else(|failure| panic!("{failure}"));
+    holds_the_forces(&rig, &reduced);
+}
+
+fn holds_the_forces(rig: &Rig, reduced: &Reduction) {
+    let derivation = derived(&reduced.model);
+    let mut tracker = Tracker::new(rig).expect("a pose");
     let mut columns = vec![Vec::new(); 6];
     let mut expected = vec![Vec::new(); 2];
     for i in 0..60 {
@@ -99,7 +122,7 @@ fn the_forces_are_those_of_the_whole_robot() {
             qd: vec![wave(1.9), wave(2.3)],
             qdd: vec![5.0 * wave(2.9), 5.0 * wave(3.1)],
         };
-        let found = forces(&rig, &tracker.follow(&state).expect("a pose")).expect("forces");
+        let found = forces(rig, &tracker.follow(&state).expect("a pose")).expect("forces");
         for d in 0..2 {
             expected[d].push(found[d]);
             columns[d].push(state.q[d]);

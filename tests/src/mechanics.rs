@@ -513,7 +513,7 @@ fn add_rod(
     gravity: &Vector3<f64>,
 ) {
     // Particles at -1, 0 and 1 m have the moments m0 + m1 + m2, m2 - m0 and m2 + m0.
-    let outer = [(second - first) / 2.0, (second + first) / 2.0];
+    let outer = [0.5 * (second - first), 0.5 * (second + first)];
     for (at, particle) in [(-1.0, outer[0]), (0.0, mass - second), (1.0, outer[1])] {
         let place = |[a, b]: [[Jet; 3]; 2]| -> [Jet; 3] {
             let d: [Jet; 3] = std::array::from_fn(|i| b[i] - a[i]);

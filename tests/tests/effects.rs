@@ -71,6 +71,10 @@ fn rig_forces(rig: &Rig, states: &[State]) -> Vec<Vec<f64>> {
     columns
 }
 
+fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
+    columns.iter().map(Vec::as_slice).collect()
+}
+
 /// Forces of the model by its reduced regressor, with nominal values.
 fn model_forces(mechanism: &Mechanism, states: &[State], load: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let n = states[0].q.len();
@@ -80,9 +84,6 @@ fn model_forces(mechanism: &Mechanism, states: &[State], load: &[Vec<f64>]) -> V
             .collect()
     };
     let (q, qd, qdd) = (column(|s| &s.q), column(|s| &s.qd), column(|s| &s.qdd));
-    fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
-        columns.iter().map(Vec::as_slice).collect()
-    }
     let derivation = derive(mechanism);
     let evaluator = Evaluator::new(&derivation);
     let states = States {

@@ -15,7 +15,7 @@ use crate::terminal;
 pub(crate) fn run(args: &CheckArgs) -> Outcome {
     if args.json && args.model.is_file() {
         // What is wrong goes to standard output as well, for editors.
-        if let Err(failure) = modelmill_spec::load_file(&args.model) {
+        if let Err(failure) = modelmill_spec::load_file_with(&args.model, model::libraries()) {
             terminal::print_json(&json!({
                 "valid": false,
                 "diagnostics": diagnostics(&failure.diagnostics, &failure.sources),

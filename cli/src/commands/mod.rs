@@ -1,10 +1,12 @@
 //! One file per command.
 
+pub(crate) mod add;
 pub(crate) mod check;
 pub(crate) mod compare;
 pub(crate) mod completions;
 pub(crate) mod diagnose;
 pub(crate) mod diff;
+pub(crate) mod effects;
 pub(crate) mod equations;
 pub(crate) mod evaluate;
 pub(crate) mod excite;

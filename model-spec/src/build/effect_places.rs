@@ -141,7 +141,8 @@ pub(super) fn common_load(
             fine = false;
             continue;
         }
-        if !lacking_units(kind, carries).is_empty() {
+        // What mechanics need of their places is checked with them.
+        if kind.mechanics.is_none() && !lacking_units(kind, carries).is_empty() {
             log.push(
                 Diagnostic::error(name.span, format!("`{kind_name}` cannot act here"))
                     .label(match carries {

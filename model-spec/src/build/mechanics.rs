@@ -7,7 +7,7 @@ use crate::build::effect_places::Scene;
 use crate::build::symbols::Symbols;
 use crate::diagnostic::{Diagnostic, Log};
 use crate::exact::{ConstantIdx, Exact, Function, Symbol};
-use crate::kinds::PART;
+use crate::kind_mechanics::PART;
 use crate::mechanism::{
     Action, Constant, DriveKind, Effect, EffectTerm, Inertial, LumpedMass, Part, Place,
 };
