@@ -135,20 +135,28 @@ pub fn repeats(
     if periods < 2 || phases < 2 {
         return None;
     }
+    // Samples of different periods seldom have the same phase, so forces are interpolated between neighbours; that
+    // lowers their noise, which is allowed for as if it were white. Where neighbours are missing a phase says nothing.
+    let mut places = Vec::with_capacity(phases);
+    for phase in 0..phases {
+        let all = (0..periods).map(|k| {
+            let t = start + period * (k as f64 + phase as f64 / phases as f64);
+            between(time, t, 1.5 * step)
+        });
+        places.extend(all.collect::<Option<Vec<_>>>());
+    }
     let spread = |force: &[f64]| {
-        let (mut error, mut size) = (0.0, 0.0);
-        for phase in 0..phases {
-            let at = |k: usize| {
-                let t = start + period * (k as f64 + phase as f64 / phases as f64);
-                force[nearest(time, t)]
-            };
-            let mean = (0..periods).map(at).sum::<f64>() / periods as f64;
-            for k in 0..periods {
-                error += (at(k) - mean).powi(2) / (periods - 1) as f64;
-                size += at(k).powi(2) / periods as f64;
-            }
+        let (mut error, mut noise, mut size) = (0.0, 0.0, 0.0);
+        for place in &places {
+            let at = |(i, part): &(usize, f64)| (1.0 - part) * force[*i] + part * force[*i + 1];
+            let mean = place.iter().map(at).sum::<f64>() / periods as f64;
+            let lowered = |(_, part): &(usize, f64)| (1.0 - part).powi(2) + part.powi(2);
+            noise += place.iter().map(lowered).sum::<f64>() * (1.0 - 1.0 / periods as f64);
+            error += place.iter().map(|p| (at(p) - mean).powi(2)).sum::<f64>();
+            size += place.iter().map(|p| at(p).powi(2)).sum::<f64>();
         }
-        (error, size)
+        let values = (places.len() * periods) as f64;
+        (error / noise, size / values)
     };
     let sums: Vec<(f64, f64)> = forces.iter().map(|force| spread(force)).collect();
     let ratio = |(error, size): (f64, f64)| (size > 0.0).then(|| (error / size).sqrt());
@@ -184,15 +192,13 @@ fn variance(values: &[f64]) -> f64 {
     values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n
 }
 
-/// Index of the sample whose time is nearest.
-fn nearest(time: &[f64], at: f64) -> usize {
-    let after = time.partition_point(|t| *t < at);
-    match after {
-        0 => 0,
-        after if after == time.len() => after - 1,
-        after if time[after] - at < at - time[after - 1] => after,
-        after => after - 1,
-    }
+/// The sample before a time and the part of the way to the next one; `None` where these are more than `apart` from each
+/// other. Beyond the ends the first and the last pair go on for half as long.
+fn between(time: &[f64], at: f64, apart: f64) -> Option<(usize, f64)> {
+    let after = time.partition_point(|t| *t < at).clamp(1, time.len() - 1);
+    let (t0, t1) = (time[after - 1], time[after]);
+    let is_near = t1 - t0 <= apart && at >= t0 - 0.5 * apart && at <= t1 + 0.5 * apart;
+    is_near.then(|| (after - 1, ((at - t0) / (t1 - t0)).clamp(0.0, 1.0)))
 }
 
 fn interpolate(time: &[f64], values: &[f64], at: f64) -> f64 {

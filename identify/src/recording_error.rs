@@ -377,9 +377,13 @@ impl fmt::Display for Fault {
                 if text.is_empty() {
                     write!(f, "column `{column}` is empty where a number is expected")?;
                 } else {
+                    let expected = match text.parse::<f64>() {
+                        Ok(value) if value.is_finite() => "a number that was measured",
+                        _ => "a finite number",
+                    };
                     write!(
                         f,
-                        "column `{column}` holds `{text}` where a finite number is expected"
+                        "column `{column}` holds `{text}` where {expected} is expected"
                     )?;
                 }
                 others(f, *count, "fields of the column are not finite or empty")?;

@@ -1,6 +1,6 @@
 //! What a prepared run tells of itself: periods and the spread of its forces over them, and standstill.
 
-use crate::notes::{Note, count_of};
+use crate::notes::{Note, count_of, short};
 use crate::periods;
 use crate::recording::Recording;
 use crate::recording_error::list;
@@ -9,19 +9,20 @@ use crate::series::Periodic;
 use crate::smoothing::Recorded;
 
 impl Recording {
-    /// Looks for a period, over which the spread of the forces is the noise floor.
+    /// Looks for a period, unless that of the motion's series is known; the spread of the forces over it is the noise floor.
     pub(crate) fn note_repeats(&self, columns: &[Recorded<'_>], drives: &[String], run: &mut Run) {
         let positions: Vec<&[f64]> = columns.iter().map(|column| column.q).collect();
         let Some(forces) = &run.force else { return };
-        let Some(period) = periods::find_period(&run.time, &positions) else {
-            return;
-        };
+        let known = run.prepared.period;
+        let period = known.or_else(|| periods::find_period(&run.time, &positions));
+        let Some(period) = period else { return };
         run.repeats = periods::repeats(&run.time, period, drives, forces);
         if let Some(repeats) = &run.repeats {
             run.notes.push(Note::info(format!(
-                "The motion in {} repeats itself every {period:.6} s, {} times in all; over these periods the forces spread \
+                "The motion in {} repeats itself every {} s, {} times in all; over these periods the forces spread \
                  by {:.3} % of their size, the noise floor.",
                 self.file(),
+                short(period),
                 repeats.periods,
                 100.0 * repeats.noise_floor
             )));
@@ -36,11 +37,11 @@ impl Recording {
             format!("{noise:.2e} of `{}{derivative}`", column.name)
         });
         format!(
-            "Derivatives of {} in {} are those of a Fourier series of period {:.6} s with {}, since it leaves nothing but \
+            "Derivatives of {} in {} are those of a Fourier series of period {} s with {}, since it leaves nothing but \
              white noise: {} (RMS). `--smoothing butterworth` filters instead.",
             list(&names),
             self.file(),
-            found.period,
+            short(found.period),
             count_of(found.harmonics, "harmonic", "harmonics"),
             left.collect::<Vec<_>>().join(", ")
         )
