@@ -1,6 +1,6 @@
 //! Which way of smoothing suits a recording, and states by it: columns go in, positions with both derivatives come out.
 
-use crate::cutoff::{Signal, choose_cutoff};
+use crate::cutoff::{LONGEST_TRIM, Signal, TRIMMED_PERIODS, choose_cutoff};
 use crate::derivatives::{Preparation, Smoothing, mean_rate};
 use crate::filters::LowPass;
 use crate::local_polynomials;
@@ -86,6 +86,15 @@ impl Recording {
                 let positions: Vec<&[f64]> = columns.iter().map(|c| c.q).collect();
                 let period = period.or_else(|| periods::find_period(time, &positions));
                 let period = period.ok_or_else(|| self.fault(Fault::NoPeriod))?;
+                let duration = time[time.len() - 1] - time[0];
+                let (shortest, longest) = (4.0 / rate, 1.5 * duration);
+                if !(shortest..longest).contains(&period) {
+                    return Err(self.fault(Fault::Period {
+                        period,
+                        shortest,
+                        longest,
+                    }));
+                }
                 let harmonics = periods::count(cutoff * period).max(1);
                 Way::Series { period, harmonics }
             }
@@ -109,7 +118,11 @@ impl Recording {
                 way.says(cutoff, prepared.cutoff_chosen),
             )));
         }
-        self.smoothed(time, columns, cutoff, way)
+        let states = self.smoothed(time, columns, cutoff, way)?;
+        if found.is_none() && matches!(way, Way::Series { .. }) {
+            self.note_left_over(columns, &states, notes);
+        }
+        Ok(states)
     }
 
     /// All columns smoothed and differentiated in one way.
@@ -149,8 +162,8 @@ impl Recording {
         preparation: &Preparation,
         notes: &mut Vec<Note>,
     ) -> (usize, usize) {
-        let most = samples / 6;
-        let spoilt = (1..most).find(|count| *count as f64 >= 3.0 * period);
+        let most = periods::count(samples as f64 / LONGEST_TRIM);
+        let spoilt = (1..most).find(|count| *count as f64 >= TRIMMED_PERIODS * period);
         if spoilt.is_none() && preparation.trim.is_none() {
             notes.push(Note::warning(format!(
                 "{} is short for its cut-off: the filter's transients reach beyond the samples dropped at the ends; \

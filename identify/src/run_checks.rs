@@ -8,6 +8,9 @@ use crate::run::Run;
 use crate::series::Periodic;
 use crate::smoothing::Recorded;
 
+/// A series that leaves more of a motion than this part is not its series.
+const LEFT_OVER: f64 = 1e-2;
+
 impl Recording {
     /// Looks for a period, unless that of the motion's series is known; the spread of the forces over it is the noise floor.
     pub(crate) fn note_repeats(&self, columns: &[Recorded<'_>], drives: &[String], run: &mut Run) {
@@ -45,6 +48,29 @@ impl Recording {
             count_of(found.harmonics, "harmonic", "harmonics"),
             left.collect::<Vec<_>>().join(", ")
         )
+    }
+
+    /// Says what a series that was asked for leaves of the motion, where that is too much.
+    pub(crate) fn note_left_over(
+        &self,
+        columns: &[Recorded<'_>],
+        states: &[[Vec<f64>; 3]],
+        notes: &mut Vec<Note>,
+    ) {
+        for (column, [q, ..]) in columns.iter().zip(states) {
+            let mean = column.q.iter().sum::<f64>() / column.q.len() as f64;
+            let size: f64 = column.q.iter().map(|v| (v - mean).powi(2)).sum();
+            let left: f64 = column.q.iter().zip(q).map(|(a, b)| (a - b).powi(2)).sum();
+            if left > LEFT_OVER.powi(2) * size {
+                notes.push(Note::warning(format!(
+                    "The Fourier series leaves {:.1} % of the motion of `{}` in {} (RMS): it has another period, or none; \
+                     take another smoothing.",
+                    100.0 * (left / size).sqrt(),
+                    column.name,
+                    self.file()
+                )));
+            }
+        }
     }
 
     /// Says which coordinates stand still, for how much of the time.
