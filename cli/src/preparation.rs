@@ -37,7 +37,7 @@ pub(crate) struct PreparationArgs {
     /// How positions are smoothed and differentiated
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) smoothing: SmoothingArg,
-    /// Period of the motion for `--smoothing fourier`, s; found from the positions if not given
+    /// Period of the motion, s, for `--smoothing fourier`, which it asks for; found from the positions if not given
     #[arg(long, value_name = "S", value_parser = parse_period)]
     pub(crate) period: Option<f64>,
     /// Leave out samples with NaN, infinite or empty fields instead of refusing the recording
@@ -100,7 +100,10 @@ impl PreparationArgs {
                 DerivativesArg::Positions => Source::Positions,
             },
             smoothing: match self.smoothing {
-                SmoothingArg::Auto => Smoothing::Automatic,
+                SmoothingArg::Auto => match self.period {
+                    None => Smoothing::Automatic,
+                    period => Smoothing::Fourier { period },
+                },
                 SmoothingArg::Butterworth => Smoothing::Butterworth,
                 SmoothingArg::SavitzkyGolay => Smoothing::SavitzkyGolay,
                 SmoothingArg::Fourier => Smoothing::Fourier {

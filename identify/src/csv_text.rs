@@ -123,8 +123,7 @@ fn parse(bytes: &[u8]) -> Field {
         .ok()
         .and_then(|text| text.parse::<f64>().ok())
     {
-        Some(number) if number.is_finite() => Field::Number(number),
-        Some(_) => Field::NotFinite,
+        Some(number) => Field::of(number),
         None => Field::Text,
     }
 }

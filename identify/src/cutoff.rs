@@ -5,7 +5,7 @@
 //! Butterworth's filter run both ways and central differences. What counts as signal, how coordinates are weighed, and
 //! the search are our own.
 
-use std::f64::consts::{LN_2, PI, TAU};
+use std::f64::consts::{LN_2, LN_10, PI, TAU};
 
 use crate::spectrum::hann_power;
 
@@ -14,6 +14,10 @@ use crate::spectrum::hann_power;
 const ABOVE_NOISE: f64 = 4.0;
 /// Relative width of a band.
 const BAND: f64 = 0.15;
+/// Periods of the cut-off that are dropped at each end for the transients, which reach 0.1 % there.
+pub(crate) const TRIMMED_PERIODS: f64 = 3.0;
+/// At most one sample in so many is dropped at each end.
+pub(crate) const LONGEST_TRIM: f64 = 6.0;
 /// Cut-offs tried.
 const STEPS: u32 = 128;
 
@@ -32,8 +36,8 @@ pub struct Signal<'a> {
 /// The spectrum of the differences is signal plus noise. White noise of the measured values has the known shape
 /// `(2 rate sin(pi f/rate))^(2 times)` there; its level is the median over the upper quarter of the band, so that
 /// quantisation counts as the noise it is. Motion is what stands above it on the average over bands, for single lines
-/// far up are seldom motion, and their share in the acceleration is huge. A cut-off then costs the signal it takes and
-/// the noise it leaves. The error of a coordinate is bounded by its size, so that one which hardly moves does not decide
+/// far up are seldom motion, and their share in the acceleration is huge. A cut-off then costs the signal it takes,
+/// the noise it leaves, and what the transients at the ends of a short recording spoil. The error of a coordinate is bounded by its size, so that one which hardly moves does not decide
 /// for the others.
 ///
 /// A low cut-off loses more samples at the ends, so the highest one is returned whose expected error is within a quarter
@@ -56,7 +60,10 @@ pub fn choose_cutoff(signals: &[Signal<'_>], rate_hz: f64, order: usize) -> Opti
     let costs: Vec<(f64, f64)> = (0..=STEPS)
         .map(|i| lowest * (highest / lowest).powf(f64::from(i) / f64::from(STEPS)))
         .map(|cutoff| {
-            let errors = spectra.iter().map(|s| s.relative_error(cutoff, order));
+            let transient = transients(cutoff / rate_hz, samples);
+            let errors = spectra
+                .iter()
+                .map(|s| s.relative_error(cutoff, order, transient));
             (cutoff, errors.sum())
         })
         .collect();
@@ -70,6 +77,15 @@ pub fn choose_cutoff(signals: &[Signal<'_>], rate_hz: f64, order: usize) -> Opti
         .filter(|(_, cost)| *cost <= bearable)
         .map(|(cutoff, _)| cutoff)
         .reduce(f64::max)
+}
+
+/// What transients at both ends leave in the samples that are kept, relative to the square of the acceleration, for a
+/// cut-off in parts of the sampling rate: three periods of it are dropped, or what a short recording can spare, and the
+/// transient falls tenfold in each.
+fn transients(cutoff: f64, samples: usize) -> f64 {
+    let periods = cutoff * samples as f64;
+    let dropped = (periods / LONGEST_TRIM).min(TRIMMED_PERIODS);
+    10.0_f64.powf(-2.0 * dropped) / (LN_10 * (periods - 2.0 * dropped))
 }
 
 /// Power of an acceleration over frequency, split into motion and noise.
@@ -133,7 +149,7 @@ impl Spectrum {
     }
 
     /// Expected square error of the filtered acceleration, relative to the square of its size plus that error.
-    fn relative_error(&self, cutoff_hz: f64, order: usize) -> f64 {
+    fn relative_error(&self, cutoff_hz: f64, order: usize, transient: f64) -> f64 {
         let bins = self.motion.len();
         let warped = (PI * cutoff_hz / self.rate_hz).tan();
         let power = 2 * i32::try_from(order).unwrap_or(i32::MAX / 2);
@@ -149,6 +165,7 @@ impl Spectrum {
             error += (1.0 - gain).powi(2) * motion + left;
             size += motion;
         }
+        error += transient * size;
         error / (error + size)
     }
 }

@@ -7,12 +7,26 @@ use crate::notes::{Note, count_of};
 use crate::recording::{Column, Computed, Defect, NotFinite, ReadOptions, Recording, missing};
 use crate::recording_error::Fault;
 
+/// No quantity that is measured in SI units comes near this, and squares of smaller numbers do not overflow.
+pub(crate) const LARGEST: f64 = 1e100;
+
 /// One field of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Field {
     Number(f64),
     NotFinite,
     Text,
+}
+
+impl Field {
+    /// A number, unless it is none that can be computed with.
+    pub(crate) fn of(value: f64) -> Self {
+        if value.abs() <= LARGEST {
+            Self::Number(value)
+        } else {
+            Self::NotFinite
+        }
+    }
 }
 
 /// Whether more samples are wanted.

@@ -45,6 +45,7 @@ pub mod numeric_rank;
 mod parquet_file;
 pub mod periods;
 pub mod physical;
+mod preparing;
 pub mod prior;
 mod recording;
 mod recording_checks;

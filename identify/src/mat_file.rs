@@ -45,14 +45,8 @@ pub(crate) fn read(
     let mut sample = Vec::new();
     for k in 0..samples {
         sample.clear();
-        sample.extend(columns.sound.iter().map(|(_, values)| {
-            let value = values[k];
-            if value.is_finite() {
-                Field::Number(value)
-            } else {
-                Field::NotFinite
-            }
-        }));
+        let numbers = columns.sound.iter().map(|(_, values)| values[k]);
+        sample.extend(numbers.map(Field::of));
         let text = |place: usize| columns.sound[place].1[k].to_string();
         if intake.take(k as u64 + 1, &sample, &text)? == Flow::Stop {
             break;

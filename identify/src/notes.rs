@@ -49,6 +49,16 @@ pub(crate) fn count_of(n: usize, one: &str, many: &str) -> String {
     }
 }
 
+/// Seven significant digits, and powers of ten where a plain number would be long.
+pub(crate) fn short(value: f64) -> String {
+    let rounded: f64 = format!("{value:.6e}").parse().unwrap_or(value);
+    if rounded != 0.0 && !(1e-4..1e7).contains(&rounded.abs()) {
+        format!("{rounded:e}")
+    } else {
+        rounded.to_string()
+    }
+}
+
 /// The candidate that is spelt most like `wanted`, if any comes close enough to be a likely slip.
 pub(crate) fn nearest<'a>(
     wanted: &str,

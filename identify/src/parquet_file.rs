@@ -159,10 +159,10 @@ fn batch(column: &mut ColumnReader, kind: &mut Kind, n: usize) -> Result<Vec<Fie
             Field::Number(f64::from(u8::from(*value)))
         }),
         ColumnReader::Int32ColumnReader(reader) => {
-            values(reader, n, |value| number(kind.whole(i64::from(*value))))
+            values(reader, n, |value| Field::of(kind.whole(i64::from(*value))))
         }
         ColumnReader::Int64ColumnReader(reader) => {
-            values(reader, n, |value| number(kind.whole(*value)))
+            values(reader, n, |value| Field::of(kind.whole(*value)))
         }
         ColumnReader::Int96ColumnReader(reader) => {
             let mut ticks = Kind::Ticks {
@@ -172,24 +172,16 @@ fn batch(column: &mut ColumnReader, kind: &mut Kind, n: usize) -> Result<Vec<Fie
                     _ => None,
                 },
             };
-            let fields = values(reader, n, |value| number(ticks.whole(value.to_nanos())));
+            let fields = values(reader, n, |value| Field::of(ticks.whole(value.to_nanos())));
             *kind = ticks;
             fields
         }
         ColumnReader::FloatColumnReader(reader) => {
-            values(reader, n, |value| number(f64::from(*value)))
+            values(reader, n, |value| Field::of(f64::from(*value)))
         }
-        ColumnReader::DoubleColumnReader(reader) => values(reader, n, |value| number(*value)),
+        ColumnReader::DoubleColumnReader(reader) => values(reader, n, |value| Field::of(*value)),
         ColumnReader::ByteArrayColumnReader(reader) => values(reader, n, |_| Field::Text),
         ColumnReader::FixedLenByteArrayColumnReader(reader) => values(reader, n, |_| Field::Text),
-    }
-}
-
-fn number(value: f64) -> Field {
-    if value.is_finite() {
-        Field::Number(value)
-    } else {
-        Field::NotFinite
     }
 }
 

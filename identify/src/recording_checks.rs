@@ -19,6 +19,8 @@ const RATIO_TOLERANCE: f64 = 0.1;
 const MISFIT: f64 = 0.3;
 /// No drive is sampled as slowly as this, s.
 const SLOWEST: f64 = 0.5;
+/// Nobody samples forces of a machine in shorter steps, s.
+const FASTEST: f64 = 2e-6;
 
 /// Middle of some numbers; zero for none.
 pub(crate) fn median(mut values: Vec<f64>) -> f64 {
@@ -69,10 +71,18 @@ impl Recording {
             self.rates(coordinates, time)
         };
         let step = median(time.windows(2).map(|w| w[1] - w[0]).collect());
+        if step <= FASTEST {
+            notes.push(Note::warning(format!(
+                "The steps of `t` in {} are {} s, which is fast for a recording of forces; time must be in s.",
+                self.file(),
+                short(step)
+            )));
+        }
         if step >= SLOWEST && rates.is_empty() && !settled {
             notes.push(Note::warning(format!(
-                "The steps of `t` in {} are {step} s, which is slow for a recording of forces; time must be in s: is it in ms?",
-                self.file()
+                "The steps of `t` in {} are {} s, which is slow for a recording of forces; time must be in s: is it in ms?",
+                self.file(),
+                short(step)
             )));
         }
         notes.extend(rates);

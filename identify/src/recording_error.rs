@@ -156,6 +156,15 @@ pub enum Fault {
     },
     /// A Fourier series was asked for, but the motion has no period that could be found.
     NoPeriod,
+    /// The period asked for is too short for the samples, or too long for the recording.
+    Period {
+        /// The period, s.
+        period: f64,
+        /// The shortest that samples can show, s.
+        shortest: f64,
+        /// The longest that the recording can show, s.
+        longest: f64,
+    },
     /// The cut-off's period is longer than the recording.
     CutoffTooLow {
         /// The cut-off, Hz.
@@ -377,9 +386,13 @@ impl fmt::Display for Fault {
                 if text.is_empty() {
                     write!(f, "column `{column}` is empty where a number is expected")?;
                 } else {
+                    let expected = match text.parse::<f64>() {
+                        Ok(value) if value.is_finite() => "a number that was measured",
+                        _ => "a finite number",
+                    };
                     write!(
                         f,
-                        "column `{column}` holds `{text}` where a finite number is expected"
+                        "column `{column}` holds `{text}` where {expected} is expected"
                     )?;
                 }
                 others(f, *count, "fields of the column are not finite or empty")?;
@@ -418,6 +431,15 @@ impl fmt::Display for Fault {
             Self::NoPeriod => f.write_str(
                 "the motion does not repeat itself within the recording, so no period can be found; give it with \
                  `--period S`, or take another smoothing",
+            ),
+            Self::Period {
+                period,
+                shortest,
+                longest,
+            } => write!(
+                f,
+                "a period of {period} s was asked for, but this recording can show periods from {shortest:.6} s to \
+                 {longest:.6} s only; choose one of them, or another smoothing"
             ),
             Self::CutoffTooLow {
                 cutoff_hz,

@@ -1,6 +1,6 @@
 //! What a prepared run tells of itself: periods and the spread of its forces over them, and standstill.
 
-use crate::notes::{Note, count_of};
+use crate::notes::{Note, count_of, short};
 use crate::periods;
 use crate::recording::Recording;
 use crate::recording_error::list;
@@ -8,20 +8,24 @@ use crate::run::Run;
 use crate::series::Periodic;
 use crate::smoothing::Recorded;
 
+/// A series that leaves more of a motion than this part is not its series.
+const LEFT_OVER: f64 = 1e-2;
+
 impl Recording {
-    /// Looks for a period, over which the spread of the forces is the noise floor.
+    /// Looks for a period, unless that of the motion's series is known; the spread of the forces over it is the noise floor.
     pub(crate) fn note_repeats(&self, columns: &[Recorded<'_>], drives: &[String], run: &mut Run) {
         let positions: Vec<&[f64]> = columns.iter().map(|column| column.q).collect();
         let Some(forces) = &run.force else { return };
-        let Some(period) = periods::find_period(&run.time, &positions) else {
-            return;
-        };
+        let known = run.prepared.period;
+        let period = known.or_else(|| periods::find_period(&run.time, &positions));
+        let Some(period) = period else { return };
         run.repeats = periods::repeats(&run.time, period, drives, forces);
         if let Some(repeats) = &run.repeats {
             run.notes.push(Note::info(format!(
-                "The motion in {} repeats itself every {period:.6} s, {} times in all; over these periods the forces spread \
+                "The motion in {} repeats itself every {} s, {} times in all; over these periods the forces spread \
                  by {:.3} % of their size, the noise floor.",
                 self.file(),
+                short(period),
                 repeats.periods,
                 100.0 * repeats.noise_floor
             )));
@@ -36,14 +40,37 @@ impl Recording {
             format!("{noise:.2e} of `{}{derivative}`", column.name)
         });
         format!(
-            "Derivatives of {} in {} are those of a Fourier series of period {:.6} s with {}, since it leaves nothing but \
+            "Derivatives of {} in {} are those of a Fourier series of period {} s with {}, since it leaves nothing but \
              white noise: {} (RMS). `--smoothing butterworth` filters instead.",
             list(&names),
             self.file(),
-            found.period,
+            short(found.period),
             count_of(found.harmonics, "harmonic", "harmonics"),
             left.collect::<Vec<_>>().join(", ")
         )
+    }
+
+    /// Says what a series that was asked for leaves of the motion, where that is too much.
+    pub(crate) fn note_left_over(
+        &self,
+        columns: &[Recorded<'_>],
+        states: &[[Vec<f64>; 3]],
+        notes: &mut Vec<Note>,
+    ) {
+        for (column, [q, ..]) in columns.iter().zip(states) {
+            let mean = column.q.iter().sum::<f64>() / column.q.len() as f64;
+            let size: f64 = column.q.iter().map(|v| (v - mean).powi(2)).sum();
+            let left: f64 = column.q.iter().zip(q).map(|(a, b)| (a - b).powi(2)).sum();
+            if left > LEFT_OVER.powi(2) * size {
+                notes.push(Note::warning(format!(
+                    "The Fourier series leaves {:.1} % of the motion of `{}` in {} (RMS): it has another period, or none; \
+                     take another smoothing.",
+                    100.0 * (left / size).sqrt(),
+                    column.name,
+                    self.file()
+                )));
+            }
+        }
     }
 
     /// Says which coordinates stand still, for how much of the time.

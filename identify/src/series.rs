@@ -16,6 +16,8 @@ use crate::spectrum::hann_power;
 
 /// Harmonics that a motion is searched for at most.
 const MOST_HARMONICS: usize = 100;
+/// Samples of a long run in which harmonics are counted first.
+const BEGINNING: usize = 1 << 16;
 /// A line stands out when its power is so many times what noise has on the average: chance lifts one in three million.
 const STANDS_OUT: f64 = 15.0;
 
@@ -233,26 +235,42 @@ fn closes(values: &[f64]) -> bool {
 
 /// The period near the one given, and as many harmonics as stand out, if they leave nothing but noise.
 fn settle(time: &[f64], signals: &[&[f64]], mut period: f64, longest: f64) -> Option<(f64, usize)> {
-    let step = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
+    let n = time.len();
+    let step = (time[n - 1] - time[0]) / (n - 1) as f64;
     let most = count(0.2 * period / step).min(MOST_HARMONICS);
     if most == 0 {
         return None;
     }
-    let refined = |mut period: f64, harmonics: usize| {
+    let refined = |period: f64, samples: usize, harmonics: usize| {
+        let signals: Vec<&[f64]> = signals.iter().map(|values| &values[..samples]).collect();
+        let mut period = period;
         for _ in 0..4 {
-            let change = Basis::new(time, period, harmonics)?.step(signals)?;
+            let change = Basis::new(&time[..samples], period, harmonics)?.step(&signals)?;
             period = (period + change.clamp(-step, step)).clamp(2.0 * step, longest);
         }
         Some(period)
     };
+    let harmonics_in = |samples: usize, period: f64, most: usize| {
+        let signals: Vec<&[f64]> = signals.iter().map(|values| &values[..samples]).collect();
+        standing_out(&time[..samples], &signals, period, most)
+    };
+    // A long run tells its harmonics in its beginning; all of it would take minutes for a hundred of them.
+    let mut samples = count(3.0 * period / step).max(BEGINNING).min(n);
     // Fewer harmonics first: their phases bear an error of the period that would turn high ones round after many periods.
     // Fewer last: what they leave free makes the period vague, and a wrong period adds harmonics.
-    period = refined(period, most.min(20))?;
-    period = refined(period, most)?;
-    let few = standing_out(time, signals, period, most)?;
-    period = refined(period, few)?;
-    let harmonics = standing_out(time, signals, period, most)?.min(few);
-    Some((period, harmonics))
+    period = refined(period, samples, most.min(20))?;
+    period = refined(period, samples, most)?;
+    let few = harmonics_in(samples, period, most)?;
+    period = refined(period, samples, few)?;
+    if samples == n {
+        return Some((period, harmonics_in(n, period, most)?.min(few)));
+    }
+    while samples < n {
+        samples = (4 * samples).min(n);
+        period = refined(period, samples, few)?;
+    }
+    // A longer run has a lower noise floor, above which some more may stand.
+    Some((period, harmonics_in(n, period, most.min(2 * few + 8))?))
 }
 
 /// The last harmonic that stands above the noise in any signal; `None` if what all harmonics leave is no white noise, or

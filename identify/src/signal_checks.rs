@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use crate::notes::{Note, count_of};
+use crate::notes::{Note, count_of, short};
 use crate::recording::Recording;
 use crate::recording_error::place_word;
 
@@ -63,12 +63,17 @@ impl Recording {
 
     fn too_large(&self, name: &str, q: &[f64]) -> Option<Note> {
         let largest = q.iter().map(|v| v.abs()).fold(0.0, f64::max);
+        let rounded = |value: f64| match value {
+            value if value < 1e7 => format!("{value:.1}"),
+            value => short(value),
+        };
         (largest > LARGE_ANGLE).then(|| {
             Note::warning(format!(
-                "`{name}` in {} reaches {largest:.1}, which is {:.1} turns if it is in rad, as it must be; if it is in \
+                "`{name}` in {} reaches {}, which is {} turns if it is in rad, as it must be; if it is in \
                  degrees, say so: `--map \"{name}={name} [deg]\"`.",
                 self.file(),
-                largest / (2.0 * PI)
+                rounded(largest),
+                rounded(largest / (2.0 * PI))
             ))
         })
     }
@@ -109,18 +114,29 @@ impl Recording {
         let other = found
             .get(1)
             .map(|(limit, count, _)| {
-                format!(", and {} at {limit}", count_of(*count, "sample", "samples"))
+                let samples = count_of(*count, "sample", "samples");
+                format!(", and {samples} at {}", plain(*limit))
             })
             .unwrap_or_default();
         Some(Note::warning(format!(
-            "The force of `{name}` in {} stays exactly at {limit} for {} while the mechanism moves, first in {} {}{other}: \
+            "The force of `{name}` in {} stays exactly at {} for {} while the mechanism moves, first in {} {}{other}: \
              the drive or its measurement seems to be saturated. The true force is not known there; use a gentler motion, \
              or leave these times out (--between).",
             self.file(),
+            plain(limit),
             count_of(count, "sample", "samples"),
             place_word(self.file()),
             self.line(first).unwrap_or(0),
         )))
+    }
+}
+
+/// A recorded number as it stands in the file, unless it is very long.
+fn plain(value: f64) -> String {
+    if value.abs() < 1e12 {
+        value.to_string()
+    } else {
+        short(value)
     }
 }
 

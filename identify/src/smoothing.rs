@@ -4,7 +4,7 @@ use crate::cutoff::Signal;
 use crate::derivatives::{differentiate, mean_rate, prepare};
 use crate::filters::LowPass;
 use crate::local_polynomials;
-use crate::notes::count_of;
+use crate::notes::{count_of, short};
 use crate::series;
 
 /// What the file holds of a coordinate.
@@ -46,6 +46,17 @@ impl Recorded<'_> {
         if let Some(complete) = self.complete() {
             return Ok(Some(complete));
         }
+        // What stands still has no rate; filters would leave rounding, whose sign is friction.
+        if is_still(self.q) && self.qd.is_none_or(is_still) {
+            let zero = vec![0.0; time.len()];
+            let recorded =
+                |values: Option<&[f64]>| values.map_or_else(|| zero.clone(), <[f64]>::to_vec);
+            return Ok(Some([
+                self.q.to_vec(),
+                recorded(self.qd),
+                recorded(self.qdd),
+            ]));
+        }
         let smooth = |values: &[f64]| match way {
             Way::Butterworth { order } => prepare(time, values, cutoff, order).map(Some),
             Way::Polynomials { half_width } => {
@@ -67,6 +78,11 @@ impl Recorded<'_> {
         let qdd = self.qdd.map(<[f64]>::to_vec);
         Ok(smooth(self.q)?.map(|all| [all.q, all.qd, qdd.unwrap_or(all.qdd)]))
     }
+}
+
+/// Whether all values are the same.
+fn is_still(values: &[f64]) -> bool {
+    values.iter().all(|v| v.total_cmp(&values[0]).is_eq())
 }
 
 /// How positions are smoothed, with all that was left open settled.
@@ -95,7 +111,8 @@ impl Way {
                 2 * half_width + 1
             ),
             Self::Series { period, harmonics } => format!(
-                "a Fourier series of period {period:.6} s with {}, up to {cutoff:.4} Hz{chosen}",
+                "a Fourier series of period {} s with {}, up to {cutoff:.4} Hz{chosen}",
+                short(period),
                 count_of(harmonics, "harmonic", "harmonics")
             ),
         }
