@@ -1,7 +1,7 @@
 //! The search for the smallest set of effects that explains what the model cannot say: forward over sets, with every
 //! member tried against every other candidate, back again, and simpler ones preferred.
 
-use super::bench::{Bench, Finer, Pick, Trial};
+use super::bench::{Bench, Pick, Trial};
 use super::evidence::Evidence;
 use super::problem::Problem;
 
@@ -43,7 +43,7 @@ pub(crate) struct Found {
 
 impl Bench<'_> {
     /// Searches forward until nothing more is supported.
-    pub(crate) fn search(&mut self, finer: &Finer<'_>, progress: &mut dyn FnMut(usize)) -> Found {
+    pub(crate) fn search(&mut self, progress: &mut dyn FnMut(usize)) -> Found {
         let mut accepted: Vec<Pick> = Vec::new();
         let mut steps = Vec::new();
         let mut beam: Vec<Vec<Pick>> = vec![Vec::new()];
@@ -82,8 +82,8 @@ impl Bench<'_> {
                 .map(|other| other.picks.clone())
                 .collect();
             let (picks, evidence) = self.simplest(&accepted, trial, evidence, &trials);
-            let refined = self.refine(picks, finer);
-            let polished = self.polish(refined, finer);
+            let refined = self.refine(picks);
+            let polished = self.polish(refined);
             accepted = self.refresh(polished);
             if !beam.contains(&accepted) {
                 beam.insert(0, accepted.clone());
@@ -197,7 +197,7 @@ impl Bench<'_> {
 
     /// Tries members of a set against candidates that come close, each with constants that are searched finely: on their
     /// grids the wrong one may have been nearer to its best value.
-    fn polish(&mut self, mut picks: Vec<Pick>, finer: &Finer<'_>) -> Vec<Pick> {
+    fn polish(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
         let is_searched = |bench: &Self, pick: &Pick| bench.candidate(pick).searched > 0;
         for i in 0..picks.len() {
             let mut others = picks.clone();
@@ -223,7 +223,7 @@ impl Bench<'_> {
                     continue;
                 }
                 let tuned = self.retune(set);
-                let tuned = self.refine(tuned, finer);
+                let tuned = self.refine(tuned);
                 let trial = self.trial(tuned);
                 if trial.wrong_sign.is_empty() && trial.squares < best.squares {
                     best = trial;
