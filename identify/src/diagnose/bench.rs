@@ -1,5 +1,6 @@
 //! The bench on which sets of effects are tried: which columns they have, and what each set leaves.
 
+use std::cell::RefCell;
 use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector};
@@ -50,6 +51,8 @@ pub(crate) struct Bench<'a> {
     friction: Vec<usize>,
     /// Pool columns by candidate and choice.
     known: HashMap<(usize, usize), Vec<usize>>,
+    /// Which columns lie in the span of others and the base.
+    pub(crate) within: RefCell<HashMap<(Vec<usize>, Vec<usize>), bool>>,
 }
 
 impl<'a> Bench<'a> {
@@ -72,6 +75,7 @@ impl<'a> Bench<'a> {
             weights: vec![1.0; problem.layout.channels.len()],
             present: vec![None; problem.candidates.len()],
             known: HashMap::new(),
+            within: RefCell::default(),
         };
         // Channels of very different forces count alike from the start.
         bench.weigh(&[]);

@@ -195,6 +195,7 @@ mod tests {
                 name: String::new(),
                 samples: 50,
                 step: 0.1,
+                sampled: 0.1,
                 is_check: false,
             }],
         };

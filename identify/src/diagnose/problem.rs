@@ -50,6 +50,8 @@ pub struct Stretch {
     pub samples: usize,
     /// Mean time between them, s.
     pub step: f64,
+    /// Time between samples as recorded, before any were left out, s.
+    pub sampled: f64,
     /// Whether it belongs to the check.
     pub is_check: bool,
 }
