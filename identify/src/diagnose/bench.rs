@@ -35,6 +35,8 @@ pub(crate) struct Trial {
     pub(crate) freedoms: usize,
     /// Effects whose estimates have the wrong sign, by position.
     pub(crate) wrong_sign: Vec<usize>,
+    /// The information criterion by which sets are compared; less is better.
+    pub(crate) score: f64,
 }
 
 /// Columns, weights, and what every candidate looks like at present.
@@ -536,6 +538,7 @@ impl<'a> Bench<'a> {
             squares,
             freedoms,
             wrong_sign,
+            score: f64::INFINITY,
         }
     }
 
