@@ -57,16 +57,16 @@ impl Bench<'_> {
             self.weigh(&accepted);
             self.look(&accepted);
             let trials = self.grow(&accepted, &beam);
-            let mut additions = trials.iter().filter(|t| self.is_addition(&accepted, t));
+            let (grown, exchanged): (Vec<&Trial>, Vec<&Trial>) =
+                trials.iter().partition(|t| self.is_addition(&accepted, t));
+            let mut additions = grown.into_iter();
             refused = Vec::new();
             let chosen = self.first_that_holds(&accepted, &mut additions, &mut refused);
             // Another set altogether must be much better than one that only grows.
             let bound = chosen
                 .as_ref()
                 .map_or(f64::INFINITY, |(trial, _)| trial.score - MUCH_BETTER);
-            let mut others = trials
-                .iter()
-                .filter(|t| t.score < bound && !self.is_addition(&accepted, t));
+            let mut others = exchanged.into_iter().filter(|t| t.score < bound);
             let other = self.first_that_holds(&accepted, &mut others, &mut Vec::new());
             let other = other.filter(|(other, _)| {
                 chosen.as_ref().is_none_or(|(grown, _)| {
@@ -128,7 +128,7 @@ impl Bench<'_> {
 
     /// The first of some sets that evidence speaks for; why single effects were refused goes into a list.
     fn first_that_holds(
-        &self,
+        &mut self,
         accepted: &[Pick],
         trials: &mut dyn Iterator<Item = &Trial>,
         refused: &mut Vec<Refused>,
@@ -137,8 +137,11 @@ impl Bench<'_> {
             let news: Vec<Pick> = difference(&trial.picks, accepted);
             let evidence = self.evidence(accepted, &trial.picks, &self.acted_on(&news));
             let wrong_sign = !trial.wrong_sign.is_empty();
-            if evidence.holds() && !wrong_sign && !self.is_slight_delay(trial) {
-                return Some((trial.clone(), evidence));
+            if evidence.holds() && !wrong_sign {
+                let trial = self.settled(trial);
+                if !self.is_slight_delay(&trial) {
+                    return Some((trial, evidence));
+                }
             }
             if let [pick] = news.as_slice() {
                 refused.push(Refused {
@@ -149,6 +152,20 @@ impl Bench<'_> {
             }
         }
         None
+    }
+
+    /// A set whose effects that depend on the fit have been made anew by it.
+    fn settled(&mut self, trial: &Trial) -> Trial {
+        let fixed = |p: &Pick| matches!(self.candidate(p).source, Source::Columns(_));
+        if trial.picks.iter().all(fixed) {
+            return trial.clone();
+        }
+        let score = trial.score;
+        let picks = self.refresh(trial.picks.clone());
+        Trial {
+            score,
+            ..self.trial(picks)
+        }
     }
 
     /// Whether a set holds a delay of less than half a sample, which is how samplers are, and no finding.
