@@ -124,10 +124,16 @@ impl Bench<'_> {
 
     /// Whether all columns of one effect lie in the span of the base, some effects and another one.
     pub(crate) fn is_within(&self, one: &Pick, other: &Pick, beside: &[Pick]) -> bool {
-        let reached = self.acted_on(std::slice::from_ref(other));
-        let acted = self.acted_on(std::slice::from_ref(one));
-        if one.columns == other.columns || acted.iter().any(|d| !reached.contains(d)) {
-            return one.columns == other.columns;
+        if one.columns == other.columns {
+            return true;
+        }
+        // Bodies of other channels may be the same beside the base; friction is not.
+        if !self.candidate(one).bears {
+            let reached = self.acted_on(std::slice::from_ref(other));
+            let acted = self.acted_on(std::slice::from_ref(one));
+            if acted.iter().any(|d| !reached.contains(d)) {
+                return false;
+            }
         }
         let key = (one.columns.clone(), other.columns.clone());
         if beside.is_empty()

@@ -3,6 +3,7 @@
 
 use super::bench::{Bench, Pick, Trial, n_columns};
 use super::evidence::Evidence;
+use super::pool::On;
 use super::problem::{Problem, Source};
 
 /// Sets that are followed at once.
@@ -11,6 +12,8 @@ const BEAM: usize = 6;
 const TESTED: usize = 10;
 /// A rival whose squares are within this factor is tried with finer constants.
 const CLOSE: f64 = 1.5;
+/// The same for one whose constant has been looked for on a grid only.
+const CLOSE_ON_A_GRID: f64 = 20.0;
 /// A simpler kind that brings this share of what one that holds it brings comes first.
 const NEARLY_ALL_OF: f64 = 0.97;
 /// Another simple kind that brings this share of what a refinement of a member brings comes first.
@@ -19,6 +22,8 @@ const MOST_OF: f64 = 0.7;
 const MUCH_BETTER: f64 = 20.0;
 /// Which share of the squared error on its channels it must take off beside that.
 const LARGE_CHANGE: f64 = 0.1;
+/// By how much the criterion must fall for an exchange of members.
+const EXCHANGED: f64 = 1.0;
 /// Most effects that are looked for.
 const MOST: usize = 40;
 
@@ -106,7 +111,8 @@ impl Bench<'_> {
                 break;
             }
         }
-        let pruned = self.prune(accepted.clone());
+        let exchanged = self.exchange(accepted.clone());
+        let pruned = self.prune(exchanged);
         if pruned != accepted {
             steps.push(Step {
                 picks: pruned,
@@ -114,6 +120,41 @@ impl Bench<'_> {
             });
         }
         Found { steps, refused }
+    }
+
+    /// Exchanges members for others by which the whole set gets better or simpler.
+    fn exchange(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
+        self.weigh(&picks);
+        let (factors, _) = self.fit(&picks, On::All);
+        let rest = self.rest(&picks, &factors);
+        let channels: Vec<usize> = (0..rest.len()).collect();
+        let worth = self.worth(&rest, &channels);
+        for i in 0..picks.len() {
+            let mut others = picks.clone();
+            others.remove(i);
+            self.look(&others);
+            let table = self.table(&picks);
+            let now = self.trial(picks.clone());
+            let mut best = (criterion(self.problem, &now, worth) - EXCHANGED, None);
+            for rival in self.present.iter().flatten() {
+                if picks.iter().any(|p| p.candidate == rival.candidate) {
+                    continue;
+                }
+                let mut set = picks.clone();
+                set[i] = rival.clone();
+                let trial = self.try_in(&table, set);
+                let score = criterion(self.problem, &trial, worth);
+                if trial.freedoms <= now.freedoms && score < best.0 && !self.is_slight_delay(&trial)
+                {
+                    best = (score, Some(trial));
+                }
+            }
+            if let (_, Some(trial)) = best {
+                let refined = self.refine(trial.picks);
+                picks = self.refresh(refined);
+            }
+        }
+        picks
     }
 
     /// Whether a set is another one and a further effect, which may take the place of what it holds.
@@ -129,7 +170,7 @@ impl Bench<'_> {
 
     /// The first of some sets that evidence speaks for; why single effects were refused goes into a list.
     fn first_that_holds(
-        &mut self,
+        &self,
         accepted: &[Pick],
         trials: &mut dyn Iterator<Item = &Trial>,
         refused: &mut Vec<Refused>,
@@ -139,10 +180,7 @@ impl Bench<'_> {
             let evidence = self.evidence(accepted, &trial.picks, &self.acted_on(&news));
             let wrong_sign = !trial.wrong_sign.is_empty();
             if evidence.holds() && !wrong_sign {
-                let trial = self.settled(trial);
-                if !self.is_slight_delay(&trial) {
-                    return Some((trial, evidence));
-                }
+                return Some((trial.clone(), evidence));
             }
             if let [pick] = news.as_slice() {
                 refused.push(Refused {
@@ -194,9 +232,12 @@ impl Bench<'_> {
         let Some(at) = trial.picks.iter().position(is_delay) else {
             return false;
         };
-        let (factors, _) = self.fit(&trial.picks, super::pool::On::All);
         let before: usize = trial.picks[..at].iter().map(|p| p.columns.len()).sum();
-        let delay = factors[self.base.len() + before].abs();
+        // On the fit alone and on all: what differs between recordings is no delay.
+        let delay = [On::Fit, On::All]
+            .map(|on| self.fit(&trial.picks, on).0[self.base.len() + before].abs())
+            .into_iter()
+            .fold(f64::INFINITY, f64::min);
         let steps = self.problem.layout.stretches.iter().map(|s| s.sampled);
         delay < 0.5 * steps.fold(0.0, f64::max)
     }
@@ -205,22 +246,12 @@ impl Bench<'_> {
     fn grow(&mut self, accepted: &[Pick], beam: &[Vec<Pick>]) -> Vec<Trial> {
         let all: Vec<Pick> = beam.iter().flatten().cloned().collect();
         let table = self.table(&all);
-        let (factors, _) = self.fit(accepted, super::pool::On::All);
+        let (factors, _) = self.fit(accepted, On::All);
         let rest = self.rest(accepted, &factors);
         let channels: Vec<usize> = (0..rest.len()).collect();
         let worth = self.worth(&rest, &channels);
         let problem = self.problem;
-        let score = |trial: &Trial| {
-            let wrong = if trial.wrong_sign.is_empty() {
-                0.0
-            } else {
-                1e12
-            };
-            worth * trial.squares.max(f64::MIN_POSITIVE).ln()
-                + trial.freedoms as f64 * worth.ln().max(1.0)
-                + overlap(problem, &trial.picks)
-                + wrong
-        };
+        let score = |trial: &Trial| criterion(problem, trial, worth);
         let mut trials: Vec<Trial> = Vec::new();
         for set in beam {
             for pick in self.present.iter().flatten() {
@@ -293,7 +324,14 @@ impl Bench<'_> {
             trial.score = score(trial);
         }
         trials.sort_by(|a, b| a.score.total_cmp(&b.score));
+        trials.truncate(40);
         trials
+            .into_iter()
+            .filter_map(|trial| {
+                let trial = self.settled(&trial);
+                (!self.is_slight_delay(&trial)).then_some(trial)
+            })
+            .collect()
     }
 
     /// Tries members of a set against candidates that come close, each with constants that are searched finely: on their
@@ -328,7 +366,12 @@ impl Bench<'_> {
                 } else {
                     set
                 };
-                if self.trial(tuned.clone()).squares > CLOSE * best.squares {
+                let close = if is_searched(self, &tuned[i]) {
+                    CLOSE_ON_A_GRID
+                } else {
+                    CLOSE
+                };
+                if self.trial(tuned.clone()).squares > close * best.squares {
                     continue;
                 }
                 let tuned = self.refine(tuned);
@@ -356,7 +399,7 @@ impl Bench<'_> {
             .present
             .iter()
             .flatten()
-            .filter(|p| self.freedoms(p) == 1)
+            .filter(|p| self.freedoms(p) == 1 && !matches!(self.candidate(p).source, Source::Delay))
             .collect();
         let mut set = accepted.to_vec();
         let mut first = None;
@@ -511,7 +554,10 @@ impl Bench<'_> {
                 .filter(|(_, evidence)| !evidence.holds())
                 .min_by(|a, b| a.1.gain.total_cmp(&b.1.gain));
             match weakest {
-                Some((i, _)) => picks = without(i),
+                Some((i, _)) => {
+                    let fewer = without(i);
+                    picks = self.simplify(fewer);
+                }
                 None => break,
             }
         }
@@ -547,6 +593,19 @@ impl Bench<'_> {
         }
         picks
     }
+}
+
+/// The information criterion of a set, with as many samples as the residual is worth; sets with impossible signs come last.
+fn criterion(problem: &Problem, trial: &Trial, worth: f64) -> f64 {
+    let wrong = if trial.wrong_sign.is_empty() {
+        0.0
+    } else {
+        1e12
+    };
+    worth * trial.squares.max(f64::MIN_POSITIVE).ln()
+        + trial.freedoms as f64 * worth.ln().max(1.0)
+        + overlap(problem, &trial.picks)
+        + wrong
 }
 
 /// A little against sets in which one kind acts twice at a place, which say what others say more plainly.
