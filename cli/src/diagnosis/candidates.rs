@@ -261,7 +261,7 @@ impl Variant {
             wanted.extend(effect.terms.iter().map(|term| term.parameter.0));
         }
         let is_wanted =
-            |product: &Monomial| matches!(product.0.as_slice(), [(p, 1)] if wanted.contains(p));
+            |product: &Monomial| product.0.iter().any(|(p, n)| *n == 1 && wanted.contains(p));
         modelmill_codegen::derive_columns(mechanism, &is_wanted)
             .map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
     }

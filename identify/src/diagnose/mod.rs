@@ -199,6 +199,9 @@ impl Bench<'_> {
     fn is_unexplained(&self, channel: usize, rest: &[f64], again: f64) -> bool {
         let squares = dot(rest, rest) / rest.len().max(1) as f64;
         let noise = self.problem.noise[channel].powi(2);
+        if squares <= noise {
+            return false;
+        }
         let worth = effective_samples(rest) / rest.len().max(1) as f64;
         let comes_again = again > UNEXPLAINED && again * squares > ABOVE_NOISE * noise;
         comes_again || squares > MUCH * noise && worth < RESEMBLE
