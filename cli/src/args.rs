@@ -168,10 +168,10 @@ pub(crate) enum Command {
         modelmill completions zsh > ~/.zfunc/_modelmill\n  \
         modelmill completions fish > ~/.config/fish/completions/modelmill.fish")]
     Completions(CompletionsArgs),
-    /// Tell the story of a model on bundled recordings: derive, compare, identify, compare again
+    /// Tell the whole story on bundled recordings: derive, compare, find what is missing, add it, watch the error fall
     #[command(
         after_help = "Examples:\n  modelmill tour\n  modelmill tour --out tour\n\n\
-        With --out the equations of both models and the figures are written as files there."
+        Models, recordings and pages are written into the folder, so that each command of the story can be repeated."
     )]
     Tour(TourArgs),
 }
@@ -554,7 +554,7 @@ pub(crate) struct CompletionsArgs {
 /// `tour`.
 #[derive(Debug, Args)]
 pub(crate) struct TourArgs {
-    /// Write the equations and the figures as files into this folder
+    /// Write models, recordings and pages into this folder; `modelmill-tour` in the folder for temporary files if not given
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }

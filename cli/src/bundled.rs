@@ -9,7 +9,7 @@ use crate::failure::{Failure, Outcome};
 use crate::terminal;
 
 /// Model files by name.
-const MODELS: [(&str, &str); 2] = [
+pub(crate) const MODELS: [(&str, &str); 2] = [
     (
         "spidermill.toml",
         include_str!("../../model-spec/models/spidermill.toml"),

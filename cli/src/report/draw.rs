@@ -64,6 +64,9 @@ impl Axis {
 
     /// Round values along the axis with their labels, about `most` of them.
     pub(super) fn ticks(&self, most: usize) -> Vec<(f64, String)> {
+        if most == 0 {
+            return Vec::new();
+        }
         if self.log {
             return self.decade_ticks(most);
         }

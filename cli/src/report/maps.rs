@@ -82,11 +82,10 @@ impl Grid {
     }
 }
 
-/// Pairs of variables that may explain an error: a motion and its rate, or two positions.
+/// Pairs of variables that may explain an error: a motion and its rate. Two positions would only retrace the path.
 fn pairs(variables: &[Variable]) -> Vec<(usize, usize)> {
     let at = |name: &str| variables.iter().position(|(n, _)| n == name);
     let mut pairs = Vec::new();
-    let mut positions = Vec::new();
     for (i, (name, _)) in variables.iter().enumerate() {
         let of = name.strip_suffix("_length").unwrap_or(name);
         // The force of a linear drive has its name, its motion is called by its length.
@@ -97,16 +96,7 @@ fn pairs(variables: &[Variable]) -> Vec<(usize, usize)> {
             && !name.ends_with("_d")
         {
             pairs.push((i, rate));
-            positions.push(i);
         }
-        if let Some(acceleration) = at(&format!("{of}_dd"))
-            && !name.ends_with("_d")
-        {
-            pairs.push((i, acceleration));
-        }
-    }
-    for (k, i) in positions.iter().enumerate().take(4) {
-        pairs.extend(positions[k + 1..].iter().take(4).map(|j| (*i, *j)));
     }
     pairs
 }

@@ -79,8 +79,6 @@ pub(crate) struct Study {
     pub(crate) left: Option<Places>,
     /// Where errors are judged.
     pub(crate) judged: Judged,
-    /// Which parameters are held.
-    held: Held,
     /// Variables on which errors may depend, along the recordings that are judged.
     variables: Vec<Variable>,
     /// Remarks on the recordings.
@@ -136,7 +134,6 @@ pub(crate) fn study(question: Question<'_>) -> Outcome<Study> {
         places,
         left,
         judged,
-        held,
         variables,
         notes,
         recordings,

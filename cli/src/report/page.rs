@@ -194,7 +194,11 @@ fn location(study: &Study) -> String {
         if !left.regions.is_empty() {
             html.push_str("<ul>\n");
             for region in &left.regions {
-                let _ = writeln!(html, "<li>{}.</li>", escape(&region.says));
+                let _ = writeln!(
+                    html,
+                    "<li>{}.</li>",
+                    escape(&regions::sentence(region, &study.before.model))
+                );
             }
             html.push_str("</ul>\n");
         }
@@ -232,6 +236,9 @@ fn candidates(study: &Study) -> String {
 }
 
 fn parameters(study: &Study) -> String {
+    if study.before.identified.is_none() {
+        return tables::parameters(&study.before);
+    }
     let mut html = String::new();
     match &study.after {
         Ok(after) => {

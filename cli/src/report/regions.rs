@@ -9,7 +9,9 @@ use super::draw::{Axis, Picture, range, with_room};
 use super::maps::Variable;
 use super::units::{force_unit, variable_unit};
 use super::versions::Version;
+use crate::model::Model;
 use crate::svg::escape;
+use crate::table::significant;
 
 const BINS: usize = 44;
 const WIDTH: f64 = 420.0;
@@ -29,11 +31,44 @@ pub(super) fn figures(
         let _ = writeln!(
             html,
             "<figure class=\"still\"><figcaption>{}.</figcaption>\n{picture}</figure>",
-            escape(&region.says)
+            escape(&sentence(region, &before.model))
         );
     }
     html.push_str("</div>\n");
     html
+}
+
+/// A region in one sentence; every number has its unit.
+pub(super) fn sentence(region: &Region, model: &Model) -> String {
+    let unit = variable_unit(model, &region.variable);
+    let [low, high] = region.range;
+    let name = if region.variable == TIME {
+        "the time"
+    } else {
+        &region.variable
+    };
+    let is_around_zero = low < 0.0 && low.to_bits() == (-high).to_bits();
+    let lies = if is_around_zero {
+        format!("within {} {unit} of zero {name}", significant(high, 3))
+    } else {
+        format!(
+            "where {name} is between {} and {} {unit}",
+            significant(low, 3),
+            significant(high, 3)
+        )
+    };
+    let file = region.says.split_once(": ").map(|(file, _)| file);
+    let of = match file {
+        Some(file) if region.variable == TIME => format!(" in {file}"),
+        _ => String::new(),
+    };
+    format!(
+        "{:.0} % of the squared error of {}{of} lies {}, in {:.0} % of the samples",
+        100.0 * region.share,
+        region.channel,
+        lies.replace('-', "−"),
+        100.0 * region.samples
+    )
 }
 
 fn picture(

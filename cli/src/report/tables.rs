@@ -6,7 +6,7 @@ use modelmill_identify::diagnose::Considered;
 use modelmill_identify::{FitParameter, Severity, Status};
 
 use super::draw::attribute;
-use super::units::force_unit;
+use super::units::{force_unit, pretty};
 use super::{Study, Version, words};
 use crate::svg::escape;
 use crate::table::{percent, significant};
@@ -74,7 +74,7 @@ pub(super) fn ladder(study: &Study) -> String {
                 percents(rung.fit),
                 percents(rung.check),
                 of(&|| evidence.map(|e| (percent(Some(e.gain)), e.gain))),
-                of(&|| evidence.map(|e| (significant(e.blocks_t, 2), e.blocks_t))),
+                of(&|| evidence.map(|e| (significant(e.blocks_t.min(999.0), 2), e.blocks_t))),
                 of(&|| {
                     evidence.map(|e| (format!("{:.0}", e.effective_samples), e.effective_samples))
                 }),
@@ -165,7 +165,7 @@ pub(super) fn effects(study: &Study) -> String {
                 "<code>{}</code> = {} {}",
                 escape(&p.symbol),
                 significant(*value, 4),
-                escape(&p.unit)
+                escape(&pretty(&p.unit))
             )
         });
         let constants = found.constants.iter().map(|(name, value)| {
@@ -303,7 +303,7 @@ pub(super) fn parameters(version: &Version) -> String {
                 (Status::Undetermined, _) => Cell::text("not determined"),
                 _ => none(),
             },
-            Cell::text(&p.unit),
+            Cell::text(&pretty(&p.unit)),
             off.map_or_else(none, |off| {
                 let text = if off >= 1000.0 {
                     "> 1000".to_owned()

@@ -37,3 +37,8 @@ pub(super) fn variable_unit(model: &Model, name: &str) -> String {
     };
     format!("{unit}{per}")
 }
+
+/// A unit as it is written by hand: `kg m^2` as `kg m²`.
+pub(super) fn pretty(unit: &str) -> String {
+    unit.replace("^2", "²").replace("^3", "³")
+}

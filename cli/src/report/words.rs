@@ -93,11 +93,18 @@ pub(crate) fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged
                 .unexplained
                 .iter()
                 .map(|d| {
-                    format!(
-                        "{} ({:.0} % of what is left there comes again with the state)",
-                        channels[*d],
-                        100.0 * diagnosis.reproducible[*d]
-                    )
+                    let again = 100.0 * diagnosis.reproducible[*d];
+                    if again < 1.0 {
+                        format!(
+                            "{} (what is left there is above the noise, and neighbouring samples resemble each other)",
+                            channels[*d]
+                        )
+                    } else {
+                        format!(
+                            "{} ({again:.0} % of what is left there comes again with the state)",
+                            channels[*d]
+                        )
+                    }
                 })
                 .collect();
             let besides = if found.is_empty() {
