@@ -21,7 +21,15 @@ pub(crate) fn run(args: &DiagnoseArgs) -> Outcome {
     suspects::examine(&model, &mut fit);
     suspects::examine(&model, &mut check);
     let held = if args.held { Held::All } else { Held::Known };
-    let answer = diagnosis::find(&args.model, &loaded, &[], &model, &fit, &check, held)?;
+    let answer = diagnosis::find(
+        &args.model,
+        &loaded,
+        model::libraries(),
+        &model,
+        &fit,
+        &check,
+        held,
+    )?;
     let (problem, diagnosis) = (&answer.problem, &answer.diagnosis);
     if args.json {
         return terminal::print_json(&report(problem, diagnosis, &fit, &check));

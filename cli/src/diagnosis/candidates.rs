@@ -23,6 +23,7 @@ const WAVES: usize = 120;
 pub(crate) struct Single {
     pub(crate) kind: usize,
     pub(crate) spots: Vec<Spot>,
+    pub(crate) sort: Sort,
     /// Symbols of its parameters with their positions among those of its variant.
     pub(crate) parameters: Vec<(String, usize)>,
     /// Symbols of constants that are searched for, with their names in the variant and how.
@@ -49,18 +50,23 @@ pub(crate) struct Candidates {
     pub(crate) known: Derivation,
     /// Effects with constants that are searched for, whose columns are evaluated again and again.
     pub(crate) searched: Derivation,
+    /// Effects that depend on what the drives carry.
+    pub(crate) carried: Derivation,
     /// The base columns as functions of a tilt about x, y and z, whose constants are the last three; with its kind.
     pub(crate) tilt: Option<(Change, Derivation)>,
     /// A delay of the forces.
     pub(crate) delay: Option<Change>,
 }
 
-impl Single {
-    /// Whether a constant of it is searched for by trial.
-    pub(crate) fn is_searched(&self) -> bool {
-        let mut searches = self.constants.iter();
-        searches.any(|(_, _, search)| *search != Search::Linear)
-    }
+/// How often the columns of an effect are evaluated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Sort {
+    /// Once.
+    Known,
+    /// For every value of a constant.
+    Searched,
+    /// Whenever a fit says anew what the drives carry.
+    Carried,
 }
 
 /// Writes down and derives all candidates of a model read from `path`.
@@ -74,7 +80,11 @@ pub(crate) fn candidates(
     let all = spots(mechanism);
     let mut singles: Vec<Single> = Vec::new();
     let mut entries = Vec::new();
-    let mut variants = [Variant::new(path)?, Variant::new(path)?];
+    let mut variants = [
+        Variant::new(path)?,
+        Variant::new(path)?,
+        Variant::new(path)?,
+    ];
     let (mut tilt, mut delay) = (None, None);
     for (k, kind) in loaded.kinds.iter().enumerate() {
         let fitting: Vec<&Spot> = all
@@ -106,7 +116,7 @@ pub(crate) fn candidates(
         let (places, sums) = sets(mechanism, kind, &fitting);
         for spots in places {
             let single = single(k, kind, &spots, singles.len());
-            variants[usize::from(single.is_searched())].write(kind, &single, singles.len());
+            variants[single.sort as usize].write(kind, &single, singles.len());
             singles.push(single);
         }
         for sum in sums {
@@ -116,9 +126,10 @@ pub(crate) fn candidates(
         }
     }
     let own = mechanism.effects.len();
-    let [known, searched] = variants;
+    let [known, searched, carried] = variants;
     let known = known.derive(path, libraries, own, &mut singles)?;
     let searched = searched.derive(path, libraries, own, &mut singles)?;
+    let carried = carried.derive(path, libraries, own, &mut singles)?;
     let tilt = match tilt {
         Some(change) => Some((change, tilted(path, libraries, model)?)),
         None => None,
@@ -129,6 +140,7 @@ pub(crate) fn candidates(
         entries,
         known,
         searched,
+        carried,
         tilt,
         delay,
     })
@@ -145,12 +157,29 @@ fn single(k: usize, kind: &EffectKind, spots: &[&Spot], number: usize) -> Single
         let name = format!("candidate{number}_{}", c.symbol);
         Some((c.symbol.clone(), name, c.search?))
     });
+    let constants: Vec<_> = searched.collect();
+    let is_range = |c: &(String, String, Search)| c.2 != Search::Linear;
     Single {
+        sort: if uses_load(kind) {
+            Sort::Carried
+        } else if constants.iter().any(is_range) {
+            Sort::Searched
+        } else {
+            Sort::Known
+        },
         kind: k,
         spots: spots.iter().copied().cloned().collect(),
         parameters: Vec::new(),
-        constants: searched.collect(),
+        constants,
     }
+}
+
+/// Whether the expression of a kind names the load of its place.
+fn uses_load(kind: &EffectKind) -> bool {
+    let mut words = kind
+        .expression
+        .split(|c: char| !c.is_alphanumeric() && c != '_');
+    words.any(|word| word == "load")
 }
 
 /// A variant of the model that has effects besides, as text.

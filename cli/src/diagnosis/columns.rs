@@ -4,12 +4,13 @@ use modelmill_codegen::{Derivation, Evaluator};
 use modelmill_identify::diagnose::{
     Candidate, Choice, Column, Effect, EffectParameter, Sign, Source,
 };
-use modelmill_spec::Search;
+use modelmill_spec::{ActsOn, EffectKind, Mechanics, Search};
 
+use crate::data::Data;
 use crate::failure::Outcome;
 use crate::model::Model;
 
-use super::candidates::{Candidates, Change, Entry, grid, sign};
+use super::candidates::{Candidates, Change, Entry, Sort, grid, sign};
 use super::numbers::{Motions, Runs, regressor};
 
 /// Half the step by which a tilt is varied, rad.
@@ -28,11 +29,11 @@ pub(super) fn columns(
     // `found[single][round]`; columns that are linear in a constant are looked at for its values 0 and 1.
     let mut found: Vec<Vec<Vec<Column>>> = vec![Vec::new(); candidates.singles.len()];
     let longest = grids.iter().map(Vec::len).max().unwrap_or(1);
-    for (is_searched, rounds) in [(false, 2), (true, longest)] {
+    for (sort, rounds) in [(Sort::Known, 2), (Sort::Searched, longest)] {
         for round in 0..rounds {
             let of_round: Vec<usize> = (0..candidates.singles.len())
-                .filter(|k| candidates.singles[*k].is_searched() == is_searched)
-                .filter(|k| !is_searched || round < grids[*k].len())
+                .filter(|k| candidates.singles[*k].sort == sort)
+                .filter(|k| sort == Sort::Known || round < grids[*k].len())
                 .collect();
             if of_round.is_empty() {
                 continue;
@@ -41,7 +42,7 @@ pub(super) fn columns(
                 Search::Linear => round.min(1) as f64,
                 Search::Range { .. } => grids[k][round],
             };
-            let columns = singles(candidates, &of_round, model, all, is_searched, &value)?;
+            let columns = singles(candidates, &of_round, model, all, sort, &value)?;
             for (k, columns) in of_round.iter().zip(columns) {
                 found[*k].push(columns);
             }
@@ -102,6 +103,7 @@ fn changed(
         },
         parameters,
         searched: 0,
+        bears: bears(&candidates.kinds[change.kind]),
         source,
     }
 }
@@ -172,13 +174,13 @@ fn singles(
     which: &[usize],
     model: &Model,
     all: &Runs<'_>,
-    is_searched: bool,
+    sort: Sort,
     value: &dyn Fn(usize, &Search) -> f64,
 ) -> Outcome<Vec<Vec<Column>>> {
-    let derivation = if is_searched {
-        &candidates.searched
-    } else {
-        &candidates.known
+    let derivation = match sort {
+        Sort::Known => &candidates.known,
+        Sort::Searched => &candidates.searched,
+        Sort::Carried => &candidates.carried,
     };
     let mechanism = &derivation.mechanism;
     let mut constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
@@ -215,6 +217,7 @@ fn candidate(
 ) -> Option<Candidate> {
     let first = &candidates.singles[entry.singles[0]];
     let kind = &candidates.kinds[first.kind];
+    let bears = bears(kind);
     let mut parameters: Vec<EffectParameter> = (first.parameters.iter())
         .filter_map(|(symbol, _)| {
             let parameter = kind.parameters.iter().find(|p| p.symbol == *symbol)?;
@@ -227,6 +230,23 @@ fn candidate(
             })
         })
         .collect();
+    let places = entry
+        .singles
+        .iter()
+        .flat_map(|k| &candidates.singles[*k].spots);
+    let effect = Effect {
+        kind: kind.name.clone(),
+        at: places.map(|spot| spot.name.clone()).collect(),
+    };
+    if first.sort == Sort::Carried {
+        return Some(Candidate {
+            effect,
+            parameters,
+            searched: 0,
+            bears,
+            source: Source::Carried,
+        });
+    }
     let sum = |round: usize| -> Vec<Column> {
         let mut columns = found[entry.singles[0]][round].clone();
         for other in &entry.singles[1..] {
@@ -276,19 +296,85 @@ fn candidate(
         let mut keep = felt.iter();
         choice.columns.retain(|_| *keep.next().unwrap_or(&false));
     }
-    let places = entry
-        .singles
-        .iter()
-        .flat_map(|k| &candidates.singles[*k].spots);
     (!parameters.is_empty()).then(|| Candidate {
-        effect: Effect {
-            kind: kind.name.clone(),
-            at: places.map(|spot| spot.name.clone()).collect(),
-        },
+        effect,
         parameters,
         searched: usize::from(searched.is_some()),
+        bears,
         source: Source::Columns(choices),
     })
+}
+
+/// Whether what a kind adds is part of what the drives carry.
+fn bears(kind: &EffectKind) -> bool {
+    kind.on.contains(&ActsOn::Point)
+        || matches!(
+            kind.mechanics,
+            Some(Mechanics::Rod | Mechanics::Part | Mechanics::Placement | Mechanics::Tilt)
+        )
+}
+
+/// Columns of all candidates that depend on what the drives carry, for loads that are stacked and decimated like the forces.
+pub(super) fn carried(
+    candidates: &Candidates,
+    model: &Model,
+    all: &Runs<'_>,
+    load: &Column,
+) -> Outcome<Vec<(usize, Vec<Column>)>> {
+    let which: Vec<usize> = (0..candidates.singles.len())
+        .filter(|k| candidates.singles[*k].sort == Sort::Carried)
+        .collect();
+    if which.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut start = 0;
+    let mut loaded = Vec::new();
+    for (one, is_check) in all {
+        let kept = one.time().len();
+        let of = |values: &Option<Vec<f64>>| match values {
+            Some(values) => between(
+                &values[start..start + kept],
+                one.decimation(),
+                one.samples(),
+            ),
+            None => vec![0.0; one.samples()],
+        };
+        let mut one = (*one).clone();
+        one.load = Some(load.0.iter().map(of).collect());
+        loaded.push((one, *is_check));
+        start += kept;
+    }
+    let all: Vec<(&Data, bool)> = loaded.iter().map(|(one, check)| (one, *check)).collect();
+    let value = |_: usize, search: &Search| match search {
+        Search::Linear => 0.0,
+        Search::Range { from, to, .. } => 0.5 * (from + to),
+    };
+    let found = singles(candidates, &which, model, &all, Sort::Carried, &value)?;
+    let mut made = Vec::new();
+    for (k, entry) in candidates.entries.iter().enumerate() {
+        let place = |single: &usize| which.iter().position(|w| w == single);
+        let mut places = entry.singles.iter().filter_map(place);
+        let Some(first) = places.next() else { continue };
+        let mut columns = found[first].clone();
+        for other in places {
+            for (column, more) in columns.iter_mut().zip(&found[other]) {
+                column.add(1.0, more);
+            }
+        }
+        made.push((k, columns));
+    }
+    Ok(made)
+}
+
+/// Values between samples of which every n-th was kept.
+fn between(kept: &[f64], factor: usize, samples: usize) -> Vec<f64> {
+    let last = kept.len().saturating_sub(1);
+    let at = |i: usize| {
+        let k = (i / factor).min(last);
+        let share = (i - k * factor) as f64 / factor as f64;
+        kept[k] + share.min(1.0) * (kept[(k + 1).min(last)] - kept[k])
+    };
+    (0..samples).map(at).collect()
 }
 
 /// Columns of an entry for another value of the constant that is searched for.
@@ -303,7 +389,15 @@ pub(super) fn finer(
         Search::Linear => 0.0,
         Search::Range { .. } => constant,
     };
-    let found = singles(candidates, &entry.singles, model, all, true, &value).ok()?;
+    let found = singles(
+        candidates,
+        &entry.singles,
+        model,
+        all,
+        Sort::Searched,
+        &value,
+    )
+    .ok()?;
     let mut found = found.into_iter();
     let mut columns = found.next()?;
     for more in found {

@@ -4,7 +4,6 @@
 
 mod candidates;
 mod columns;
-mod loads;
 mod numbers;
 mod places;
 mod problem;

@@ -16,15 +16,15 @@ pub(crate) type Runs<'a> = [(&'a Data, bool)];
 pub(super) fn layout(model: &Model, all: &Runs<'_>) -> Layout {
     let stretch = |(one, is_check): &(&Data, bool)| {
         let time = one.time();
-        let last = time.len().saturating_sub(1);
+        let mean = |time: &[f64]| match time {
+            [first, .., last] => (last - first) / (time.len() - 1) as f64,
+            _ => 1.0,
+        };
         Stretch {
             name: one.run.file.clone(),
             samples: time.len(),
-            step: if last > 0 {
-                (time[last] - time[0]) / last as f64
-            } else {
-                1.0
-            },
+            step: mean(&time),
+            sampled: mean(&one.run.time),
             is_check: *is_check,
         }
     };

@@ -3,17 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use modelmill_codegen::Evaluator;
-use modelmill_identify::diagnose::{Column, Diagnosis, Problem, diagnose, white_noise};
+use modelmill_identify::diagnose::{Column, Diagnosis, Problem, Supply, diagnose, white_noise};
 use modelmill_spec::Loaded;
 
 use crate::data::Data;
 use crate::failure::Outcome;
 use crate::model::Model;
 use crate::progress::watched;
+use crate::standstill::drive_rates;
 
 use super::candidates::{Candidates, candidates};
-use super::columns::{Origin, columns, finer};
-use super::loads::loads;
+use super::columns::{Origin, carried, columns, finer};
 use super::numbers::{Runs, layout, regressor, stack, variables};
 
 /// Which parameters keep their nominal values.
@@ -46,21 +46,21 @@ pub(crate) fn find(
     let candidates = watched("writing down what may be missing", 0, |_| {
         candidates(path, loaded, libraries, model)
     })?;
-    let carried = loads(model, fit, check)?;
-    let all: Vec<(&Data, bool)> = carried
-        .iter()
-        .map(|(one, is_check)| (one, *is_check))
+    let all: Vec<(&Data, bool)> = (fit.iter().map(|one| (one, false)))
+        .chain(check.iter().map(|one| (one, true)))
         .collect();
     let (mut problem, origins) = watched("computing what each would add", 0, |_| {
         problem(&candidates, model, &all)
     })?;
     hold(&mut problem, model, held);
-    let finer = |candidate: usize, constant: f64| match origins[candidate] {
-        Origin::Entry(k) => finer(&candidates, model, &all, &candidates.entries[k], constant),
-        Origin::Tilt | Origin::Delay => None,
+    let supply = Made {
+        candidates: &candidates,
+        origins: &origins,
+        model,
+        all: &all,
     };
     let diagnosis = watched("looking for what is missing", 0, |_| {
-        diagnose(&problem, &finer, &mut |_| {})
+        diagnose(&problem, &supply, &mut |_| {})
     });
     Ok(Answer {
         problem,
@@ -68,6 +68,33 @@ pub(crate) fn find(
         candidates,
         origins,
     })
+}
+
+/// Columns that are made while the search goes on.
+struct Made<'a> {
+    candidates: &'a Candidates,
+    origins: &'a [Origin],
+    model: &'a Model,
+    all: &'a Runs<'a>,
+}
+
+impl Supply for Made<'_> {
+    fn finer(&self, candidate: usize, constant: f64) -> Option<Vec<Column>> {
+        let Origin::Entry(k) = self.origins[candidate] else {
+            return None;
+        };
+        let entry = &self.candidates.entries[k];
+        finer(self.candidates, self.model, self.all, entry, constant)
+    }
+
+    fn carried(&self, load: &Column) -> Vec<(usize, Vec<Column>)> {
+        // Poses without answer were reported when the recordings were evaluated for the first time.
+        let made = carried(self.candidates, self.model, self.all, load).unwrap_or_default();
+        let place = |entry: usize| self.origins.iter().position(|o| *o == Origin::Entry(entry));
+        made.into_iter()
+            .filter_map(|(entry, columns)| Some((place(entry)?, columns)))
+            .collect()
+    }
 }
 
 /// The problem in numbers, with all columns of the base.
@@ -84,6 +111,8 @@ fn problem(
         measured: Column::new(measured),
         base: regressor(all, &Evaluator::new(&model.derivation), model)?,
         candidates: columns,
+        base_bears: (0..model.base.len()).map(|k| !model.is_effect(k)).collect(),
+        friction: friction(model, all)?,
         variables: variables(model, all),
         held: None,
     };
@@ -93,17 +122,34 @@ fn problem(
 /// Takes what is not free off the measured forces.
 fn hold(problem: &mut Problem, model: &Model, held: Held) {
     let mut known = Column(vec![None; model.drives().len()]);
-    let mut free = Vec::new();
+    let (mut free, mut bears) = (Vec::new(), Vec::new());
     for (k, column) in std::mem::take(&mut problem.base).into_iter().enumerate() {
         if held == Held::All || model.is_known(k) {
             known.add(model.nominal[k], &column);
         } else {
             free.push(column);
+            bears.push(problem.base_bears[k]);
         }
     }
     problem.base = free;
+    problem.base_bears = bears;
     if !known.is_zero() {
         problem.measured.add(-1.0, &known);
         problem.held = Some(known);
     }
+}
+
+/// Viscous and dry friction and an offset of every drive by itself.
+fn friction(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Column>> {
+    let rates = stack(all, |one| drive_rates(model, one))?;
+    let mut friction = Vec::new();
+    for (d, rate) in rates.iter().enumerate() {
+        let signs = rate.iter().map(|v| v.signum()).collect();
+        for values in [rate.clone(), signs, vec![1.0; rate.len()]] {
+            let mut column = Column(vec![None; rates.len()]);
+            column.0[d] = Some(values);
+            friction.push(column);
+        }
+    }
+    Ok(friction)
 }

@@ -98,14 +98,29 @@ impl Bench<'_> {
 
     /// Whether all columns of one effect lie in the span of the base, some effects and another one.
     pub(crate) fn is_within(&self, one: &Pick, other: &Pick, beside: &[Pick]) -> bool {
+        let reached = self.acted_on(std::slice::from_ref(other));
+        let acted = self.acted_on(std::slice::from_ref(one));
+        if one.columns == other.columns || acted.iter().any(|d| !reached.contains(d)) {
+            return one.columns == other.columns;
+        }
+        let key = (one.columns.clone(), other.columns.clone());
+        if beside.is_empty()
+            && let Some(known) = self.within.borrow().get(&key)
+        {
+            return *known;
+        }
         let mut span = self.columns(beside);
         span.extend(&other.columns);
-        one.columns.iter().all(|k| {
+        let found = one.columns.iter().all(|k| {
             let mut which = span.clone();
             which.push(*k);
             let gram = self.pool.gram(&which, &self.weights, super::pool::On::All);
             let own = gram[(which.len() - 1, which.len() - 1)];
             solve(&gram).1 <= WITHIN * own
-        })
+        });
+        if beside.is_empty() {
+            self.within.borrow_mut().insert(key, found);
+        }
+        found
     }
 }

@@ -1,16 +1,16 @@
 //! The bench on which sets of effects are tried: which columns they have, and what each set leaves.
 
+use std::cell::RefCell;
+use std::collections::HashMap;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::noise::effective_samples;
 use super::pool::{DEPENDENT, On, Pool, dot, solve};
-use super::problem::{Candidate, Choice, Column, Problem, Sign, Source};
+use super::problem::{Candidate, Choice, Column, Problem, Sign, Source, Supply};
 
 /// A column of which the others leave a smaller share of squares than this says nothing new.
 const SAID: f64 = 1e-6;
-
-/// Columns of a candidate for another value of the constant that is searched for.
-pub type Finer<'a> = dyn Fn(usize, f64) -> Option<Vec<Column>> + 'a;
 
 /// An effect that was picked, with the columns that it has for its choice of constants.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,23 +47,35 @@ pub(crate) struct Bench<'a> {
     pub(crate) weights: Vec<f64>,
     /// The best choice of each candidate for the present residual; `None` if the model says it all already.
     pub(crate) present: Vec<Option<Pick>>,
+    supply: &'a dyn Supply,
+    friction: Vec<usize>,
     /// Pool columns by candidate and choice.
-    known: std::collections::HashMap<(usize, usize), Vec<usize>>,
+    known: HashMap<(usize, usize), Vec<usize>>,
+    /// Which columns lie in the span of others and the base.
+    pub(crate) within: RefCell<HashMap<(Vec<usize>, Vec<usize>), bool>>,
 }
 
 impl<'a> Bench<'a> {
-    pub(crate) fn new(problem: &'a Problem) -> Self {
+    pub(crate) fn new(problem: &'a Problem, supply: &'a dyn Supply) -> Self {
         let mut pool = Pool::new(&problem.layout);
         let base = problem.base.iter().map(|c| pool.add(c.clone())).collect();
         let measured = pool.add(problem.measured.clone());
+        let friction = problem
+            .friction
+            .iter()
+            .map(|c| pool.add(c.clone()))
+            .collect();
         let mut bench = Self {
             problem,
+            supply,
+            friction,
             pool,
             base,
             measured,
             weights: vec![1.0; problem.layout.channels.len()],
             present: vec![None; problem.candidates.len()],
-            known: std::collections::HashMap::new(),
+            known: HashMap::new(),
+            within: RefCell::default(),
         };
         // Channels of very different forces count alike from the start.
         bench.weigh(&[]);
@@ -130,6 +142,7 @@ impl<'a> Bench<'a> {
         let weights = self.weights.clone();
         let factor = Factored::new(self.pool.gram(&which, &weights, On::All));
         let problem = self.problem;
+        let carried = self.carried(picks);
         let mut present = Vec::with_capacity(problem.candidates.len());
         for (k, candidate) in problem.candidates.iter().enumerate() {
             let pick = match &candidate.source {
@@ -148,6 +161,7 @@ impl<'a> Bench<'a> {
                     best.map(|best| self.pick(k, best))
                 }
                 Source::Tangent(_) | Source::Delay => Some(self.tangent(k, picks, &factors)),
+                Source::Carried => carried.get(&k).cloned(),
             };
             present.push(pick.and_then(|mut pick| {
                 pick.rank = self.rank(&pick, &which, &factor);
@@ -221,8 +235,9 @@ impl<'a> Bench<'a> {
     }
 
     /// Searches for the constants of a set's effects between the values of their grids, by golden sections.
-    pub(crate) fn refine(&mut self, mut picks: Vec<Pick>, finer: &Finer<'_>) -> Vec<Pick> {
+    pub(crate) fn refine(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
         let problem = self.problem;
+        let supply = self.supply;
         for i in 0..picks.len() {
             let candidate = picks[i].candidate;
             let Source::Columns(choices) = &problem.candidates[candidate].source else {
@@ -251,7 +266,7 @@ impl<'a> Bench<'a> {
             let which = self.columns(&others);
             let factor = Factored::new(self.pool.gram(&which, &self.weights, On::All));
             let at = |log: f64| -> Option<(f64, Vec<Column>)> {
-                let columns = finer(candidate, log.exp())?;
+                let columns = supply.finer(candidate, log.exp())?;
                 Some((self.explained(&columns, &which, &factor, &rest), columns))
             };
             let Some(best) = golden(low.ln(), high.ln(), &at) else {
@@ -274,6 +289,44 @@ impl<'a> Bench<'a> {
             }
         }
         picks
+    }
+
+    /// Candidates that depend on what the drives carry, with the columns that a fit gives them.
+    fn carried(&mut self, picks: &[Pick]) -> HashMap<usize, Pick> {
+        let is_carried = |c: &Candidate| matches!(c.source, Source::Carried);
+        if !self.problem.candidates.iter().any(is_carried) {
+            return HashMap::new();
+        }
+        let mut which = self.columns(picks);
+        let n = which.len();
+        which.extend(&self.friction);
+        which.push(self.measured);
+        let (factors, _) = solve(&self.pool.gram(&which, &self.weights, On::All));
+        let of_picks = picks.iter().flat_map(|pick| {
+            let candidate = self.candidate(pick);
+            pick.columns.iter().map(|_| candidate.bears)
+        });
+        let bears: Vec<bool> = (self.problem.base_bears.iter().copied())
+            .chain(of_picks)
+            .collect();
+        let mut load = self.problem.held.clone().unwrap_or_default();
+        load.0.resize(self.weights.len(), None);
+        for ((k, factor), bears) in which[..n].iter().zip(factors.iter()).zip(bears) {
+            if bears {
+                load.add(*factor, self.pool.column(*k));
+            }
+        }
+        let made = self.supply.carried(&load);
+        let picks = made.into_iter().map(|(candidate, columns)| {
+            let pick = Pick {
+                candidate,
+                constants: Vec::new(),
+                rank: columns.len(),
+                columns: columns.into_iter().map(|c| self.pool.add(c)).collect(),
+            };
+            (candidate, pick)
+        });
+        picks.collect()
     }
 
     /// Columns of a candidate that is a small change of the model as fitted.
@@ -315,7 +368,7 @@ impl<'a> Bench<'a> {
                 });
                 vec![self.late(&force, found.unwrap_or(0.0))]
             }
-            Source::Columns(_) => unreachable!("known columns are no tangents"),
+            Source::Columns(_) | Source::Carried => unreachable!("they are no tangents"),
         };
         Pick {
             candidate,
@@ -369,8 +422,13 @@ impl<'a> Bench<'a> {
                 }
                 let (factors, _) = self.fit(&picks, On::All);
                 let rank = picks[i].rank;
-                picks[i] = self.tangent(candidate, &picks.clone(), &factors);
-                picks[i].rank = rank;
+                let anew = match self.problem.candidates[candidate].source {
+                    Source::Carried => self.carried(&picks).remove(&candidate),
+                    _ => Some(self.tangent(candidate, &picks.clone(), &factors)),
+                };
+                if let Some(anew) = anew {
+                    picks[i] = Pick { rank, ..anew };
+                }
             }
         }
         picks
@@ -582,7 +640,7 @@ fn golden<T>(
 /// Inner products of the effects' columns and the measured forces once the base is taken off.
 pub(crate) struct Table {
     left: DMatrix<f64>,
-    place: std::collections::HashMap<usize, usize>,
+    place: HashMap<usize, usize>,
 }
 
 pub(crate) fn n_columns(picks: &[Pick]) -> usize {

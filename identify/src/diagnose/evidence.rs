@@ -19,15 +19,19 @@ const FOLDS: usize = 10;
 pub(crate) const LEAST_GAIN: f64 = 0.02;
 /// How many of its own deviations over the blocks the gain must be above zero.
 const LEAST_T: f64 = 2.5;
+/// A gain from which on it is enough that blocks gain by shares of their own, and how sure that must be.
+const LARGE_GAIN: f64 = 0.5;
+const LEAST_SHARES_T: f64 = 4.0;
 
 /// What speaks for one set of effects beside another.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Evidence {
     /// Share of the squared error that leaves, on the channels where the change acts, where the sets were not fitted.
     pub gain: f64,
-    /// The gain, or the gain of each block relative to itself, in units of its standard deviation over contiguous blocks;
-    /// the larger of both.
+    /// The gain in units of its standard deviation over contiguous blocks.
     pub blocks_t: f64,
+    /// The same for the gain of each block relative to itself.
+    pub shares_t: f64,
     /// By how much the information criterion falls, with the effective number of samples.
     pub bic: f64,
     /// How many independent equations the residual before is worth.
@@ -37,12 +41,17 @@ pub struct Evidence {
 impl Evidence {
     /// Whether it is enough to believe in a change.
     pub fn holds(&self) -> bool {
-        self.gain >= LEAST_GAIN && self.blocks_t >= LEAST_T && self.bic > 0.0
+        self.gain >= LEAST_GAIN && self.is_steady() && self.bic > 0.0
+    }
+
+    /// Whether the gain is the same all along: in the mean over the blocks, or, if it is large, block by block.
+    fn is_steady(&self) -> bool {
+        self.blocks_t >= LEAST_T || self.gain >= LARGE_GAIN && self.shares_t >= LEAST_SHARES_T
     }
 
     /// What is lacking, in words.
     pub fn lacks(&self, has_check: bool) -> Option<&'static str> {
-        if self.gain <= 0.0 || self.blocks_t < LEAST_T {
+        if self.gain <= 0.0 || !self.is_steady() {
             Some(if has_check {
                 "not supported by the check"
             } else {
@@ -75,7 +84,7 @@ impl Bench<'_> {
         let mean_share = shares.iter().sum::<f64>() / n;
         let spread = shares.iter().map(|s| (s - mean_share).powi(2)).sum::<f64>();
         let error_share = (spread / (n * (n - 1.0).max(1.0))).sqrt().max(1e-3);
-        let t = t.max(mean_share / error_share);
+        let shares_t = mean_share / error_share;
         let total: f64 = old.iter().sum();
         let [old_fit, new_fit] = [before, after].map(|picks| {
             let (factors, _) = self.fit(picks, On::All);
@@ -92,6 +101,7 @@ impl Bench<'_> {
         Evidence {
             gain: if total > 0.0 { n * mean / total } else { 0.0 },
             blocks_t: t,
+            shares_t,
             bic: worth * (old_fit.0 / new_fit.0.max(f64::MIN_POSITIVE)).ln()
                 - (count(after) - count(before)) * worth.ln(),
             effective_samples: worth,

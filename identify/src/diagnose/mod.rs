@@ -18,12 +18,11 @@ mod search;
 
 use serde::Serialize;
 
-pub use bench::Finer;
 pub use evidence::Evidence;
 pub use noise::{effective_samples, white_noise};
-pub use pool::factors;
 pub use problem::{
-    Candidate, Choice, Column, Effect, EffectParameter, Layout, Problem, Sign, Source, Stretch,
+    Candidate, Choice, Column, Effect, EffectParameter, Layout, NoSupply, Problem, Sign, Source,
+    Stretch, Supply,
 };
 
 use bench::{Bench, Pick};
@@ -116,17 +115,17 @@ pub struct Diagnosis {
     pub unexplained: Vec<usize>,
 }
 
-/// Finds what is missing. `finer` gives columns for constants between the choices of a candidate, if it can; `progress` is
-/// told how many steps were made.
+/// Finds what is missing. `supply` makes columns that are not known from the start; `progress` is told how many steps were
+/// made.
 pub fn diagnose(
     problem: &Problem,
-    finer: &Finer<'_>,
+    supply: &dyn Supply,
     progress: &mut dyn FnMut(usize),
 ) -> Diagnosis {
-    let mut bench = Bench::new(problem);
+    let mut bench = Bench::new(problem, supply);
     bench.look(&[]);
     let alone = bench.explained_alone();
-    let found = bench.search(finer, progress);
+    let found = bench.search(progress);
     let picks = found.steps.last().map_or(Vec::new(), |s| s.picks.clone());
     let mut ladder = vec![bench.rung(&[], &[], None)];
     let mut before: Vec<Pick> = Vec::new();

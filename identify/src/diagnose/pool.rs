@@ -97,35 +97,6 @@ impl Pool {
     }
 }
 
-/// Least squares factors of some columns, each channel in units of its own size.
-pub fn factors(measured: &Column, columns: &[&Column]) -> Vec<f64> {
-    let size = |values: &Option<Vec<f64>>| values.as_ref().map_or(0.0, |v| dot(v, v));
-    let weight = |values| match size(values) {
-        0.0 => 1.0,
-        size => 1.0 / size,
-    };
-    let weights: Vec<f64> = measured.0.iter().map(weight).collect();
-    let all: Vec<&Column> = columns.iter().copied().chain([measured]).collect();
-    let product = |a: &Column, b: &Column| -> f64 {
-        let pairs = a.0.iter().zip(&b.0).zip(&weights);
-        pairs
-            .map(|((a, b), weight)| match (a, b) {
-                (Some(a), Some(b)) => weight * dot(a, b),
-                _ => 0.0,
-            })
-            .sum()
-    };
-    let n = all.len();
-    let mut gram = DMatrix::zeros(n, n);
-    for i in 0..n {
-        for j in 0..=i {
-            gram[(i, j)] = product(all[i], all[j]);
-            gram[(j, i)] = gram[(i, j)];
-        }
-    }
-    solve(&gram).0.as_slice().to_vec()
-}
-
 /// Samples that count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum On {
@@ -224,6 +195,7 @@ mod tests {
                 name: String::new(),
                 samples: 50,
                 step: 0.1,
+                sampled: 0.1,
                 is_check: false,
             }],
         };

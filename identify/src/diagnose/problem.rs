@@ -50,6 +50,8 @@ pub struct Stretch {
     pub samples: usize,
     /// Mean time between them, s.
     pub step: f64,
+    /// Time between samples as recorded, before any were left out, s.
+    pub sampled: f64,
     /// Whether it belongs to the check.
     pub is_check: bool,
 }
@@ -145,6 +147,30 @@ pub enum Source {
     Tangent(Vec<Vec<Column>>),
     /// All forces come later than the motion; the parameter is the delay, s.
     Delay,
+    /// They depend on what the drives carry, which the fit says: see [`Supply::carried`].
+    Carried,
+}
+
+/// Columns that are made while the search goes on.
+pub trait Supply {
+    /// Columns of a candidate for another value of the constant that is searched for, if they can be had.
+    fn finer(&self, candidate: usize, constant: f64) -> Option<Vec<Column>>;
+
+    /// Columns of all candidates that depend on what the drives carry.
+    fn carried(&self, load: &Column) -> Vec<(usize, Vec<Column>)>;
+}
+
+/// For problems in which all columns are known from the start.
+pub struct NoSupply;
+
+impl Supply for NoSupply {
+    fn finer(&self, _: usize, _: f64) -> Option<Vec<Column>> {
+        None
+    }
+
+    fn carried(&self, _: &Column) -> Vec<(usize, Vec<Column>)> {
+        Vec::new()
+    }
 }
 
 /// An effect that may be missing.
@@ -156,6 +182,8 @@ pub struct Candidate {
     pub parameters: Vec<EffectParameter>,
     /// Constants that are searched for; they count as parameters.
     pub searched: usize,
+    /// Whether what it adds is part of what the drives carry: masses and weight, rather than friction.
+    pub bears: bool,
     /// Its columns.
     pub source: Source,
 }
@@ -171,6 +199,10 @@ pub struct Problem {
     pub held: Option<Column>,
     /// Columns of the parameters that are free.
     pub base: Vec<Column>,
+    /// Which of them are part of what the drives carry.
+    pub base_bears: Vec<bool>,
+    /// Friction of every drive by itself, beside which the load is estimated.
+    pub friction: Vec<Column>,
     /// What may be missing.
     pub candidates: Vec<Candidate>,
     /// Variables on which forces may depend, by name: positions, rates, accelerations, loads; one number per sample.

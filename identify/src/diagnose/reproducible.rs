@@ -169,6 +169,7 @@ mod tests {
                 name: String::new(),
                 samples: n,
                 step: 0.004,
+                sampled: 0.004,
                 is_check: false,
             }],
         };

@@ -1,9 +1,9 @@
 //! The search for the smallest set of effects that explains what the model cannot say: forward over sets, with every
 //! member tried against every other candidate, back again, and simpler ones preferred.
 
-use super::bench::{Bench, Finer, Pick, Trial};
+use super::bench::{Bench, Pick, Trial};
 use super::evidence::Evidence;
-use super::problem::Problem;
+use super::problem::{Problem, Source};
 
 /// Sets that are followed at once.
 const BEAM: usize = 6;
@@ -43,7 +43,7 @@ pub(crate) struct Found {
 
 impl Bench<'_> {
     /// Searches forward until nothing more is supported.
-    pub(crate) fn search(&mut self, finer: &Finer<'_>, progress: &mut dyn FnMut(usize)) -> Found {
+    pub(crate) fn search(&mut self, progress: &mut dyn FnMut(usize)) -> Found {
         let mut accepted: Vec<Pick> = Vec::new();
         let mut steps = Vec::new();
         let mut beam: Vec<Vec<Pick>> = vec![Vec::new()];
@@ -60,7 +60,7 @@ impl Bench<'_> {
                 let channels = self.acted_on(&news);
                 let evidence = self.evidence(&accepted, &trial.picks, &channels);
                 let wrong_sign = !trial.wrong_sign.is_empty();
-                if evidence.holds() && !wrong_sign {
+                if evidence.holds() && !wrong_sign && !self.is_slight_delay(trial) {
                     chosen = Some((trial.clone(), evidence));
                     break;
                 }
@@ -81,9 +81,12 @@ impl Bench<'_> {
                 .take(BEAM)
                 .map(|other| other.picks.clone())
                 .collect();
+            let (trial, evidence) = self
+                .simple_first(&accepted, &trial)
+                .unwrap_or((trial, evidence));
             let (picks, evidence) = self.simplest(&accepted, trial, evidence, &trials);
-            let refined = self.refine(picks, finer);
-            let polished = self.polish(refined, finer);
+            let refined = self.refine(picks);
+            let polished = self.polish(refined);
             accepted = self.refresh(polished);
             if !beam.contains(&accepted) {
                 beam.insert(0, accepted.clone());
@@ -105,6 +108,19 @@ impl Bench<'_> {
             });
         }
         Found { steps, refused }
+    }
+
+    /// Whether a set holds a delay of less than half a sample, which is how samplers are, and no finding.
+    fn is_slight_delay(&self, trial: &Trial) -> bool {
+        let is_delay = |pick: &Pick| matches!(self.candidate(pick).source, Source::Delay);
+        let Some(at) = trial.picks.iter().position(is_delay) else {
+            return false;
+        };
+        let (factors, _) = self.fit(&trial.picks, super::pool::On::All);
+        let before: usize = trial.picks[..at].iter().map(|p| p.columns.len()).sum();
+        let delay = factors[self.base.len() + before].abs();
+        let steps = self.problem.layout.stretches.iter().map(|s| s.sampled);
+        delay < 0.5 * steps.fold(0.0, f64::max)
     }
 
     /// All sets that one more effect makes of those in the beam, the best of them improved by exchanges; best first.
@@ -174,7 +190,11 @@ impl Bench<'_> {
                             continue;
                         }
                         let mut picks = best.picks.clone();
-                        picks[i] = pick.clone();
+                        let mut pick = pick.clone();
+                        if pick.columns.len() > 1 && self.is_within(&picks[i], &pick, &[]) {
+                            pick.rank = (pick.rank + picks[i].rank).min(pick.columns.len());
+                        }
+                        picks[i] = pick;
                         let trial = self.try_in(&table, picks);
                         let bound = better.as_ref().map_or(score(&best) - 1e-9, &score);
                         if score(&trial) < bound {
@@ -197,7 +217,7 @@ impl Bench<'_> {
 
     /// Tries members of a set against candidates that come close, each with constants that are searched finely: on their
     /// grids the wrong one may have been nearer to its best value.
-    fn polish(&mut self, mut picks: Vec<Pick>, finer: &Finer<'_>) -> Vec<Pick> {
+    fn polish(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
         let is_searched = |bench: &Self, pick: &Pick| bench.candidate(pick).searched > 0;
         for i in 0..picks.len() {
             let mut others = picks.clone();
@@ -223,7 +243,7 @@ impl Bench<'_> {
                     continue;
                 }
                 let tuned = self.retune(set);
-                let tuned = self.refine(tuned, finer);
+                let tuned = self.refine(tuned);
                 let trial = self.trial(tuned);
                 if trial.wrong_sign.is_empty() && trial.squares < best.squares {
                     best = trial;
@@ -232,6 +252,47 @@ impl Bench<'_> {
             picks = best.picks;
         }
         picks
+    }
+
+    /// Where several simple effects with no more freedoms than a large one explain more, the first of them.
+    fn simple_first(&self, accepted: &[Pick], best: &Trial) -> Option<(Trial, Evidence)> {
+        let before: usize = accepted.iter().map(|p| self.freedoms(p)).sum();
+        let budget = best.freedoms.checked_sub(before)?;
+        if budget < 2 {
+            return None;
+        }
+        let mut all = accepted.to_vec();
+        all.extend(best.picks.iter().cloned());
+        let table = self.table(&all);
+        let simple: Vec<&Pick> = self
+            .present
+            .iter()
+            .flatten()
+            .filter(|p| self.freedoms(p) == 1)
+            .collect();
+        let mut set = accepted.to_vec();
+        let mut first = None;
+        for _ in 0..budget {
+            let trials = simple
+                .iter()
+                .filter(|pick| set.iter().all(|p| p.candidate != pick.candidate))
+                .map(|pick| {
+                    let mut picks = set.clone();
+                    picks.push((*pick).clone());
+                    self.try_in(&table, picks)
+                })
+                .filter(|trial| trial.wrong_sign.is_empty());
+            let next = trials.min_by(|a, b| a.squares.total_cmp(&b.squares))?;
+            set.clone_from(&next.picks);
+            first.get_or_insert_with(|| next.clone());
+            if next.squares < best.squares {
+                let first = first?;
+                let news = difference(&first.picks, accepted);
+                let evidence = self.evidence(accepted, &first.picks, &self.acted_on(&news));
+                return evidence.holds().then_some((first, evidence));
+            }
+        }
+        None
     }
 
     /// Of the sets that are as good as the best as far as the blocks can tell, the one with the fewest freedoms; of several
