@@ -92,20 +92,6 @@ fn read_paired(
     Ok(data)
 }
 
-/// Reads a recording that ships with the program.
-pub(crate) fn read_text(model: &Model, name: &str, text: &str) -> Outcome<Data> {
-    let recording = Recording::from_reader(text.as_bytes(), name, &ReadOptions::default())?;
-    let preparation = PreparationArgs::none().preparation();
-    let mut run = recording.states_with(&model.active(), &model.drives(), &preparation)?;
-    pair(&mut run, model.derivation.mechanism.force_delay)?;
-    Ok(Data {
-        run,
-        variance: None,
-        weights: None,
-        load: None,
-    })
-}
-
 /// Gives every force the states of the moment at which it acted, by the model's delay.
 fn pair(run: &mut Run, delay: f64) -> Outcome {
     if delay == 0.0 {

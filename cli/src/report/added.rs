@@ -22,13 +22,47 @@ pub(crate) struct Added {
 /// The effects that were found, as entries with the estimates for nominal values.
 pub(crate) fn entries(answer: &Answer) -> Vec<NewEffect> {
     let found = answer.diagnosis.effects.iter();
-    found
-        .filter_map(|found| {
-            let kinds = &answer.candidates.kinds;
-            let kind = kinds.iter().find(|kind| kind.name == found.effect.kind)?;
-            Some(entry(found, kind, answer))
-        })
-        .collect()
+    let entries = found.filter_map(|found| {
+        let kinds = &answer.candidates.kinds;
+        let kind = kinds.iter().find(|kind| kind.name == found.effect.kind)?;
+        Some(entry(found, kind, answer))
+    });
+    apart(entries.collect())
+}
+
+/// Entries of one kind that share places, such as friction at both drives and more of it at one, as entries that do not:
+/// a model file has a kind once at a place. Their parameters add up, since their columns are the same there.
+fn apart(entries: Vec<NewEffect>) -> Vec<NewEffect> {
+    let mut made: Vec<NewEffect> = Vec::new();
+    for entry in entries {
+        let meets = |one: &NewEffect| {
+            one.kind == entry.kind
+                && one.constants == entry.constants
+                && one.at.iter().any(|place| entry.at.contains(place))
+        };
+        let Some(k) = made.iter().position(meets) else {
+            made.push(entry);
+            continue;
+        };
+        let other = made.remove(k);
+        let more = entry.at.iter().filter(|p| !other.at.contains(p));
+        let places: Vec<String> = other.at.iter().chain(more).cloned().collect();
+        let of = |wanted: &dyn Fn(bool, bool) -> bool, effect: &NewEffect| NewEffect {
+            at: places
+                .iter()
+                .filter(|p| wanted(other.at.contains(p), entry.at.contains(p)))
+                .cloned()
+                .collect(),
+            ..effect.clone()
+        };
+        let groups = [
+            of(&|first, second| first && !second, &other),
+            of(&|first, second| first && second, &sum(&other, &entry)),
+            of(&|first, second| second && !first, &entry),
+        ];
+        made.splice(k..k, groups.into_iter().filter(|one| !one.at.is_empty()));
+    }
+    made
 }
 
 /// An estimate may belong to a parameter, to a constant that was found linearly, or to the product of both.
@@ -66,6 +100,24 @@ fn entry(found: &FoundEffect, kind: &EffectKind, answer: &Answer) -> NewEffect {
         *value = rounded(*value);
     }
     effect
+}
+
+/// Both effects at one place.
+fn sum(one: &NewEffect, other: &NewEffect) -> NewEffect {
+    let mut both = one.clone();
+    for more in &other.parameters {
+        let known = both.parameters.iter_mut().find(|p| p.symbol == more.symbol);
+        match known {
+            Some(p) => {
+                p.nominal = match (p.nominal, more.nominal) {
+                    (Some(a), Some(b)) => Some(rounded(a + b)),
+                    (a, b) => a.or(b),
+                }
+            }
+            None => both.parameters.push(more.clone()),
+        }
+    }
+    both
 }
 
 fn rounded(value: f64) -> f64 {
@@ -130,6 +182,39 @@ pub(crate) fn quoted(word: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn friction(at: &[&str], size: f64) -> NewEffect {
+        NewEffect {
+            kind: "coulomb_friction".to_owned(),
+            at: at.iter().map(|p| (*p).to_owned()).collect(),
+            parameters: vec![NewParameter {
+                symbol: "Fc".to_owned(),
+                nominal: Some(size),
+                ..NewParameter::default()
+            }],
+            ..NewEffect::default()
+        }
+    }
+
+    #[test]
+    fn what_acts_twice_at_a_place_is_added_up_there() {
+        let made = apart(vec![
+            friction(&["a", "b", "c"], 25.0),
+            friction(&["c"], 15.0),
+        ]);
+        assert_eq!(made, [friction(&["a", "b"], 25.0), friction(&["c"], 40.0)]);
+        // The force at each place is what it was, whatever the order.
+        let made = apart(vec![
+            friction(&["c"], 15.0),
+            friction(&["a", "b"], 1.0),
+            friction(&["a", "b", "c"], 25.0),
+        ]);
+        let at = |place: &str| -> f64 {
+            let here = made.iter().filter(|e| e.at.iter().any(|p| p == place));
+            here.map(|e| e.parameters[0].nominal.unwrap()).sum()
+        };
+        assert_eq!([at("a"), at("b"), at("c")], [26.0, 26.0, 40.0]);
+    }
 
     #[test]
     fn commands_say_what_is_added() {

@@ -13,7 +13,7 @@ use crate::table::percent;
 /// The page's text.
 pub(crate) fn render(study: &Study) -> String {
     let last = study.last();
-    let equations = equations::pages(&last.model).html;
+    let equations = equations::html(&last.model);
     let name = &study.before.model.name;
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\

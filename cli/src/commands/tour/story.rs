@@ -114,7 +114,7 @@ impl Story {
         self.line("Where the error lives:");
         self.lines(&show::places(&seen.places));
         self.line("");
-        self.say("True, but it does not say what is missing. So far every tool goes; the thinking is left to you.");
+        self.say("True, but it does not say what is missing. This is as far as other tools go; the thinking is left to you.");
         self.command(&format!(
             "compare {} --data {}",
             place.name("spidermill.toml"),
