@@ -5,8 +5,9 @@
 //! Butterworth's filter run both ways and central differences. What counts as signal, how coordinates are weighed, and
 //! the search are our own.
 
-use std::f64::consts::{LN_2, LN_10, PI, TAU};
+use std::f64::consts::{LN_10, PI, TAU};
 
+use crate::recording_checks::median;
 use crate::spectrum::hann_power;
 
 /// A band of the spectrum holds motion where its power is above so many times the noise.
@@ -34,7 +35,7 @@ pub struct Signal<'a> {
 /// to its size, for signals of one length sampled at `rate_hz`; `None` when none of them holds motion above its noise.
 ///
 /// The spectrum of the differences is signal plus noise. White noise of the measured values has the known shape
-/// `(2 rate sin(pi f/rate))^(2 times)` there; its level is the median over the upper quarter of the band, so that
+/// `(2 rate sin(pi f/rate))^(2 times)` there; its level is the median of means over the upper quarter of the band, so that
 /// quantisation counts as the noise it is. Motion is what stands above it on the average over bands, for single lines
 /// far up are seldom motion, and their share in the acceleration is huge. A cut-off then costs the signal it takes,
 /// the noise it leaves, and what the transients at the ends of a short recording spoil. The error of a coordinate is bounded by its size, so that one which hardly moves does not decide
@@ -113,15 +114,17 @@ impl Spectrum {
         let angle = |k: usize| PI * k as f64 / (bins - 1) as f64;
         let shape =
             |k: usize| (2.0 * rate_hz * (0.5 * angle(k)).sin()).powi(2 * i32::from(signal.times));
-        let mut upper: Vec<f64> = (bins * 3 / 4..bins - 1)
+        let upper: Vec<f64> = (bins * 3 / 4..bins - 1)
             .map(|k| power[k] / shape(k))
             .collect();
-        if upper.is_empty() {
-            return None;
-        }
-        upper.sort_by(f64::total_cmp);
-        // The median of an exponentially distributed periodogram is ln 2 of its mean.
-        let noise = upper[upper.len() / 2] / LN_2;
+        // The median passes over lines; means below it hold where noise itself is made of lines, as in a run that was
+        // put together from copies.
+        let means = upper.chunks(upper.len().div_ceil(64).max(16));
+        let noise = median(
+            means
+                .map(|c| c.iter().sum::<f64>() / c.len() as f64)
+                .collect(),
+        );
         let mut motion = vec![0.0; bins];
         // A window of von Hann and padding spread one frequency over some bins.
         let narrowest = (8 * bins).div_ceil(differences.len());

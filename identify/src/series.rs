@@ -16,6 +16,8 @@ use crate::spectrum::hann_power;
 
 /// Harmonics that a motion is searched for at most.
 const MOST_HARMONICS: usize = 100;
+/// Runs of more samples are not tried as a single period: it would take long, and nobody moves so slowly.
+const LONGEST_ALONE: usize = 1 << 18;
 /// Samples of a long run in which harmonics are counted first.
 const BEGINNING: usize = 1 << 16;
 /// A line stands out when its power is so many times what noise has on the average: chance lifts one in three million.
@@ -203,6 +205,7 @@ pub fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<Periodic> {
     let found = find_period(time, &moving);
     let whole = [duration + step, duration]
         .into_iter()
+        .filter(|_| found.is_none() && time.len() <= LONGEST_ALONE)
         .filter(|_| moving.iter().all(|values| closes(values)));
     let (period, harmonics) = found
         .into_iter()

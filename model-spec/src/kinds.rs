@@ -187,6 +187,8 @@ pub struct EffectKind {
     pub explains: String,
     /// What it is easily taken for, and which experiment tells them apart. May be empty.
     pub doubles: String,
+    /// A simpler kind that it holds as a special case.
+    pub refines: Option<String>,
     /// True if the model file or a library of its own defines it, false if the program's library does.
     pub is_own: bool,
 }
@@ -321,6 +323,7 @@ pub(crate) fn describe(entry: &EffectKindEntry, is_own: bool) -> EffectKind {
             .collect(),
         explains: words(&entry.explains),
         doubles: words(&entry.doubles),
+        refines: entry.refines.as_ref().map(|text| text.text.clone()),
         is_own,
     }
 }

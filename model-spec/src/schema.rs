@@ -376,6 +376,8 @@ record! {
         "explains" explains: optional Text,
         /// What it is easily taken for, and which experiment tells them apart.
         "doubles" doubles: optional Text,
+        /// A simpler kind that it holds as a special case and is looked for before it.
+        "refines" refines: optional Text,
     }
 }
 

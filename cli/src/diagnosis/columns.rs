@@ -104,6 +104,7 @@ fn changed(
         parameters,
         searched: 0,
         bears: bears(&candidates.kinds[change.kind]),
+        refines: None,
         source,
     }
 }
@@ -244,6 +245,7 @@ fn candidate(
             parameters,
             searched: 0,
             bears,
+            refines: kind.refines.clone(),
             source: Source::Carried,
         });
     }
@@ -301,6 +303,7 @@ fn candidate(
         parameters,
         searched: usize::from(searched.is_some()),
         bears,
+        refines: kind.refines.clone(),
         source: Source::Columns(choices),
     })
 }

@@ -25,6 +25,9 @@ pub(crate) struct Pick {
     pub(crate) rank: usize,
 }
 
+/// A column of a choice: candidate, choice, column.
+type ChoiceColumn = (usize, usize, usize);
+
 /// A set of effects, fitted to all samples with the base parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct Trial {
@@ -35,6 +38,8 @@ pub(crate) struct Trial {
     pub(crate) freedoms: usize,
     /// Effects whose estimates have the wrong sign, by position.
     pub(crate) wrong_sign: Vec<usize>,
+    /// The information criterion by which sets are compared; less is better.
+    pub(crate) score: f64,
 }
 
 /// Columns, weights, and what every candidate looks like at present.
@@ -51,6 +56,8 @@ pub(crate) struct Bench<'a> {
     friction: Vec<usize>,
     /// Pool columns by candidate and choice.
     known: HashMap<(usize, usize), Vec<usize>>,
+    /// Inner products of the columns of choices with those of the pool, channel by channel of the choice's column.
+    seen: RefCell<HashMap<ChoiceColumn, Vec<Option<Box<[f64]>>>>>,
     /// Which columns lie in the span of others and the base.
     pub(crate) within: RefCell<HashMap<(Vec<usize>, Vec<usize>), bool>>,
 }
@@ -75,6 +82,7 @@ impl<'a> Bench<'a> {
             weights: vec![1.0; problem.layout.channels.len()],
             present: vec![None; problem.candidates.len()],
             known: HashMap::new(),
+            seen: RefCell::default(),
             within: RefCell::default(),
         };
         // Channels of very different forces count alike from the start.
@@ -150,10 +158,11 @@ impl<'a> Bench<'a> {
                     let best = if choices.len() == 1 {
                         Some(0)
                     } else {
-                        let score = |choice: &Choice| {
-                            self.explained(&choice.columns, &which, &factor, &rest)
+                        let score = |(at, choice): (usize, &Choice)| {
+                            let products = self.products_of_choice((k, at), choice, &which);
+                            self.explained(&choice.columns, &products, &factor, &rest)
                         };
-                        let scored = choices.iter().map(score).enumerate();
+                        let scored = choices.iter().enumerate().map(score).enumerate();
                         scored
                             .max_by(|a, b| a.1.total_cmp(&b.1))
                             .map(|(best, _)| best)
@@ -213,8 +222,12 @@ impl<'a> Bench<'a> {
                 let rest = self.rest(&others, &factors);
                 let which = self.columns(&others);
                 let factor = Factored::new(self.pool.gram(&which, &self.weights, On::All));
-                let score = |columns: &[Column]| self.explained(columns, &which, &factor, &rest);
-                let scored = choices.iter().map(|c| score(&c.columns)).enumerate();
+                let candidate = old.candidate;
+                let score = |(at, choice): (usize, &Choice)| {
+                    let products = self.products_of_choice((candidate, at), choice, &which);
+                    self.explained(&choice.columns, &products, &factor, &rest)
+                };
+                let scored = choices.iter().enumerate().map(score).enumerate();
                 let Some((best, explained)) = scored.max_by(|a, b| a.1.total_cmp(&b.1)) else {
                     continue;
                 };
@@ -223,7 +236,9 @@ impl<'a> Bench<'a> {
                     .iter()
                     .map(|k| self.pool.column(*k).clone())
                     .collect();
-                if explained > score(&own) {
+                if explained
+                    > self.explained(&own, &self.all_products(&own, &which), &factor, &rest)
+                {
                     picks[i] = self.pick(old.candidate, best);
                 }
             }
@@ -267,7 +282,8 @@ impl<'a> Bench<'a> {
             let factor = Factored::new(self.pool.gram(&which, &self.weights, On::All));
             let at = |log: f64| -> Option<(f64, Vec<Column>)> {
                 let columns = supply.finer(candidate, log.exp())?;
-                Some((self.explained(&columns, &which, &factor, &rest), columns))
+                let products = self.all_products(&columns, &which);
+                Some((self.explained(&columns, &products, &factor, &rest), columns))
             };
             let Some(best) = golden(low.ln(), high.ln(), &at) else {
                 continue;
@@ -277,7 +293,8 @@ impl<'a> Bench<'a> {
                 .iter()
                 .map(|k| self.pool.column(*k).clone())
                 .collect();
-            let now = self.explained(&own, &which, &factor, &rest);
+            let products = self.all_products(&own, &which);
+            let now = self.explained(&own, &products, &factor, &rest);
             let (log, (explained, columns)) = best;
             if explained > now {
                 picks[i] = Pick {
@@ -461,6 +478,43 @@ impl<'a> Bench<'a> {
         DVector::from_iterator(which.len(), which.iter().map(product))
     }
 
+    fn all_products(&self, columns: &[Column], which: &[usize]) -> Vec<DVector<f64>> {
+        columns.iter().map(|c| self.products(c, which)).collect()
+    }
+
+    /// Weighted inner products of a choice's columns with some of the pool; each is computed once.
+    fn products_of_choice(
+        &self,
+        (candidate, choice): (usize, usize),
+        columns: &Choice,
+        which: &[usize],
+    ) -> Vec<DVector<f64>> {
+        let mut seen = self.seen.borrow_mut();
+        let mut all = Vec::with_capacity(columns.columns.len());
+        for (i, column) in columns.columns.iter().enumerate() {
+            let known = seen.entry((candidate, choice, i)).or_default();
+            let mut products = DVector::zeros(which.len());
+            for (product, k) in products.iter_mut().zip(which) {
+                if known.len() <= *k {
+                    known.resize(*k + 1, None);
+                }
+                let by_channel = known[*k].get_or_insert_with(|| {
+                    let pairs = column.0.iter().zip(&self.pool.column(*k).0);
+                    pairs
+                        .filter_map(|(a, b)| {
+                            let a = a.as_ref()?;
+                            Some(b.as_ref().map_or(0.0, |b| dot(a, b)))
+                        })
+                        .collect()
+                });
+                let weights = column.channels().map(|d| self.weights[d]);
+                *product = by_channel.iter().zip(weights).map(|(x, w)| x * w).sum();
+            }
+            all.push(products);
+        }
+        all
+    }
+
     fn product(&self, a: &Column, b: &Column) -> f64 {
         let pairs = a.0.iter().zip(&b.0).zip(&self.weights);
         pairs
@@ -475,15 +529,12 @@ impl<'a> Bench<'a> {
     fn explained(
         &self,
         columns: &[Column],
-        which: &[usize],
+        products: &[DVector<f64>],
         factor: &Factored,
         rest: &[Vec<f64>],
     ) -> f64 {
         let n = columns.len();
-        let halves: Vec<DVector<f64>> = columns
-            .iter()
-            .map(|c| factor.half(&self.products(c, which)))
-            .collect();
+        let halves: Vec<DVector<f64>> = products.iter().map(|p| factor.half(p)).collect();
         let mut gram = DMatrix::zeros(n + 1, n + 1);
         for i in 0..n {
             for j in 0..=i {
@@ -536,6 +587,7 @@ impl<'a> Bench<'a> {
             squares,
             freedoms,
             wrong_sign,
+            score: f64::INFINITY,
         }
     }
 

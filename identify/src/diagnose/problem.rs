@@ -184,6 +184,8 @@ pub struct Candidate {
     pub searched: usize,
     /// Whether what it adds is part of what the drives carry: masses and weight, rather than friction.
     pub bears: bool,
+    /// A simpler kind that it holds as a special case and that comes before it.
+    pub refines: Option<String>,
     /// Its columns.
     pub source: Source,
 }

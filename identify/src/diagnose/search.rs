@@ -8,13 +8,17 @@ use super::problem::{Problem, Source};
 /// Sets that are followed at once.
 const BEAM: usize = 6;
 /// Sets of a size that are put to the test before the search gives up.
-const TESTED: usize = 8;
+const TESTED: usize = 10;
 /// A rival whose squares are within this factor is tried with finer constants.
 const CLOSE: f64 = 1.5;
 /// A simpler kind that brings this share of what one that holds it brings comes first.
 const NEARLY_ALL_OF: f64 = 0.97;
 /// Another simple kind that brings this share of what a refinement of a member brings comes first.
 const MOST_OF: f64 = 0.7;
+/// By how much (in the logarithm of the likelihood, twice) another set must be better than one that only grows.
+const MUCH_BETTER: f64 = 20.0;
+/// Which share of the squared error on its channels it must take off beside that.
+const LARGE_CHANGE: f64 = 0.1;
 /// Most effects that are looked for.
 const MOST: usize = 40;
 
@@ -53,26 +57,27 @@ impl Bench<'_> {
             self.weigh(&accepted);
             self.look(&accepted);
             let trials = self.grow(&accepted, &beam);
-            let mut chosen = None;
+            let (grown, exchanged): (Vec<&Trial>, Vec<&Trial>) =
+                trials.iter().partition(|t| self.is_addition(&accepted, t));
+            let mut additions = grown.into_iter();
             refused = Vec::new();
-            for trial in trials.iter().take(TESTED) {
-                let news: Vec<Pick> = difference(&trial.picks, &accepted);
-                let channels = self.acted_on(&news);
-                let evidence = self.evidence(&accepted, &trial.picks, &channels);
-                let wrong_sign = !trial.wrong_sign.is_empty();
-                if evidence.holds() && !wrong_sign && !self.is_slight_delay(trial) {
-                    chosen = Some((trial.clone(), evidence));
-                    break;
-                }
-                if let [pick] = news.as_slice() {
-                    refused.push(Refused {
-                        pick: pick.clone(),
-                        evidence,
-                        wrong_sign,
-                    });
-                }
-            }
-            let Some((trial, evidence)) = chosen else {
+            let chosen = self.first_that_holds(&accepted, &mut additions, &mut refused);
+            // Another set altogether must be much better than one that only grows.
+            let bound = chosen
+                .as_ref()
+                .map_or(f64::INFINITY, |(trial, _)| trial.score - MUCH_BETTER);
+            let mut others = exchanged.into_iter().filter(|t| t.score < bound);
+            let other = self.first_that_holds(&accepted, &mut others, &mut Vec::new());
+            let other = other.filter(|(other, _)| {
+                chosen.as_ref().is_none_or(|(grown, _)| {
+                    let mut differ = difference(&other.picks, &grown.picks);
+                    differ.extend(difference(&grown.picks, &other.picks));
+                    let channels = self.acted_on(&differ);
+                    let evidence = self.evidence(&grown.picks, &other.picks, &channels);
+                    evidence.holds() && evidence.gain > LARGE_CHANGE
+                })
+            });
+            let Some((trial, evidence)) = other.or(chosen) else {
                 break;
             };
             beam = trials
@@ -108,6 +113,59 @@ impl Bench<'_> {
             });
         }
         Found { steps, refused }
+    }
+
+    /// Whether a set is another one and a further effect, which may take the place of what it holds.
+    fn is_addition(&self, accepted: &[Pick], trial: &Trial) -> bool {
+        let is_new = |pick: &&Pick| accepted.iter().all(|p| p.candidate != pick.candidate);
+        let mut news = trial.picks.iter().filter(is_new);
+        let (Some(new), None) = (news.next(), news.next()) else {
+            return false;
+        };
+        let replaced = self.replaced(accepted, &trial.picks);
+        replaced.iter().all(|p| self.is_within(p, new, &[]))
+    }
+
+    /// The first of some sets that evidence speaks for; why single effects were refused goes into a list.
+    fn first_that_holds(
+        &mut self,
+        accepted: &[Pick],
+        trials: &mut dyn Iterator<Item = &Trial>,
+        refused: &mut Vec<Refused>,
+    ) -> Option<(Trial, Evidence)> {
+        for trial in trials.take(TESTED) {
+            let news: Vec<Pick> = difference(&trial.picks, accepted);
+            let evidence = self.evidence(accepted, &trial.picks, &self.acted_on(&news));
+            let wrong_sign = !trial.wrong_sign.is_empty();
+            if evidence.holds() && !wrong_sign {
+                let trial = self.settled(trial);
+                if !self.is_slight_delay(&trial) {
+                    return Some((trial, evidence));
+                }
+            }
+            if let [pick] = news.as_slice() {
+                refused.push(Refused {
+                    pick: pick.clone(),
+                    evidence,
+                    wrong_sign,
+                });
+            }
+        }
+        None
+    }
+
+    /// A set whose effects that depend on the fit have been made anew by it.
+    fn settled(&mut self, trial: &Trial) -> Trial {
+        let fixed = |p: &Pick| matches!(self.candidate(p).source, Source::Columns(_));
+        if trial.picks.iter().all(fixed) {
+            return trial.clone();
+        }
+        let score = trial.score;
+        let picks = self.refresh(trial.picks.clone());
+        Trial {
+            score,
+            ..self.trial(picks)
+        }
     }
 
     /// Whether a set holds a delay of less than half a sample, which is how samplers are, and no finding.
@@ -211,7 +269,10 @@ impl Bench<'_> {
                 trials.push(best);
             }
         }
-        trials.sort_by(|a, b| score(a).total_cmp(&score(b)));
+        for trial in &mut trials {
+            trial.score = score(trial);
+        }
+        trials.sort_by(|a, b| a.score.total_cmp(&b.score));
         trials
     }
 
@@ -308,7 +369,6 @@ impl Bench<'_> {
         // A kind that holds a simpler one, such as friction that differs by direction, comes after it.
         // So does what refines a member, after other simple kinds.
         let refines = !self.replaced(accepted, &chosen.0.picks).is_empty();
-        let most_of = if refines { MOST_OF } else { NEARLY_ALL_OF };
         let nested = trials.iter().filter(|trial| {
             let news = difference(&trial.picks, accepted);
             let bests = difference(&chosen.0.picks, accepted);
@@ -326,8 +386,17 @@ impl Bench<'_> {
         });
         let mut simpler: Vec<(Trial, Evidence)> = Vec::new();
         for trial in nested {
-            let channels = self.acted_on(&difference(&trial.picks, accepted));
-            let own = self.evidence(accepted, &trial.picks, &channels);
+            let news = difference(&trial.picks, accepted);
+            let own = self.evidence(accepted, &trial.picks, &self.acted_on(&news));
+            let kind = &self.candidate(&news[0]).effect.kind;
+            let is_refined = difference(&chosen.0.picks, accepted)
+                .iter()
+                .any(|best| self.candidate(best).refines.as_ref() == Some(kind));
+            let most_of = if refines || is_refined {
+                MOST_OF
+            } else {
+                NEARLY_ALL_OF
+            };
             if own.holds() && own.gain > most_of * chosen.1.gain {
                 simpler.push((trial.clone(), own));
             }
