@@ -45,7 +45,11 @@ fn json(model: &Model, rank: Option<&NumericRank>) -> String {
 
 /// The equations of a model as one self-contained page.
 pub(crate) fn html(model: &Model) -> String {
-    page(&model.derivation, Format::Html, numeric_rank(model).as_ref())
+    page(
+        &model.derivation,
+        Format::Html,
+        numeric_rank(model).as_ref(),
+    )
 }
 
 /// Eq. (9) on the file's values, with a warning where it says something else than exact reduction.

@@ -96,7 +96,11 @@ impl Axis {
             self.from.log10().floor() as i32,
             self.to.log10().ceil() as i32,
         );
-        #[expect(clippy::cast_possible_truncation, reason = "a few decades")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a few decades"
+        )]
         let every = ((decades / most.max(1) as f64).ceil() as usize).max(1);
         for exponent in (low..=high).step_by(every) {
             for step in steps {
@@ -128,7 +132,11 @@ fn label(value: f64, step: f64) -> String {
         let text = format!("{value:.1e}");
         return text.replace(".0e", "e");
     }
-    #[expect(clippy::cast_possible_truncation, reason = "a few decimals")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a few decimals"
+    )]
     let decimals = (-(step.abs() * 1.001).log10().floor()).max(0.0) as usize;
     format!("{value:.decimals$}").replace('-', "−")
 }

@@ -1,5 +1,6 @@
 //! Where the error lives: a sentence and a picture for each region, the mean and the spread of the error over its variable.
 
+use std::cmp::Ordering;
 use std::fmt::Write as _;
 
 use modelmill_identify::Region;
@@ -162,7 +163,7 @@ struct Bin {
 /// Mean and standard deviation of an error in stretches of equal length that hold at least three samples.
 fn binned(over: &[f64], error: &[f64]) -> Vec<Bin> {
     let [low, high] = range(over);
-    if !(high > low) {
+    if high.partial_cmp(&low) != Some(Ordering::Greater) {
         return Vec::new();
     }
     let mut sums = vec![(0.0, 0.0, 0.0); BINS];

@@ -1,6 +1,7 @@
 //! Spectra of what the model leaves, by averaged windowed segments (P. Welch, IEEE Trans. Audio Electroacoustics 15 (1967)).
 
 use std::f64::consts::TAU;
+use std::fmt::Write as _;
 
 use super::draw::{Axis, LEFT, Picture, RIGHT, WIDTH, range};
 use super::units::force_unit;
@@ -114,17 +115,18 @@ pub(super) fn figures(before: &Version, after: Option<&Version>) -> String {
             let mut path = String::new();
             for (k, (f, v)) in curve.iter().enumerate() {
                 let pen = if k == 0 { 'M' } else { 'L' };
-                path.push_str(&format!("{pen}{:.1} {:.1}", x.at(*f), y.at(v.sqrt())));
+                let _ = write!(path, "{pen}{:.1} {:.1}", x.at(*f), y.at(v.sqrt()));
             }
             picture.path(&format!("curve {class}"), &path);
         }
         let unit = force_unit(&before.model, d);
-        html.push_str(&format!(
+        let _ = write!(
+            html,
             "<figure class=\"still\"><figcaption><b>{}: error over frequency, {unit}/√Hz</b> {}</figcaption>\n{}</figure>\n",
             escape(drive),
             super::keys(after.is_some()),
             picture.finish(&format!("spectrum of the error of {drive}"))
-        ));
+        );
     }
     html
 }

@@ -36,7 +36,7 @@ pub(crate) fn check(page: &str) {
         }
         let name: String = tag
             .chars()
-            .take_while(|c| c.is_ascii_alphanumeric())
+            .take_while(char::is_ascii_alphanumeric)
             .collect();
         assert!(!name.is_empty(), "`<` that begins no tag: {}", excerpt(tag));
         for (key, value) in attributes(&tag[name.len()..]) {
