@@ -90,6 +90,32 @@ impl Bench<'_> {
                     }
                 }
             }
+            // And two for one.
+            let halves: Vec<&Pick> = (self.present.iter().flatten())
+                .filter(|one| one.rank < pick.rank && self.candidate(one).searched == 0)
+                .filter(|one| picks.iter().all(|p| p.candidate != one.candidate))
+                .filter(|one| self.is_within(one, &pick, &[]))
+                .collect();
+            for (k, one) in halves.iter().enumerate() {
+                for two in &halves[k + 1..] {
+                    let mut set = others.clone();
+                    set.extend([(*one).clone(), (*two).clone()]);
+                    let trial = self.trial(set);
+                    let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
+                    if worse > APART || !trial.wrong_sign.is_empty() {
+                        continue;
+                    }
+                    for half in [one, two] {
+                        let effect = &self.candidate(half).effect;
+                        if found.iter().all(|alias| alias.effect != *effect) {
+                            found.push(Alias {
+                                effect: effect.clone(),
+                                worse,
+                            });
+                        }
+                    }
+                }
+            }
             found.sort_by(|a, b| a.worse.total_cmp(&b.worse));
             all.push(found);
         }

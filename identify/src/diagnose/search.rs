@@ -1,7 +1,7 @@
 //! The search for the smallest set of effects that explains what the model cannot say: forward over sets, with every
 //! member tried against every other candidate, back again, and simpler ones preferred.
 
-use super::bench::{Bench, Pick, Trial};
+use super::bench::{Bench, Pick, Trial, n_columns};
 use super::evidence::Evidence;
 use super::problem::{Problem, Source};
 
@@ -56,6 +56,7 @@ impl Bench<'_> {
             progress(steps.len());
             self.weigh(&accepted);
             self.look(&accepted);
+            self.leave_out_slight_delays(&accepted);
             let trials = self.grow(&accepted, &beam);
             let (grown, exchanged): (Vec<&Trial>, Vec<&Trial>) =
                 trials.iter().partition(|t| self.is_addition(&accepted, t));
@@ -152,6 +153,25 @@ impl Bench<'_> {
             }
         }
         None
+    }
+
+    /// Passes over a delay that would be less than half a sample beside a set.
+    fn leave_out_slight_delays(&mut self, accepted: &[Pick]) {
+        let all = self.present.iter().flatten();
+        let delays: Vec<Pick> = all
+            .filter(|p| matches!(self.candidate(p).source, Source::Delay))
+            .cloned()
+            .collect();
+        for delay in delays {
+            let candidate = delay.candidate;
+            let mut set = accepted.to_vec();
+            set.push(delay);
+            let set = self.refresh(set);
+            let trial = self.trial(set);
+            if self.is_slight_delay(&trial) {
+                self.present[candidate] = None;
+            }
+        }
     }
 
     /// A set whose effects that depend on the fit have been made anew by it.
@@ -300,10 +320,17 @@ impl Bench<'_> {
             for rival in rivals {
                 let mut set = others.clone();
                 set.insert(i, rival);
-                if self.try_in(&table, set.clone()).squares > CLOSE * best.squares {
+                // On another set's constants a rival is judged by its own.
+                let tuned = if is_searched(self, &set[i]) {
+                    self.retune(set)
+                } else if self.try_in(&table, set.clone()).squares > CLOSE * best.squares {
+                    continue;
+                } else {
+                    set
+                };
+                if self.trial(tuned.clone()).squares > CLOSE * best.squares {
                     continue;
                 }
-                let tuned = self.retune(set);
                 let tuned = self.refine(tuned);
                 let trial = self.trial(tuned);
                 if trial.wrong_sign.is_empty() && trial.squares < best.squares {
@@ -465,6 +492,10 @@ impl Bench<'_> {
     fn prune(&mut self, picks: Vec<Pick>) -> Vec<Pick> {
         self.weigh(&picks);
         let mut picks = self.simplify(picks);
+        let trial = self.trial(picks.clone());
+        if self.is_slight_delay(&trial) {
+            picks.retain(|p| !matches!(self.candidate(p).source, Source::Delay));
+        }
         loop {
             let without = |i: usize| {
                 let mut rest = picks.clone();
@@ -481,9 +512,40 @@ impl Bench<'_> {
                 .min_by(|a, b| a.1.gain.total_cmp(&b.1.gain));
             match weakest {
                 Some((i, _)) => picks = without(i),
-                None => return picks,
+                None => break,
             }
         }
+        self.join(picks)
+    }
+
+    /// Takes one effect for two that it is the same as, such as dry friction that differs by direction for dry friction and
+    /// an offset: one cause is likelier than two.
+    fn join(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
+        for i in 0..picks.len() {
+            for j in i + 1..picks.len() {
+                let pair = [picks[i].clone(), picks[j].clone()];
+                let mut others = picks.clone();
+                others.remove(j);
+                others.remove(i);
+                self.look(&others);
+                let same = self.present.iter().flatten().find(|one| {
+                    let is_new = picks.iter().all(|p| p.candidate != one.candidate);
+                    is_new
+                        && one.rank == n_columns(&pair)
+                        && self.candidate(one).searched == 0
+                        && pair.iter().all(|p| self.is_within(p, one, &[]))
+                });
+                let Some(same) = same.cloned() else { continue };
+                let mut set = others.clone();
+                set.insert(i, same);
+                let trial = self.trial(set);
+                if trial.wrong_sign.is_empty() {
+                    picks = trial.picks;
+                    return self.join(picks);
+                }
+            }
+        }
+        picks
     }
 }
 
