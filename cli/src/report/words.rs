@@ -89,24 +89,27 @@ pub(crate) fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged
             if found.len() == 1 { "it" } else { "them" },
         ),
         Verdict::Unexplained => {
-            let sits: Vec<String> = diagnosis
-                .unexplained
+            let of = |d: &usize| 100.0 * diagnosis.reproducible[*d];
+            let unexplained = diagnosis.unexplained.iter();
+            let (again, noisy): (Vec<&usize>, Vec<&usize>) =
+                unexplained.partition(|d| of(d) >= 1.0);
+            let mut sits: Vec<String> = again
                 .iter()
                 .map(|d| {
-                    let again = 100.0 * diagnosis.reproducible[*d];
-                    if again < 1.0 {
-                        format!(
-                            "{} (what is left there is above the noise, and neighbouring samples resemble each other)",
-                            channels[*d]
-                        )
-                    } else {
-                        format!(
-                            "{} ({again:.0} % of what is left there comes again with the state)",
-                            channels[*d]
-                        )
-                    }
+                    format!(
+                        "{} ({:.0} % of what is left there comes again with the state)",
+                        channels[**d],
+                        of(d)
+                    )
                 })
                 .collect();
+            let names: Vec<&str> = noisy.iter().map(|d| channels[**d].as_str()).collect();
+            if !names.is_empty() {
+                sits.push(format!(
+                    "{} (above the noise there, and neighbouring samples resemble each other)",
+                    names.join(", ")
+                ));
+            }
             let besides = if found.is_empty() {
                 format!(
                     "The model misses the forces by {} {}, where the noise is {noise}.",
