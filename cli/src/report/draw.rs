@@ -86,7 +86,7 @@ impl Axis {
     fn decade_ticks(&self, most: usize) -> Vec<(f64, String)> {
         let decades = (self.to / self.from).log10();
         let mut ticks = Vec::new();
-        let steps: &[f64] = if decades <= 1.3 {
+        let steps: &[f64] = if decades <= 2.0 {
             &[1.0, 2.0, 5.0]
         } else {
             &[1.0]

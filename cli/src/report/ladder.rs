@@ -6,7 +6,9 @@ use super::draw::{Axis, Picture, WIDTH};
 use super::words::{self, Judged};
 use crate::table::percent;
 
+/// Least height of a step, and that of a line of its label.
 const ROW: f64 = 46.0;
+const LINE: f64 = 14.0;
 const TOP: f64 = 34.0;
 const LEFT: f64 = 290.0;
 /// Longest line of a label.
@@ -21,7 +23,13 @@ pub(super) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
     if !low.is_finite() {
         return String::new();
     }
-    let bottom = TOP + ROW * ladder.len() as f64;
+    let labels: Vec<Vec<String>> = ladder
+        .iter()
+        .map(|rung| words::lines(&words::rung(rung), LETTERS))
+        .collect();
+    let longest = labels.iter().map(Vec::len).max().unwrap_or(1);
+    let row = ROW.max(LINE * longest as f64 + 8.0);
+    let bottom = TOP + row * ladder.len() as f64;
     let percents = [100.0 * low / 1.6, 100.0 * high * 1.6];
     let x = Axis::decades(percents, [LEFT, WIDTH - 110.0]);
     let y = Axis::new([0.0, 1.0], [bottom, TOP]);
@@ -45,7 +53,7 @@ pub(super) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
     }
     let mut last: Option<[f64; 3]> = None;
     for (k, rung) in ladder.iter().enumerate() {
-        let middle = TOP + ROW * (k as f64 + 0.5);
+        let middle = TOP + row * (k as f64 + 0.5);
         let [fit, check] = [rung.fit, rung.check].map(|e| x.at(100.0 * e));
         if let Some([fit_before, check_before, before]) = last {
             picture.path(
@@ -77,11 +85,9 @@ pub(super) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
             "start",
             &format!("{} {}", judged.short(), percent(Some(rung.check))),
         );
-        let lines = words::lines(&words::rung(rung), LETTERS);
-        let shown = lines.len().min(3);
-        for (i, line) in lines[..shown].iter().enumerate() {
-            let up = 7.0 * (shown as f64 - 1.0);
-            let at = [LEFT - 12.0, middle + 4.0 - up + 14.0 * i as f64];
+        for (i, line) in labels[k].iter().enumerate() {
+            let up = 0.5 * LINE * (labels[k].len() as f64 - 1.0);
+            let at = [LEFT - 12.0, middle + 4.0 - up + LINE * i as f64];
             picture.text("label", at, "end", line);
         }
     }
