@@ -33,7 +33,6 @@ pub(crate) struct Answer {
     pub(crate) problem: Problem,
     pub(crate) diagnosis: Diagnosis,
     pub(crate) candidates: Candidates,
-    pub(crate) origins: Vec<Origin>,
 }
 
 /// Finds what a model lacks.
@@ -69,7 +68,6 @@ pub(crate) fn find(
         problem,
         diagnosis,
         candidates,
-        origins,
     })
 }
 

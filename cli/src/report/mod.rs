@@ -87,6 +87,13 @@ pub(crate) struct Study {
     recordings: String,
 }
 
+impl Study {
+    /// Remarks on the recordings.
+    pub(crate) fn notes(&self) -> &[Note] {
+        &self.notes
+    }
+}
+
 /// Diagnoses a model, adds what was found in memory, and identifies both.
 pub(crate) fn study(question: Question<'_>) -> Outcome<Study> {
     let Question {
