@@ -1,13 +1,14 @@
 //! `diagnose`: which effect is missing, and what speaks for it.
 
-use modelmill_identify::diagnose::{FoundEffect, Verdict};
+use modelmill_identify::diagnose::{FoundEffect, Rung, Verdict};
 use modelmill_identify::{FitParameter, Region, Status};
+use modelmill_spec::Loaded;
 use modelmill_spec::edit::NewEffect;
 use serde_json::{Value, json};
 
 use crate::args::DiagnoseArgs;
-use crate::data;
-use crate::diagnosis::Held;
+use crate::data::{self, Data};
+use crate::diagnosis::{self, Answer, Held};
 use crate::failure::Outcome;
 use crate::model::{self, Model};
 use crate::report::{self, Question, Study, Version, added, words};
@@ -25,7 +26,7 @@ const NAMED: usize = 6;
 pub(crate) fn run(args: &DiagnoseArgs) -> Outcome {
     let loaded = model::load(&args.model)?;
     let model = model::derive_loaded(&args.model.display().to_string(), &loaded)?;
-    let read = |model: &Model| -> Outcome<[Vec<data::Data>; 2]> {
+    let read = |model: &Model| -> Outcome<[Vec<Data>; 2]> {
         let mut fit = data::read_all(model, &args.data, &args.preparation)?;
         let mut check = data::read_all(model, &args.check, &args.preparation)?;
         data::note_twins(&mut fit, &mut check);
@@ -45,29 +46,41 @@ pub(crate) fn run(args: &DiagnoseArgs) -> Outcome {
         again: &read,
         recordings: String::new(),
     })?;
+    // Base parameters that are off may hide what nominal values lack.
+    let is_off = !args.held && !off_nominal(last(&study)).is_empty();
+    let held = is_off
+        .then(|| with_nominal(args, &loaded, &study))
+        .transpose()?;
     if args.json {
-        return terminal::print_json(&object(&study));
+        return terminal::print_json(&object(&study, held.as_ref()));
     }
-    terminal::print(&text(&study, &args.model.display().to_string()).join("\n"))
+    let lines = text(&study, held.as_ref(), &args.model.display().to_string());
+    terminal::print(&lines.join("\n"))
+}
+
+/// The same question with all parameters held at their nominal values.
+fn with_nominal(args: &DiagnoseArgs, loaded: &Loaded, study: &Study) -> Outcome<Answer> {
+    let version = &study.before;
+    let of = |is_check: bool| -> Vec<Data> {
+        let runs = version.data.iter().zip(&version.runs);
+        let wanted = runs.filter(|(_, run)| run.is_check == is_check);
+        wanted.map(|(data, _)| data.clone()).collect()
+    };
+    diagnosis::find(
+        &args.model,
+        loaded,
+        model::libraries(),
+        &version.model,
+        &of(false),
+        &of(true),
+        Held::All,
+    )
 }
 
 /// The answer as scripts read it.
-fn object(study: &Study) -> Value {
+fn object(study: &Study, held: Option<&Answer>) -> Value {
     let diagnosis = &study.answer.diagnosis;
     let channels = &study.answer.problem.layout.channels;
-    let steps: Vec<Value> = (diagnosis.ladder.iter())
-        .map(|rung| {
-            json!({
-                "added": rung.added.first(),
-                "also_added": rung.added.get(1..).unwrap_or_default(),
-                "dropped": rung.dropped,
-                "fit": rung.fit,
-                "check": rung.check,
-                "gain": rung.evidence.map(|e| e.gain),
-                "evidence": rung.evidence,
-            })
-        })
-        .collect();
     let effects: Vec<Value> = (diagnosis.effects.iter())
         .map(|found| {
             let estimates: Vec<Value> = estimates(study, found)
@@ -100,14 +113,44 @@ fn object(study: &Study) -> Value {
         "model": study.before.model.name,
         "verdict": diagnosis.verdict,
         "noise_floor": diagnosis.noise_floor,
-        "steps": steps,
+        "steps": steps(&diagnosis.ladder),
         "effects": effects,
         "candidates": candidates,
         "parameters_off_nominal": off,
         "unexplained": unexplained,
         "data": study.notes(),
         "where": regions(study),
+        "with_nominal_parameters": held.map(|answer| {
+            json!({
+                "verdict": answer.diagnosis.verdict,
+                "steps": steps(&answer.diagnosis.ladder),
+                "effects": answer.diagnosis.effects.iter().map(|found| {
+                    let parameters = &answer.problem.candidates[found.candidate].parameters;
+                    let values = parameters.iter().zip(&found.estimates);
+                    let estimates: Vec<Value> = values
+                        .map(|(p, value)| json!({"name": p.symbol, "value": value, "std": null, "unit": p.unit}))
+                        .collect();
+                    json!({"kind": found.effect.kind, "at": found.effect.at, "estimates": estimates})
+                }).collect::<Vec<_>>(),
+            })
+        }),
     })
+}
+
+/// The ladder as scripts read it.
+fn steps(ladder: &[Rung]) -> Vec<Value> {
+    let step = |rung: &Rung| {
+        json!({
+            "added": rung.added.first(),
+            "also_added": rung.added.get(1..).unwrap_or_default(),
+            "dropped": rung.dropped,
+            "fit": rung.fit,
+            "check": rung.check,
+            "gain": rung.evidence.map(|e| e.gain),
+            "evidence": rung.evidence,
+        })
+    };
+    ladder.iter().map(step).collect()
 }
 
 /// An estimate of a found effect.
@@ -153,7 +196,7 @@ fn estimates(study: &Study, found: &FoundEffect) -> Vec<Estimate> {
                     .find(|(symbol, _)| symbol == constant);
                 if let Some((_, value)) = known {
                     estimate.value = *value;
-                    estimate.name = constant.to_owned();
+                    constant.clone_into(&mut estimate.name);
                 }
             }
         }
@@ -259,7 +302,7 @@ fn everywhere(study: &Study, channel: usize) -> Region {
 }
 
 /// The answer for people.
-fn text(study: &Study, model: &str) -> Vec<String> {
+fn text(study: &Study, held: Option<&Answer>, model: &str) -> Vec<String> {
     let style = terminal::style();
     let diagnosis = &study.answer.diagnosis;
     let channels = &study.answer.problem.layout.channels;
@@ -304,7 +347,7 @@ fn text(study: &Study, model: &str) -> Vec<String> {
         lines.push("  It is spread evenly over coordinates, rates, loads and time.".to_owned());
     }
     refused(study, &mut lines);
-    off(study, &mut lines);
+    off(study, held, &mut lines);
     if !study.entries.is_empty() {
         lines.push(String::new());
         lines.push(style.bold("how to go on"));
@@ -402,7 +445,7 @@ fn refused(study: &Study, lines: &mut Vec<String>) {
 }
 
 /// Parameters that differ from what the file says.
-fn off(study: &Study, lines: &mut Vec<String>) {
+fn off(study: &Study, held: Option<&Answer>, lines: &mut Vec<String>) {
     let off = off_nominal(last(study));
     if off.is_empty() {
         return;
@@ -434,6 +477,17 @@ fn off(study: &Study, lines: &mut Vec<String>) {
         &rows,
     ));
     lines.push(
-        "  They make up for what the nominal values lack, such as a payload; --held asks what that is.".to_owned(),
+        "  They make up for what the nominal values lack, such as a payload or a misplaced mass."
+            .to_owned(),
     );
+    let Some(answer) = held else { return };
+    let channels = &answer.problem.layout.channels;
+    let says = words::verdict(&answer.diagnosis, channels, study.judged);
+    let says = format!("With all parameters held at their nominal values: {says}");
+    lines.extend(
+        words::lines(&says, 98)
+            .iter()
+            .map(|line| format!("  {line}")),
+    );
+    lines.push("  (--held tells more.)".to_owned());
 }
