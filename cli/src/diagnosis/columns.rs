@@ -11,7 +11,7 @@ use crate::failure::Outcome;
 use crate::model::Model;
 
 use super::candidates::{Candidates, Change, Entry, Sort, grid, sign};
-use super::numbers::{Motions, Runs, regressor};
+use super::numbers::{Motions, Runs, regressor, regressor_of};
 
 /// Half the step by which a tilt is varied, rad.
 const TILT: f64 = 1e-4;
@@ -193,14 +193,22 @@ fn singles(
         }
     }
     let evaluator = Evaluator::with_constants(derivation, constants);
-    let columns = regressor(all, &evaluator, model)?;
     let reduction = &derivation.reduction;
+    let holds =
+        |product: usize, parameter: usize| reduction.products[product].0.contains(&(parameter, 1));
+    let wanted = |k: usize| {
+        let mut parameters = which
+            .iter()
+            .flat_map(|w| &candidates.singles[*w].parameters);
+        parameters.any(|(_, parameter)| holds(reduction.retained[k], *parameter))
+    };
+    let columns = regressor_of(all, &evaluator, model, &wanted)?;
     // Where a parameter stands in products, as a mass whose place is one, the others have their nominal values.
     let of = |(_, parameter): &(String, usize)| -> Column {
         let mut sum = Column(vec![None; model.drives().len()]);
         for (k, product) in reduction.retained.iter().enumerate() {
             let powers = &reduction.products[*product].0;
-            if powers.contains(&(*parameter, 1)) {
+            if holds(*product, *parameter) {
                 let others = powers.iter().filter(|(p, _)| p != parameter);
                 let value = |(p, n): &(usize, u32)| {
                     let n = i32::try_from(*n).unwrap_or(i32::MAX);

@@ -65,20 +65,38 @@ pub(super) fn regressor(
     evaluator: &Evaluator<'_>,
     model: &Model,
 ) -> Outcome<Vec<Column>> {
+    regressor_of(all, evaluator, model, &|_| true)
+}
+
+/// The same of some columns only; the others are zero.
+pub(super) fn regressor_of(
+    all: &Runs<'_>,
+    evaluator: &Evaluator<'_>,
+    model: &Model,
+    wanted: &dyn Fn(usize) -> bool,
+) -> Outcome<Vec<Column>> {
     let drives = model.drives().len();
-    let stacked = stack(all, |one| {
+    let mut stacked: Vec<Vec<f64>> = Vec::new();
+    for (one, _) in all {
         let mut columns: Vec<Vec<f64>> = Vec::new();
         one.for_each_block(model, |states| {
             Ok::<_, Failure>(evaluator.regressor_blocks(states, |_, block| {
                 columns.resize(block.len(), Vec::new());
-                for (column, values) in columns.iter_mut().zip(block) {
+                let n = block.len() / drives.max(1);
+                let pairs = columns.iter_mut().zip(block).enumerate();
+                for (_, (column, values)) in pairs.filter(|(k, _)| wanted(k % n)) {
                     column.extend_from_slice(values);
                 }
                 Ok(())
             }))
         })?;
-        Ok(columns)
-    })?;
+        stacked.resize(columns.len(), Vec::new());
+        for (whole, column) in stacked.iter_mut().zip(columns) {
+            if !column.is_empty() {
+                whole.extend(decimated(column, one)?);
+            }
+        }
+    }
     let n = stacked.len() / drives.max(1);
     // Drives are outermost.
     let mut by_column: Vec<Vec<Vec<f64>>> = vec![Vec::new(); n];

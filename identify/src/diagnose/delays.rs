@@ -24,10 +24,10 @@ impl Bench<'_> {
         }
     }
 
-    /// A set whose effects that depend on the fit have been made anew by it.
+    /// A set with a delay whose effects that depend on the fit have been made anew by it.
     pub(crate) fn settled(&mut self, trial: &Trial) -> Trial {
-        let fixed = |p: &Pick| matches!(self.candidate(p).source, Source::Columns(_));
-        if trial.picks.iter().all(fixed) {
+        let is_late = |p: &Pick| matches!(self.candidate(p).source, Source::Delay);
+        if !trial.picks.iter().any(is_late) {
             return trial.clone();
         }
         let score = trial.score;

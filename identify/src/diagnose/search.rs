@@ -280,7 +280,8 @@ impl Bench<'_> {
                 } else {
                     set
                 };
-                let close = if is_searched(self, &tuned[i]) {
+                let kind = |pick: &Pick| self.candidate(pick).effect.kind.clone();
+                let close = if kind(&tuned[i]) == kind(&own) {
                     CLOSE_ON_A_GRID
                 } else {
                     CLOSE
