@@ -148,7 +148,7 @@ fn is_rounding(drive: usize, measured: &[Vec<Vec<f64>>], forces: &[Vec<Vec<f64>>
 
 /// Variables on which an error may depend, decimated like the forces: coordinates and their
 /// derivatives, passive coordinates, lengths and rates of linear drives, and measured loads.
-fn variables(model: &Model, data: &Data) -> Outcome<Vec<(String, Vec<f64>)>> {
+pub(crate) fn variables(model: &Model, data: &Data) -> Outcome<Vec<(String, Vec<f64>)>> {
     let run = &data.run;
     let mut variables = Vec::new();
     for (i, name) in model.active().into_iter().enumerate() {

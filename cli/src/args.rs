@@ -105,6 +105,12 @@ pub(crate) enum Command {
         --data recordings/spidermill-mbs/with-rods-fit.csv \\\n      \
         --check recordings/spidermill-mbs/with-rods-check.csv")]
     Diagnose(DiagnoseArgs),
+    /// Tell what a model lacks as one self-contained page: ladder, curves, error maps, candidates, parameters, equations
+    #[command(after_help = "Examples (from the project's root):\n  \
+        modelmill report model-spec/models/spidermill.toml \\\n      \
+        --data recordings/spidermill-mbs/with-rods-fit.csv \\\n      \
+        --check recordings/spidermill-mbs/with-rods-check.csv --out report")]
+    Report(ReportArgs),
     /// Drive a full-body rig along a trajectory and record what its sensors read
     #[command(
         after_help = "The trajectory (CSV) has a column t and one per coordinate of the rig; its rates and \
@@ -162,10 +168,10 @@ pub(crate) enum Command {
         modelmill completions zsh > ~/.zfunc/_modelmill\n  \
         modelmill completions fish > ~/.config/fish/completions/modelmill.fish")]
     Completions(CompletionsArgs),
-    /// Tell the story of a model on bundled recordings: derive, compare, identify, compare again
+    /// Tell the whole story on bundled recordings: derive, compare, find what is missing, add it, watch the error fall
     #[command(
         after_help = "Examples:\n  modelmill tour\n  modelmill tour --out tour\n\n\
-        With --out the equations of both models and the figures are written as files there."
+        Models, recordings and pages are written into the folder, so that each command of the story can be repeated."
     )]
     Tour(TourArgs),
 }
@@ -351,6 +357,27 @@ pub(crate) struct DiagnoseArgs {
     pub(crate) preparation: PreparationArgs,
 }
 
+/// `report`.
+#[derive(Debug, Args)]
+pub(crate) struct ReportArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Recordings to find it in (CSV, Parquet, MATLAB 5); may be repeated
+    #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
+    pub(crate) data: Vec<PathBuf>,
+    /// Recordings that decide what is believed; without any, blocks of --data take turns
+    #[arg(long, value_name = "RUN", num_args = 1..)]
+    pub(crate) check: Vec<PathBuf>,
+    /// Hold all parameters at their nominal values, so that what is wrong with them shows too
+    #[arg(long)]
+    pub(crate) held: bool,
+    /// Write the page `report.html` into this folder
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    #[command(flatten)]
+    pub(crate) preparation: PreparationArgs,
+}
+
 /// `simulate`.
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArgs {
@@ -527,7 +554,7 @@ pub(crate) struct CompletionsArgs {
 /// `tour`.
 #[derive(Debug, Args)]
 pub(crate) struct TourArgs {
-    /// Write the equations and the figures as files into this folder
+    /// Write models, recordings and pages into this folder; `modelmill-tour` in the folder for temporary files if not given
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }

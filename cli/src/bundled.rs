@@ -9,7 +9,7 @@ use crate::failure::{Failure, Outcome};
 use crate::terminal;
 
 /// Model files by name.
-const MODELS: [(&str, &str); 2] = [
+pub(crate) const MODELS: [(&str, &str); 2] = [
     (
         "spidermill.toml",
         include_str!("../../model-spec/models/spidermill.toml"),
@@ -34,10 +34,6 @@ const RIGS: [(&str, &str); 2] = [
 
 /// A recorded pair of runs of the whole robot: one to identify from, one to check on.
 pub(crate) struct Runs {
-    /// Short name.
-    pub(crate) name: &'static str,
-    /// What the robot was.
-    pub(crate) about: &'static str,
     /// Name and text of the recording to identify from.
     pub(crate) fit: (&'static str, &'static str),
     /// Name and text of the recording to check on.
@@ -46,8 +42,6 @@ pub(crate) struct Runs {
 
 /// The robot as the model describes it.
 pub(crate) const PLAIN: Runs = Runs {
-    name: "plain",
-    about: "the whole robot, masses as in Table 1",
     fit: (
         "spidermill-mbs/plain-fit.csv",
         include_str!("../../recordings/spidermill-mbs/plain-fit.csv"),
@@ -60,8 +54,6 @@ pub(crate) const PLAIN: Runs = Runs {
 
 /// The robot with something that the model does not know of.
 pub(crate) const WITH_RODS: Runs = Runs {
-    name: "with rods",
-    about: "besides, each spindle is a rod of 8 kg",
     fit: (
         "spidermill-mbs/with-rods-fit.csv",
         include_str!("../../recordings/spidermill-mbs/with-rods-fit.csv"),

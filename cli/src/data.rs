@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use modelmill_codegen::{PoseFault, PoseReason, States};
 use modelmill_identify::filters::decimate_time;
-use modelmill_identify::{Note, ReadOptions, Recording, Run, Severity, name_of_bytes, place_word};
+use modelmill_identify::{Note, Recording, Run, Severity, name_of_bytes, place_word};
 
 use crate::columns::read_options;
 use crate::failure::{Failure, Outcome};
@@ -90,20 +90,6 @@ fn read_paired(
         }
     }
     Ok(data)
-}
-
-/// Reads a recording that ships with the program.
-pub(crate) fn read_text(model: &Model, name: &str, text: &str) -> Outcome<Data> {
-    let recording = Recording::from_reader(text.as_bytes(), name, &ReadOptions::default())?;
-    let preparation = PreparationArgs::none().preparation();
-    let mut run = recording.states_with(&model.active(), &model.drives(), &preparation)?;
-    pair(&mut run, model.derivation.mechanism.force_delay)?;
-    Ok(Data {
-        run,
-        variance: None,
-        weights: None,
-        load: None,
-    })
 }
 
 /// Gives every force the states of the moment at which it acted, by the model's delay.

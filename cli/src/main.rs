@@ -24,6 +24,7 @@ mod plot;
 mod preparation;
 mod progress;
 mod regression;
+mod report;
 mod sampled_rank;
 mod show;
 mod standstill;
@@ -76,6 +77,7 @@ fn run(command: &Command) -> Outcome {
         Command::Identify(args) => commands::identify::run(args),
         Command::Compare(args) => commands::compare::run(args),
         Command::Diagnose(args) => commands::diagnose::run(args),
+        Command::Report(args) => commands::report::run(args),
         Command::Simulate(args) => commands::simulate::run(args),
         Command::Reduce(args) => commands::reduce::run(args),
         Command::Import(args) => commands::import::run(args),

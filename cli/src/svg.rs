@@ -108,7 +108,7 @@ impl<'a> Figure<'a> {
             let colour = COLOURS[k % COLOURS.len()];
             let n = values.len().max(2) - 1;
             let mut points = String::new();
-            for (i, value) in thinned(values) {
+            for (i, value) in thinned(values, POINTS) {
                 let x = LEFT + plot_width * i as f64 / n as f64;
                 let _ = write!(points, "{x:.1},{:.1} ", y(value));
             }
@@ -151,13 +151,14 @@ impl<'a> Figure<'a> {
     }
 }
 
-/// Least and largest value of each of some hundred stretches, with their places.
-fn thinned(values: &[f64]) -> Vec<(usize, f64)> {
-    if values.len() <= POINTS {
+/// Least and largest value of each of half as many stretches as points are wanted, with their places; all values where
+/// they are few enough.
+pub(crate) fn thinned(values: &[f64], wanted: usize) -> Vec<(usize, f64)> {
+    if values.len() <= wanted {
         return values.iter().copied().enumerate().collect();
     }
-    let stretch = values.len().div_ceil(POINTS / 2);
-    let mut points = Vec::with_capacity(POINTS + 2);
+    let stretch = values.len().div_ceil((wanted / 2).max(1));
+    let mut points = Vec::with_capacity(wanted + 2);
     for (k, span) in values.chunks(stretch).enumerate() {
         let at = |i: usize| (k * stretch + i, span[i]);
         let by = |a: &usize, b: &usize| span[*a].total_cmp(&span[*b]);

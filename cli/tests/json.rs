@@ -238,29 +238,3 @@ fn generate_prints_rust_and_completions_name_the_commands() {
         );
     }
 }
-
-#[test]
-fn the_tour_tells_the_story_and_writes_its_files() {
-    let story = printed(&["tour"]);
-    for part in [
-        "p4_min = m4 - m4*dc3/d3",
-        "spidermill, plain",
-        "spidermill-paper, with rods",
-        "check, identified",
-        "32.1 %",
-        "2.18 %",
-    ] {
-        assert!(story.contains(part), "{part} in\n{story}");
-    }
-    let folder = scratch("tour");
-    printed(&["tour", "--out", &folder]);
-    for file in [
-        "spidermill-equations.html",
-        "spidermill-paper-equations.md",
-        "spidermill-with-rods.svg",
-        "spidermill-paper-plain-fit.json",
-    ] {
-        let text = std::fs::read_to_string(format!("{folder}/{file}")).expect(file);
-        assert!(text.len() > 1000, "{file}");
-    }
-}

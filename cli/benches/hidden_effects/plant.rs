@@ -63,7 +63,7 @@ impl Plant {
         let rig = modelmill_rig::load(
             &path.to_string_lossy(),
             RIG,
-            &mut modelmill_rig::read_limited,
+            &mut modelmill_spec::read_limited,
         )
         .map_err(|failure| failure.render(false))?
         .rig;

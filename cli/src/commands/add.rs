@@ -148,7 +148,8 @@ fn refused(path: &str, failure: EditFailure) -> Failure {
     }
 }
 
-fn difference(old: &str, new: &str, [before, after]: [&str; 2]) -> String {
+/// The change as a unified diff.
+pub(crate) fn difference(old: &str, new: &str, [before, after]: [&str; 2]) -> String {
     TextDiff::from_lines(old, new)
         .unified_diff()
         .context_radius(CONTEXT)
@@ -156,7 +157,8 @@ fn difference(old: &str, new: &str, [before, after]: [&str; 2]) -> String {
         .to_string()
 }
 
-fn coloured(difference: &str) -> String {
+/// A diff for the terminal.
+pub(crate) fn coloured(difference: &str) -> String {
     let style = terminal::style();
     let lines = difference.lines().map(|line| {
         if line.starts_with("+++") || line.starts_with("---") {

@@ -43,21 +43,13 @@ fn json(model: &Model, rank: Option<&NumericRank>) -> String {
     equations.json()
 }
 
-/// Pages that the tour writes.
-pub(crate) struct Pages {
-    /// One self-contained page.
-    pub(crate) html: String,
-    /// The same as Markdown.
-    pub(crate) markdown: String,
-}
-
-/// The pages of a model.
-pub(crate) fn pages(model: &Model) -> Pages {
-    let rank = numeric_rank(model);
-    Pages {
-        html: page(&model.derivation, Format::Html, rank.as_ref()),
-        markdown: page(&model.derivation, Format::Markdown, rank.as_ref()),
-    }
+/// The equations of a model as one self-contained page.
+pub(crate) fn html(model: &Model) -> String {
+    page(
+        &model.derivation,
+        Format::Html,
+        numeric_rank(model).as_ref(),
+    )
 }
 
 /// Eq. (9) on the file's values, with a warning where it says something else than exact reduction.

@@ -16,5 +16,6 @@ pub(crate) mod identify;
 pub(crate) mod import;
 pub(crate) mod interpret;
 pub(crate) mod reduce;
+pub(crate) mod report;
 pub(crate) mod simulate;
 pub(crate) mod tour;

@@ -1,211 +1,193 @@
-//! `tour`: the main job on bundled recordings, told as a short story with figures.
+//! `tour`: the whole story on bundled recordings: derive, compare, see where it fails, learn what is missing, add it, watch
+//! the error fall; then the same for the paper's own treatment. Everything it uses and makes goes into one folder, so that
+//! each command can be repeated by hand.
 
 mod story;
 
-use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::along;
 use crate::args::TourArgs;
 use crate::bundled::{self, PLAIN, Runs, WITH_RODS};
-use crate::commands::equations;
-use crate::commands::identify::{self, Result as Identified};
+use crate::commands::{add, report};
 use crate::data::{self, Data};
-use crate::estimators::EstimatorArgs;
+use crate::diagnosis::Held;
 use crate::failure::{Failure, Outcome};
 use crate::model::{self, Model};
 use crate::output;
-use crate::svg;
-use crate::table::{count, number, percent};
+use crate::preparation::PreparationArgs;
+use crate::report::{Question, Study, added, render, study, words};
 use crate::terminal;
 use story::Story;
 
-/// Tells the story; with `--out`, writes the equations and the figures as files.
+/// The page of the robot with rods.
+const RODS_PAGE: &str = "report.html";
+/// The page of the paper's treatment.
+const PAPER_PAGE: &str = "report-paper.html";
+/// The model with what was found.
+const EDITED: &str = "spidermill-completed.toml";
+
+/// Tells the story and writes its files.
 pub(crate) fn run(args: &TourArgs) -> Outcome {
-    let folder = args.out.as_deref();
-    if let Some(folder) = folder {
-        std::fs::create_dir_all(folder).map_err(|error| {
-            Failure::Input(format!(
-                "the folder {} cannot be made: {error}; give another one with --out",
-                folder.display()
-            ))
-        })?;
-    }
-    let consistent = load("spidermill.toml")?;
-    let paper = load("spidermill-paper.toml")?;
+    let folder = args
+        .out
+        .clone()
+        .unwrap_or_else(|| std::env::temp_dir().join("modelmill-tour"));
+    report::make_folder(&folder)?;
+    let place = Place::unpack(&folder)?;
     let mut story = Story::new(terminal::style());
-    story.mill(&consistent, &paper);
 
-    let chapters = [
-        Chapter::new(&consistent, &PLAIN)?,
-        Chapter::new(&paper, &PLAIN)?,
-        Chapter::new(&consistent, &WITH_RODS)?,
-        Chapter::new(&paper, &WITH_RODS)?,
-    ];
-    let [plain, plain_paper, rods, rods_paper] = &chapters;
+    let (path, model) = place.model("spidermill.toml")?;
+    let [_, check] = place.read(&model, &WITH_RODS)?;
+    story.derive(&place.name("spidermill.toml"), &model);
+    let seen = Seen::new(&model, &check)?;
+    story.compare(&place, &model, &seen);
 
-    story.heading("2  A robot that is what the model says");
-    story.say(&format!(
-        "A multibody code of another house simulated the whole robot, 11 groups of bodies, with the masses of Table 1. \
-         {} samples of one motion serve to identify, {} of another to check.",
-        plain.result.fit.samples,
-        plain.check.samples(),
-    ));
-    story.parameters(plain);
-    story.say(&format!(
-        "Before any identification the reduced model misses the measured forces by {} (nrms on the check). \
-         Nothing was lost by the reduction from 11 groups to {}.",
-        percent(plain.before()),
-        count(consistent.base.len(), "number", "numbers"),
-    ));
+    let rods = place.study(&path, model, &WITH_RODS, Held::Known)?;
+    story.diagnose(&place, &rods);
+    let edited = place.add(&path, &rods)?;
+    story.add(&place, edited.as_ref());
+    story.ladder(&rods);
+    place.write(RODS_PAGE, &render(&rods))?;
 
-    story.heading("3  The same robot under the paper's treatment");
-    story.say(
-        "The paper lets the platform's mass m4 act at the joint in the balance of forces and at the coupler's centre \
-         in the balance of moments. Its model has one base parameter more, and the same robot does not fit it:",
-    );
-    story.parameters(plain_paper);
-    story.forces(plain_paper)?;
-    let p4 = &plain_paper.result.fit.parameters[3];
-    story.say(&format!(
-        "Identification repairs this, {} before and {} after, and says what was wrong: {} = {} falls from {} to {} {}. \
-         For a mass that sits in one place it is zero.",
-        percent(plain_paper.before()),
-        percent(plain_paper.after()),
-        p4.name,
-        p4.expression,
-        p4.nominal.map_or_else(String::new, number),
-        number(p4.value),
-        p4.unit,
-    ));
+    let (path, model) = place.model("spidermill-paper.toml")?;
+    let paper = place.study(&path, model, &PLAIN, Held::All)?;
+    story.paper(&place, &paper);
+    place.write(PAPER_PAGE, &render(&paper))?;
 
-    story.heading("4  A robot with something that no model knows of");
-    story.say(&format!(
-        "Now each spindle is a rod of 8 kg. The consistent model misses the check by {}; identified, by {}.",
-        percent(rods.before()),
-        percent(rods.after()),
-    ));
-    story.parameters(rods);
-    story.forces(rods)?;
-    story.regions(rods)?;
-    let p4 = &rods_paper.result.fit.parameters[3];
-    story.say(&format!(
-        "Under the paper's treatment the error falls from {} to {}, but at a price: {} becomes {} {}, where the truth is 0. \
-         The parameters took over part of what is missing. A small error alone does not make a model true.",
-        percent(rods_paper.before()),
-        percent(rods_paper.after()),
-        p4.name,
-        number(p4.value),
-        p4.unit,
-    ));
-
-    story.heading("5  All errors on runs that identification did not see");
-    story.overview(&chapters);
-    if let Some(folder) = folder {
-        let files = write_files(folder, &[&consistent, &paper], &chapters)?;
-        story.heading("Files");
-        for file in files {
-            story.line(&format!("  {file}"));
-        }
-    } else {
-        story.say(
-            "`modelmill tour --out DIR` writes the equations and these figures as files; \
-             `modelmill equations MODEL` and `modelmill identify MODEL --data RUN` do the same for a mechanism of yours.",
-        );
-    }
+    story.pages(&place);
     terminal::print(story.text.trim_start())
 }
 
-fn load(name: &str) -> Outcome<Model> {
-    model::derive_loaded(name, &bundled::model(name)?)
+/// The folder of the tour.
+struct Place {
+    folder: PathBuf,
 }
 
-/// One model on one pair of runs.
-struct Chapter<'a> {
-    model: &'a Model,
-    runs: &'static Runs,
-    check: Data,
-    result: Identified,
-}
+impl Place {
+    /// Writes models and recordings of the program into a folder.
+    fn unpack(folder: &Path) -> Outcome<Self> {
+        let place = Self {
+            folder: folder.to_owned(),
+        };
+        for (name, text) in bundled::MODELS {
+            place.write(name, text)?;
+        }
+        for runs in [&PLAIN, &WITH_RODS] {
+            for (name, text) in [runs.fit, runs.check] {
+                place.write(file_name(name), text)?;
+            }
+        }
+        Ok(place)
+    }
 
-impl<'a> Chapter<'a> {
-    fn new(model: &'a Model, runs: &'static Runs) -> Outcome<Self> {
-        let fit = data::read_text(model, runs.fit.0, runs.fit.1)?;
-        let mut check = vec![data::read_text(model, runs.check.0, runs.check.1)?];
-        let result = identify::identify(model, &[fit], &[], &check, &EstimatorArgs::default())?;
-        Ok(Self {
+    fn write(&self, name: &str, text: &str) -> Outcome {
+        output::write(&self.folder.join(name), text)
+    }
+
+    /// A file of the folder as a command has it.
+    fn name(&self, file: &str) -> String {
+        added::quoted(&self.folder.join(file).display().to_string())
+    }
+
+    /// Recordings as a command has them.
+    fn recordings(&self, runs: &Runs) -> String {
+        format!(
+            "--data {} --check {}",
+            self.name(file_name(runs.fit.0)),
+            self.name(file_name(runs.check.0))
+        )
+    }
+
+    fn model(&self, name: &str) -> Outcome<(PathBuf, Model)> {
+        let path = self.folder.join(name);
+        let model = model::derive(&path)?;
+        Ok((path, model))
+    }
+
+    fn read(&self, model: &Model, runs: &Runs) -> Outcome<[Vec<Data>; 2]> {
+        let read = |name: &str| {
+            let path = self.folder.join(file_name(name));
+            data::read(model, &path, &PreparationArgs::none())
+        };
+        Ok([read(runs.fit.0)?, read(runs.check.0)?])
+    }
+
+    fn study(&self, path: &Path, model: Model, runs: &Runs, held: Held) -> Outcome<Study> {
+        let loaded = model::load(path)?;
+        let again = |model: &Model| self.read(model, runs);
+        let [fit, check] = again(&model)?;
+        study(Question {
+            path,
+            loaded: &loaded,
+            libraries: &[],
             model,
-            runs,
-            check: check.remove(0),
-            result,
+            fit,
+            check,
+            held,
+            again: &again,
+            recordings: self.recordings(runs),
         })
     }
 
-    /// nrms on the check with nominal values.
-    fn before(&self) -> Option<f64> {
-        self.result.nominal_check.as_ref().and_then(|f| f.nrms)
-    }
-
-    /// nrms on the check with identified values.
-    fn after(&self) -> Option<f64> {
-        self.result.fit.check.as_ref().and_then(|f| f.nrms)
-    }
-
-    /// Measured forces of the check and errors before and after, `[drive][sample]`.
-    fn curves(&self) -> Outcome<[Vec<Vec<f64>>; 3]> {
-        let measured = along::measured(&self.check)?;
-        let error = |values: &[f64]| -> Outcome<Vec<Vec<f64>>> {
-            let model = along::forces(self.model, &self.check, values)?;
-            let pairs = measured.iter().zip(&model);
-            Ok(pairs
-                .map(|(y, m)| y.iter().zip(m).map(|(y, m)| y - m).collect())
-                .collect())
+    /// Writes the model with what was found beside the one it came from; the commands for it, and the difference.
+    fn add(&self, path: &Path, study: &Study) -> Outcome<Option<(Vec<String>, String)>> {
+        let Some(edited) = &study.edited else {
+            return Ok(None);
         };
-        let before = error(&self.model.nominal)?;
-        let after = error(&self.result.values())?;
-        Ok([measured, before, after])
-    }
-
-    fn title(&self) -> String {
-        format!("{}, {}", self.model.name, self.runs.name)
+        let before = std::fs::read_to_string(path)
+            .map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
+        self.write(EDITED, &edited.text)?;
+        let name = path.display().to_string();
+        let commands = study.entries.iter();
+        let commands = commands.map(|entry| added::command(&name, entry)).collect();
+        let difference = add::difference(&before, &edited.text, ["spidermill.toml", EDITED]);
+        Ok(Some((commands, add::coloured(&difference))))
     }
 }
 
-/// Equations pages and figures; the paths of what was written.
-fn write_files(folder: &Path, models: &[&Model], chapters: &[Chapter<'_>]) -> Outcome<Vec<String>> {
-    let mut written = Vec::new();
-    let mut write = |name: String, text: &str| -> Outcome {
-        let path = folder.join(name);
-        output::write(&path, text)?;
-        written.push(path.display().to_string());
-        Ok(())
-    };
-    for model in models {
-        let pages = equations::pages(model);
-        write(format!("{}-equations.html", model.name), &pages.html)?;
-        write(format!("{}-equations.md", model.name), &pages.markdown)?;
+/// The last part of a bundled recording's name.
+fn file_name(name: &str) -> &str {
+    name.rsplit('/').next().unwrap_or(name)
+}
+
+/// The model with nominal parameters held against a recording.
+struct Seen {
+    figures: modelmill_identify::Figures,
+    places: along::Places,
+    time: Vec<f64>,
+    measured: Vec<Vec<f64>>,
+    errors: Vec<Vec<f64>>,
+}
+
+impl Seen {
+    fn new(model: &Model, data: &[Data]) -> Outcome<Self> {
+        let one = data
+            .first()
+            .ok_or_else(|| Failure::Input("the bundled recording has no sample".to_owned()))?;
+        let measured = along::measured(one)?;
+        let forces = along::forces(model, one, &model.nominal)?;
+        let errors = measured
+            .iter()
+            .zip(&forces)
+            .map(|(y, m)| y.iter().zip(m).map(|(y, m)| y - m).collect())
+            .collect();
+        let figures = along::figures(&model.drives(), [(&measured[..], &forces[..])])?;
+        let all = [measured];
+        let places = along::places(model, std::slice::from_ref(one), &all, &[forces])?;
+        let [measured] = all;
+        Ok(Self {
+            figures,
+            places,
+            time: one.time(),
+            measured,
+            errors,
+        })
     }
-    for chapter in chapters {
-        let [measured, before, after] = chapter.curves()?;
-        let time = chapter.check.time();
-        let mut figure = svg::Figure::new(&format!("{}, check run", chapter.title()), &time);
-        for (d, drive) in chapter.model.drives().iter().enumerate() {
-            figure.panel(&format!("{drive}, N"), &[("measured", &measured[d])]);
-            figure.panel(
-                &format!("{drive}, error, N"),
-                &[("nominal", &before[d]), ("identified", &after[d])],
-            );
-        }
-        let name = format!(
-            "{}-{}",
-            chapter.model.name,
-            chapter.runs.name.replace(' ', "-")
-        );
-        write(format!("{name}.svg"), &figure.finish())?;
-        let mut fit = String::new();
-        let value = chapter.result.json()?;
-        let _ = writeln!(fit, "{value:#}");
-        write(format!("{name}-fit.json"), &fit)?;
-    }
-    Ok(written)
+}
+
+/// The verdict of a study in words.
+fn verdict(study: &Study) -> String {
+    let drives = study.before.model.drives();
+    words::verdict(&study.answer.diagnosis, &drives, study.judged)
 }

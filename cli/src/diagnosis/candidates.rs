@@ -261,7 +261,7 @@ impl Variant {
             wanted.extend(effect.terms.iter().map(|term| term.parameter.0));
         }
         let is_wanted =
-            |product: &Monomial| matches!(product.0.as_slice(), [(p, 1)] if wanted.contains(p));
+            |product: &Monomial| product.0.iter().any(|(p, n)| *n == 1 && wanted.contains(p));
         modelmill_codegen::derive_columns(mechanism, &is_wanted)
             .map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
     }
@@ -338,8 +338,10 @@ pub(crate) fn grid(single: &Single, [rate, travel]: [f64; 2]) -> Vec<f64> {
         return match of {
             // Waves differ by how often they fit into the travel.
             Scale::Travel if from > 0.0 => {
-                let times = ((1.0 / from - 1.0 / to) / 0.4).ceil() as usize;
-                let waves = evenly(times.clamp(2, WAVES), 1.0 / to, 1.0 / from);
+                // So many that neighbours differ by less than half a wave over the travel.
+                let (few, many) = (1.0 / to, 1.0 / from);
+                let count = (2..WAVES).find(|n| (many - few) / (*n as f64) < 0.4);
+                let waves = evenly(count.unwrap_or(WAVES), few, many);
                 waves.into_iter().map(|times| scale / times).collect()
             }
             _ if from > 0.0 => {

@@ -195,13 +195,21 @@ fn singles(
     let evaluator = Evaluator::with_constants(derivation, constants);
     let columns = regressor(all, &evaluator, model)?;
     let reduction = &derivation.reduction;
+    // Where a parameter stands in products, as a mass whose place is one, the others have their nominal values.
     let of = |(_, parameter): &(String, usize)| -> Column {
-        let at = reduction.retained.iter().position(|product| {
+        let mut sum = Column(vec![None; model.drives().len()]);
+        for (k, product) in reduction.retained.iter().enumerate() {
             let powers = &reduction.products[*product].0;
-            matches!(powers.as_slice(), [(q, 1)] if q == parameter)
-        });
-        let none = || Column(vec![None; model.drives().len()]);
-        at.map_or_else(none, |at| columns[at].clone())
+            if powers.contains(&(*parameter, 1)) {
+                let others = powers.iter().filter(|(p, _)| p != parameter);
+                let value = |(p, n): &(usize, u32)| {
+                    let n = i32::try_from(*n).unwrap_or(i32::MAX);
+                    mechanism.parameters[*p].nominal.powi(n)
+                };
+                sum.add(others.map(value).product(), &columns[k]);
+            }
+        }
+        sum
     };
     Ok(which
         .iter()

@@ -8,4 +8,4 @@ mod numbers;
 mod places;
 mod problem;
 
-pub(crate) use problem::{Held, find};
+pub(crate) use problem::{Answer, Held, find};

@@ -16,6 +16,9 @@ use super::candidates::{Candidates, candidates};
 use super::columns::{Origin, carried, columns, finer};
 use super::numbers::{Runs, layout, regressor, stack, variables};
 
+/// Errors below this share of a force are rounding, of the recording or of whatever simulated it.
+const ROUNDING: f64 = 3e-6;
+
 /// Which parameters keep their nominal values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Held {
@@ -30,7 +33,6 @@ pub(crate) struct Answer {
     pub(crate) problem: Problem,
     pub(crate) diagnosis: Diagnosis,
     pub(crate) candidates: Candidates,
-    pub(crate) origins: Vec<Origin>,
 }
 
 /// Finds what a model lacks.
@@ -66,7 +68,6 @@ pub(crate) fn find(
         problem,
         diagnosis,
         candidates,
-        origins,
     })
 }
 
@@ -107,7 +108,7 @@ fn problem(
     let (columns, origins) = columns(candidates, model, all)?;
     let problem = Problem {
         layout: layout(model, all),
-        noise: measured.iter().map(|force| white_noise(force)).collect(),
+        noise: measured.iter().map(|force| noise(force)).collect(),
         measured: Column::new(measured),
         base: regressor(all, &Evaluator::new(&model.derivation), model)?,
         candidates: columns,
@@ -152,4 +153,11 @@ fn friction(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Column>> {
         }
     }
     Ok(friction)
+}
+
+/// White noise of a force, but not less than what rounding leaves of it.
+fn noise(force: &[f64]) -> f64 {
+    let squares = force.iter().map(|f| f * f).sum::<f64>();
+    let size = (squares / force.len().max(1) as f64).sqrt();
+    white_noise(force).max(ROUNDING * size)
 }

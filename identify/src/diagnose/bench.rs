@@ -5,8 +5,9 @@ use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::factored::Factored;
 use super::noise::effective_samples;
-use super::pool::{DEPENDENT, On, Pool, dot, solve};
+use super::pool::{On, Pool, dot, solve};
 use super::problem::{Candidate, Choice, Column, Problem, Sign, Source, Supply};
 
 /// A column of which the others leave a smaller share of squares than this says nothing new.
@@ -27,6 +28,10 @@ pub(crate) struct Pick {
 
 /// A column of a choice: candidate, choice, column.
 type ChoiceColumn = (usize, usize, usize);
+/// Inner products with columns of the pool, channel by channel of the choice's column.
+type Seen = HashMap<ChoiceColumn, Vec<Option<Box<[f64]>>>>;
+/// Columns that lie in the span of others and the base.
+type Within = HashMap<(Vec<usize>, Vec<usize>), bool>;
 
 /// A set of effects, fitted to all samples with the base parameters.
 #[derive(Clone, Debug)]
@@ -52,14 +57,14 @@ pub(crate) struct Bench<'a> {
     pub(crate) weights: Vec<f64>,
     /// The best choice of each candidate for the present residual; `None` if the model says it all already.
     pub(crate) present: Vec<Option<Pick>>,
-    supply: &'a dyn Supply,
-    friction: Vec<usize>,
+    pub(crate) supply: &'a dyn Supply,
+    pub(crate) friction: Vec<usize>,
     /// Pool columns by candidate and choice.
     known: HashMap<(usize, usize), Vec<usize>>,
     /// Inner products of the columns of choices with those of the pool, channel by channel of the choice's column.
-    seen: RefCell<HashMap<ChoiceColumn, Vec<Option<Box<[f64]>>>>>,
+    seen: RefCell<Seen>,
     /// Which columns lie in the span of others and the base.
-    pub(crate) within: RefCell<HashMap<(Vec<usize>, Vec<usize>), bool>>,
+    pub(crate) within: RefCell<Within>,
 }
 
 impl<'a> Bench<'a> {
@@ -148,7 +153,7 @@ impl<'a> Bench<'a> {
         let rest = self.rest(picks, &factors);
         let which = self.columns(picks);
         let weights = self.weights.clone();
-        let factor = Factored::new(self.pool.gram(&which, &weights, On::All));
+        let factor = Factored::new(&self.pool.gram(&which, &weights, On::All));
         let problem = self.problem;
         let carried = self.carried(picks);
         let mut present = Vec::with_capacity(problem.candidates.len());
@@ -203,254 +208,6 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Chooses the constants of each effect of a set anew, beside those of the others.
-    pub(crate) fn retune(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
-        let problem = self.problem;
-        for _ in 0..2 {
-            let before = picks.clone();
-            for i in 0..picks.len() {
-                let Source::Columns(choices) = &problem.candidates[picks[i].candidate].source
-                else {
-                    continue;
-                };
-                if choices.len() < 2 {
-                    continue;
-                }
-                let mut others = picks.clone();
-                let old = others.remove(i);
-                let (factors, _) = self.fit(&others, On::All);
-                let rest = self.rest(&others, &factors);
-                let which = self.columns(&others);
-                let factor = Factored::new(self.pool.gram(&which, &self.weights, On::All));
-                let candidate = old.candidate;
-                let score = |(at, choice): (usize, &Choice)| {
-                    let products = self.products_of_choice((candidate, at), choice, &which);
-                    self.explained(&choice.columns, &products, &factor, &rest)
-                };
-                let scored = choices.iter().enumerate().map(score).enumerate();
-                let Some((best, explained)) = scored.max_by(|a, b| a.1.total_cmp(&b.1)) else {
-                    continue;
-                };
-                let own: Vec<Column> = old
-                    .columns
-                    .iter()
-                    .map(|k| self.pool.column(*k).clone())
-                    .collect();
-                if explained
-                    > self.explained(&own, &self.all_products(&own, &which), &factor, &rest)
-                {
-                    picks[i] = self.pick(old.candidate, best);
-                }
-            }
-            if picks == before {
-                break;
-            }
-        }
-        picks
-    }
-
-    /// Searches for the constants of a set's effects between the values of their grids, by golden sections.
-    pub(crate) fn refine(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
-        let problem = self.problem;
-        let supply = self.supply;
-        for i in 0..picks.len() {
-            let candidate = picks[i].candidate;
-            let Source::Columns(choices) = &problem.candidates[candidate].source else {
-                continue;
-            };
-            let [(name, value)] = picks[i].constants.as_slice() else {
-                continue;
-            };
-            let (name, value) = (name.clone(), *value);
-            let mut grid: Vec<f64> = choices.iter().map(|c| c.constants[0].1).collect();
-            grid.sort_by(f64::total_cmp);
-            let low = grid
-                .iter()
-                .copied()
-                .filter(|x| *x < value)
-                .fold(0.7 * value, f64::max);
-            let high = grid
-                .iter()
-                .copied()
-                .filter(|x| *x > value)
-                .fold(1.4 * value, f64::min);
-            let mut others = picks.clone();
-            others.remove(i);
-            let (factors, _) = self.fit(&others, On::All);
-            let rest = self.rest(&others, &factors);
-            let which = self.columns(&others);
-            let factor = Factored::new(self.pool.gram(&which, &self.weights, On::All));
-            let at = |log: f64| -> Option<(f64, Vec<Column>)> {
-                let columns = supply.finer(candidate, log.exp())?;
-                let products = self.all_products(&columns, &which);
-                Some((self.explained(&columns, &products, &factor, &rest), columns))
-            };
-            let Some(best) = golden(low.ln(), high.ln(), &at) else {
-                continue;
-            };
-            let own: Vec<Column> = picks[i]
-                .columns
-                .iter()
-                .map(|k| self.pool.column(*k).clone())
-                .collect();
-            let products = self.all_products(&own, &which);
-            let now = self.explained(&own, &products, &factor, &rest);
-            let (log, (explained, columns)) = best;
-            if explained > now {
-                picks[i] = Pick {
-                    candidate,
-                    constants: vec![(name, log.exp())],
-                    rank: picks[i].rank,
-                    columns: columns.into_iter().map(|c| self.pool.add(c)).collect(),
-                };
-            }
-        }
-        picks
-    }
-
-    /// Candidates that depend on what the drives carry, with the columns that a fit gives them.
-    fn carried(&mut self, picks: &[Pick]) -> HashMap<usize, Pick> {
-        let is_carried = |c: &Candidate| matches!(c.source, Source::Carried);
-        if !self.problem.candidates.iter().any(is_carried) {
-            return HashMap::new();
-        }
-        let mut which = self.columns(picks);
-        let n = which.len();
-        which.extend(&self.friction);
-        which.push(self.measured);
-        let (factors, _) = solve(&self.pool.gram(&which, &self.weights, On::All));
-        let of_picks = picks.iter().flat_map(|pick| {
-            let candidate = self.candidate(pick);
-            pick.columns.iter().map(|_| candidate.bears)
-        });
-        let bears: Vec<bool> = (self.problem.base_bears.iter().copied())
-            .chain(of_picks)
-            .collect();
-        let mut load = self.problem.held.clone().unwrap_or_default();
-        load.0.resize(self.weights.len(), None);
-        for ((k, factor), bears) in which[..n].iter().zip(factors.iter()).zip(bears) {
-            if bears {
-                load.add(*factor, self.pool.column(*k));
-            }
-        }
-        let made = self.supply.carried(&load);
-        let picks = made.into_iter().map(|(candidate, columns)| {
-            let pick = Pick {
-                candidate,
-                constants: Vec::new(),
-                rank: columns.len(),
-                columns: columns.into_iter().map(|c| self.pool.add(c)).collect(),
-            };
-            (candidate, pick)
-        });
-        picks.collect()
-    }
-
-    /// Columns of a candidate that is a small change of the model as fitted.
-    fn tangent(&mut self, candidate: usize, picks: &[Pick], factors: &DVector<f64>) -> Pick {
-        let columns: Vec<Column> = match &self.problem.candidates[candidate].source {
-            Source::Tangent(parameters) => parameters
-                .iter()
-                .map(|changes| {
-                    let mut sum = Column(vec![None; self.weights.len()]);
-                    for (change, factor) in changes.iter().zip(factors.iter()) {
-                        sum.add(*factor, change);
-                    }
-                    sum
-                })
-                .collect(),
-            Source::Delay => {
-                let mut force = self.problem.held.clone().unwrap_or_default();
-                force.0.resize(self.weights.len(), None);
-                let is_delay = |pick: &Pick| {
-                    matches!(
-                        self.problem.candidates[pick.candidate].source,
-                        Source::Delay
-                    )
-                };
-                let delays: Vec<usize> = picks
-                    .iter()
-                    .filter(|pick| is_delay(pick))
-                    .flat_map(|pick| pick.columns.clone())
-                    .collect();
-                for (k, factor) in self.columns(picks).iter().zip(factors.iter()) {
-                    if !delays.contains(k) {
-                        force.add(*factor, self.pool.column(*k));
-                    }
-                }
-                // The delay that was found so far, where it is not new.
-                let found = picks.iter().position(|pick| is_delay(pick)).map(|i| {
-                    let before: usize = picks[..i].iter().map(|p| p.columns.len()).sum();
-                    factors[self.base.len() + before]
-                });
-                vec![self.late(&force, found.unwrap_or(0.0))]
-            }
-            Source::Columns(_) | Source::Carried => unreachable!("they are no tangents"),
-        };
-        Pick {
-            candidate,
-            constants: Vec::new(),
-            rank: columns.len(),
-            columns: columns.into_iter().map(|c| self.pool.add(c)).collect(),
-        }
-    }
-
-    /// What a force changes by when it is read later by `delay`, for each second of it; for delays below a tenth of a
-    /// sample minus its rate of change.
-    fn late(&self, force: &Column, delay: f64) -> Column {
-        let stretches = &self.problem.layout.stretches;
-        let changes = |values: &Vec<f64>| {
-            let mut changes = Vec::with_capacity(values.len());
-            let mut start = 0;
-            for stretch in stretches {
-                let part = &values[start..start + stretch.samples];
-                let last = part.len() - 1;
-                let samples = delay / stretch.step;
-                for i in 0..part.len() {
-                    if samples.abs() < 0.1 {
-                        let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
-                        let time = stretch.step * (after - before).max(1) as f64;
-                        changes.push((part[before] - part[after]) / time);
-                        continue;
-                    }
-                    let at = (i as f64 - samples).clamp(0.0, last as f64);
-                    let low = at.floor();
-                    let (k, share) = (low as usize, at - low);
-                    let then = part[k] + share * (part[(k + 1).min(last)] - part[k]);
-                    changes.push((then - part[i]) / delay);
-                }
-                start += stretch.samples;
-            }
-            changes
-        };
-        Column(force.0.iter().map(|v| v.as_ref().map(changes)).collect())
-    }
-
-    /// Makes the columns of effects that depend on the fit anew.
-    pub(crate) fn refresh(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
-        for _ in 0..3 {
-            for i in 0..picks.len() {
-                let candidate = picks[i].candidate;
-                if matches!(
-                    self.problem.candidates[candidate].source,
-                    Source::Columns(_)
-                ) {
-                    continue;
-                }
-                let (factors, _) = self.fit(&picks, On::All);
-                let rank = picks[i].rank;
-                let anew = match self.problem.candidates[candidate].source {
-                    Source::Carried => self.carried(&picks).remove(&candidate),
-                    _ => Some(self.tangent(candidate, &picks.clone(), &factors)),
-                };
-                if let Some(anew) = anew {
-                    picks[i] = Pick { rank, ..anew };
-                }
-            }
-        }
-        picks
-    }
-
     /// How many columns of a candidate say something that others do not say already.
     fn rank(&self, pick: &Pick, which: &[usize], factor: &Factored) -> usize {
         let columns: Vec<&Column> = pick.columns.iter().map(|k| self.pool.column(*k)).collect();
@@ -473,17 +230,17 @@ impl<'a> Bench<'a> {
     }
 
     /// Weighted inner products of a column that need not be in the pool with some that are.
-    fn products(&self, column: &Column, which: &[usize]) -> DVector<f64> {
+    pub(crate) fn products(&self, column: &Column, which: &[usize]) -> DVector<f64> {
         let product = |k: &usize| self.product(column, self.pool.column(*k));
         DVector::from_iterator(which.len(), which.iter().map(product))
     }
 
-    fn all_products(&self, columns: &[Column], which: &[usize]) -> Vec<DVector<f64>> {
+    pub(crate) fn all_products(&self, columns: &[Column], which: &[usize]) -> Vec<DVector<f64>> {
         columns.iter().map(|c| self.products(c, which)).collect()
     }
 
     /// Weighted inner products of a choice's columns with some of the pool; each is computed once.
-    fn products_of_choice(
+    pub(crate) fn products_of_choice(
         &self,
         (candidate, choice): (usize, usize),
         columns: &Choice,
@@ -526,7 +283,7 @@ impl<'a> Bench<'a> {
     }
 
     /// By how much some columns would lower the weighted sum of squares of a residual beside those that made it.
-    fn explained(
+    pub(crate) fn explained(
         &self,
         columns: &[Column],
         products: &[DVector<f64>],
@@ -629,7 +386,7 @@ impl<'a> Bench<'a> {
         let gram = self.pool.gram(&which, &self.weights, On::All);
         let n = self.base.len();
         let m = columns.len();
-        let factor = Factored::new(gram.view((0, 0), (n, n)).into_owned());
+        let factor = Factored::new(&gram.view((0, 0), (n, n)).into_owned());
         let mut left = gram.view((n, n), (m, m)).into_owned();
         if n > 0 {
             let halves = factor.halves(&gram.view((0, n), (n, m)).into_owned());
@@ -660,35 +417,6 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// The largest value of a function between two bounds, by golden sections (J. Kiefer 1953).
-fn golden<T>(
-    mut low: f64,
-    mut high: f64,
-    at: &dyn Fn(f64) -> Option<(f64, T)>,
-) -> Option<(f64, (f64, T))> {
-    let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let (mut a, mut b) = (high - ratio * (high - low), low + ratio * (high - low));
-    let (mut of_a, mut of_b) = (at(a)?, at(b)?);
-    for _ in 0..12 {
-        if of_a.0 > of_b.0 {
-            high = b;
-            (b, of_b) = (a, of_a);
-            a = high - ratio * (high - low);
-            of_a = at(a)?;
-        } else {
-            low = a;
-            (a, of_a) = (b, of_b);
-            b = low + ratio * (high - low);
-            of_b = at(b)?;
-        }
-    }
-    Some(if of_a.0 > of_b.0 {
-        (a, of_a)
-    } else {
-        (b, of_b)
-    })
-}
-
 /// Inner products of the effects' columns and the measured forces once the base is taken off.
 pub(crate) struct Table {
     left: DMatrix<f64>,
@@ -697,68 +425,4 @@ pub(crate) struct Table {
 
 pub(crate) fn n_columns(picks: &[Pick]) -> usize {
     picks.iter().map(|p| p.columns.len()).sum()
-}
-
-/// A decomposed matrix of inner products; columns that depend on earlier ones are passed over.
-struct Factored {
-    lower: DMatrix<f64>,
-    scale: Vec<f64>,
-    kept: Vec<bool>,
-}
-
-impl Factored {
-    fn new(gram: DMatrix<f64>) -> Self {
-        let n = gram.nrows();
-        let scale: Vec<f64> = (0..n)
-            .map(|i| {
-                let root = gram[(i, i)].sqrt();
-                if root > 0.0 { root } else { 1.0 }
-            })
-            .collect();
-        let mut lower = DMatrix::zeros(n, n);
-        let mut kept = vec![false; n];
-        for i in 0..n {
-            for j in 0..=i {
-                if j < i && !kept[j] {
-                    continue;
-                }
-                let mut sum = gram[(i, j)] / (scale[i] * scale[j]);
-                for k in 0..j {
-                    sum -= lower[(i, k)] * lower[(j, k)];
-                }
-                if j < i {
-                    lower[(i, j)] = sum / lower[(j, j)];
-                } else if sum > DEPENDENT {
-                    kept[i] = true;
-                    lower[(i, i)] = sum.sqrt();
-                }
-            }
-        }
-        Self { lower, scale, kept }
-    }
-
-    /// `L^-1 x`: its square is what the columns explain.
-    fn half(&self, products: &DVector<f64>) -> DVector<f64> {
-        let n = products.len();
-        let mut half = DVector::zeros(n);
-        for i in 0..n {
-            if !self.kept[i] {
-                continue;
-            }
-            let mut sum = products[i] / self.scale[i];
-            for k in 0..i {
-                sum -= self.lower[(i, k)] * half[k];
-            }
-            half[i] = sum / self.lower[(i, i)];
-        }
-        half
-    }
-
-    fn halves(&self, products: &DMatrix<f64>) -> DMatrix<f64> {
-        let columns: Vec<DVector<f64>> = products
-            .column_iter()
-            .map(|column| self.half(&column.into_owned()))
-            .collect();
-        DMatrix::from_columns(&columns)
-    }
 }

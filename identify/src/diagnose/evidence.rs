@@ -17,6 +17,8 @@ const BLOCKS: usize = 12;
 const FOLDS: usize = 10;
 /// A change must lower the squared error on its channels by this share where it was not fitted.
 pub(crate) const LEAST_GAIN: f64 = 0.02;
+/// Squared errors below this, in units of what counts as noise, are nobody's.
+const BELOW_NOISE: f64 = 0.8;
 /// How many of its own deviations over the blocks the gain must be above zero.
 const LEAST_T: f64 = 2.5;
 /// A gain from which on it is enough that blocks gain by shares of their own, and how sure that must be.
@@ -36,12 +38,17 @@ pub struct Evidence {
     pub bic: f64,
     /// How many independent equations the residual before is worth.
     pub effective_samples: f64,
+    /// The squared error before, relative to what counts as noise.
+    pub above_noise: f64,
 }
 
 impl Evidence {
     /// Whether it is enough to believe in a change.
     pub fn holds(&self) -> bool {
-        self.gain >= LEAST_GAIN && self.is_steady() && self.bic > 0.0
+        self.gain >= LEAST_GAIN
+            && self.is_steady()
+            && self.bic > 0.0
+            && self.above_noise > BELOW_NOISE
     }
 
     /// Whether the gain is the same all along: in the mean over the blocks, or, if it is large, block by block.
@@ -51,7 +58,9 @@ impl Evidence {
 
     /// What is lacking, in words.
     pub fn lacks(&self, has_check: bool) -> Option<&'static str> {
-        if self.gain <= 0.0 || !self.is_steady() {
+        if self.above_noise <= BELOW_NOISE {
+            Some("what is left is rounding")
+        } else if self.gain <= 0.0 || !self.is_steady() {
             Some(if has_check {
                 "not supported by the check"
             } else {
@@ -105,6 +114,7 @@ impl Bench<'_> {
             bic: worth * (old_fit.0 / new_fit.0.max(f64::MIN_POSITIVE)).ln()
                 - (count(after) - count(before)) * worth.ln(),
             effective_samples: worth,
+            above_noise: old_fit.0 / (channels.len() * self.problem.layout.samples()).max(1) as f64,
         }
     }
 

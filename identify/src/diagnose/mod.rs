@@ -2,19 +2,26 @@
 //! comes out, with what cannot be told apart, and an honest answer where nothing explains it.
 //!
 //! 1. [`Problem`] - measured forces, columns of the model, candidates with the constants that are searched for.
-//! 2. `pool`, `bench` - inner products of all columns, so that a set of effects is fitted in microseconds.
-//! 3. `search` - forward over sets, with exchanges, back again; `evidence` decides on time that was not fitted.
+//! 2. `pool`, `factored`, `bench` - inner products of all columns, so that a set of effects is fitted in microseconds;
+//!    `tuning` finds constants, `following` makes columns that depend on the fit, `delays` those of late forces.
+//! 3. `search` - forward over sets, with exchanges; `evidence` decides on time that was not fitted; `settle` makes the last
+//!    set as small and simple as it can be.
 //! 4. `aliases` - what this recording cannot tell apart; `reproducible` - what no candidate explains and no noise is.
 //! 5. [`Diagnosis`] - the answer.
 
 mod aliases;
 mod bench;
+mod delays;
 mod evidence;
+mod factored;
+mod following;
 mod noise;
 mod pool;
 mod problem;
 mod reproducible;
 mod search;
+mod settle;
+mod tuning;
 
 use serde::Serialize;
 
@@ -199,6 +206,9 @@ impl Bench<'_> {
     fn is_unexplained(&self, channel: usize, rest: &[f64], again: f64) -> bool {
         let squares = dot(rest, rest) / rest.len().max(1) as f64;
         let noise = self.problem.noise[channel].powi(2);
+        if squares <= noise {
+            return false;
+        }
         let worth = effective_samples(rest) / rest.len().max(1) as f64;
         let comes_again = again > UNEXPLAINED && again * squares > ABOVE_NOISE * noise;
         comes_again || squares > MUCH * noise && worth < RESEMBLE

@@ -1,7 +1,7 @@
 //! The search for the smallest set of effects that explains what the model cannot say: forward over sets, with every
 //! member tried against every other candidate, back again, and simpler ones preferred.
 
-use super::bench::{Bench, Pick, Trial, n_columns};
+use super::bench::{Bench, Pick, Trial};
 use super::evidence::Evidence;
 use super::pool::On;
 use super::problem::{Problem, Source};
@@ -22,8 +22,6 @@ const MOST_OF: f64 = 0.7;
 const MUCH_BETTER: f64 = 20.0;
 /// Which share of the squared error on its channels it must take off beside that.
 const LARGE_CHANGE: f64 = 0.1;
-/// By how much the criterion must fall for an exchange of members.
-const EXCHANGED: f64 = 1.0;
 /// Most effects that are looked for.
 const MOST: usize = 40;
 
@@ -122,41 +120,6 @@ impl Bench<'_> {
         Found { steps, refused }
     }
 
-    /// Exchanges members for others by which the whole set gets better or simpler.
-    fn exchange(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
-        self.weigh(&picks);
-        let (factors, _) = self.fit(&picks, On::All);
-        let rest = self.rest(&picks, &factors);
-        let channels: Vec<usize> = (0..rest.len()).collect();
-        let worth = self.worth(&rest, &channels);
-        for i in 0..picks.len() {
-            let mut others = picks.clone();
-            others.remove(i);
-            self.look(&others);
-            let table = self.table(&picks);
-            let now = self.trial(picks.clone());
-            let mut best = (criterion(self.problem, &now, worth) - EXCHANGED, None);
-            for rival in self.present.iter().flatten() {
-                if picks.iter().any(|p| p.candidate == rival.candidate) {
-                    continue;
-                }
-                let mut set = picks.clone();
-                set[i] = rival.clone();
-                let trial = self.try_in(&table, set);
-                let score = criterion(self.problem, &trial, worth);
-                if trial.freedoms <= now.freedoms && score < best.0 && !self.is_slight_delay(&trial)
-                {
-                    best = (score, Some(trial));
-                }
-            }
-            if let (_, Some(trial)) = best {
-                let refined = self.refine(trial.picks);
-                picks = self.refresh(refined);
-            }
-        }
-        picks
-    }
-
     /// Whether a set is another one and a further effect, which may take the place of what it holds.
     fn is_addition(&self, accepted: &[Pick], trial: &Trial) -> bool {
         let is_new = |pick: &&Pick| accepted.iter().all(|p| p.candidate != pick.candidate);
@@ -164,7 +127,7 @@ impl Bench<'_> {
         let (Some(new), None) = (news.next(), news.next()) else {
             return false;
         };
-        let replaced = self.replaced(accepted, &trial.picks);
+        let replaced = Self::replaced(accepted, &trial.picks);
         replaced.iter().all(|p| self.is_within(p, new, &[]))
     }
 
@@ -191,55 +154,6 @@ impl Bench<'_> {
             }
         }
         None
-    }
-
-    /// Passes over a delay that would be less than half a sample beside a set.
-    fn leave_out_slight_delays(&mut self, accepted: &[Pick]) {
-        let all = self.present.iter().flatten();
-        let delays: Vec<Pick> = all
-            .filter(|p| matches!(self.candidate(p).source, Source::Delay))
-            .cloned()
-            .collect();
-        for delay in delays {
-            let candidate = delay.candidate;
-            let mut set = accepted.to_vec();
-            set.push(delay);
-            let set = self.refresh(set);
-            let trial = self.trial(set);
-            if self.is_slight_delay(&trial) {
-                self.present[candidate] = None;
-            }
-        }
-    }
-
-    /// A set whose effects that depend on the fit have been made anew by it.
-    fn settled(&mut self, trial: &Trial) -> Trial {
-        let fixed = |p: &Pick| matches!(self.candidate(p).source, Source::Columns(_));
-        if trial.picks.iter().all(fixed) {
-            return trial.clone();
-        }
-        let score = trial.score;
-        let picks = self.refresh(trial.picks.clone());
-        Trial {
-            score,
-            ..self.trial(picks)
-        }
-    }
-
-    /// Whether a set holds a delay of less than half a sample, which is how samplers are, and no finding.
-    fn is_slight_delay(&self, trial: &Trial) -> bool {
-        let is_delay = |pick: &Pick| matches!(self.candidate(pick).source, Source::Delay);
-        let Some(at) = trial.picks.iter().position(is_delay) else {
-            return false;
-        };
-        let before: usize = trial.picks[..at].iter().map(|p| p.columns.len()).sum();
-        // On the fit alone and on all: what differs between recordings is no delay.
-        let delay = [On::Fit, On::All]
-            .map(|on| self.fit(&trial.picks, on).0[self.base.len() + before].abs())
-            .into_iter()
-            .fold(f64::INFINITY, f64::min);
-        let steps = self.problem.layout.stretches.iter().map(|s| s.sampled);
-        delay < 0.5 * steps.fold(0.0, f64::max)
     }
 
     /// All sets that one more effect makes of those in the beam, the best of them improved by exchanges; best first.
@@ -438,7 +352,7 @@ impl Bench<'_> {
         let mut chosen = (best, evidence);
         // A kind that holds a simpler one, such as friction that differs by direction, comes after it.
         // So does what refines a member, after other simple kinds.
-        let refines = !self.replaced(accepted, &chosen.0.picks).is_empty();
+        let refines = !Self::replaced(accepted, &chosen.0.picks).is_empty();
         let nested = trials.iter().filter(|trial| {
             let news = difference(&trial.picks, accepted);
             let bests = difference(&chosen.0.picks, accepted);
@@ -449,7 +363,7 @@ impl Bench<'_> {
                 return false;
             };
             trial.wrong_sign.is_empty()
-                && self.replaced(accepted, &trial.picks).is_empty()
+                && Self::replaced(accepted, &trial.picks).is_empty()
                 && simple.rank < own.rank
                 && self.candidate(simple).searched <= self.candidate(own).searched
                 && (refines || self.is_within(simple, own, accepted))
@@ -494,109 +408,14 @@ impl Bench<'_> {
     }
 
     /// Members of a set that are no longer in another.
-    fn replaced(&self, accepted: &[Pick], picks: &[Pick]) -> Vec<Pick> {
+    fn replaced(accepted: &[Pick], picks: &[Pick]) -> Vec<Pick> {
         let gone = |pick: &&Pick| picks.iter().all(|p| p.candidate != pick.candidate);
         accepted.iter().filter(gone).cloned().collect()
-    }
-
-    /// Takes simpler kinds where nothing speaks for what they lack.
-    fn simplify(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
-        for i in 0..picks.len() {
-            if picks[i].columns.len() < 2 {
-                continue;
-            }
-            let mut others = picks.clone();
-            let own = others.remove(i);
-            self.look(&others);
-            let rank = self.present[own.candidate].as_ref().map_or(0, |p| p.rank);
-            let nested: Vec<Pick> = (self.present.iter().flatten())
-                .filter(|one| one.rank < rank)
-                .filter(|one| self.candidate(one).searched <= self.candidate(&own).searched)
-                .filter(|one| self.is_within(one, &own, &others))
-                .cloned()
-                .collect();
-            let channels = self.acted_on(std::slice::from_ref(&own));
-            for simple in nested {
-                let mut set = picks.clone();
-                set[i] = simple;
-                let trial = self.trial(set);
-                if trial.wrong_sign.is_empty()
-                    && !self.evidence(&trial.picks, &picks, &channels).holds()
-                {
-                    picks = trial.picks;
-                    break;
-                }
-            }
-        }
-        picks
-    }
-
-    /// Takes out, one by one, what is no longer needed.
-    fn prune(&mut self, picks: Vec<Pick>) -> Vec<Pick> {
-        self.weigh(&picks);
-        let mut picks = self.simplify(picks);
-        let trial = self.trial(picks.clone());
-        if self.is_slight_delay(&trial) {
-            picks.retain(|p| !matches!(self.candidate(p).source, Source::Delay));
-        }
-        loop {
-            let without = |i: usize| {
-                let mut rest = picks.clone();
-                rest.remove(i);
-                rest
-            };
-            let tests = (0..picks.len()).map(|i| {
-                let rest = without(i);
-                let channels = self.acted_on(std::slice::from_ref(&picks[i]));
-                (i, self.evidence(&rest, &picks, &channels))
-            });
-            let weakest = tests
-                .filter(|(_, evidence)| !evidence.holds())
-                .min_by(|a, b| a.1.gain.total_cmp(&b.1.gain));
-            match weakest {
-                Some((i, _)) => {
-                    let fewer = without(i);
-                    picks = self.simplify(fewer);
-                }
-                None => break,
-            }
-        }
-        self.join(picks)
-    }
-
-    /// Takes one effect for two that it is the same as, such as dry friction that differs by direction for dry friction and
-    /// an offset: one cause is likelier than two.
-    fn join(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
-        for i in 0..picks.len() {
-            for j in i + 1..picks.len() {
-                let pair = [picks[i].clone(), picks[j].clone()];
-                let mut others = picks.clone();
-                others.remove(j);
-                others.remove(i);
-                self.look(&others);
-                let same = self.present.iter().flatten().find(|one| {
-                    let is_new = picks.iter().all(|p| p.candidate != one.candidate);
-                    is_new
-                        && one.rank == n_columns(&pair)
-                        && self.candidate(one).searched == 0
-                        && pair.iter().all(|p| self.is_within(p, one, &[]))
-                });
-                let Some(same) = same.cloned() else { continue };
-                let mut set = others.clone();
-                set.insert(i, same);
-                let trial = self.trial(set);
-                if trial.wrong_sign.is_empty() {
-                    picks = trial.picks;
-                    return self.join(picks);
-                }
-            }
-        }
-        picks
     }
 }
 
 /// The information criterion of a set, with as many samples as the residual is worth; sets with impossible signs come last.
-fn criterion(problem: &Problem, trial: &Trial, worth: f64) -> f64 {
+pub(crate) fn criterion(problem: &Problem, trial: &Trial, worth: f64) -> f64 {
     let wrong = if trial.wrong_sign.is_empty() {
         0.0
     } else {

@@ -1,15 +1,21 @@
 //! The words of the tour: paragraphs, tables and figures in the order in which they are told.
 
-use modelmill_identify::Figures;
+use modelmill_identify::diagnose::Rung;
 
-use super::Chapter;
-use crate::along;
-use crate::failure::Outcome;
+use super::{EDITED, PAPER_PAGE, PLAIN, Place, RODS_PAGE, Seen, WITH_RODS, verdict};
 use crate::model::Model;
 use crate::plot::{Curve, bar, time_axis};
+use crate::report::{Study, words};
 use crate::show;
 use crate::table::{Align, count, percent, table};
 use crate::terminal::Style;
+
+/// Width of a paragraph.
+const WIDTH: usize = 76;
+/// Width of the longest bar.
+const BAR: usize = 30;
+/// Candidates that are named beside those that were found.
+const OTHERS: usize = 5;
 
 /// The text as it grows.
 pub(super) struct Story {
@@ -26,8 +32,7 @@ impl Story {
         }
     }
 
-    /// A line as it is.
-    pub(super) fn line(&mut self, line: &str) {
+    fn line(&mut self, line: &str) {
         self.text.push_str(line.trim_end());
         self.text.push('\n');
     }
@@ -39,7 +44,7 @@ impl Story {
     }
 
     /// A heading between blank lines.
-    pub(super) fn heading(&mut self, text: &str) {
+    fn heading(&mut self, text: &str) {
         let heading = self.style.bold(text);
         self.line("");
         self.line(&heading);
@@ -47,169 +52,240 @@ impl Story {
     }
 
     /// A paragraph, wrapped.
-    pub(super) fn say(&mut self, text: &str) {
-        let mut line = String::new();
-        for word in text.split_whitespace() {
-            if line.chars().count() + word.chars().count() > 76 {
-                self.line(&line);
-                line.clear();
-            }
-            if !line.is_empty() {
-                line.push(' ');
-            }
-            line.push_str(word);
-        }
+    fn say(&mut self, text: &str) {
+        self.lines(&words::lines(text, WIDTH));
+        self.line("");
+    }
+
+    /// The command that does the same.
+    fn command(&mut self, command: &str) {
+        let line = self.style.cyan(&format!("  $ modelmill {command}"));
         self.line(&line);
         self.line("");
     }
 
-    /// What the mill makes of the two model files.
-    pub(super) fn mill(&mut self, consistent: &Model, paper: &Model) {
-        self.heading("1  From a model file to base parameters");
-        let mechanism = &consistent.derivation.mechanism;
+    /// What the mill makes of the model file.
+    pub(super) fn derive(&mut self, name: &str, model: &Model) {
+        self.heading("1  Derive: from a model file to what can be known");
+        let mechanism = &model.derivation.mechanism;
+        let reduction = &model.derivation.reduction;
         self.say(&format!(
-            "spidermill.toml describes a parallel robot: {}, {}, {}. Its forces are linear in {} of dynamic parameters, \
-             p_g; many of their columns depend on one another. What remains, exactly and in symbols, is p_min:",
+            "A parallel robot carries a platform on two cranks, each pushed by a ball screw. Its model file has {}, {} and {}. \
+             The forces of the screws are linear in {} of masses, lengths and inertias, but many say the same thing. These {} are \
+             all that any measurement can tell, found exactly and in symbols:",
             count(mechanism.parts.len(), "body", "bodies"),
             count(mechanism.loops.len(), "loop", "loops"),
-            count(mechanism.drives.len(), "ball screw", "ball screws"),
-            count(consistent.derivation.reduction.products.len(), "product", "products"),
+            count(mechanism.drives.len(), "drive", "drives"),
+            count(reduction.products.len(), "product", "products"),
+            model.base.len(),
         ));
-        self.expressions(consistent);
-        self.line("");
-        self.say(&format!(
-            "spidermill-paper.toml is a variant of it that splits the platform's mass as the paper does, with {} in p_g \
-             (eq. 5). Its p_min is eq. (16) of the paper:",
-            count(paper.derivation.reduction.products.len(), "product", "products"),
-        ));
-        self.expressions(paper);
-    }
-
-    fn expressions(&mut self, model: &Model) {
         self.lines(&show::expressions(2, model));
+        self.line("");
+        self.command(&format!("equations {name}"));
     }
 
-    /// Identified values beside nominal ones, and the errors of both.
-    pub(super) fn parameters(&mut self, chapter: &Chapter<'_>) {
-        let title = self.style.cyan(&chapter.title());
-        self.line(&format!("  {title}: {}", chapter.runs.about));
-        self.lines(&show::parameters(&chapter.result.fit.parameters));
-        let error = |figures: Option<&Figures>, name: &str| -> Vec<String> {
-            let mut row = vec![name.to_owned()];
-            if let Some(figures) = figures {
-                row.push(percent(figures.nrms));
-                row.extend(figures.channels.values().map(|c| percent(c.nrms)));
+    /// How far the model is off, and where.
+    pub(super) fn compare(&mut self, place: &Place, model: &Model, seen: &Seen) {
+        self.heading("2  Compare: where does the model fail?");
+        self.say(&format!(
+            "Another house's multibody code simulated the whole robot, eleven groups of bodies, and something besides that the \
+             model file does not know of. Held against that recording, with the masses of the drawings, the model misses the \
+             forces by {}. First the force of one screw, then what the model misses:",
+            percent(seen.figures.nrms)
+        ));
+        let drive = model.drives().first().cloned().unwrap_or_default();
+        if let (Some(measured), Some(error)) = (seen.measured.first(), seen.errors.first()) {
+            for (title, values, height) in [
+                (format!("{drive}, measured, N"), measured, 5),
+                (format!("{drive}, measured less model, N"), error, 5),
+            ] {
+                let title = self.style.dim(&title);
+                self.line(&format!("{:>9}  {title}", ""));
+                let curve = Curve {
+                    values,
+                    height,
+                    limit: None,
+                };
+                self.lines(&curve.lines());
             }
-            row
-        };
-        let result = &chapter.result;
-        let rows = [
-            error(Some(&result.nominal_fit), "fit, nominal"),
-            error(Some(&result.fit.fit), "fit, identified"),
-            error(result.nominal_check.as_ref(), "check, nominal"),
-            error(result.fit.check.as_ref(), "check, identified"),
-        ];
-        let drives = chapter.model.drives();
-        let mut columns = vec![("error (nrms)", Align::Left), ("all", Align::Right)];
-        columns.extend(drives.iter().map(|d| (d.as_str(), Align::Right)));
+            self.line(&time_axis(&seen.time));
+            self.line("");
+        }
+        self.line("Where the error lives:");
+        self.lines(&show::places(&seen.places));
         self.line("");
+        self.say("True, but it does not say what is missing. This is as far as other tools go; the thinking is left to you.");
+        self.command(&format!(
+            "compare {} --data {}",
+            place.name("spidermill.toml"),
+            place.name(super::file_name(WITH_RODS.check.0))
+        ));
+    }
+
+    /// What is missing, and what else was tried.
+    pub(super) fn diagnose(&mut self, place: &Place, study: &Study) {
+        self.heading("3  Diagnose: what is missing?");
+        let all = &study.answer.diagnosis.candidates;
+        self.say(&format!(
+            "modelmill writes down every effect of its library at every place of this mechanism, {} in all: friction of many \
+             kinds, springs, inertias, offsets, delays, rods. It fits them beside the model on one run, and believes only what \
+             also lowers the error on another, which it did not fit.",
+            count(all.len(), "candidate", "candidates")
+        ));
+        self.say(&verdict(study));
+        let shown = all.iter().filter(|c| c.refused.is_none());
+        let others = all.iter().filter(|c| c.refused.is_some()).take(OTHERS);
+        let rows: Vec<Vec<String>> = shown
+            .chain(others)
+            .map(|c| {
+                vec![
+                    words::effect(&c.effect),
+                    format!("{:.0} %", 100.0 * c.explained),
+                    c.refused.clone().unwrap_or_else(|| "found".to_owned()),
+                ]
+            })
+            .collect();
+        let columns = [
+            ("candidate", Align::Left),
+            ("explains alone", Align::Right),
+            ("verdict", Align::Left),
+        ];
         self.lines(&table(2, &columns, &rows));
         self.line("");
-    }
-
-    /// Measured force of the first drive, and the errors before and after on one scale.
-    pub(super) fn forces(&mut self, chapter: &Chapter<'_>) -> Outcome {
-        let [measured, before, after] = chapter.curves()?;
-        let time = chapter.check.time();
-        let drive = chapter.model.drives().first().cloned().unwrap_or_default();
-        let (Some(measured), Some(before), Some(after)) =
-            (measured.first(), before.first(), after.first())
-        else {
-            return Ok(());
-        };
-        let largest = before
-            .iter()
-            .chain(after)
-            .fold(0.0_f64, |m, v| m.max(v.abs()));
-        let parts = [
-            (format!("{drive}, measured, N"), measured, 6, None),
-            (
-                "error with nominal values, N".to_owned(),
-                before,
-                4,
-                Some(largest),
-            ),
-            (
-                "error with identified values, N".to_owned(),
-                after,
-                4,
-                Some(largest),
-            ),
-        ];
-        for (title, values, height, limit) in parts {
-            let title = self.style.dim(&title);
-            self.line(&format!("{:>9}  {title}", ""));
-            let curve = Curve {
-                values,
-                height,
-                limit,
-            };
-            self.lines(&curve.lines());
-        }
-        self.line(&time_axis(&time));
-        self.line("");
-        Ok(())
-    }
-
-    /// Where the error after identification lives.
-    pub(super) fn regions(&mut self, chapter: &Chapter<'_>) -> Outcome {
-        let measured = [along::measured(&chapter.check)?];
-        let forces = [along::forces(
-            chapter.model,
-            &chapter.check,
-            &chapter.result.values(),
-        )?];
-        let places = along::places(
-            chapter.model,
-            std::slice::from_ref(&chapter.check),
-            &measured,
-            &forces,
-        )?;
-        self.line("Where what is left lives, on the check:");
-        self.lines(&show::places(&places));
-        self.line("");
-        Ok(())
-    }
-
-    /// All errors on the checks as bars.
-    pub(super) fn overview(&mut self, chapters: &[Chapter<'_>]) {
-        let largest = chapters
-            .iter()
-            .flat_map(|c| [c.before(), c.after()])
-            .flatten()
-            .fold(0.0, f64::max);
-        for chapter in chapters {
-            for (when, nrms) in [
-                ("nominal", chapter.before()),
-                ("identified", chapter.after()),
-            ] {
-                let name = if when == "nominal" {
-                    chapter.title()
-                } else {
-                    String::new()
-                };
-                let bar = bar(nrms.unwrap_or(0.0), largest, 24);
-                let bar = if when == "nominal" {
-                    self.style.red(&bar)
-                } else {
-                    self.style.green(&bar)
-                };
-                self.line(&format!(
-                    "  {name:<28}{when:<11}{:>11}  {bar}",
-                    percent(nrms)
+        for found in &study.answer.diagnosis.effects {
+            let kinds = &study.answer.candidates.kinds;
+            if let Some(kind) = kinds.iter().find(|k| k.name == found.effect.kind) {
+                self.say(&format!("{}: {}", words::effect(&found.effect), kind.says));
+            }
+            if !found.indistinguishable_from.is_empty() {
+                self.say(&format!(
+                    "This recording cannot tell it from {}.",
+                    words::effects(&found.indistinguishable_from)
                 ));
             }
         }
+        self.command(&format!(
+            "diagnose {} {}",
+            place.name("spidermill.toml"),
+            place.recordings(&WITH_RODS)
+        ));
+    }
+
+    /// What changes in the model file.
+    pub(super) fn add(&mut self, place: &Place, edited: Option<&(Vec<String>, String)>) {
+        self.heading("4  Add: the model file learns it");
+        let Some((commands, difference)) = edited else {
+            self.say("Nothing was found that could be added.");
+            return;
+        };
+        self.say(&format!(
+            "An effect is some lines of the model file, with the estimates for nominal values. Comments and layout stay. Here \
+             the result is written to {}:",
+            place.name(EDITED)
+        ));
+        let lines: Vec<String> = difference.lines().map(|line| format!("  {line}")).collect();
+        self.lines(&lines);
         self.line("");
+        for command in commands {
+            let line = self.style.cyan(&format!("  $ {command}"));
+            self.line(&line);
+        }
+        self.line("");
+    }
+
+    /// Errors step by step, and the parameters in the end.
+    pub(super) fn ladder(&mut self, study: &Study) {
+        self.heading("5  Identify again, and watch the error fall");
+        let diagnosis = &study.answer.diagnosis;
+        self.bars(&diagnosis.ladder, diagnosis.noise_floor);
+        if let Ok(after) = &study.after
+            && let Some(result) = &after.identified
+        {
+            self.line("The parameters of the completed model, from the data alone:");
+            self.lines(&show::expressions(2, &after.model));
+            self.line("");
+            self.lines(&show::parameters(&result.fit.parameters));
+            self.line("");
+        }
+        self.say(
+            "What was hidden: each screw is a rod of 8 kg and 0.9 m that swings about its base. Its moment of inertia is \
+             8 * 0.9^2 / 3 = 2.16 kg m^2, its first moment 8 * 0.9 / 2 = 3.6 kg m. Compare with Jr and Sr above.",
+        );
+    }
+
+    /// Errors on the check as bars over decades, down to the noise.
+    fn bars(&mut self, ladder: &[Rung], noise: f64) {
+        let largest = ladder.iter().map(|rung| rung.check).fold(noise, f64::max);
+        let least = ladder.iter().map(|rung| rung.check);
+        let least = least.chain([noise]).filter(|e| *e > 0.0);
+        let least = least.fold(f64::INFINITY, f64::min) / 3.0;
+        let share = |error: f64| {
+            if error > 0.0 && largest > least {
+                (error / least).ln() / (largest / least).ln()
+            } else {
+                0.0
+            }
+        };
+        let name = "the noise in the forces".to_owned();
+        let rungs = ladder.iter().map(|rung| (words::rung(rung), rung.check));
+        for (name, error) in rungs.chain([(name, noise)]) {
+            let bar = bar(share(error), 1.0, BAR);
+            let bar = if error > noise * 1.3 {
+                self.style.red(&bar)
+            } else {
+                self.style.green(&bar)
+            };
+            let lines = words::lines(&name, 34);
+            for (k, line) in lines.iter().enumerate() {
+                if k + 1 < lines.len() {
+                    self.line(&format!("  {line}"));
+                } else {
+                    self.line(&format!("  {line:<35}{:>11}  {bar}", percent(Some(error))));
+                }
+            }
+        }
+        self.line("");
+        self.say(
+            "Error relative to the force on the check run, which was not fitted; bars are decades.",
+        );
+    }
+
+    /// The treatment of the paper.
+    pub(super) fn paper(&mut self, place: &Place, study: &Study) {
+        self.heading("6  The same question to a published model");
+        self.say(
+            "The paper that describes this robot lets the platform's mass m4 act at the joint in the balance of forces, and at \
+             the middle of the coupler in the balance of moments. Its parameters come from drawings, and its authors saw an \
+             error that they could not name. On a simulation of the robot exactly as the paper has it, with all parameters held:",
+        );
+        self.say(&verdict(study));
+        let diagnosis = &study.answer.diagnosis;
+        self.bars(&diagnosis.ladder, diagnosis.noise_floor);
+        for found in &diagnosis.effects {
+            let kinds = &study.answer.candidates.kinds;
+            if let Some(kind) = kinds.iter().find(|k| k.name == found.effect.kind) {
+                self.say(&format!("{}: {}", words::effect(&found.effect), kind.says));
+            }
+        }
+        self.command(&format!(
+            "diagnose {} {} --held",
+            place.name("spidermill-paper.toml"),
+            place.recordings(&PLAIN)
+        ));
+    }
+
+    /// Where to look on.
+    pub(super) fn pages(&mut self, place: &Place) {
+        self.heading("7  The pages");
+        self.say(
+            "All of this, with curves that can be zoomed, error maps, every candidate, parameters and equations, is on two pages \
+             that need no network. Open them in a browser:",
+        );
+        for page in [RODS_PAGE, PAPER_PAGE] {
+            self.line(&format!("  {}", place.name(page)));
+        }
+        self.line("");
+        self.say("For a mechanism of yours:");
+        self.command("report MODEL --data RUN --check OTHER_RUN --out DIR");
     }
 }

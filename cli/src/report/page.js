@@ -1,0 +1,356 @@
+// Curves that can be zoomed and moved, and tables that can be sorted. Without this script the pictures stand as they are.
+(() => {
+  'use strict';
+  document.documentElement.classList.add('scripted');
+  const SVG = 'http://www.w3.org/2000/svg';
+  const HEIGHT = 210, LEFT = 66, RIGHT = 14, TOP = 8, BOTTOM = 34;
+
+  const make = (name, attributes, parent, text) => {
+    const element = document.createElementNS(SVG, name);
+    for (const key in attributes) element.setAttribute(key, attributes[key]);
+    if (text !== undefined) element.textContent = text;
+    parent.appendChild(element);
+    return element;
+  };
+
+  // A curve's values: 16-bit steps between its least and its largest value; 65535 is a gap.
+  const unpack = (curve) => {
+    const bytes = atob(curve.data);
+    const values = new Float64Array(bytes.length / 2);
+    for (let i = 0; i < values.length; i++) {
+      const steps = bytes.charCodeAt(2 * i) | bytes.charCodeAt(2 * i + 1) << 8;
+      values[i] = steps === 65535 ? NaN : curve.low + curve.step * steps;
+    }
+    return { name: curve.name, cls: curve.class, from: curve.span[0], to: curve.span[1], values, shown: true };
+  };
+
+  const ticks = (from, to, most) => {
+    const rough = Math.max((to - from) / most, Number.MIN_VALUE * 1e10);
+    const decade = Math.pow(10, Math.floor(Math.log10(rough)));
+    const step = [1, 2, 5, 10].find((s) => s * decade >= rough * 0.999) * decade;
+    const decimals = Math.min(12, Math.max(0, -Math.floor(Math.log10(step * 1.001))));
+    const label = (v) => {
+      if (Math.abs(v) < 1e-9 * step) return '0';
+      if (Math.abs(v) >= 1e5 || step < 1e-4) return v.toExponential(1).replace('.0e', 'e').replace('e+', 'e');
+      return v.toFixed(decimals).replace('-', '\u2212');
+    };
+    const found = [];
+    for (let k = Math.ceil(from / step - 1e-9); k * step <= to + 1e-9 * step && found.length < 30; k++)
+      found.push([k * step, label(k * step)]);
+    return found;
+  };
+
+  // Which values of a curve lie within a stretch of time, with one more at each end.
+  const within = (curve, from, to) => {
+    const last = curve.values.length - 1;
+    const at = (t) => (t - curve.from) / Math.max(curve.to - curve.from, Number.MIN_VALUE) * last;
+    return [Math.max(0, Math.floor(at(from))), Math.min(last, Math.ceil(at(to)))];
+  };
+
+  class Run {
+    constructor(root) {
+      this.root = root;
+      const data = JSON.parse(document.getElementById(root.dataset.curves).textContent);
+      const figures = root.querySelectorAll('figure.plot');
+      this.plots = data.panels.map((panel, k) => new Plot(this, figures[k], panel));
+      const curves = this.plots.flatMap((plot) => plot.curves);
+      this.whole = [Math.min(...curves.map((c) => c.from)), Math.max(...curves.map((c) => c.to))];
+      this.show(...this.whole);
+      root.addEventListener('toggle', () => this.draw());
+    }
+
+    // Shows a stretch of time, kept within the recording and not shorter than some samples.
+    show(from, to) {
+      const [first, last] = this.whole;
+      const least = (last - first) * 1e-4;
+      const length = Math.min(Math.max(to - from, least), last - first);
+      this.from = Math.min(Math.max(from, first), last - length);
+      this.to = this.from + length;
+      this.root.dataset.from = this.from;
+      this.root.dataset.to = this.to;
+      this.draw();
+    }
+
+    zoom(factor, at) {
+      const middle = at === undefined ? (this.from + this.to) / 2 : at;
+      this.show(middle - (middle - this.from) * factor, middle + (this.to - middle) * factor);
+    }
+
+    move(share) {
+      const by = share * (this.to - this.from);
+      this.show(this.from + by, this.to + by);
+    }
+
+    reset() { this.show(...this.whole); }
+
+    draw() {
+      if (this.waiting || !this.plots) return;
+      this.waiting = true;
+      // Drawing once for many events; at once where frames do not come, as in a tab that is not seen.
+      const now = () => {
+        if (!this.waiting) return;
+        this.waiting = false;
+        for (const plot of this.plots) plot.draw();
+      };
+      requestAnimationFrame(now);
+      setTimeout(now, 60);
+    }
+  }
+
+  class Plot {
+    constructor(run, figure, panel) {
+      this.run = run;
+      this.svg = figure.querySelector('svg');
+      this.curves = panel.curves.map(unpack);
+      this.unit = panel.unit;
+      this.legend(figure);
+      this.tools(figure);
+      this.readout = document.createElement('output');
+      this.readout.className = 'readout';
+      figure.appendChild(this.readout);
+      this.svg.setAttribute('tabindex', '0');
+      this.listen();
+    }
+
+    legend(figure) {
+      for (const key of figure.querySelectorAll('.key')) {
+        const curve = this.curves.find((c) => c.name === key.dataset.curve);
+        const button = document.createElement('button');
+        button.type = 'button';
+        button.className = key.className;
+        button.textContent = key.textContent;
+        button.setAttribute('aria-pressed', 'true');
+        button.addEventListener('click', () => {
+          curve.shown = !curve.shown;
+          button.setAttribute('aria-pressed', String(curve.shown));
+          this.draw();
+        });
+        key.replaceWith(button);
+      }
+    }
+
+    tools(figure) {
+      const tools = document.createElement('span');
+      tools.className = 'tools';
+      const button = (text, says, act) => {
+        const one = document.createElement('button');
+        one.type = 'button';
+        one.textContent = text;
+        one.title = says;
+        one.setAttribute('aria-label', says);
+        one.addEventListener('click', act);
+        tools.appendChild(one);
+      };
+      button('+', 'zoom in', () => this.run.zoom(0.5));
+      button('\u2212', 'zoom out', () => this.run.zoom(2));
+      button('\u27F2', 'the whole recording', () => this.run.reset());
+      figure.querySelector('figcaption').prepend(tools);
+    }
+
+    draw() {
+      const box = this.svg.getBoundingClientRect();
+      if (!box.width) return;
+      const width = this.width = Math.max(280, box.width);
+      const { from, to } = this.run;
+      this.x = (t) => LEFT + (t - from) / (to - from) * (width - LEFT - RIGHT);
+      let low = Infinity, high = -Infinity;
+      for (const curve of this.curves) {
+        if (!curve.shown) continue;
+        const [first, last] = within(curve, from, to);
+        for (let i = first; i <= last; i++) {
+          const v = curve.values[i];
+          if (v < low) low = v;
+          if (v > high) high = v;
+        }
+      }
+      if (!(high >= low)) { low = -1; high = 1; }
+      const room = high > low ? 0.05 * (high - low) : 0.5 * Math.max(Math.abs(high), 1e-9);
+      low -= room; high += room;
+      const foot = HEIGHT - BOTTOM;
+      const y = (v) => foot - (v - low) / (high - low) * (foot - TOP);
+      this.svg.setAttribute('viewBox', `0 0 ${width} ${HEIGHT}`);
+      this.svg.replaceChildren();
+      for (const [v, label] of ticks(from, to, Math.max(3, Math.min(10, width / 85)))) {
+        const at = this.x(v).toFixed(1);
+        make('path', { class: 'grid', d: `M${at} ${TOP}V${foot}` }, this.svg);
+        make('text', { class: 'tick', x: at, y: foot + 15, 'text-anchor': 'middle' }, this.svg, label);
+      }
+      for (const [v, label] of ticks(low, high, 4)) {
+        const at = y(v).toFixed(1);
+        make('path', { class: 'grid', d: `M${LEFT} ${at}H${width - RIGHT}` }, this.svg);
+        make('text', { class: 'tick', x: LEFT - 6, y: +at + 4, 'text-anchor': 'end' }, this.svg, label);
+      }
+      make('text', { class: 'tick', x: width - RIGHT, y: foot + 31, 'text-anchor': 'end' }, this.svg, 'time, s');
+      for (const curve of this.curves)
+        if (curve.shown) make('path', { class: `curve ${curve.cls}`, d: this.path(curve, y) }, this.svg);
+      make('path', { class: 'frame', d: `M${LEFT} ${TOP}H${width - RIGHT}V${foot}H${LEFT}Z` }, this.svg);
+      this.marked = make('rect', { class: 'marked', x: 0, y: TOP, width: 0, height: foot - TOP }, this.svg);
+      this.cursor = make('path', { class: 'cursor', d: '' }, this.svg);
+    }
+
+    // One point for a value, or least and largest of each pixel where there are more values than pixels.
+    path(curve, y) {
+      const [first, last] = within(curve, this.run.from, this.run.to);
+      const { values, from, to } = curve;
+      const end = Math.max(values.length - 1, 1);
+      const edge = (v) => Math.min(Math.max(v, LEFT), this.width - RIGHT);
+      const x = (i) => this.x(from + (to - from) * i / end);
+      const stretch = Math.max(1, Math.floor((last - first + 1) / (2 * this.width)));
+      let d = '', pen = 'M';
+      const put = (i) => {
+        const v = values[i];
+        if (Number.isNaN(v)) { pen = 'M'; return; }
+        d += `${pen}${edge(x(i)).toFixed(1)} ${y(v).toFixed(1)}`;
+        pen = 'L';
+      };
+      for (let i = first; i <= last; i += stretch) {
+        let low = i, high = i;
+        for (let j = i; j < Math.min(i + stretch, last + 1); j++) {
+          if (values[j] < values[low]) low = j;
+          if (values[j] > values[high]) high = j;
+        }
+        put(Math.min(low, high));
+        if (low !== high) put(Math.max(low, high));
+      }
+      return d;
+    }
+
+    time(event) {
+      const box = this.svg.getBoundingClientRect();
+      const inner = (this.width || box.width) - LEFT - RIGHT;
+      const share = ((event.clientX - box.left) * (this.width || box.width) / box.width - LEFT) / inner;
+      return this.run.from + Math.min(Math.max(share, 0), 1) * (this.run.to - this.run.from);
+    }
+
+    listen() {
+      const svg = this.svg, run = this.run, down = new Map();
+      let start = null;
+      svg.addEventListener('wheel', (event) => {
+        // A page that is being scrolled goes on scrolling although a picture comes under the pointer.
+        if (performance.now() - scrolled < 250 && document.activeElement !== svg) return;
+        event.preventDefault();
+        if (Math.abs(event.deltaX) > Math.abs(event.deltaY)) run.move(event.deltaX / 600);
+        else run.zoom(Math.pow(1.0018, Math.max(-240, Math.min(240, event.deltaY))), this.time(event));
+      }, { passive: false });
+      svg.addEventListener('dblclick', (event) => { event.preventDefault(); run.reset(); });
+      svg.addEventListener('pointerdown', (event) => {
+        if (event.button > 0) return;
+        try { svg.setPointerCapture(event.pointerId); } catch { /* A made-up pointer cannot be captured. */ }
+        down.set(event.pointerId, event.clientX);
+        start = { time: this.time(event), x: event.clientX, from: run.from, to: run.to, marks: event.shiftKey };
+        if (down.size === 2) {
+          const [a, b] = [...down.values()];
+          start.apart = Math.max(Math.abs(a - b), 10);
+        }
+      });
+      svg.addEventListener('pointermove', (event) => {
+        this.tell(event);
+        if (!down.has(event.pointerId) || !start) return;
+        down.set(event.pointerId, event.clientX);
+        const inner = svg.getBoundingClientRect().width - LEFT - RIGHT;
+        if (down.size === 2) {
+          const [a, b] = [...down.values()];
+          const length = (start.to - start.from) * (start.apart || 10) / Math.max(Math.abs(a - b), 10);
+          const middle = (start.from + start.to) / 2;
+          run.show(middle - length / 2, middle + length / 2);
+        } else if (start.marks) {
+          const [a, b] = [this.x(start.time), this.x(this.time(event))];
+          this.marked.setAttribute('x', Math.min(a, b));
+          this.marked.setAttribute('width', Math.abs(a - b));
+        } else {
+          const by = (event.clientX - start.x) / inner * (start.to - start.from);
+          if (Math.abs(event.clientX - start.x) > 2) run.show(start.from - by, start.to - by);
+        }
+      });
+      const up = (event) => {
+        if (start && start.marks && down.size === 1 && event.type === 'pointerup') {
+          const t = this.time(event);
+          if (Math.abs(this.x(t) - this.x(start.time)) > 4) run.show(Math.min(t, start.time), Math.max(t, start.time));
+        }
+        down.delete(event.pointerId);
+        if (this.marked) this.marked.setAttribute('width', 0);
+        if (!down.size) start = null;
+      };
+      svg.addEventListener('pointerup', up);
+      svg.addEventListener('pointercancel', up);
+      svg.addEventListener('pointerleave', () => {
+        this.readout.textContent = '';
+        if (this.cursor) this.cursor.setAttribute('d', '');
+      });
+      svg.addEventListener('keydown', (event) => {
+        const act = {
+          '+': () => run.zoom(0.5), '=': () => run.zoom(0.5), '-': () => run.zoom(2),
+          ArrowLeft: () => run.move(-0.2), ArrowRight: () => run.move(0.2),
+          0: () => run.reset(), Escape: () => run.reset(), Home: () => run.reset(),
+        }[event.key];
+        if (!act || event.ctrlKey || event.metaKey) return;
+        event.preventDefault();
+        act();
+      });
+    }
+
+    // Values below the pointer.
+    tell(event) {
+      if (!this.x || !this.cursor) return;
+      const t = this.time(event);
+      const at = this.x(t).toFixed(1);
+      this.cursor.setAttribute('d', `M${at} ${TOP}V${HEIGHT - BOTTOM}`);
+      const digits = (v) => (Number.isFinite(v) ? Number(v.toPrecision(4)).toString() : '\u2014');
+      const values = this.curves.filter((c) => c.shown).map((c) => {
+        const i = Math.round((t - c.from) / Math.max(c.to - c.from, Number.MIN_VALUE) * (c.values.length - 1));
+        return `${c.name} ${digits(c.values[Math.min(Math.max(i, 0), c.values.length - 1)])}`;
+      });
+      this.readout.textContent = `${t.toFixed(3)} s: ${values.join(', ')} ${this.unit}`;
+    }
+  }
+
+  let scrolled = -1e9;
+  window.addEventListener('scroll', () => { scrolled = performance.now(); }, { passive: true });
+  const runs = [...document.querySelectorAll('[data-curves]')].map((root) => new Run(root));
+  const again = () => runs.forEach((run) => run.draw());
+  if (window.ResizeObserver) {
+    const observer = new ResizeObserver(again);
+    observer.observe(document.querySelector('main'));
+  } else window.addEventListener('resize', again);
+
+  // Paper shows everything that is folded, the equations apart.
+  window.addEventListener('beforeprint', () => {
+    for (const one of document.querySelectorAll('details:not(.embedded)')) {
+      if (!one.open && !one.closest('.embedded')) { one.open = true; one.dataset.folded = ''; }
+    }
+    for (const run of runs) for (const plot of run.plots) plot.draw();
+  });
+  window.addEventListener('afterprint', () => {
+    for (const one of document.querySelectorAll('details[data-folded]')) { one.open = false; delete one.dataset.folded; }
+  });
+
+  for (const table of document.querySelectorAll('table.sortable')) {
+    const heads = [...table.querySelectorAll('th')];
+    heads.forEach((head, k) => {
+      const button = document.createElement('button');
+      button.type = 'button';
+      button.append(...head.childNodes);
+      head.append(button);
+      button.addEventListener('click', () => {
+        const falling = head.classList.contains('number') ? head.ariaSort !== 'descending' : head.ariaSort === 'ascending';
+        for (const other of heads) other.removeAttribute('aria-sort');
+        head.setAttribute('aria-sort', falling ? 'descending' : 'ascending');
+        const key = (row) => {
+          const cell = row.cells[k];
+          const value = cell.dataset.value;
+          return value === undefined ? cell.textContent.trim() : Number(value);
+        };
+        const body = table.tBodies[0];
+        const rows = [...body.rows].map((row) => [key(row), row]);
+        rows.sort(([a], [b]) => {
+          if (typeof a === 'number' && typeof b === 'number') return a - b;
+          // What has no number comes first, which is last when falling.
+          if (typeof a !== typeof b) return typeof a === 'string' ? -1 : 1;
+          return a.localeCompare(b);
+        });
+        if (falling) rows.reverse();
+        body.append(...rows.map(([, row]) => row));
+      });
+    });
+  }
+})();

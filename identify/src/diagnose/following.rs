@@ -1,0 +1,170 @@
+//! Effects whose columns follow from the fit: small changes of the model, late forces, and what depends on the load.
+
+use std::collections::HashMap;
+
+use nalgebra::DVector;
+
+use super::bench::{Bench, Pick};
+use super::pool::{On, solve};
+use super::problem::{Candidate, Column, Source};
+
+impl Bench<'_> {
+    /// Candidates that depend on what the drives carry, with the columns that a fit gives them.
+    pub(crate) fn carried(&mut self, picks: &[Pick]) -> HashMap<usize, Pick> {
+        let is_carried = |c: &Candidate| matches!(c.source, Source::Carried);
+        if !self.problem.candidates.iter().any(is_carried) {
+            return HashMap::new();
+        }
+        let mut which = self.columns(picks);
+        let n = which.len();
+        which.extend(&self.friction);
+        which.push(self.measured);
+        let (factors, _) = solve(&self.pool.gram(&which, &self.weights, On::All));
+        let of_picks = picks.iter().flat_map(|pick| {
+            let candidate = self.candidate(pick);
+            pick.columns.iter().map(|_| candidate.bears)
+        });
+        let bears: Vec<bool> = (self.problem.base_bears.iter().copied())
+            .chain(of_picks)
+            .collect();
+        let mut load = self.problem.held.clone().unwrap_or_default();
+        load.0.resize(self.weights.len(), None);
+        for ((k, factor), bears) in which[..n].iter().zip(factors.iter()).zip(bears) {
+            if bears {
+                load.add(*factor, self.pool.column(*k));
+            }
+        }
+        let made = self.supply.carried(&load);
+        let picks = made.into_iter().map(|(candidate, columns)| {
+            let pick = Pick {
+                candidate,
+                constants: Vec::new(),
+                rank: columns.len(),
+                columns: columns.into_iter().map(|c| self.pool.add(c)).collect(),
+            };
+            (candidate, pick)
+        });
+        picks.collect()
+    }
+
+    /// Columns of a candidate that is a small change of the model as fitted.
+    pub(crate) fn tangent(
+        &mut self,
+        candidate: usize,
+        picks: &[Pick],
+        factors: &DVector<f64>,
+    ) -> Pick {
+        let columns: Vec<Column> = match &self.problem.candidates[candidate].source {
+            Source::Tangent(parameters) => parameters
+                .iter()
+                .map(|changes| {
+                    let mut sum = Column(vec![None; self.weights.len()]);
+                    for (change, factor) in changes.iter().zip(factors.iter()) {
+                        sum.add(*factor, change);
+                    }
+                    sum
+                })
+                .collect(),
+            Source::Delay => {
+                let mut force = self.problem.held.clone().unwrap_or_default();
+                force.0.resize(self.weights.len(), None);
+                let is_delay = |pick: &Pick| {
+                    matches!(
+                        self.problem.candidates[pick.candidate].source,
+                        Source::Delay
+                    )
+                };
+                let delays: Vec<usize> = picks
+                    .iter()
+                    .filter(|pick| is_delay(pick))
+                    .flat_map(|pick| pick.columns.clone())
+                    .collect();
+                for (k, factor) in self.columns(picks).iter().zip(factors.iter()) {
+                    if !delays.contains(k) {
+                        force.add(*factor, self.pool.column(*k));
+                    }
+                }
+                // The delay that was found so far, where it is not new.
+                let found = picks.iter().position(is_delay).map(|i| {
+                    let before: usize = picks[..i].iter().map(|p| p.columns.len()).sum();
+                    factors[self.base.len() + before]
+                });
+                vec![self.late(&force, found.unwrap_or(0.0))]
+            }
+            Source::Columns(_) | Source::Carried => unreachable!("they are no tangents"),
+        };
+        Pick {
+            candidate,
+            constants: Vec::new(),
+            rank: columns.len(),
+            columns: columns.into_iter().map(|c| self.pool.add(c)).collect(),
+        }
+    }
+
+    /// What a force changes by when it is read later by `delay`, for each second of it; for delays below a tenth of a
+    /// sample minus its rate of change.
+    pub(crate) fn late(&self, force: &Column, delay: f64) -> Column {
+        let stretches = &self.problem.layout.stretches;
+        let changes = |values: &Vec<f64>| {
+            let mut changes = Vec::with_capacity(values.len());
+            let mut start = 0;
+            for stretch in stretches {
+                let part = &values[start..start + stretch.samples];
+                let last = part.len() - 1;
+                let samples = delay / stretch.step;
+                for i in 0..part.len() {
+                    if samples.abs() < 0.1 {
+                        let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
+                        let time = stretch.step * (after - before).max(1) as f64;
+                        changes.push((part[before] - part[after]) / time);
+                        continue;
+                    }
+                    let then = between(part, i as f64 - samples);
+                    changes.push((then - part[i]) / delay);
+                }
+                start += stretch.samples;
+            }
+            changes
+        };
+        Column(force.0.iter().map(|v| v.as_ref().map(changes)).collect())
+    }
+
+    /// Makes the columns of effects that depend on the fit anew.
+    pub(crate) fn refresh(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
+        for _ in 0..3 {
+            for i in 0..picks.len() {
+                let candidate = picks[i].candidate;
+                if matches!(
+                    self.problem.candidates[candidate].source,
+                    Source::Columns(_)
+                ) {
+                    continue;
+                }
+                let (factors, _) = self.fit(&picks, On::All);
+                let rank = picks[i].rank;
+                let anew = match self.problem.candidates[candidate].source {
+                    Source::Carried => self.carried(&picks).remove(&candidate),
+                    _ => Some(self.tangent(candidate, &picks.clone(), &factors)),
+                };
+                if let Some(anew) = anew {
+                    picks[i] = Pick { rank, ..anew };
+                }
+            }
+        }
+        picks
+    }
+}
+
+/// A series at a place between its samples.
+fn between(values: &[f64], at: f64) -> f64 {
+    let last = values.len() - 1;
+    let at = at.clamp(0.0, last as f64);
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to the places of samples"
+    )]
+    let k = at.floor() as usize;
+    let share = at - at.floor();
+    values[k] + share * (values[(k + 1).min(last)] - values[k])
+}

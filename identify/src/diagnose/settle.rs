@@ -1,0 +1,141 @@
+//! From the set that the search ends with to the answer: members exchanged, taken out, made simpler, joined.
+
+use super::bench::{Bench, Pick, n_columns};
+use super::pool::On;
+use super::problem::Source;
+use super::search::criterion;
+
+/// By how much the criterion must fall for an exchange of members.
+const EXCHANGED: f64 = 1.0;
+
+impl Bench<'_> {
+    /// Takes simpler kinds where nothing speaks for what they lack.
+    fn simplify(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
+        for i in 0..picks.len() {
+            if picks[i].columns.len() < 2 {
+                continue;
+            }
+            let mut others = picks.clone();
+            let own = others.remove(i);
+            self.look(&others);
+            let rank = self.present[own.candidate].as_ref().map_or(0, |p| p.rank);
+            let nested: Vec<Pick> = (self.present.iter().flatten())
+                .filter(|one| one.rank < rank)
+                .filter(|one| self.candidate(one).searched <= self.candidate(&own).searched)
+                .filter(|one| self.is_within(one, &own, &others))
+                .cloned()
+                .collect();
+            let channels = self.acted_on(std::slice::from_ref(&own));
+            for simple in nested {
+                let mut set = picks.clone();
+                set[i] = simple;
+                let trial = self.trial(set);
+                if trial.wrong_sign.is_empty()
+                    && !self.evidence(&trial.picks, &picks, &channels).holds()
+                {
+                    picks = trial.picks;
+                    break;
+                }
+            }
+        }
+        picks
+    }
+
+    /// Takes out, one by one, what is no longer needed.
+    pub(crate) fn prune(&mut self, picks: Vec<Pick>) -> Vec<Pick> {
+        self.weigh(&picks);
+        let mut picks = self.simplify(picks);
+        let trial = self.trial(picks.clone());
+        if self.is_slight_delay(&trial) {
+            picks.retain(|p| !matches!(self.candidate(p).source, Source::Delay));
+        }
+        loop {
+            let without = |i: usize| {
+                let mut rest = picks.clone();
+                rest.remove(i);
+                rest
+            };
+            let tests = (0..picks.len()).map(|i| {
+                let rest = without(i);
+                let channels = self.acted_on(std::slice::from_ref(&picks[i]));
+                (i, self.evidence(&rest, &picks, &channels))
+            });
+            let weakest = tests
+                .filter(|(_, evidence)| !evidence.holds())
+                .min_by(|a, b| a.1.gain.total_cmp(&b.1.gain));
+            match weakest {
+                Some((i, _)) => {
+                    let fewer = without(i);
+                    picks = self.simplify(fewer);
+                }
+                None => break,
+            }
+        }
+        self.join(picks)
+    }
+
+    /// Takes one effect for two that it is the same as, such as dry friction that differs by direction for dry friction and
+    /// an offset: one cause is likelier than two.
+    fn join(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
+        for i in 0..picks.len() {
+            for j in i + 1..picks.len() {
+                let pair = [picks[i].clone(), picks[j].clone()];
+                let mut others = picks.clone();
+                others.remove(j);
+                others.remove(i);
+                self.look(&others);
+                let same = self.present.iter().flatten().find(|one| {
+                    let is_new = picks.iter().all(|p| p.candidate != one.candidate);
+                    is_new
+                        && one.rank == n_columns(&pair)
+                        && self.candidate(one).searched == 0
+                        && pair.iter().all(|p| self.is_within(p, one, &[]))
+                });
+                let Some(same) = same.cloned() else { continue };
+                let mut set = others.clone();
+                set.insert(i, same);
+                let trial = self.trial(set);
+                if trial.wrong_sign.is_empty() {
+                    picks = trial.picks;
+                    return self.join(picks);
+                }
+            }
+        }
+        picks
+    }
+
+    /// Exchanges members for others by which the whole set gets better or simpler.
+    pub(crate) fn exchange(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
+        self.weigh(&picks);
+        let (factors, _) = self.fit(&picks, On::All);
+        let rest = self.rest(&picks, &factors);
+        let channels: Vec<usize> = (0..rest.len()).collect();
+        let worth = self.worth(&rest, &channels);
+        for i in 0..picks.len() {
+            let mut others = picks.clone();
+            others.remove(i);
+            self.look(&others);
+            let table = self.table(&picks);
+            let now = self.trial(picks.clone());
+            let mut best = (criterion(self.problem, &now, worth) - EXCHANGED, None);
+            for rival in self.present.iter().flatten() {
+                if picks.iter().any(|p| p.candidate == rival.candidate) {
+                    continue;
+                }
+                let mut set = picks.clone();
+                set[i] = rival.clone();
+                let trial = self.try_in(&table, set);
+                let score = criterion(self.problem, &trial, worth);
+                if trial.freedoms <= now.freedoms && score < best.0 && !self.is_slight_delay(&trial)
+                {
+                    best = (score, Some(trial));
+                }
+            }
+            if let (_, Some(trial)) = best {
+                let refined = self.refine(trial.picks);
+                picks = self.refresh(refined);
+            }
+        }
+        picks
+    }
+}
