@@ -111,6 +111,12 @@ impl Bench<'_> {
         }
         let exchanged = self.exchange(accepted.clone());
         let pruned = self.prune(exchanged);
+        // Smaller and simpler, but not worse: else nothing is exchanged.
+        let pruned = if self.is_worse(&pruned, &accepted) {
+            self.prune(accepted.clone())
+        } else {
+            pruned
+        };
         if pruned != accepted {
             steps.push(Step {
                 picks: pruned,
@@ -118,6 +124,14 @@ impl Bench<'_> {
             });
         }
         Found { steps, refused }
+    }
+
+    /// Whether evidence speaks for one set beside another that is to take its place.
+    fn is_worse(&mut self, settled: &[Pick], before: &[Pick]) -> bool {
+        self.weigh(before);
+        let channels: Vec<usize> = (0..self.weights.len()).collect();
+        let evidence = self.evidence(settled, before, &channels);
+        evidence.gain > LARGE_CHANGE && evidence.holds()
     }
 
     /// Whether a set is another one and a further effect, which may take the place of what it holds.
