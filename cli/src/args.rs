@@ -336,9 +336,9 @@ pub(crate) struct CompareArgs {
     pub(crate) preparation: PreparationArgs,
 }
 
-/// `diagnose`.
+/// What is diagnosed, for the commands that do.
 #[derive(Debug, Args)]
-pub(crate) struct DiagnoseArgs {
+pub(crate) struct AskArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
     /// Recordings to find it in (CSV, Parquet, MATLAB 5); may be repeated
@@ -350,32 +350,28 @@ pub(crate) struct DiagnoseArgs {
     /// Hold all parameters at their nominal values, so that what is wrong with them shows too
     #[arg(long)]
     pub(crate) held: bool,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) preparation: PreparationArgs,
+}
+
+/// `diagnose`.
+#[derive(Debug, Args)]
+pub(crate) struct DiagnoseArgs {
+    #[command(flatten)]
+    pub(crate) ask: AskArgs,
+    /// Print one JSON object on standard output
+    #[arg(long, help_heading = None)]
+    pub(crate) json: bool,
 }
 
 /// `report`.
 #[derive(Debug, Args)]
 pub(crate) struct ReportArgs {
-    /// Model file (TOML)
-    pub(crate) model: PathBuf,
-    /// Recordings to find it in (CSV, Parquet, MATLAB 5); may be repeated
-    #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
-    pub(crate) data: Vec<PathBuf>,
-    /// Recordings that decide what is believed; without any, blocks of --data take turns
-    #[arg(long, value_name = "RUN", num_args = 1..)]
-    pub(crate) check: Vec<PathBuf>,
-    /// Hold all parameters at their nominal values, so that what is wrong with them shows too
-    #[arg(long)]
-    pub(crate) held: bool,
-    /// Write the page `report.html` into this folder
-    #[arg(long, value_name = "DIR")]
-    pub(crate) out: PathBuf,
     #[command(flatten)]
-    pub(crate) preparation: PreparationArgs,
+    pub(crate) ask: AskArgs,
+    /// Write the page `report.html` into this folder
+    #[arg(long, value_name = "DIR", help_heading = None)]
+    pub(crate) out: PathBuf,
 }
 
 /// `simulate`.

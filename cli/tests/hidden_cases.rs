@@ -1,5 +1,5 @@
 //! The benchmark of hidden effects makes what it says it makes: recordings that repeat, effects of the size that is
-//! asked for, and a truth that leaves nothing but noise.
+//! asked for, and a truth that leaves nothing but noise; and a few of them are found.
 #![allow(
     dead_code,
     reason = "modules of the benchmark, of which the score is tested elsewhere"
@@ -9,6 +9,8 @@
 mod alternatives;
 #[path = "../benches/hidden_effects/answer.rs"]
 mod answer;
+#[path = "../benches/hidden_effects/ask.rs"]
+mod ask;
 #[path = "../benches/hidden_effects/case.rs"]
 mod case;
 #[path = "../benches/hidden_effects/columns.rs"]
@@ -35,7 +37,7 @@ mod span;
 use std::path::Path;
 
 use case::{Case, class_of};
-use judge::{Class, SAME};
+use judge::{Class, FALL, SAME, judge};
 use plant::Plant;
 use span::{Span, norm};
 
@@ -130,5 +132,46 @@ fn no_library_says_what_is_outside() {
         all.extend(columns::library(along));
         let rest = span::rms(&all.rest(&forces));
         assert!(rest > 1.9 * case.noise, "{}: {rest}", case.truth());
+    }
+}
+
+/// One effect, two, none, and one that no library holds.
+#[test]
+fn hidden_effects_are_found() {
+    const SEED: u64 = 1001;
+    let plant = plant();
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("hidden_diagnosis");
+    std::fs::create_dir_all(&folder).expect("a folder for the recordings");
+    let program = Path::new(env!("CARGO_BIN_EXE_modelmill"));
+    for number in [1, 5, 6, 12, 24, 34] {
+        let case = Case::draw(&plant, SEED, number).expect("a case");
+        let mut floor = 0.0;
+        let files = record::FILES.map(|file| folder.join(format!("{number}-{file}")));
+        for (which, file) in files.iter().enumerate() {
+            let recorded = record::record(&case, SEED, which).expect("a recording");
+            floor = recorded.floor;
+            std::fs::write(file, recorded.csv).expect("the recording is written");
+        }
+        let (answer, _) = ask::diagnose(program.as_os_str(), &plant.model, &files[0], &files[1]);
+        let answer = answer.unwrap_or_else(|why| panic!("{}: {why}", case.truth()));
+        let mut excess = |claims: &[placed::Placed]| {
+            let left = case.excess(&plant, claims);
+            left.unwrap_or(f64::INFINITY)
+        };
+        let mark = judge(case.class, &case.placed(), &answer, &mut excess);
+        assert!(
+            mark.is_right(),
+            "{}: {}; {answer:?}",
+            case.truth(),
+            mark.says()
+        );
+        if !case.hidden.is_empty() {
+            let last = answer.steps.last().expect("a ladder").check;
+            assert!(
+                last <= FALL * floor,
+                "{}: {last} over {floor}",
+                case.truth()
+            );
+        }
     }
 }

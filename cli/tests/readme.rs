@@ -67,6 +67,48 @@ fn the_dependencies_of_the_readme_exist() {
     }
 }
 
+/// What `diagnose` prints on the bundled recordings stands in the README; digits of rounding may differ between machines.
+#[test]
+fn what_the_readme_says_of_the_rods_is_printed() {
+    let command = blocks("sh")
+        .into_iter()
+        .find(|block| block.starts_with("modelmill diagnose"))
+        .expect("the command");
+    let paths = command.replace('\\', " ");
+    let args: Vec<String> = paths
+        .split_whitespace()
+        .skip(1)
+        .map(|word| match word.contains('/') {
+            true => workspace(word).display().to_string(),
+            false => word.to_owned(),
+        })
+        .collect();
+    let args: Vec<&str> = args.iter().map(String::as_str).collect();
+    let printed = printed(&args);
+    let shown = blocks("text")
+        .into_iter()
+        .find(|block| block.starts_with("The model lacks"))
+        .expect("the answer");
+    let words =
+        |line: &str| -> Vec<String> { line.split_whitespace().map(str::to_owned).collect() };
+    let same = |a: &str, b: &str| {
+        let number = |word: &str| word.trim_end_matches(['.', ',', ';']).parse::<f64>().ok();
+        match (number(a), number(b)) {
+            (Some(x), Some(y)) if x.abs() > 1e-3 => (x - y).abs() <= 1e-3 * x.abs(),
+            (Some(_), Some(y)) => y.abs() < 1e-3,
+            _ => a == b,
+        }
+    };
+    for line in shown.lines().filter(|line| !line.is_empty()) {
+        let wanted = words(line);
+        let found = printed.lines().any(|other| {
+            let other = words(other);
+            other.len() == wanted.len() && wanted.iter().zip(&other).all(|(a, b)| same(a, b))
+        });
+        assert!(found, "`{line}` of the README is not in\n{printed}");
+    }
+}
+
 /// Examples with a path are meant for the project's root.
 #[test]
 fn paths_in_the_help_exist() {

@@ -151,7 +151,7 @@ fn deviation(values: &[f64]) -> f64 {
 }
 
 fn answer(problem: &Problem) -> Diagnosis {
-    diagnose(problem, &NoSupply, &mut |_| {})
+    diagnose(problem, &NoSupply)
 }
 
 /// Kinds that were found, in the order of their names.

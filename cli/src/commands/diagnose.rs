@@ -2,17 +2,15 @@
 
 use modelmill_identify::diagnose::{FoundEffect, Rung, Verdict};
 use modelmill_identify::{FitParameter, Region, Status};
-use modelmill_spec::Loaded;
 use modelmill_spec::edit::NewEffect;
 use serde_json::{Value, json};
 
-use crate::args::DiagnoseArgs;
-use crate::data::{self, Data};
+use crate::args::{AskArgs, DiagnoseArgs};
+use crate::data::Data;
 use crate::diagnosis::{self, Answer, Held};
 use crate::failure::Outcome;
-use crate::model::{self, Model};
-use crate::report::{self, Question, Study, Version, added, words};
-use crate::suspects;
+use crate::model;
+use crate::report::{self, Study, Version, added, words};
 use crate::table::{Align, number, percent, significant, table};
 use crate::terminal;
 
@@ -24,42 +22,22 @@ const NAMED: usize = 6;
 
 /// Prints what is missing, or that nothing is, or that nothing known explains it.
 pub(crate) fn run(args: &DiagnoseArgs) -> Outcome {
-    let loaded = model::load(&args.model)?;
-    let model = model::derive_loaded(&args.model.display().to_string(), &loaded)?;
-    let read = |model: &Model| -> Outcome<[Vec<Data>; 2]> {
-        let mut fit = data::read_all(model, &args.data, &args.preparation)?;
-        let mut check = data::read_all(model, &args.check, &args.preparation)?;
-        data::note_twins(&mut fit, &mut check);
-        Ok([fit, check])
-    };
-    let [mut fit, mut check] = read(&model)?;
-    suspects::examine(&model, &mut fit);
-    suspects::examine(&model, &mut check);
-    let study = report::study(Question {
-        path: &args.model,
-        loaded: &loaded,
-        libraries: model::libraries(),
-        model,
-        fit,
-        check,
-        held: if args.held { Held::All } else { Held::Known },
-        again: &read,
-        recordings: String::new(),
-    })?;
+    let study = report::ask(&args.ask)?;
     // Base parameters that are off may hide what nominal values lack.
-    let is_off = !args.held && !off_nominal(last(&study)).is_empty();
+    let is_off = !args.ask.held && !off_nominal(last(&study)).is_empty();
     let held = is_off
-        .then(|| with_nominal(args, &loaded, &study))
+        .then(|| with_nominal(&args.ask, &study))
         .transpose()?;
     if args.json {
         return terminal::print_json(&object(&study, held.as_ref()));
     }
-    let lines = text(&study, held.as_ref(), &args.model.display().to_string());
+    let lines = text(&study, held.as_ref(), &args.ask.model.display().to_string());
     terminal::print(&lines.join("\n"))
 }
 
 /// The same question with all parameters held at their nominal values.
-fn with_nominal(args: &DiagnoseArgs, loaded: &Loaded, study: &Study) -> Outcome<Answer> {
+fn with_nominal(args: &AskArgs, study: &Study) -> Outcome<Answer> {
+    let loaded = model::load_quietly(&args.model)?;
     let version = &study.before;
     let of = |is_check: bool| -> Vec<Data> {
         let runs = version.data.iter().zip(&version.runs);
@@ -68,7 +46,7 @@ fn with_nominal(args: &DiagnoseArgs, loaded: &Loaded, study: &Study) -> Outcome<
     };
     diagnosis::find(
         &args.model,
-        loaded,
+        &loaded,
         model::libraries(),
         &version.model,
         &of(false),
@@ -330,10 +308,7 @@ fn text(study: &Study, held: Option<&Answer>, model: &str) -> Vec<String> {
         ],
         &rows,
     ));
-    lines.push(format!(
-        "  the noise in the forces is {}",
-        percent(Some(diagnosis.noise_floor))
-    ));
+    lines.push(format!("  {}", words::floor(diagnosis)));
     found(study, &mut lines);
     lines.push(String::new());
     lines.push(style.bold(if diagnosis.verdict == Verdict::Unexplained {

@@ -8,4 +8,4 @@ mod numbers;
 mod places;
 mod problem;
 
-pub(crate) use problem::{Answer, Held, find};
+pub(crate) use problem::{Answer, Held, ROUNDING, find};

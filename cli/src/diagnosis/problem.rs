@@ -17,7 +17,7 @@ use super::columns::{Origin, carried, columns, finer};
 use super::numbers::{Runs, layout, regressor, stack, variables};
 
 /// Errors below this share of a force are rounding, of the recording or of whatever simulated it.
-const ROUNDING: f64 = 3e-6;
+pub(crate) const ROUNDING: f64 = 3e-6;
 
 /// Which parameters keep their nominal values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,7 +62,7 @@ pub(crate) fn find(
         all: &all,
     };
     let diagnosis = watched("looking for what is missing", 0, |_| {
-        diagnose(&problem, &supply, &mut |_| {})
+        diagnose(&problem, &supply)
     });
     Ok(Answer {
         problem,

@@ -1,10 +1,11 @@
 //! The page that tells what a diagnosis found: a model and its recordings go in, one self-contained page comes out.
 //!
-//! `diagnosis` -> `added` (the model file with what was found) -> `versions` (both models identified, along all recordings)
+//! `ask` (what the command line names) -> `diagnosis` -> `added` (the model file with what was found) -> `versions` (both models identified, along all recordings)
 //! -> `words`, `tables`, and pictures (`ladder`, `curves`, `maps`, `regions`, `spectrum`) -> `page`. The pictures stand by
 //! themselves; `page.js` makes curves that can be zoomed and tables that can be sorted out of them.
 
 pub(crate) mod added;
+mod ask;
 mod curves;
 mod draw;
 mod ladder;
@@ -31,6 +32,7 @@ use crate::model::{self, Model};
 use crate::progress::watched;
 
 use added::Added;
+pub(crate) use ask::ask;
 use maps::Variable;
 pub(crate) use page::render;
 pub(crate) use versions::Version;

@@ -2,6 +2,7 @@
 
 use modelmill_identify::diagnose::{Diagnosis, Effect, Rung, Verdict};
 
+use crate::diagnosis::ROUNDING;
 use crate::table::percent;
 
 /// Where errors are judged.
@@ -62,13 +63,23 @@ pub(crate) fn rung(rung: &Rung) -> String {
     says.join(" ")
 }
 
+/// What the errors are held against: the noise in the forces, or rounding where there is none.
+pub(crate) fn floor(diagnosis: &Diagnosis) -> String {
+    let floor = percent(Some(diagnosis.noise_floor));
+    if diagnosis.noise_floor <= 2.0 * ROUNDING {
+        format!("there is no noise in the forces, and what is below {floor} is rounding")
+    } else {
+        format!("the noise in the forces is {floor}")
+    }
+}
+
 /// The verdict in one or two sentences with figures.
 pub(crate) fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged) -> String {
     let ladder = &diagnosis.ladder;
     let (Some(first), Some(last)) = (ladder.first(), ladder.last()) else {
         return String::new();
     };
-    let noise = percent(Some(diagnosis.noise_floor));
+    let noise = floor(diagnosis);
     let found: Vec<Effect> = diagnosis.effects.iter().map(|f| f.effect.clone()).collect();
     let falls = format!(
         "the error {} falls from {} to {}",
@@ -78,13 +89,13 @@ pub(crate) fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged
     );
     match diagnosis.verdict {
         Verdict::Adequate => format!(
-            "The model is adequate: it misses the forces by {} {}, and the noise in them is {noise}. No effect of the library \
-             would lower that where it was not fitted.",
+            "The model is adequate: it misses the forces by {} {}; {noise}. No effect of the library would lower that where it \
+             was not fitted.",
             percent(Some(first.check)),
             judged.words()
         ),
         Verdict::MissingEffect => format!(
-            "The model lacks {}. With {} {falls}; the noise in the forces is {noise}.",
+            "The model lacks {}. With {} {falls}; {noise}.",
             effects(&found),
             if found.len() == 1 { "it" } else { "them" },
         ),
@@ -112,15 +123,12 @@ pub(crate) fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged
             }
             let besides = if found.is_empty() {
                 format!(
-                    "The model misses the forces by {} {}, where the noise is {noise}.",
+                    "The model misses the forces by {} {}; {noise}.",
                     percent(Some(last.check)),
                     judged.words()
                 )
             } else {
-                format!(
-                    "With {} {falls}, where the noise is {noise}.",
-                    effects(&found)
-                )
+                format!("With {} {falls}; {noise}.", effects(&found))
             };
             format!(
                 "Something is missing that no effect of the library explains, in {}. {besides}",

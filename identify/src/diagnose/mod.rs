@@ -122,22 +122,17 @@ pub struct Diagnosis {
     pub unexplained: Vec<usize>,
 }
 
-/// Finds what is missing. `supply` makes columns that are not known from the start; `progress` is told how many steps were
-/// made.
-pub fn diagnose(
-    problem: &Problem,
-    supply: &dyn Supply,
-    progress: &mut dyn FnMut(usize),
-) -> Diagnosis {
+/// Finds what is missing. `supply` makes columns that are not known from the start.
+pub fn diagnose(problem: &Problem, supply: &dyn Supply) -> Diagnosis {
     let mut bench = Bench::new(problem, supply);
     bench.look(&[]);
     let alone = bench.explained_alone();
-    let found = bench.search(progress);
+    let found = bench.search();
     let picks = found.steps.last().map_or(Vec::new(), |s| s.picks.clone());
     let mut ladder = vec![bench.rung(&[], &[], None)];
     let mut before: Vec<Pick> = Vec::new();
     for step in &found.steps {
-        ladder.push(bench.rung(&before, &step.picks, Some(step.evidence)));
+        ladder.push(bench.rung(&before, &step.picks, step.evidence));
         before.clone_from(&step.picks);
     }
     let aliases = bench.aliases(&picks);

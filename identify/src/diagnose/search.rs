@@ -29,7 +29,8 @@ const MOST: usize = 40;
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
     pub(crate) picks: Vec<Pick>,
-    pub(crate) evidence: Evidence,
+    /// `None` where the last set is made smaller, for which the lack of evidence speaks.
+    pub(crate) evidence: Option<Evidence>,
 }
 
 /// Why the best candidates of a step were refused.
@@ -50,13 +51,12 @@ pub(crate) struct Found {
 
 impl Bench<'_> {
     /// Searches forward until nothing more is supported.
-    pub(crate) fn search(&mut self, progress: &mut dyn FnMut(usize)) -> Found {
+    pub(crate) fn search(&mut self) -> Found {
         let mut accepted: Vec<Pick> = Vec::new();
         let mut steps = Vec::new();
         let mut beam: Vec<Vec<Pick>> = vec![Vec::new()];
         let mut refused;
         loop {
-            progress(steps.len());
             self.weigh(&accepted);
             self.look(&accepted);
             self.leave_out_slight_delays(&accepted);
@@ -100,10 +100,9 @@ impl Bench<'_> {
             if !beam.contains(&accepted) {
                 beam.insert(0, accepted.clone());
             }
-            let evidence_of_step = evidence;
             steps.push(Step {
                 picks: accepted.clone(),
-                evidence: evidence_of_step,
+                evidence: Some(evidence),
             });
             if accepted.len() >= MOST {
                 break;
@@ -120,7 +119,7 @@ impl Bench<'_> {
         if pruned != accepted {
             steps.push(Step {
                 picks: pruned,
-                evidence: Evidence::default(),
+                evidence: None,
             });
         }
         Found { steps, refused }
