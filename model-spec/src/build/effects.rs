@@ -135,6 +135,22 @@ fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut Log) -> Kinds<'a> {
             && entry.on.is_some();
         kinds.insert(&name.text, (entry, complete && log.n_errors() == before));
     }
+    for refined in own.iter().filter_map(|entry| entry.refines.as_ref()) {
+        if !kinds.contains_key(refined.text.as_str()) {
+            log.push(
+                Diagnostic::error(
+                    refined.span,
+                    format!("unknown kind of effect `{}`", refined.text),
+                )
+                .label("expected the simpler kind that this one holds as a special case")
+                .help(suggest::advice(
+                    &refined.text,
+                    "kinds",
+                    kinds.keys().copied(),
+                )),
+            );
+        }
+    }
     kinds
 }
 
