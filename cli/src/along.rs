@@ -1,7 +1,7 @@
 //! A model along a recording: its forces, beside the measured ones, and where they differ.
 
 use modelmill_codegen::{Evaluator, States};
-use modelmill_identify::filters::decimate_table;
+use modelmill_identify::decimation::decimate_columns;
 use modelmill_identify::locate::{LocateOptions, TIME, locate};
 use modelmill_identify::{Comparison, Figures, Region};
 use modelmill_spec::DriveKind;
@@ -222,17 +222,27 @@ pub(crate) fn columns(
     Ok(columns)
 }
 
-/// The parallel filter, on every column.
-fn decimated(columns: Vec<Vec<f64>>, data: &Data) -> Outcome<Vec<Vec<f64>>> {
+/// The parallel filter, on every column; one of zeros stays one.
+pub(crate) fn decimated(columns: Vec<Vec<f64>>, data: &Data) -> Outcome<Vec<Vec<f64>>> {
     let factor = data.decimation();
     if factor == 1 {
         return Ok(columns);
     }
-    columns
+    let is_zero = |column: &[f64]| column.iter().all(|x| *x == 0.0);
+    let moving: Vec<&[f64]> = columns
         .iter()
-        .map(|column| {
-            decimate_table(column, 1, factor)
-                .map_err(|error| Failure::Input(format!("{}: {error}", data.run.file)))
+        .map(Vec::as_slice)
+        .filter(|column| !is_zero(column))
+        .collect();
+    let mut filtered = decimate_columns(&moving, factor)
+        .map_err(|error| Failure::Input(format!("{}: {error}", data.run.file)))?
+        .into_iter();
+    let picked = |column: &Vec<f64>| column.iter().copied().step_by(factor).collect();
+    Ok(columns
+        .iter()
+        .map(|column| match is_zero(column) {
+            true => picked(column),
+            false => filtered.next().unwrap_or_default(),
         })
-        .collect()
+        .collect())
 }

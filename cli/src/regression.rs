@@ -2,10 +2,10 @@
 //! they fit a modest memory; else they are made again for every pass.
 
 use modelmill_codegen::{Evaluator, PoseFault, States};
+use modelmill_identify::decimation::decimate_table;
 use modelmill_identify::deviations::Visit;
 use modelmill_identify::essential::{Dropped, EssentialOptions, essential};
 use modelmill_identify::estimate::{Estimate, EstimateOptions, Weighting, estimate};
-use modelmill_identify::filters::decimate_table;
 use modelmill_identify::instruments::instrumental;
 use modelmill_identify::physical::Physical;
 use modelmill_identify::prior::with_prior;

@@ -6,10 +6,13 @@
 //! "Discrete-Time Signal Processing", ch. 7; forward-backward filtering with odd padding and
 //! steady initial states as F. Gustafsson, "Determining the initial states in forward-backward
 //! filtering", IEEE Trans. Signal Processing 44 (1996), in the form that MATLAB's and scipy's
-//! `filtfilt` share; decimation as their `decimate`.
+//! `filtfilt` share.
 
+use std::array;
 use std::f64::consts::PI;
 use std::fmt;
+
+use pulp::{Arch, Simd, WithSimd};
 
 /// Why a filter could not be designed or applied.
 #[derive(Debug, Clone, PartialEq)]
@@ -221,6 +224,16 @@ impl LowPass {
     /// the first sample, as MATLAB's and scipy's `filtfilt` do.
     /// Fails when the signal is not longer than [`LowPass::padding`].
     pub fn zero_phase(&self, signal: &[f64]) -> Result<Vec<f64>, FilterError> {
+        let lanes: Vec<[f64; 1]> = signal.iter().map(|x| [*x]).collect();
+        Ok(self.zero_phase_lanes(&lanes)?.into_flattened())
+    }
+
+    /// The same of several signals side by side: a recursion waits for its last result, which leaves time for others.
+    /// Every lane gives the bits that it gives alone.
+    pub(crate) fn zero_phase_lanes<const N: usize>(
+        &self,
+        signal: &[[f64; N]],
+    ) -> Result<Vec<[f64; N]>, FilterError> {
         let pad = self.padding();
         let n = signal.len();
         if n <= pad {
@@ -229,30 +242,62 @@ impl LowPass {
                 need: pad + 1,
             });
         }
-        let mut extended = Vec::with_capacity(n + 2 * pad);
-        extended.extend((1..=pad).rev().map(|i| 2.0 * signal[0] - signal[i]));
+        let mirrored =
+            |about: usize, i: usize| array::from_fn(|k| 2.0 * signal[about][k] - signal[i][k]);
+        let mut extended: Vec<[f64; N]> = Vec::with_capacity(n + 2 * pad);
+        extended.extend((1..=pad).rev().map(|i| mirrored(0, i)));
         extended.extend_from_slice(signal);
-        extended.extend((1..=pad).map(|i| 2.0 * signal[n - 1] - signal[n - 1 - i]));
-        self.run_from_steady_state(&mut extended);
-        extended.reverse();
-        self.run_from_steady_state(&mut extended);
-        extended.reverse();
+        extended.extend((1..=pad).map(|i| mirrored(n - 1, n - 1 - i)));
+        let arch = Arch::new();
+        for _ in 0..2 {
+            arch.dispatch(FromSteadyState {
+                sections: &self.sections,
+                signal: &mut extended,
+            });
+            extended.reverse();
+        }
         extended.truncate(pad + n);
         extended.drain(..pad);
         Ok(extended)
     }
+}
 
-    fn run_from_steady_state(&self, signal: &mut [f64]) {
-        let mut level = signal[0];
-        for section in &self.sections {
-            let [mut z1, mut z2] = section.steady_state().map(|state| state * level);
-            level *= section.dc_gain();
-            let ([b0, b1, b2], [a1, a2]) = (section.b, section.a);
-            for x in signal.iter_mut() {
-                let y = b0 * *x + z1;
-                z1 = b1 * *x - a1 * y + z2;
-                z2 = b2 * *x - a2 * y;
-                *x = y;
+/// Sections one after the other, from the steady state of the first sample on.
+struct FromSteadyState<'a, const N: usize> {
+    sections: &'a [Section],
+    signal: &'a mut [[f64; N]],
+}
+
+impl<const N: usize> WithSimd for FromSteadyState<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        /// Samples that stay in the nearest cache while all sections pass over them.
+        const CHUNK: usize = 64;
+        let mut level = self.signal[0];
+        let mut states: Vec<[[f64; N]; 2]> = Vec::with_capacity(self.sections.len());
+        for section in self.sections {
+            states.push(
+                section
+                    .steady_state()
+                    .map(|state| level.map(|level| state * level)),
+            );
+            level = level.map(|level| level * section.dc_gain());
+        }
+        for chunk in self.signal.chunks_mut(CHUNK) {
+            for (section, state) in self.sections.iter().zip(&mut states) {
+                let ([b0, b1, b2], [a1, a2]) = (section.b, section.a);
+                let [mut z1, mut z2] = *state;
+                for x in chunk.iter_mut() {
+                    for k in 0..N {
+                        let y = b0 * x[k] + z1[k];
+                        z1[k] = b1 * x[k] - a1 * y + z2[k];
+                        z2[k] = b2 * x[k] - a2 * y;
+                        x[k] = y;
+                    }
+                }
+                *state = [z1, z2];
             }
         }
     }
@@ -274,64 +319,4 @@ fn warp(cutoff_hz: f64, rate_hz: f64) -> Result<f64, FilterError> {
     } else {
         Err(FilterError::CutoffOutOfRange { cutoff_hz, rate_hz })
     }
-}
-
-/// The low-pass that [`decimate`] uses: Chebyshev 1, order 8, 0.05 dB, up to 0.8 of the new
-/// half rate.
-fn anti_alias(factor: usize) -> Result<LowPass, FilterError> {
-    LowPass::chebyshev1(8, 0.05, 0.4 / factor as f64, 1.0)
-}
-
-/// Every `factor`-th sample, starting with the first, of the zero-phase low-passed signal
-/// (Chebyshev 1, order 8, 0.05 dB of ripple): MATLAB's and scipy's `decimate`.
-/// A factor of 1 returns the signal as it is.
-/// Fails when the factor is 0 or the signal has 27 samples or fewer.
-///
-/// ```
-/// let ramp: Vec<f64> = (0..200).map(f64::from).collect();
-/// let short = modelmill_identify::filters::decimate(&ramp, 10)?;
-/// assert_eq!(short.len(), 20);
-/// # Ok::<(), modelmill_identify::FilterError>(())
-/// ```
-pub fn decimate(signal: &[f64], factor: usize) -> Result<Vec<f64>, FilterError> {
-    match factor {
-        0 => Err(FilterError::FactorOutOfRange { factor }),
-        1 => Ok(signal.to_vec()),
-        _ if factor >= signal.len() => Err(FilterError::FactorOutOfRange { factor }),
-        _ => Ok(anti_alias(factor)?
-            .zero_phase(signal)?
-            .into_iter()
-            .step_by(factor)
-            .collect()),
-    }
-}
-
-/// Every `factor`-th time stamp, those that [`decimate`] keeps; times are picked, not filtered.
-pub fn decimate_time(time: &[f64], factor: usize) -> Vec<f64> {
-    time.iter().copied().step_by(factor.max(1)).collect()
-}
-
-/// [`decimate`] on each of `width` interleaved columns: `table[sample * width + column]` in, the
-/// same layout out. With `width = n_channels * n_columns` this is the parallel filter on a
-/// regressor whose rows are interleaved per sample; with `width = n_channels` on the forces.
-/// Fails as [`decimate`] does, and when the length is no multiple of `width`.
-pub fn decimate_table(table: &[f64], width: usize, factor: usize) -> Result<Vec<f64>, FilterError> {
-    if width == 0 || !table.len().is_multiple_of(width) {
-        return Err(FilterError::Shape {
-            have: table.len(),
-            per_sample: width,
-        });
-    }
-    if factor == 1 {
-        return Ok(table.to_vec());
-    }
-    let samples = table.len() / width;
-    let mut short = vec![0.0; samples.div_ceil(factor.max(1)) * width];
-    for column in 0..width {
-        let signal: Vec<f64> = table.iter().skip(column).step_by(width).copied().collect();
-        for (sample, value) in decimate(&signal, factor)?.into_iter().enumerate() {
-            short[sample * width + column] = value;
-        }
-    }
-    Ok(short)
 }

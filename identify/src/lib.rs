@@ -6,7 +6,7 @@
 //! 1. [`Recording::read`] - CSV, Parquet or MATLAB's format 5 into named columns; every fault has its line and its remedy.
 //! 2. [`Recording::suspicions`] - what looks wrong with them; [`Recording::runs_with`] - coordinates with derivatives ([`derivatives`], [`filters`]) and
 //!    forces, as a [`Run`] for each stretch between gaps in time; the caller evaluates its regressor along it, rows interleaved per
-//!    sample (`row = sample * n_channels + channel`), and applies [`filters::decimate_table`] to
+//!    sample (`row = sample * n_channels + channel`), and applies [`decimation::decimate_table`] to
 //!    regressor and force where the run asks for it.
 //! 3. [`LeastSquares`] - eq. (12) from a stream of rows; [`deviations::autocorrelated`] - what
 //!    the result is worth.
@@ -23,6 +23,7 @@
 pub mod base_fit;
 mod csv_text;
 pub mod cutoff;
+pub mod decimation;
 mod delay;
 pub mod derivatives;
 pub mod deviations;

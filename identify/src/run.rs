@@ -62,7 +62,7 @@ pub struct PreparedAs {
     #[serde(default)]
     pub trim_asked_for: bool,
     /// The parallel decimation that the regression is to apply to the columns of the regressor
-    /// and to the forces ([`crate::filters::decimate_table`]); the columns here are not decimated.
+    /// and to the forces ([`crate::decimation::decimate_table`]); the columns here are not decimated.
     pub decimate: usize,
 }
 

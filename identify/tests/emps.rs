@@ -6,8 +6,8 @@
 
 use std::path::PathBuf;
 
+use modelmill_identify::decimation::{decimate_table, decimate_time};
 use modelmill_identify::deviations::autocorrelated;
-use modelmill_identify::filters::{decimate_table, decimate_time};
 use modelmill_identify::locate::{LocateOptions, locate};
 use modelmill_identify::{LeastSquares, LeastSquaresError, Preparation, Recording, Run, figures};
 

@@ -1,7 +1,8 @@
 //! Filters and differences against numbers from scipy and numpy.
 
+use modelmill_identify::decimation::{decimate, decimate_columns, decimate_table};
 use modelmill_identify::derivatives::differentiate;
-use modelmill_identify::filters::{LowPass, decimate, decimate_table};
+use modelmill_identify::filters::LowPass;
 
 #[allow(clippy::unreadable_literal, reason = "numbers as numpy prints them")]
 #[path = "reference/filter_tables.rs"]
@@ -92,6 +93,22 @@ fn a_design_has_the_gain_it_promises() {
             (filter.gain(30.0, 250.0) - 10.0_f64.powf(-0.5 / 20.0)).abs() < 1e-12,
             "order {order}"
         );
+    }
+}
+
+#[test]
+fn columns_side_by_side_get_the_bits_that_they_get_alone() {
+    let columns: Vec<Vec<f64>> = (0..11)
+        .map(|k| {
+            let bent = |x: f64| x.powi(2) - f64::from(k) * x;
+            signal().into_iter().map(bent).collect()
+        })
+        .collect();
+    let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let together = decimate_columns(&columns, 10).unwrap();
+    assert_eq!(together.len(), columns.len());
+    for (column, short) in columns.iter().zip(together) {
+        assert_eq!(decimate(column, 10).unwrap(), short);
     }
 }
 

@@ -5,6 +5,7 @@ use modelmill_identify::diagnose::{
     Candidate, Choice, Column, Effect, EffectParameter, Sign, Source,
 };
 use modelmill_spec::{ActsOn, EffectKind, Mechanics, Search};
+use rayon::prelude::*;
 
 use crate::data::Data;
 use crate::failure::Outcome;
@@ -27,25 +28,35 @@ pub(super) fn columns(
         .map(|single| grid(single, motions.scale(single.spots[0].place)))
         .collect();
     // `found[single][round]`; columns that are linear in a constant are looked at for its values 0 and 1.
-    let mut found: Vec<Vec<Vec<Column>>> = vec![Vec::new(); candidates.singles.len()];
     let longest = grids.iter().map(Vec::len).max().unwrap_or(1);
-    for (sort, rounds) in [(Sort::Known, 2), (Sort::Searched, longest)] {
-        for round in 0..rounds {
-            let of_round: Vec<usize> = (0..candidates.singles.len())
-                .filter(|k| candidates.singles[*k].sort == sort)
-                .filter(|k| sort == Sort::Known || round < grids[*k].len())
-                .collect();
-            if of_round.is_empty() {
-                continue;
-            }
-            let value = |k: usize, search: &Search| match search {
-                Search::Linear => round.min(1) as f64,
-                Search::Range { .. } => grids[k][round],
+    let rounds = (0..2)
+        .map(|round| (Sort::Known, round))
+        .chain((0..longest).map(|round| (Sort::Searched, round)));
+    let jobs: Vec<(Sort, usize, Vec<usize>)> = rounds
+        .map(|(sort, round)| {
+            let takes_part = |k: &usize| {
+                candidates.singles[*k].sort == sort
+                    && (sort == Sort::Known || round < grids[*k].len())
             };
-            let columns = singles(candidates, &of_round, model, all, sort, &value)?;
-            for (k, columns) in of_round.iter().zip(columns) {
-                found[*k].push(columns);
-            }
+            let of_round = (0..candidates.singles.len()).filter(takes_part);
+            (sort, round, of_round.collect())
+        })
+        .filter(|(_, _, of_round): &(_, _, Vec<usize>)| !of_round.is_empty())
+        .collect();
+    let made: Vec<Outcome<Vec<Vec<Column>>>> = jobs
+        .par_iter()
+        .map(|(sort, round, of_round)| {
+            let value = |k: usize, search: &Search| match search {
+                Search::Linear => (*round).min(1) as f64,
+                Search::Range { .. } => grids[k][*round],
+            };
+            singles(candidates, of_round, model, all, *sort, &value)
+        })
+        .collect();
+    let mut found: Vec<Vec<Vec<Column>>> = vec![Vec::new(); candidates.singles.len()];
+    for ((_, _, of_round), columns) in jobs.iter().zip(made) {
+        for (k, columns) in of_round.iter().zip(columns?) {
+            found[*k].push(columns);
         }
     }
     let (mut made, mut origins) = (Vec::new(), Vec::new());

@@ -2,9 +2,9 @@
 
 use modelmill_codegen::Evaluator;
 use modelmill_identify::diagnose::{Column, Layout, Stretch};
-use modelmill_identify::filters::decimate_table;
 use modelmill_spec::Place;
 
+use crate::along::decimated;
 use crate::data::Data;
 use crate::failure::{Failure, Outcome};
 use crate::model::Model;
@@ -43,20 +43,11 @@ pub(super) fn stack(
     for (one, _) in all {
         let columns = of(one)?;
         stacked.resize(columns.len().max(stacked.len()), Vec::new());
-        for (whole, column) in stacked.iter_mut().zip(columns) {
-            whole.extend(decimated(column, one)?);
+        for (whole, column) in stacked.iter_mut().zip(decimated(columns, one)?) {
+            whole.extend(column);
         }
     }
     Ok(stacked)
-}
-
-fn decimated(column: Vec<f64>, data: &Data) -> Outcome<Vec<f64>> {
-    let factor = data.decimation();
-    if factor == 1 || column.iter().all(|x| *x == 0.0) {
-        return Ok(column.into_iter().step_by(factor).collect());
-    }
-    decimate_table(&column, 1, factor)
-        .map_err(|error| Failure::Input(format!("{}: {error}", data.run.file)))
 }
 
 /// Columns of a regressor along all recordings.
@@ -75,35 +66,62 @@ pub(super) fn regressor_of(
     model: &Model,
     wanted: &dyn Fn(usize) -> bool,
 ) -> Outcome<Vec<Column>> {
-    let drives = model.drives().len();
-    let mut stacked: Vec<Vec<f64>> = Vec::new();
+    let n_drives = model.drives().len();
+    let mut stacked: Vec<Option<Vec<f64>>> = Vec::new();
+    let mut before = 0;
     for (one, _) in all {
-        let mut columns: Vec<Vec<f64>> = Vec::new();
-        one.for_each_block(model, |states| {
-            Ok::<_, Failure>(evaluator.regressor_blocks(states, |_, block| {
-                columns.resize(block.len(), Vec::new());
-                let n = block.len() / drives.max(1);
-                let pairs = columns.iter_mut().zip(block).enumerate();
-                for (_, (column, values)) in pairs.filter(|(k, _)| wanted(k % n)) {
-                    column.extend_from_slice(values);
-                }
-                Ok(())
-            }))
-        })?;
-        stacked.resize(columns.len(), Vec::new());
-        for (whole, column) in stacked.iter_mut().zip(columns) {
-            if !column.is_empty() {
-                whole.extend(decimated(column, one)?);
-            }
+        let columns = moving(one, evaluator, model, wanted)?;
+        stacked.resize(columns.len(), None);
+        let (slots, columns): (Vec<_>, Vec<_>) = (stacked.iter_mut().zip(columns))
+            .filter_map(|(slot, column)| Some((slot, column?)))
+            .unzip();
+        for (slot, column) in slots.into_iter().zip(decimated(columns, one)?) {
+            slot.get_or_insert_with(|| vec![0.0; before]).extend(column);
+        }
+        before += one.samples().div_ceil(one.decimation());
+        for column in stacked.iter_mut().flatten() {
+            column.resize(before, 0.0);
         }
     }
-    let n = stacked.len() / drives.max(1);
+    let n = stacked.len() / n_drives.max(1);
     // Drives are outermost.
-    let mut by_column: Vec<Vec<Vec<f64>>> = vec![Vec::new(); n];
+    let mut by_column = vec![Column::default(); n];
     for (k, values) in stacked.into_iter().enumerate() {
-        by_column[k % n].push(values);
+        by_column[k % n].0.push(values);
     }
-    Ok(by_column.into_iter().map(Column::new).collect())
+    Ok(by_column)
+}
+
+/// Columns along one recording, drive by drive; `None` where they are zero throughout, as most are on most drives.
+fn moving(
+    one: &Data,
+    evaluator: &Evaluator<'_>,
+    model: &Model,
+    wanted: &dyn Fn(usize) -> bool,
+) -> Outcome<Vec<Option<Vec<f64>>>> {
+    let n_drives = model.drives().len();
+    let mut columns: Vec<Option<Vec<f64>>> = Vec::new();
+    let mut before = 0;
+    one.for_each_block(model, |states| {
+        Ok::<_, Failure>(evaluator.regressor_blocks(states, |samples, block| {
+            columns.resize(block.len(), None);
+            let n = block.len() / n_drives.max(1);
+            for (k, (column, values)) in columns.iter_mut().zip(block).enumerate() {
+                if !wanted(k % n) || (column.is_none() && values.iter().all(|x| *x == 0.0)) {
+                    continue;
+                }
+                let column = column.get_or_insert_with(|| {
+                    let mut zeros = Vec::with_capacity(one.samples());
+                    zeros.resize(before, 0.0);
+                    zeros
+                });
+                column.extend_from_slice(values);
+            }
+            before += samples;
+            Ok(())
+        }))
+    })?;
+    Ok(columns)
 }
 
 /// Variables on which an unknown force may depend.

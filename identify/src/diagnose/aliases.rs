@@ -1,12 +1,14 @@
 //! What a recording cannot tell apart: effects that, put in place of a found one, explain it as well.
 
-use super::bench::{Bench, Pick, n_columns};
+use super::bench::{Bench, Pick, Trial, n_columns};
 use super::pool::solve;
 use super::problem::Effect;
 
 /// How much worse (twice the logarithm of the likelihood, with the samples that the residual is worth) a set may be and
 /// still not be told from the best.
 const APART: f64 = 9.0;
+/// What stands in for an effect must take off this share of the squared error that the effect takes off.
+const STANDS_IN: f64 = 0.8;
 /// A column of which others leave less than this share of squares lies in their span.
 const WITHIN: f64 = 1e-6;
 
@@ -32,6 +34,13 @@ impl Bench<'_> {
             let channels: Vec<usize> = (0..rest.len()).collect();
             let worth = self.worth(&rest, &channels);
             let table = self.table(picks);
+            // How much worse a set is in place of the found one, if it may stand for what the found one adds to `fewer`.
+            let in_place = |bench: &Self, fewer: &[Pick], trial: &Trial| -> Option<f64> {
+                let left = bench.try_in(&table, fewer.to_vec()).squares;
+                let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
+                let is_near = worse < APART && left - trial.squares > STANDS_IN * (left - squares);
+                (is_near && trial.wrong_sign.is_empty()).then_some(worse)
+            };
             let mut found: Vec<Alias> = Vec::new();
             for candidate in self.present.iter().flatten() {
                 if picks.iter().any(|p| p.candidate == candidate.candidate) {
@@ -56,8 +65,7 @@ impl Bench<'_> {
                 let mut set = others.clone();
                 set.push(candidate.clone());
                 let trial = self.try_in(&table, set);
-                let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
-                if worse < APART && trial.wrong_sign.is_empty() {
+                if let Some(worse) = in_place(self, &others, &trial) {
                     found.push(Alias {
                         effect: self.candidate(candidate).effect.clone(),
                         worse,
@@ -77,10 +85,8 @@ impl Bench<'_> {
                     let mut set = fewer.clone();
                     set.push(candidate.clone());
                     let trial = self.try_in(&table, set);
-                    let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
                     let effect = &self.candidate(candidate).effect;
-                    if worse < APART
-                        && trial.wrong_sign.is_empty()
+                    if let Some(worse) = in_place(self, &fewer, &trial)
                         && found.iter().all(|alias| alias.effect != *effect)
                     {
                         found.push(Alias {
@@ -101,10 +107,9 @@ impl Bench<'_> {
                     let mut set = others.clone();
                     set.extend([(*one).clone(), (*two).clone()]);
                     let trial = self.trial(set);
-                    let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
-                    if worse > APART || !trial.wrong_sign.is_empty() {
+                    let Some(worse) = in_place(self, &others, &trial) else {
                         continue;
-                    }
+                    };
                     for half in [one, two] {
                         let effect = &self.candidate(half).effect;
                         if found.iter().all(|alias| alias.effect != *effect) {

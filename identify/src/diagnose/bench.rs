@@ -8,10 +8,12 @@ use nalgebra::{DMatrix, DVector};
 use super::factored::Factored;
 use super::noise::effective_samples;
 use super::pool::{On, Pool, dot, solve};
-use super::problem::{Candidate, Choice, Column, Problem, Sign, Source, Supply};
+use super::problem::{Candidate, Choice, Column, EffectParameter, Problem, Sign, Source, Supply};
 
 /// A column of which the others leave a smaller share of squares than this says nothing new.
 const SAID: f64 = 1e-6;
+/// If an estimate of the wrong sign takes off less than this share of the squared error, the sign is chance.
+const SIGN_IS_CHANCE: f64 = 0.05;
 
 /// An effect that was picked, with the columns that it has for its choice of constants.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,6 +55,8 @@ pub(crate) struct Bench<'a> {
     pub(crate) pool: Pool,
     pub(crate) base: Vec<usize>,
     pub(crate) measured: usize,
+    /// A column of zeros, for parameters of an effect that are held at zero.
+    zero: usize,
     /// One over the variance of each channel.
     pub(crate) weights: Vec<f64>,
     /// The best choice of each candidate for the present residual; `None` if the model says it all already.
@@ -72,6 +76,7 @@ impl<'a> Bench<'a> {
         let mut pool = Pool::new(&problem.layout);
         let base = problem.base.iter().map(|c| pool.add(c.clone())).collect();
         let measured = pool.add(problem.measured.clone());
+        let zero = pool.add(Column(vec![None; problem.layout.channels.len()]));
         let friction = problem
             .friction
             .iter()
@@ -84,6 +89,7 @@ impl<'a> Bench<'a> {
             pool,
             base,
             measured,
+            zero,
             weights: vec![1.0; problem.layout.channels.len()],
             present: vec![None; problem.candidates.len()],
             known: HashMap::new(),
@@ -326,8 +332,35 @@ impl<'a> Bench<'a> {
 
     /// A set of effects, fitted to all samples.
     pub(crate) fn trial(&self, picks: Vec<Pick>) -> Trial {
-        let (factors, squares) = self.fit(&picks, On::All);
-        self.judged(picks, factors.as_slice(), squares)
+        self.signed(picks, |picks| self.fit(picks, On::All))
+    }
+
+    /// A set of effects by some fit. Of an effect with several parameters, one whose sign makes no physical sense is zero
+    /// if next to nothing speaks against that: half of the time an estimate of what is not there has the wrong sign.
+    /// Not so where a kind refines another or is bent by a constant: without one of its parameters it is another kind.
+    fn signed(&self, mut picks: Vec<Pick>, fit: impl Fn(&[Pick]) -> (DVector<f64>, f64)) -> Trial {
+        let (mut factors, squares) = fit(&picks);
+        let mut trial = self.judged(picks.clone(), factors.as_slice(), squares);
+        loop {
+            let several = |i: usize| {
+                let columns = picks[i].columns.iter().filter(|k| **k != self.zero);
+                let candidate = self.candidate(&picks[i]);
+                candidate.refines.is_none() && candidate.searched == 0 && columns.count() > 1
+            };
+            let wrong = self.wrong_parameters(&picks, factors.as_slice());
+            let Some((i, j)) = wrong.into_iter().find(|(i, _)| several(*i)) else {
+                break;
+            };
+            picks[i].columns[j] = self.zero;
+            picks[i].rank = picks[i].rank.saturating_sub(1).max(1);
+            let less;
+            (factors, less) = fit(&picks);
+            if less > squares * (1.0 + SIGN_IS_CHANCE) {
+                break;
+            }
+            trial = self.judged(picks.clone(), factors.as_slice(), less);
+        }
+        trial
     }
 
     /// Numbers that are free in an effect.
@@ -337,7 +370,9 @@ impl<'a> Bench<'a> {
 
     /// A trial from factors of base and effects.
     fn judged(&self, picks: Vec<Pick>, factors: &[f64], squares: f64) -> Trial {
-        let wrong_sign = self.wrong_signs(&picks, &factors[factors.len() - n_columns(&picks)..]);
+        let wrong = self.wrong_parameters(&picks, factors);
+        let mut wrong_sign: Vec<usize> = wrong.into_iter().map(|(i, _)| i).collect();
+        wrong_sign.dedup();
         let freedoms = picks.iter().map(|p| self.freedoms(p)).sum();
         Trial {
             picks,
@@ -348,23 +383,26 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Effects with an estimate whose sign makes no physical sense, by position.
-    fn wrong_signs(&self, picks: &[Pick], factors: &[f64]) -> Vec<usize> {
-        let mut at = 0;
+    /// Estimates whose sign makes no physical sense, by position of effect and parameter.
+    fn wrong_parameters(&self, picks: &[Pick], factors: &[f64]) -> Vec<(usize, usize)> {
+        let mut at = factors.len() - n_columns(picks);
         let mut wrong = Vec::new();
         for (i, pick) in picks.iter().enumerate() {
             let parameters = &self.candidate(pick).parameters;
             let own = &factors[at..at + parameters.len()];
             at += parameters.len();
             let largest = own.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-            let is_wrong = parameters.iter().zip(own).any(|(p, x)| match p.sign {
+            let is_wrong = |(p, x): (&EffectParameter, &f64)| match p.sign {
                 Sign::Positive => *x < -1e-9 * largest,
                 Sign::Negative => *x > 1e-9 * largest,
                 Sign::Any => false,
-            });
-            if is_wrong {
-                wrong.push(i);
-            }
+            };
+            let of_pick = parameters.iter().zip(own).map(is_wrong).enumerate();
+            wrong.extend(
+                of_pick
+                    .filter(|(_, is_wrong)| *is_wrong)
+                    .map(|(j, _)| (i, j)),
+            );
         }
         wrong
     }
@@ -380,7 +418,8 @@ impl<'a> Bench<'a> {
                 }
             }
         }
-        columns.push(self.measured);
+        columns.retain(|k| *k != self.zero);
+        columns.extend([self.zero, self.measured]);
         let mut which = self.base.clone();
         which.extend(&columns);
         let gram = self.pool.gram(&which, &self.weights, On::All);
@@ -405,15 +444,15 @@ impl<'a> Bench<'a> {
 
     /// A set of effects, fitted by a table that holds its columns.
     pub(crate) fn try_in(&self, table: &Table, picks: Vec<Pick>) -> Trial {
-        let mut which: Vec<usize> = picks
-            .iter()
-            .flat_map(|p| &p.columns)
-            .map(|k| table.place[k])
-            .collect();
-        which.push(table.left.nrows() - 1);
-        let gram = table.left.select_rows(&which).select_columns(&which);
-        let (factors, squares) = solve(&gram);
-        self.judged(picks, factors.as_slice(), squares)
+        self.signed(picks, |picks| {
+            let mut which: Vec<usize> = picks
+                .iter()
+                .flat_map(|p| &p.columns)
+                .map(|k| table.place[k])
+                .collect();
+            which.push(table.left.nrows() - 1);
+            solve(&table.left.select_rows(&which).select_columns(&which))
+        })
     }
 }
 

@@ -2,9 +2,11 @@
 //!
 //! Residuals of mechanisms resemble their neighbours, so that tests that count samples find effects everywhere. Blocks of
 //! time that follow each other are compared instead: on the recordings of the check if there are any, else each fold of the
-//! fit with factors from the others. The information criterion counts as many samples as the residual is worth.
+//! fit with factors from the others. The information criterion counts as many samples as the residual is worth, and asks
+//! more of the best of many candidates than of the only one.
 //! Sources: J. Racine, "Consistent cross-validatory model-selection for dependent data: hv-block cross-validation",
-//! J. Econometrics 99 (2000); G. Schwarz, Annals of Statistics 6 (1978).
+//! J. Econometrics 99 (2000); G. Schwarz, Annals of Statistics 6 (1978); J. Chen and Z. Chen, "Extended Bayesian
+//! information criteria for model selection with large model spaces", Biometrika 95 (2008).
 
 use serde::Serialize;
 
@@ -34,7 +36,8 @@ pub struct Evidence {
     pub blocks_t: f64,
     /// The same for the gain of each block relative to itself.
     pub shares_t: f64,
-    /// By how much the information criterion falls, with the effective number of samples.
+    /// By how much the extended information criterion falls, with the effective number of samples and the number of
+    /// candidates that there were to choose from.
     pub bic: f64,
     /// How many independent equations the residual before is worth.
     pub effective_samples: f64,
@@ -107,12 +110,15 @@ impl Bench<'_> {
             freedoms.sum::<usize>() as f64
         };
         let worth = old_fit.1;
+        // The best of so many fits chance better than any one of them.
+        let choices = (self.problem.candidates.len().max(1) as f64).ln();
+        let price = |picks: &[Pick]| count(picks) * worth.ln() + 2.0 * picks.len() as f64 * choices;
         Evidence {
             gain: if total > 0.0 { n * mean / total } else { 0.0 },
             blocks_t: t,
             shares_t,
             bic: worth * (old_fit.0 / new_fit.0.max(f64::MIN_POSITIVE)).ln()
-                - (count(after) - count(before)) * worth.ln(),
+                - (price(after) - price(before)),
             effective_samples: worth,
             above_noise: old_fit.0 / (channels.len() * self.problem.layout.samples()).max(1) as f64,
         }

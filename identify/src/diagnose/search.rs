@@ -96,7 +96,8 @@ impl Bench<'_> {
             let (picks, evidence) = self.simplest(&accepted, trial, evidence, &trials);
             let refined = self.refine(picks);
             let polished = self.polish(refined);
-            accepted = self.refresh(polished);
+            let refreshed = self.refresh(polished);
+            accepted = self.trial(refreshed).picks;
             if !beam.contains(&accepted) {
                 beam.insert(0, accepted.clone());
             }
@@ -116,6 +117,7 @@ impl Bench<'_> {
         } else {
             pruned
         };
+        let pruned = self.trial(pruned).picks;
         if pruned != accepted {
             steps.push(Step {
                 picks: pruned,
