@@ -89,7 +89,6 @@ pub(crate) fn run(args: &ExciteArgs) -> Outcome {
             unit: told::unit(&model),
             drives: model.drives().len(),
             samples,
-            period: args.period,
             asked,
         }),
         _ => None,

@@ -1,6 +1,7 @@
 //! What `excite --separate` asks and says: which effects can be told apart at all, by how much along the trajectory, and how
 //! many samples that takes.
 
+use std::fmt::Write as _;
 use std::path::Path;
 
 use modelmill_identify::diagnose::Effect;
@@ -47,9 +48,8 @@ pub(crate) struct Told<'a> {
     /// What forces are measured in.
     pub(crate) unit: &'static str,
     pub(crate) drives: usize,
-    /// Samples of one period, and its length in s.
+    /// Samples of one period.
     pub(crate) samples: usize,
-    pub(crate) period: f64,
 }
 
 /// Derives what is asked and looks at random motions for what cannot be told at all.
@@ -174,6 +174,11 @@ impl Asked {
         self.pair.along(model, &self.data, &self.which)
     }
 
+    /// Samples of the recordings.
+    fn samples(&self) -> usize {
+        self.data.iter().map(|one| one.time().len()).sum()
+    }
+
     fn rivals(&self) -> Vec<Effect> {
         let of = |k: &usize| self.pair.rivals[*k].effect().clone();
         self.which.iter().map(of).collect()
@@ -211,19 +216,24 @@ pub(crate) fn unit(model: &Model) -> &'static str {
 }
 
 impl Told<'_> {
-    /// Samples of each drive until a difference is plain; `None` where the noise is not known.
-    fn needed(&self, apart: &Apart) -> Option<f64> {
+    /// The difference in standard deviations of the white noise, over some samples of each drive; `None` where the noise is
+    /// not known.
+    fn deviations(&self, apart: &Apart, samples: usize) -> Option<f64> {
         let noise = self.asked.pair.noise()?;
-        let each = (apart.force / noise).powi(2) * self.drives as f64;
-        Some((PLAIN * PLAIN / each).ceil().max(1.0))
+        Some(apart.force / noise * ((samples * self.drives) as f64).sqrt())
+    }
+
+    /// Periods of the trajectory until the difference is plain, at least one.
+    fn periods(&self) -> Option<f64> {
+        let one = self.deviations(&self.apart, self.samples)?;
+        Some((PLAIN / one).powi(2).ceil().max(1.0))
     }
 
     pub(crate) fn json(&self) -> Value {
         let pair = &self.asked.pair;
-        let one = |apart: &Apart| {
+        let one = |apart: &Apart, samples: usize| {
             let constants = apart.constants.iter().map(|(s, v)| (s.clone(), json!(v)));
             let is_held = pair.rivals[apart.rival].is_held;
-            let needed = self.needed(apart);
             json!({
                 "apart": apart.force,
                 "effect": apart.figures.effect,
@@ -235,8 +245,8 @@ impl Told<'_> {
                     "at": pair.rivals[apart.rival].effect().at,
                     "constants": constants.collect::<Map<_, _>>(),
                 },
-                "samples_needed": needed,
-                "periods_needed": needed.map(|n| n / self.samples as f64),
+                "samples": samples,
+                "deviations": self.deviations(apart, samples),
             })
         };
         let left_out: Vec<&Effect> = (0..pair.rivals.len())
@@ -252,9 +262,10 @@ impl Told<'_> {
             "beside": pair.beside().collect::<Vec<_>>(),
             "noise": pair.noise(),
             "unit": self.unit,
-            "trajectory": one(&self.apart),
+            "trajectory": one(&self.apart, self.samples),
             "best_random": self.random,
-            "recordings": self.before.as_ref().map(one),
+            "periods_needed": self.periods(),
+            "recordings": self.before.as_ref().map(|before| one(before, self.asked.samples())),
         })
     }
 
@@ -277,7 +288,7 @@ impl Told<'_> {
         });
         lines.push(String::new());
         let force = |value: f64| format!("{} {}", significant(value, 3), self.unit);
-        let row = |name: &str, apart: &Apart| {
+        let row = |name: &str, apart: &Apart, samples: usize| {
             let nearest = pair.rivals[apart.rival].effect();
             let constants = apart.constants.iter();
             let constants: Vec<String> = constants
@@ -287,21 +298,18 @@ impl Told<'_> {
             if !constants.is_empty() {
                 nearest = format!("{nearest}, {}", constants.join(", "));
             }
-            let needed = self.needed(apart).map_or_else(String::new, |needed| {
-                let periods = needed / self.samples as f64;
-                format!("{needed:.0} ({} periods)", significant(periods, 2))
-            });
+            let deviations = self.deviations(apart, samples);
             vec![
                 name.to_owned(),
                 force(apart.figures.effect),
                 force(apart.force),
+                deviations.map_or_else(String::new, |n| significant(n, 3)),
                 nearest,
-                needed,
             ]
         };
         let mut rows: Vec<Vec<String>> = Vec::new();
         if let Some(before) = &self.before {
-            rows.push(row("the recordings", before));
+            rows.push(row("the recordings", before, self.asked.samples()));
         }
         rows.push(vec![
             format!(
@@ -313,15 +321,19 @@ impl Told<'_> {
             String::new(),
             String::new(),
         ]);
-        rows.push(row("this trajectory", &self.apart));
+        rows.push(row(
+            "one period of this trajectory",
+            &self.apart,
+            self.samples,
+        ));
         lines.extend(table(
             2,
             &[
                 ("root mean square, all drives", Align::Left),
                 ("effect", Align::Right),
                 ("apart", Align::Right),
+                ("in deviations", Align::Right),
                 ("nearest", Align::Left),
-                ("samples needed", Align::Right),
             ],
             &rows,
         ));
@@ -333,54 +345,45 @@ impl Told<'_> {
         if let Some(before) = &self.before
             && before.force > 0.0
         {
-            says.push_str(&format!(
+            let _ = write!(
+                says,
                 ", and {} times as far as in the recordings",
                 significant(self.apart.force / before.force, 3)
-            ));
+            );
         }
         lines.push(format!(
             "  {says}; {} were evaluated",
             count(evaluations, "trajectory", "trajectories")
         ));
-        match (pair.noise(), self.needed(&self.apart)) {
-            (Some(noise), Some(needed)) => {
-                let seconds = needed * self.period / self.samples as f64;
-                lines.extend(
-                    words::lines(
-                        &format!(
-                            "Against white noise of {} the difference is {PLAIN} standard deviations after {} s; noise that \
-                             resembles itself takes longer, and `diagnose` tells what a recording is worth.",
-                            force(noise),
-                            significant(seconds, 2)
-                        ),
-                        98,
-                    )
-                    .iter()
-                    .map(|line| format!("  {line}")),
-                );
-            }
-            _ => lines.push(
-                "  With --noise SIZE, or --data RUN, it says how many samples that takes."
-                    .to_owned(),
+        lines.extend(indented(&match (pair.noise(), self.periods()) {
+            (Some(noise), Some(periods)) => format!(
+                "Against white noise of {} it takes {} for {PLAIN} standard deviations of all samples together; noise that \
+                 resembles itself takes longer, and `diagnose` tells what a recording is worth.",
+                force(noise),
+                if periods > 1.0 {
+                    format!("{periods} periods")
+                } else {
+                    "no more than one period".to_owned()
+                }
             ),
-        }
+            _ => "With --noise SIZE, or --data RUN, it says how many periods it takes.".to_owned(),
+        }));
         for k in &self.asked.which {
             let rival = &pair.rivals[*k];
             if rival.is_held {
-                lines.extend(
-                    words::lines(
-                        &format!(
-                            "{} is a special case of {} here: if it is the true one, nothing but its simplicity tells.",
-                            words::effect(rival.effect()),
-                            words::effect(pair.effect())
-                        ),
-                        98,
-                    )
-                    .iter()
-                    .map(|line| format!("  {line}")),
-                );
+                lines.extend(indented(&format!(
+                    "{} is a special case of {} here: if it is the true one, nothing but its simplicity tells.",
+                    words::effect(rival.effect()),
+                    words::effect(pair.effect())
+                )));
             }
         }
         lines
     }
+}
+
+/// A sentence in lines.
+fn indented(says: &str) -> Vec<String> {
+    let lines = words::lines(says, 98);
+    lines.iter().map(|line| format!("  {line}")).collect()
 }
