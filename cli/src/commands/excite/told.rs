@@ -287,7 +287,7 @@ impl Told<'_> {
             format!("  with {}", sizes.join(", "))
         });
         lines.push(String::new());
-        let force = |value: f64| format!("{} {}", significant(value, 3), self.unit);
+        let force = |value: f64| self.force(value);
         let row = |name: &str, apart: &Apart, samples: usize| {
             let nearest = pair.rivals[apart.rival].effect();
             let constants = apart.constants.iter();
@@ -355,11 +355,22 @@ impl Told<'_> {
             "  {says}; {} were evaluated",
             count(evaluations, "trajectory", "trajectories")
         ));
-        lines.extend(indented(&match (pair.noise(), self.periods()) {
+        lines.extend(self.remarks());
+        lines
+    }
+
+    fn force(&self, value: f64) -> String {
+        format!("{} {}", significant(value, 3), self.unit)
+    }
+
+    /// What the figures mean.
+    fn remarks(&self) -> Vec<String> {
+        let pair = &self.asked.pair;
+        let mut lines = indented(&match (pair.noise(), self.periods()) {
             (Some(noise), Some(periods)) => format!(
                 "Against white noise of {} it takes {} for {PLAIN} standard deviations of all samples together; noise that \
                  resembles itself takes longer, and `diagnose` tells what a recording is worth.",
-                force(noise),
+                self.force(noise),
                 if periods > 1.0 {
                     format!("{periods} periods")
                 } else {
@@ -367,7 +378,7 @@ impl Told<'_> {
                 }
             ),
             _ => "With --noise SIZE, or --data RUN, it says how many periods it takes.".to_owned(),
-        }));
+        });
         for k in &self.asked.which {
             let rival = &pair.rivals[*k];
             if rival.is_held {
