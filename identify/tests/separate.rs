@@ -100,7 +100,7 @@ fn a_spring_beside_a_mass_takes_two_harmonics() {
     };
     let mut best = 0.0_f64;
     for ratio in (1..300).map(|k| 0.01 * f64::from(k)) {
-        for phase in (0..90).map(|k| PI * f64::from(k) / 45.0) {
+        for phase in (0..360).map(|k| PI * f64::from(k) / 180.0) {
             let at = |x: f64| x.sin() + ratio * (2.0 * x + phase).sin();
             let values = (0..720).map(|k| at(PI * f64::from(k) / 360.0));
             let [low, high] = values.fold([0.0_f64; 2], |[low, high], q| [low.min(q), high.max(q)]);
