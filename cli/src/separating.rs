@@ -91,11 +91,16 @@ impl Pair {
             truth.kind.mechanics == Some(modelmill_spec::Mechanics::Tilt)
                 || parameters.iter().any(|p| p.symbol == symbol)
         };
+        let constants = &truth.kind.constants;
+        let is_linear = |symbol: &str| {
+            let mut of = constants.iter().filter(|c| c.symbol == symbol);
+            of.any(|c| c.search == Some(modelmill_spec::Search::Linear))
+        };
         let mut sizes: Vec<(String, f64)> = separate.values.clone();
         // A constant beside which the effect is linear is found as a product with its parameter.
         for (symbol, value) in &separate.values {
             for (parameter, size) in &separate.values {
-                if !is_size(symbol) && is_size(parameter) {
+                if is_linear(symbol) && is_size(parameter) {
                     sizes.push((format!("{parameter}*{symbol}"), size * value));
                 }
             }
