@@ -240,9 +240,12 @@ pub(crate) fn decimated(columns: Vec<Vec<f64>>, data: &Data) -> Outcome<Vec<Vec<
     let picked = |column: &Vec<f64>| column.iter().copied().step_by(factor).collect();
     Ok(columns
         .iter()
-        .map(|column| match is_zero(column) {
-            true => picked(column),
-            false => filtered.next().unwrap_or_default(),
+        .map(|column| {
+            if is_zero(column) {
+                picked(column)
+            } else {
+                filtered.next().unwrap_or_default()
+            }
         })
         .collect())
 }

@@ -8,6 +8,7 @@ use crate::effect_args::{AddArgs, EffectsArgs};
 use crate::estimators::EstimatorArgs;
 use crate::limits::Limit;
 use crate::preparation::PreparationArgs;
+use crate::separate_args::SeparateArgs;
 use crate::standstill::StandstillArgs;
 
 /// From a model file to base parameters, equations, fast Rust, and parameters from measurements.
@@ -151,8 +152,11 @@ pub(crate) enum Command {
     #[command(after_help = "Examples (from the project's root):\n  \
         modelmill excite model-spec/models/spidermill.toml --out trajectory.csv\n  \
         modelmill excite model-spec/models/two_link.toml --harmonics 5 --period 10 \\\n      \
-        --limits q1=-1:1 --limits q1_d=2 --limits q2=-1.5:1.5 --limits q2_d=3 --out trajectory.csv\n\n\
-        Limits stand in the model file's `[limits]`; --limits adds to them or replaces them.")]
+        --limits q1=-1:1 --limits q1_d=2 --limits q2=-1.5:1.5 --limits q2_d=3 --out trajectory.csv\n  \
+        modelmill excite model-spec/models/spidermill.toml --separate coulomb_friction@spindle_left:Fc=12 \\\n      \
+        --from load_friction@spindle_left --noise 1 --out separate.csv   motion that tells two effects apart\n\n\
+        Limits stand in the model file's `[limits]`; --limits adds to them or replaces them. `diagnose` prints the \
+        command that separates what its recordings cannot tell apart.")]
     Excite(ExciteArgs),
     /// Reproduce the experiment of the paper on the bundled rig, and explain its errors, as one page
     #[command(
@@ -461,6 +465,8 @@ pub(crate) struct ExciteArgs {
     /// Print one JSON object on standard output
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) separate: SeparateArgs,
 }
 
 /// `experiment`.

@@ -26,6 +26,8 @@ mod progress;
 mod regression;
 mod report;
 mod sampled_rank;
+mod separate_args;
+mod separating;
 mod show;
 mod standstill;
 mod suspects;

@@ -9,7 +9,7 @@ use modelmill_identify::{Preparation, Smoothing};
 const USUAL_ORDER: usize = 4;
 
 /// How recordings are read and states are prepared.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, PartialEq, Args)]
 #[command(next_help_heading = "Reading and preparing recordings")]
 pub(crate) struct PreparationArgs {
     /// The recording calls our column by another name, e.g. `--map theta1=pos_left`, or ours is a

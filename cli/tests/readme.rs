@@ -78,9 +78,12 @@ fn what_the_readme_says_of_the_rods_is_printed() {
     let args: Vec<String> = paths
         .split_whitespace()
         .skip(1)
-        .map(|word| match word.contains('/') {
-            true => workspace(word).display().to_string(),
-            false => word.to_owned(),
+        .map(|word| {
+            if word.contains('/') {
+                workspace(word).display().to_string()
+            } else {
+                word.to_owned()
+            }
         })
         .collect();
     let args: Vec<&str> = args.iter().map(String::as_str).collect();

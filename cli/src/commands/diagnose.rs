@@ -1,7 +1,10 @@
 //! `diagnose`: which effect is missing, and what speaks for it.
 
-use modelmill_identify::diagnose::{FoundEffect, Rung, Verdict};
+use std::fmt::Write as _;
+
+use modelmill_identify::diagnose::{Effect, FoundEffect, Rung, Verdict};
 use modelmill_identify::{FitParameter, Region, Status};
+use modelmill_spec::Mechanics;
 use modelmill_spec::edit::NewEffect;
 use serde_json::{Value, json};
 
@@ -10,6 +13,8 @@ use crate::data::Data;
 use crate::diagnosis::{self, Answer, Held};
 use crate::failure::Outcome;
 use crate::model;
+use crate::preparation::PreparationArgs;
+use crate::report::added::{NamedEffect, quoted};
 use crate::report::{self, Study, Version, added, words};
 use crate::table::{Align, number, percent, significant, table};
 use crate::terminal;
@@ -29,9 +34,9 @@ pub(crate) fn run(args: &DiagnoseArgs) -> Outcome {
         .then(|| with_nominal(&args.ask, &study))
         .transpose()?;
     if args.json {
-        return terminal::print_json(&object(&study, held.as_ref()));
+        return terminal::print_json(&object(&study, held.as_ref(), &args.ask));
     }
-    let lines = text(&study, held.as_ref(), &args.ask.model.display().to_string());
+    let lines = text(&study, held.as_ref(), &args.ask);
     terminal::print(&lines.join("\n"))
 }
 
@@ -56,7 +61,7 @@ fn with_nominal(args: &AskArgs, study: &Study) -> Outcome<Answer> {
 }
 
 /// The answer as scripts read it.
-fn object(study: &Study, held: Option<&Answer>) -> Value {
+fn object(study: &Study, held: Option<&Answer>, args: &AskArgs) -> Value {
     let diagnosis = &study.answer.diagnosis;
     let channels = &study.answer.problem.layout.channels;
     let effects: Vec<Value> = (diagnosis.effects.iter())
@@ -71,6 +76,7 @@ fn object(study: &Study, held: Option<&Answer>) -> Value {
                 "estimates": estimates,
                 "indistinguishable_from": found.indistinguishable_from,
                 "separate_by": separate_by(study, found),
+                "separate_command": separate_command(study, found, args),
             })
         })
         .collect();
@@ -213,6 +219,54 @@ fn separate_by(study: &Study, found: &FoundEffect) -> Option<String> {
     (!kind.doubles.is_empty()).then(|| kind.doubles.clone())
 }
 
+/// The command that computes such an experiment. What only moves forces in time has no force of its own to be made large.
+fn separate_command(study: &Study, found: &FoundEffect, args: &AskArgs) -> Option<String> {
+    let is_force = |effect: &&Effect| {
+        let kinds = study.answer.candidates.kinds.iter();
+        let mut kind = kinds.filter(|kind| kind.name == effect.kind);
+        kind.all(|kind| kind.mechanics != Some(Mechanics::Delay))
+    };
+    let rivals = found.indistinguishable_from.iter().filter(is_force);
+    let rivals: Vec<Effect> = rivals.cloned().collect();
+    if rivals.is_empty() || !is_force(&&found.effect) {
+        return None;
+    }
+    let values = estimates(study, found).into_iter();
+    let values = values.filter(|e| !e.name.contains('*') && e.value.is_finite());
+    let effect = (
+        &found.effect,
+        values.map(|e| (e.name, e.value)).collect::<Vec<_>>(),
+    );
+    let others = (study.answer.diagnosis.effects.iter())
+        .filter(|other| other.effect != found.effect && is_force(&&other.effect));
+    let beside: Vec<NamedEffect<'_>> = others
+        .map(|other| (&other.effect, other.constants.clone()))
+        .collect();
+    let mut more = String::new();
+    let noise = &study.answer.problem.noise;
+    let squares: f64 = noise.iter().map(|n| n * n).sum();
+    let noise = (squares / noise.len().max(1) as f64).sqrt();
+    if noise > 0.0 && noise.is_finite() {
+        let _ = write!(more, " --noise {}", significant(noise, 3));
+    }
+    // Recordings that need more than other names for their columns cannot be compared with there.
+    let preparation = &args.preparation;
+    let plain = PreparationArgs {
+        map: preparation.map.clone(),
+        ..PreparationArgs::none()
+    };
+    if *preparation == plain {
+        for path in &args.data {
+            let _ = write!(more, " --data {}", quoted(&path.display().to_string()));
+        }
+        for (ours, theirs) in &preparation.map {
+            let _ = write!(more, " --map {}", quoted(&format!("{ours}={theirs}")));
+        }
+    }
+    let model = args.model.display().to_string();
+    Some(added::separating(&model, &effect, &rivals, &beside, &more))
+}
+
 /// The model with all that was found, or as it is.
 fn last(study: &Study) -> &Version {
     study.after.as_ref().unwrap_or(&study.before)
@@ -280,7 +334,8 @@ fn everywhere(study: &Study, channel: usize) -> Region {
 }
 
 /// The answer for people.
-fn text(study: &Study, held: Option<&Answer>, model: &str) -> Vec<String> {
+fn text(study: &Study, held: Option<&Answer>, args: &AskArgs) -> Vec<String> {
+    let model = &args.model.display().to_string();
     let style = terminal::style();
     let diagnosis = &study.answer.diagnosis;
     let channels = &study.answer.problem.layout.channels;
@@ -309,7 +364,7 @@ fn text(study: &Study, held: Option<&Answer>, model: &str) -> Vec<String> {
         &rows,
     ));
     lines.push(format!("  {}", words::floor(diagnosis)));
-    found(study, &mut lines);
+    found(study, args, &mut lines);
     lines.push(String::new());
     lines.push(style.bold(if diagnosis.verdict == Verdict::Unexplained {
         "where what is left sits"
@@ -341,7 +396,7 @@ fn text(study: &Study, held: Option<&Answer>, model: &str) -> Vec<String> {
 }
 
 /// What was found, with values and doubles.
-fn found(study: &Study, lines: &mut Vec<String>) {
+fn found(study: &Study, args: &AskArgs, lines: &mut Vec<String>) {
     let style = terminal::style();
     let diagnosis = &study.answer.diagnosis;
     if diagnosis.effects.is_empty() {
@@ -378,6 +433,10 @@ fn found(study: &Study, lines: &mut Vec<String>) {
             if let Some(says) = separate_by(study, found) {
                 let wrapped = words::lines(&says, 96);
                 lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
+            }
+            if let Some(command) = separate_command(study, found, args) {
+                lines.push("    Motion that tells them apart is sought by".to_owned());
+                lines.push(format!("      {command}"));
             }
         }
     }

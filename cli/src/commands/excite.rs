@@ -1,4 +1,7 @@
-//! `excite`: the periodic trajectory that tells the base parameters apart best, eq. (14), (15) and (17).
+//! `excite`: the periodic trajectory that tells the base parameters apart best, eq. (14), (15) and (17), or that tells an
+//! effect from what it may be taken for.
+
+mod told;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -19,9 +22,12 @@ use crate::svg::Figure;
 use crate::table::{Align, count, number, significant, table};
 use crate::terminal;
 
+use told::Told;
+
 /// Searches, and writes the trajectory and its picture.
 pub(crate) fn run(args: &ExciteArgs) -> Outcome {
-    let model = model::derive(&args.model)?;
+    let loaded = model::load(&args.model)?;
+    let model = model::derive_loaded(&args.model.display().to_string(), &loaded)?;
     let inputs = || model.files.iter().map(AsRef::<Path>::as_ref);
     let target = Target::new(&args.out, inputs())?;
     let figure = Target::new(&figure_path(args), inputs())?;
@@ -33,33 +39,78 @@ pub(crate) fn run(args: &ExciteArgs) -> Outcome {
     }
     let all_limits = limits::limits(&model, &args.limits)?;
     let coordinates = limits::of_active(&model, &all_limits)?;
-    let options = args.options();
+    let mut options = args.options();
     let plant = ModelPlant::new(&model, &all_limits);
-    let found = if plant.has_unknowns() {
-        watched("searching for a trajectory", steps(&options), |done| {
-            excite(&plant, &coordinates, &options, &|more| done.add(more))
-        })
-        .map_err(|error| Failure::Input(format!("{}: {error}", model.path)))?
-    } else {
+    let asked = told::ask(
+        &args.model,
+        &loaded,
+        &model,
+        &plant,
+        &coordinates,
+        &options,
+        &args.separate,
+    )?;
+    let separating = asked.as_ref().map(|asked| asked.plant(&plant, &model));
+    if separating.is_some() {
+        options.criterion = Criterion::Separation;
+    } else if !plant.has_unknowns() {
         return Err(Failure::Input(format!(
             "{}: no base parameter is unknown, so there is nothing to excite",
             model.path
         )));
+    }
+    let searched: &dyn Plant = match &separating {
+        Some(separating) => separating,
+        None => &plant,
     };
+    let found = watched("searching for a trajectory", steps(&options), |done| {
+        excite(searched, &coordinates, &options, &|more| done.add(more))
+    })
+    .map_err(|error| Failure::Input(format!("{}: {error}", model.path)))?;
     let samples = samples(args);
     let motion = Motion::sample(&found.series, samples);
     let time: Vec<f64> = (0..samples)
         // Picoseconds are enough, and 7.288 reads better than 7.287999999999999.
         .map(|i| (1e12 * i as f64 * args.period / samples as f64).round() / 1e12)
         .collect();
+    let told = match (&asked, &separating) {
+        (Some(asked), Some(separating)) => Some(Told {
+            apart: separating
+                .along(&motion, &separating.which)
+                .ok_or_else(|| {
+                    Failure::Input(format!(
+                        "{}: nothing is left of the difference at {} samples per second; \
+                     give a higher --rate",
+                        model.path, args.rate
+                    ))
+                })?,
+            random: (-found.first).exp(),
+            before: asked.before(&model)?,
+            unit: told::unit(&model),
+            drives: model.drives().len(),
+            samples,
+            asked,
+        }),
+        _ => None,
+    };
+    let title = match &told {
+        Some(told) => format!("{}: tells {}", model.name, told.asked.words()),
+        None => format!(
+            "{}: excitation with condition number {}",
+            model.name,
+            significant(found.condition_number, 4)
+        ),
+    };
     target.write(&csv(&model, &time, &motion))?;
-    figure.write(&picture(&model, &plant, &found, &time, &motion))?;
+    figure.write(&picture(&model, &plant, &found, &title, &time, &motion))?;
     let answer = Answer {
         model: &model,
         found: &found,
         options: &options,
+        told,
         scaled: plant
             .regressor(&motion)
+            .filter(|w| w.ncols() > 0)
             .map(|w| scaled_condition_number(&w))
             .filter(|c| c.is_finite()),
     };
@@ -139,16 +190,12 @@ fn picture(
     model: &Model,
     plant: &ModelPlant<'_>,
     found: &Excitation,
+    title: &str,
     time: &[f64],
     motion: &Motion,
 ) -> String {
     let names = model.active();
-    let title = format!(
-        "{}: excitation with condition number {}",
-        model.name,
-        significant(found.condition_number, 4)
-    );
-    let mut figure = Figure::new(&title, time);
+    let mut figure = Figure::new(title, time);
     let around: Vec<Vec<f64>> = motion
         .q
         .iter()
@@ -201,6 +248,7 @@ struct Answer<'a> {
     model: &'a Model,
     found: &'a Excitation,
     options: &'a Options,
+    told: Option<Told<'a>>,
     scaled: Option<f64>,
 }
 
@@ -228,6 +276,7 @@ impl Answer<'_> {
         let criterion = |value: f64| match self.options.criterion {
             Criterion::Condition => value.exp(),
             Criterion::LogDet => value,
+            Criterion::Separation => (-value).exp(),
         };
         json!({
             "model": self.model.name,
@@ -238,7 +287,9 @@ impl Answer<'_> {
             "criterion": match self.options.criterion {
                 Criterion::Condition => "condition",
                 Criterion::LogDet => "log_det",
+                Criterion::Separation => "separation",
             },
+            "separation": self.told.as_ref().map(Told::json),
             "value": criterion(found.value),
             "ends": found.ends.iter().map(|end| criterion(*end)).collect::<Vec<_>>(),
             "evaluations": found.evaluations,
@@ -260,7 +311,20 @@ impl Answer<'_> {
             count(self.options.harmonics, "harmonic", "harmonics"),
             self.options.period
         ))];
-        lines.push(format!(
+        if let Some(told) = &self.told {
+            lines.extend(told.text(found.evaluations, found.random));
+        } else {
+            lines.extend(self.conditions());
+        }
+        lines.push(String::new());
+        lines.extend(self.limits());
+        lines.join("\n")
+    }
+
+    /// What the trajectory is worth for the base parameters.
+    fn conditions(&self) -> Vec<String> {
+        let found = self.found;
+        let mut lines = vec![format!(
             "  condition number {}, against {} of the best of {} ({} times better)",
             number(found.condition_number),
             number(found.start),
@@ -270,7 +334,7 @@ impl Answer<'_> {
                 "random trajectories within the limits"
             ),
             significant(found.start / found.condition_number, 3),
-        ));
+        )];
         if let Some(scaled) = self.scaled {
             lines.push(format!(
                 "  {} with columns of equal norm; the regressor was evaluated for {}",
@@ -278,7 +342,12 @@ impl Answer<'_> {
                 count(found.evaluations, "trajectory", "trajectories")
             ));
         }
-        lines.push(String::new());
+        lines
+    }
+
+    /// How close the trajectory comes to its limits.
+    fn limits(&self) -> Vec<String> {
+        let found = self.found;
         let rows: Vec<Vec<String>> = found
             .margins
             .iter()
@@ -299,7 +368,7 @@ impl Answer<'_> {
                 ]
             })
             .collect();
-        lines.extend(table(
+        table(
             2,
             &[
                 ("limit", Align::Left),
@@ -308,7 +377,6 @@ impl Answer<'_> {
                 ("checked", Align::Left),
             ],
             &rows,
-        ));
-        lines.join("\n")
+        )
     }
 }

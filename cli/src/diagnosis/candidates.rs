@@ -28,6 +28,8 @@ pub(crate) struct Single {
     pub(crate) parameters: Vec<(String, usize)>,
     /// Symbols of constants that are searched for, with their names in the variant and how.
     pub(crate) constants: Vec<(String, String, Search)>,
+    /// Symbols of constants whose values are given.
+    pub(crate) given: Vec<(String, f64)>,
 }
 
 /// A candidate: entries whose columns add up, since they share their parameters.
@@ -115,7 +117,7 @@ pub(crate) fn candidates(
         let first = singles.len();
         let (places, sums) = sets(mechanism, kind, &fitting);
         for spots in places {
-            let single = single(k, kind, &spots, singles.len());
+            let single = single(k, kind, &spots, singles.len(), &[]);
             variants[single.sort as usize].write(kind, &single, singles.len());
             singles.push(single);
         }
@@ -152,8 +154,17 @@ fn has(mechanism: &Mechanism, kind: &EffectKind, spot: &Spot) -> bool {
     effects.any(|effect| effect.kind == kind.name && effect.places.contains(&spot.place))
 }
 
-fn single(k: usize, kind: &EffectKind, spots: &[&Spot], number: usize) -> Single {
-    let searched = kind.constants.iter().filter_map(|c| {
+/// A kind at its places; constants that are given are not searched for.
+pub(super) fn single(
+    k: usize,
+    kind: &EffectKind,
+    spots: &[&Spot],
+    number: usize,
+    given: &[(String, f64)],
+) -> Single {
+    let is_open = |symbol: &str| given.iter().all(|(known, _)| known != symbol);
+    let open = kind.constants.iter().filter(|c| is_open(&c.symbol));
+    let searched = open.filter_map(|c| {
         let name = format!("candidate{number}_{}", c.symbol);
         Some((c.symbol.clone(), name, c.search?))
     });
@@ -171,11 +182,12 @@ fn single(k: usize, kind: &EffectKind, spots: &[&Spot], number: usize) -> Single
         spots: spots.iter().copied().cloned().collect(),
         parameters: Vec::new(),
         constants,
+        given: given.to_vec(),
     }
 }
 
 /// Whether the expression of a kind names the load of its place.
-fn uses_load(kind: &EffectKind) -> bool {
+pub(super) fn uses_load(kind: &EffectKind) -> bool {
     let mut words = kind
         .expression
         .split(|c: char| !c.is_alphanumeric() && c != '_');
@@ -183,7 +195,7 @@ fn uses_load(kind: &EffectKind) -> bool {
 }
 
 /// A variant of the model that has effects besides, as text.
-struct Variant {
+pub(super) struct Variant {
     text: String,
     constants: String,
     /// Which candidates it holds, in order.
@@ -191,7 +203,7 @@ struct Variant {
 }
 
 impl Variant {
-    fn new(path: &Path) -> Outcome<Self> {
+    pub(super) fn new(path: &Path) -> Outcome<Self> {
         Ok(Self {
             text: header(path)?,
             constants: String::new(),
@@ -199,7 +211,7 @@ impl Variant {
         })
     }
 
-    fn write(&mut self, kind: &EffectKind, single: &Single, number: usize) {
+    pub(super) fn write(&mut self, kind: &EffectKind, single: &Single, number: usize) {
         self.singles.push(number);
         let places: Vec<String> = single
             .spots
@@ -219,13 +231,14 @@ impl Variant {
                 .collect();
             let _ = writeln!(self.text, "parameters = {{ {} }}", named.join(", "));
         }
-        if single.constants.is_empty() {
+        let searched =
+            (single.constants.iter()).map(|(symbol, name, _)| format!("{symbol} = \"{name}\""));
+        let given = (single.given.iter()).map(|(symbol, value)| format!("{symbol} = {value:?}"));
+        let constants: Vec<String> = searched.chain(given).collect();
+        if constants.is_empty() {
             return;
         }
-        let given: Vec<String> = (single.constants.iter())
-            .map(|(symbol, name, _)| format!("{symbol} = \"{name}\""))
-            .collect();
-        let _ = writeln!(self.text, "constants = {{ {} }}", given.join(", "));
+        let _ = writeln!(self.text, "constants = {{ {} }}", constants.join(", "));
         for (symbol, name, _) in &single.constants {
             let constant = kind.constants.iter().find(|c| c.symbol == *symbol);
             let carries = single.spots[0].carries;
@@ -240,7 +253,7 @@ impl Variant {
     }
 
     /// Derives the columns of its effects alone; `own` effects of the model come before them.
-    fn derive(
+    pub(super) fn derive(
         mut self,
         path: &Path,
         libraries: &[PathBuf],
@@ -268,7 +281,7 @@ impl Variant {
 }
 
 /// The base columns of a model as functions of a tilt of its base.
-fn tilted(path: &Path, libraries: &[PathBuf], model: &Model) -> Outcome<Derivation> {
+pub(super) fn tilted(path: &Path, libraries: &[PathBuf], model: &Model) -> Outcome<Derivation> {
     let mut text = header(path)?;
     let names = ["tx", "ty", "tz"].map(|t| (t, format!("candidate_{t}")));
     let given: Vec<String> = names

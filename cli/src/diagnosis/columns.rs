@@ -11,7 +11,7 @@ use crate::data::Data;
 use crate::failure::Outcome;
 use crate::model::Model;
 
-use super::candidates::{Candidates, Change, Entry, Sort, grid, sign};
+use super::candidates::{Candidates, Change, Entry, Single, Sort, grid, sign};
 use super::numbers::{Motions, Runs, regressor, regressor_of};
 
 /// Half the step by which a tilt is varied, rad.
@@ -23,13 +23,25 @@ pub(super) fn columns(
     model: &Model,
     all: &Runs<'_>,
 ) -> Outcome<(Vec<Candidate>, Vec<Origin>)> {
-    let motions = Motions::new(model, all)?;
-    let grids: Vec<Vec<f64>> = (candidates.singles.iter())
-        .map(|single| grid(single, motions.scale(single.spots[0].place)))
-        .collect();
+    let is_known = |single: &Single| single.sort == Sort::Known;
+    let is_linear = |single: &Single| single.constants.iter().any(|c| c.2 == Search::Linear);
+    let grids: Vec<Vec<f64>> = if candidates.singles.iter().all(is_known) {
+        vec![vec![1.0]; candidates.singles.len()]
+    } else {
+        let motions = Motions::new(model, all)?;
+        (candidates.singles.iter())
+            .map(|single| grid(single, motions.scale(single.spots[0].place)))
+            .collect()
+    };
+    // Nothing changes in a second round where no constant does.
+    let of_known = if candidates.singles.iter().any(is_linear) {
+        2
+    } else {
+        1
+    };
     // `found[single][round]`; columns that are linear in a constant are looked at for its values 0 and 1.
     let longest = grids.iter().map(Vec::len).max().unwrap_or(1);
-    let rounds = (0..2)
+    let rounds = (0..of_known)
         .map(|round| (Sort::Known, round))
         .chain((0..longest).map(|round| (Sort::Searched, round)));
     let jobs: Vec<(Sort, usize, Vec<usize>)> = rounds

@@ -216,11 +216,14 @@ fn states(
 ) -> Outcome<Vec<Vec<f64>>> {
     let mut stacked: Vec<Vec<f64>> = Vec::new();
     for (one, _) in all {
-        let columns = crate::along::columns(model, one, &mut evaluate)?;
-        stacked.resize(columns.len(), Vec::new());
-        for (whole, column) in stacked.iter_mut().zip(columns) {
-            whole.extend(column);
-        }
+        one.for_each_block(model, |states| {
+            Ok::<_, Failure>(evaluate(states).map(|columns| {
+                stacked.resize(columns.len(), Vec::new());
+                for (whole, column) in stacked.iter_mut().zip(columns) {
+                    whole.extend(column);
+                }
+            }))
+        })?;
     }
     Ok(stacked)
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use modelmill_identify::diagnose::FoundEffect;
+use modelmill_identify::diagnose::{Effect, FoundEffect};
 use modelmill_spec::edit::{EditFailure, NewEffect, NewParameter, add_to_model};
 use modelmill_spec::{EffectKind, Loaded};
 
@@ -170,9 +170,45 @@ pub(crate) fn command(model: &str, effect: &NewEffect) -> String {
     command
 }
 
+/// The command that looks for motion along which effects differ; values and constants are those of the effect and of what
+/// is there in either case.
+pub(crate) fn separating(
+    model: &str,
+    effect: &NamedEffect<'_>,
+    rivals: &[Effect],
+    beside: &[NamedEffect<'_>],
+    more: &str,
+) -> String {
+    let mut command = format!(
+        "modelmill excite {} --separate {}",
+        quoted(model),
+        quoted(&named(effect))
+    );
+    for rival in rivals {
+        let _ = write!(command, " --from {}", quoted(&named(&(rival, Vec::new()))));
+    }
+    for one in beside {
+        let _ = write!(command, " --beside {}", quoted(&named(one)));
+    }
+    let _ = write!(command, "{more} --out separate.csv");
+    command
+}
+
+/// An effect with values by their symbols.
+pub(crate) type NamedEffect<'a> = (&'a Effect, Vec<(String, f64)>);
+
+/// `KIND@PLACE,PLACE:NAME=VALUE`.
+fn named((effect, values): &NamedEffect<'_>) -> String {
+    let mut text = format!("{}@{}", effect.kind, effect.at.join(","));
+    for (symbol, value) in values {
+        let _ = write!(text, ":{symbol}={}", rounded(*value));
+    }
+    text
+}
+
 /// A word as a shell takes it.
 pub(crate) fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./,=+:".contains(c);
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./,=+:@".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {
         word.to_owned()
     } else {

@@ -40,16 +40,22 @@ impl<'a> Measure<'a> {
         Motion::sample(series, samples(self.options))
     }
 
-    /// The criterion, the smaller the better; infinite where the mechanism cannot follow or columns are dependent.
+    /// The criterion, the smaller the better; infinite where the mechanism cannot follow, columns are dependent, or effects
+    /// are the same.
     /// For the condition number it is its logarithm, which is smoother to search on.
     pub(super) fn value(&self, motion: &Motion) -> f64 {
         self.evaluations.set(self.evaluations.get() + 1);
+        if self.options.criterion == Criterion::Separation {
+            // Lengths of zero have no logarithm.
+            let apart = self.plant.apart(motion).filter(|apart| *apart > 0.0);
+            return apart.map_or(f64::INFINITY, |apart| -apart.ln());
+        }
         let Some(w) = self.plant.regressor(motion) else {
             return f64::INFINITY;
         };
         match self.options.criterion {
             Criterion::Condition => condition_number(&w).ln(),
-            Criterion::LogDet => log_det(&w),
+            Criterion::LogDet | Criterion::Separation => log_det(&w),
         }
     }
 

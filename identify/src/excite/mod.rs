@@ -5,6 +5,9 @@
 //! 2. `search` - sequential quadratic programming from each start.
 //! 3. `feasible` - what was found, shrunk until no limit is exceeded, between samples either.
 //!
+//! What is made small is a [`Criterion`]: uncertainty of the base parameters, or, with [`separate`], what two effects have in
+//! common.
+//!
 //! How a mechanism moves is the business of the caller, who gives a [`Plant`].
 
 mod feasible;
@@ -12,6 +15,7 @@ mod fourier;
 mod measure;
 mod random;
 mod search;
+pub mod separate;
 
 use std::fmt;
 
@@ -64,6 +68,12 @@ pub trait Plant {
     /// For each of [`Plant::limits`] and each sample, by how much it is exceeded, as a share of half its range:
     /// negative inside, -1 in the middle; `None` where the mechanism cannot follow.
     fn excess(&self, motion: &Motion) -> Option<Vec<Vec<f64>>>;
+
+    /// For [`Criterion::Separation`], by how much effects can be told apart along a motion, such as a force in root mean
+    /// squares; `None` where the mechanism cannot follow, and for plants that are not asked to tell any apart.
+    fn apart(&self, _motion: &Motion) -> Option<f64> {
+        None
+    }
 }
 
 /// Limits of one active coordinate, `[low, high]`.
@@ -87,6 +97,8 @@ pub enum Criterion {
     Condition,
     /// `-log det(W'W / N)`, which does not depend on units.
     LogDet,
+    /// What effects have in common: made small is `-log` of [`Plant::apart`].
+    Separation,
 }
 
 /// How to search.
@@ -127,8 +139,10 @@ impl Default for Options {
 pub struct Excitation {
     /// One series for each active coordinate.
     pub series: Vec<Series>,
-    /// Value of the criterion: the logarithm of the condition number, or `-log det`.
+    /// Value of the criterion: the logarithm of the condition number, `-log det`, or `-log` of what is apart.
     pub value: f64,
+    /// The same for the best of the random trajectories.
+    pub first: f64,
     /// Condition number of the regressor, eq. (13), at [`samples`] steps over the period.
     pub condition_number: f64,
     /// The same for the best of the random trajectories.
@@ -169,6 +183,8 @@ pub enum ExciteError {
     NothingToExcite,
     /// The regressor has dependent columns along every trajectory that was tried.
     Deficient,
+    /// The effects are the same along every trajectory that was tried.
+    Inseparable,
 }
 
 impl fmt::Display for ExciteError {
@@ -189,6 +205,9 @@ impl fmt::Display for ExciteError {
             Self::Deficient => f.write_str(
                 "no trajectory within the limits tells all base parameters apart; widen the limits or use more harmonics",
             ),
+            Self::Inseparable => {
+                f.write_str("no trajectory within the limits tells the effects apart")
+            }
         }
     }
 }
@@ -241,12 +260,32 @@ pub fn excite(
         condition_number: condition(&series),
         start: condition(&first.1),
         value,
+        first: first.0,
         random: drawn.feasible,
         evaluations: measure.evaluations(),
         ends,
         margins: feasible::margins(&measure, &series),
         series,
     })
+}
+
+/// Random motions within the limits, as a search would start from.
+pub fn random_motions(
+    plant: &dyn Plant,
+    limits: &[CoordinateLimits],
+    options: &Options,
+    wanted: usize,
+) -> Result<Vec<Motion>, ExciteError> {
+    if limits.is_empty() {
+        return Err(ExciteError::NothingToExcite);
+    }
+    let measure = measure::Measure::new(plant, limits, options);
+    let mut motions = Vec::new();
+    let mut draws = random::Draws(options.seed);
+    random::feasible_ones(&measure, &mut draws, wanted, |series| {
+        motions.push(measure.motion(&series));
+    })?;
+    Ok(motions)
 }
 
 /// Ends of searches that are polished.

@@ -2,7 +2,7 @@
 
 use super::feasible::{reach, worst};
 use super::measure::{Measure, half};
-use super::{ExciteError, Series};
+use super::{Criterion, ExciteError, Series};
 
 /// Trajectories that kept the limits.
 pub(super) struct Drawn {
@@ -22,45 +22,17 @@ pub(super) fn draw(measure: &Measure<'_>, progress: &dyn Fn(usize)) -> Result<Dr
     let wanted = measure.options.random.max(1);
     let mut draws = Draws(measure.options.seed);
     let mut drawn: Vec<(f64, Vec<Series>)> = Vec::new();
-    let names = measure.plant.limits();
-    let mut blame = vec![0_usize; names.len()];
-    let (mut tried, mut feasible) = (0, 0);
-    while feasible < wanted && tried < PATIENCE * wanted {
-        tried += 1;
-        let mut series: Vec<Series> = (0..measure.limits.len())
-            .map(|i| one(measure, i, &mut draws))
-            .collect();
-        let mut is_kept = false;
-        for _ in 0..SHRINKS {
-            match worst(measure, &series, super::samples(measure.options)) {
-                Some((_, excess)) if excess <= 0.0 => {
-                    is_kept = true;
-                    break;
-                }
-                Some((k, _)) if k < blame.len() => blame[k] += 1,
-                _ => {}
-            }
-            series = series.iter().map(|s| s.scaled(0.8)).collect();
-        }
-        if !is_kept {
-            continue;
-        }
+    let mut feasible = 0;
+    feasible_ones(measure, &mut draws, wanted, |series| {
         feasible += 1;
         progress(1);
         let value = measure.value(&measure.motion(&series));
         if value.is_finite() {
             drawn.push((value, series));
         }
-    }
-    if feasible == 0 {
-        let most = (0..names.len()).max_by_key(|k| blame[*k]);
-        return Err(ExciteError::NoStart {
-            tried,
-            most: most.filter(|k| blame[*k] > 0).map(|k| names[k].clone()),
-        });
-    }
+    })?;
     if drawn.is_empty() {
-        return Err(ExciteError::Deficient);
+        return Err(nothing(measure));
     }
     drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
     // A search polishes each of them; before that, they must hold between samples too.
@@ -72,9 +44,55 @@ pub(super) fn draw(measure: &Measure<'_>, progress: &dyn Fn(usize)) -> Result<Dr
     let mut best = kept;
     best.sort_by(|a, b| a.0.total_cmp(&b.0));
     if best.is_empty() {
-        return Err(ExciteError::Deficient);
+        return Err(nothing(measure));
     }
     Ok(Drawn { best, feasible })
+}
+
+/// Why no trajectory is worth anything.
+fn nothing(measure: &Measure<'_>) -> ExciteError {
+    match measure.options.criterion {
+        Criterion::Separation => ExciteError::Inseparable,
+        Criterion::Condition | Criterion::LogDet => ExciteError::Deficient,
+    }
+}
+
+/// Draws trajectories until as many as are wanted have kept the limits, or patience ends; an error if none has.
+pub(super) fn feasible_ones(
+    measure: &Measure<'_>,
+    draws: &mut Draws,
+    wanted: usize,
+    mut take: impl FnMut(Vec<Series>),
+) -> Result<(), ExciteError> {
+    let names = measure.plant.limits();
+    let mut blame = vec![0_usize; names.len()];
+    let (mut tried, mut feasible) = (0, 0);
+    while feasible < wanted && tried < PATIENCE * wanted {
+        tried += 1;
+        let mut series: Vec<Series> = (0..measure.limits.len())
+            .map(|i| one(measure, i, draws))
+            .collect();
+        for _ in 0..SHRINKS {
+            match worst(measure, &series, super::samples(measure.options)) {
+                Some((_, excess)) if excess <= 0.0 => {
+                    feasible += 1;
+                    take(series);
+                    break;
+                }
+                Some((k, _)) if k < blame.len() => blame[k] += 1,
+                _ => {}
+            }
+            series = series.iter().map(|s| s.scaled(0.8)).collect();
+        }
+    }
+    if feasible > 0 {
+        return Ok(());
+    }
+    let most = (0..names.len()).max_by_key(|k| blame[*k]);
+    Err(ExciteError::NoStart {
+        tried,
+        most: most.filter(|k| blame[*k] > 0).map(|k| names[k].clone()),
+    })
 }
 
 /// A series of one coordinate that fills the tightest of its limits, around a mean value that leaves it room.
@@ -98,7 +116,7 @@ fn one(measure: &Measure<'_>, i: usize, draws: &mut Draws) -> Series {
 }
 
 /// Random numbers that are the same on every machine (Steele et al., `SplitMix`, 2014).
-struct Draws(u64);
+pub(super) struct Draws(pub(super) u64);
 
 impl Draws {
     /// Between 0 and 1.
