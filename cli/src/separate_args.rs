@@ -23,7 +23,7 @@ pub(crate) struct SeparateArgs {
     #[arg(long, value_name = "KIND@PLACE,...[:NAME=VALUE]", value_parser = parse_named, requires = "separate")]
     pub(crate) beside: Vec<Named>,
     /// Standard deviation of the noise in the forces, in N or N m, against which the difference is held
-    #[arg(long, value_name = "SIZE", value_parser = parse_noise, requires = "separate")]
+    #[arg(long, value_name = "SIZE", value_parser = parse_noise, requires = "separate", allow_negative_numbers = true)]
     pub(crate) noise: Option<f64>,
     /// Recordings to compare with, of one motion; they give the size of the effect and the noise too, where these are not
     /// given

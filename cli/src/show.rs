@@ -113,9 +113,7 @@ pub(crate) fn places(places: &Places) -> Vec<String> {
         ));
     }
     if lines.is_empty() {
-        lines.push(
-            "  The error is spread evenly over coordinates, rates, loads and time.".to_owned(),
-        );
+        lines.push("  No region of coordinates, rates, loads or time stands out.".to_owned());
     }
     lines
 }

@@ -392,9 +392,14 @@ fn refuse_twin(
             .constants
             .iter()
             .all(|one| known.constant(&one.symbol, mechanism) == wanted(&one.symbol));
+        // What couples two places may couple each with a third.
+        let names = known.places.iter().map(|p| mechanism.place_name(*p));
+        if kind.places == Some(2) && !names.clone().all(|n| effect.at.iter().any(|at| at == n)) {
+            continue;
+        }
         let whole = matches!(known.places[..], [Place::Base | Place::Force]);
-        let place = (known.places.iter())
-            .map(|place| mechanism.place_name(*place))
+        let place = names
+            .into_iter()
             .find(|name| effect.at.iter().any(|at| at == name));
         if let Some(place) = place.filter(|_| alike || whole) {
             return Err(EditFailure::Effect(format!(

@@ -157,6 +157,17 @@ fn a_variant_gets_the_effect_itself() {
 }
 
 #[test]
+fn a_drive_may_be_coupled_with_two_others() {
+    let arm = "schema = 1\nname = \"mine\"\nextends = \"puma560.toml\"\n";
+    let (text, _) = add(arm, &effect("coupled_drive", &["joint4", "joint5"])).unwrap();
+    let (_, loaded) = add(&text, &effect("coupled_drive", &["joint5", "joint6"])).unwrap();
+    assert_eq!(loaded.mechanism.effects.len(), 2);
+    assert!(loaded.warnings.is_empty());
+    let says = add(&text, &effect("coupled_drive", &["joint5", "joint4"])).unwrap_err();
+    assert!(says.contains("already"), "{says}");
+}
+
+#[test]
 fn a_second_ripple_gets_names_of_its_own() {
     let mut ripple = effect("force_ripple", &["motor"]);
     ripple.constants.push(("pitch".to_owned(), 0.1));

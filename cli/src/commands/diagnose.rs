@@ -145,6 +145,20 @@ struct Estimate {
     unit: String,
 }
 
+/// Unit of a constant of a found effect at its places.
+fn unit_of_constant(study: &Study, found: &FoundEffect, name: &str) -> String {
+    let candidates = &study.answer.candidates;
+    let kind = (candidates.kinds.iter()).find(|kind| kind.name == found.effect.kind);
+    let constant = kind.and_then(|kind| kind.constants.iter().find(|one| one.symbol == name));
+    let mut spots = candidates.singles.iter().flat_map(|single| &single.spots);
+    let spot = spots.find(|spot| found.effect.at.contains(&spot.name));
+    let units = constant.zip(spot).and_then(|(constant, spot)| {
+        let mut units = constant.units.iter();
+        units.find(|(carries, _)| *carries == spot.carries)
+    });
+    units.map_or_else(String::new, |(_, unit)| unit.clone())
+}
+
 /// Estimates of an effect with their deviations, from identification with everything that was found; where the model with
 /// the effects cannot say them apart, those of the search.
 fn estimates(study: &Study, found: &FoundEffect) -> Vec<Estimate> {
@@ -163,12 +177,16 @@ fn estimates(study: &Study, found: &FoundEffect) -> Vec<Estimate> {
         name: name.clone(),
         value: *value,
         std: None,
-        unit: String::new(),
+        unit: unit_of_constant(study, found, name),
     }));
     let is_its =
         |entry: &&NewEffect| entry.kind == found.effect.kind && entry.at == found.effect.at;
     if let Some(entry) = study.entries.iter().find(is_its) {
         for estimate in &mut all {
+            // What is held at zero, since its sign would make no sense, stays there.
+            if estimate.value == 0.0 {
+                continue;
+            }
             if let Some(p) = identified(study, entry, &estimate.name) {
                 estimate.value = p.value;
                 estimate.std = p.std;
@@ -283,7 +301,8 @@ fn off_nominal(version: &Version) -> Vec<(&FitParameter, f64, f64)> {
         .filter_map(|(_, p)| {
             let (nominal, std) = (p.nominal?, p.std?);
             let sigmas = (p.value - nominal).abs() / std;
-            let is_off = sigmas > SIGMAS && (p.value - nominal).abs() > OFF * nominal.abs();
+            let is_off =
+                std > 0.0 && sigmas > SIGMAS && (p.value - nominal).abs() > OFF * nominal.abs();
             is_off.then_some((p, nominal, sigmas))
         })
         .collect();
@@ -374,7 +393,7 @@ fn text(study: &Study, held: Option<&Answer>, args: &AskArgs) -> Vec<String> {
     let places = regions(study);
     lines.extend(places.iter().map(|region| format!("  {}.", region.says)));
     if places.is_empty() {
-        lines.push("  It is spread evenly over coordinates, rates, loads and time.".to_owned());
+        lines.push("  No region of coordinates, rates, loads or time stands out.".to_owned());
     }
     refused(study, &mut lines);
     off(study, held, &mut lines);
@@ -410,9 +429,9 @@ fn found(study: &Study, args: &AskArgs, lines: &mut Vec<String>) {
                 let std = e
                     .std
                     .map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
-                format!("{} = {}{std} {}", e.name, number(e.value), e.unit)
-                    .trim_end()
-                    .to_owned()
+                let unit = if e.unit == "1" { "" } else { &e.unit };
+                let said = format!("{} = {}{std} {unit}", e.name, number(e.value));
+                said.trim_end().to_owned().trim_end().to_owned()
             })
             .collect();
         lines.push(format!(
@@ -453,7 +472,7 @@ fn refused(study: &Study, lines: &mut Vec<String>) {
                     words::effect(&c.effect),
                     percent(Some(c.explained)),
                     if why == "sign" {
-                        "its sign makes no sense".to_owned()
+                        "beside what was found its sign makes no sense".to_owned()
                     } else {
                         why
                     },

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use modelmill_codegen::{Derivation, Monomial};
-use modelmill_spec::{EffectKind, Loaded, Mechanics, Mechanism, Scale, Search, Sign};
+use modelmill_spec::{Effect, EffectKind, Loaded, Mechanics, Mechanism, Scale, Search, Sign};
 
 use crate::failure::{Failure, Outcome};
 use crate::model::Model;
@@ -91,7 +91,8 @@ pub(crate) fn candidates(
     for (k, kind) in loaded.kinds.iter().enumerate() {
         let fitting: Vec<&Spot> = all
             .iter()
-            .filter(|spot| fits(mechanism, kind, spot) && !has(mechanism, kind, spot))
+            .filter(|spot| fits(mechanism, kind, spot))
+            .filter(|spot| kind.places == Some(2) || !has(mechanism, kind, &[*spot]))
             .collect();
         if let Some(mechanics @ (Mechanics::Tilt | Mechanics::Delay)) = kind.mechanics {
             if let Some(spot) = fitting.first() {
@@ -117,6 +118,9 @@ pub(crate) fn candidates(
         let first = singles.len();
         let (places, sums) = sets(mechanism, kind, &fitting);
         for spots in places {
+            if kind.places == Some(2) && has(mechanism, kind, &spots) {
+                continue;
+            }
             let single = single(k, kind, &spots, singles.len(), &[]);
             variants[single.sort as usize].write(kind, &single, singles.len());
             singles.push(single);
@@ -148,10 +152,11 @@ pub(crate) fn candidates(
     })
 }
 
-/// Whether the model has the effect already.
-fn has(mechanism: &Mechanism, kind: &EffectKind, spot: &Spot) -> bool {
+/// Whether the model has the effect at all of some places already.
+fn has(mechanism: &Mechanism, kind: &EffectKind, spots: &[&Spot]) -> bool {
+    let holds = |effect: &Effect| spots.iter().all(|spot| effect.places.contains(&spot.place));
     let mut effects = mechanism.effects.iter();
-    effects.any(|effect| effect.kind == kind.name && effect.places.contains(&spot.place))
+    effects.any(|effect| effect.kind == kind.name && holds(effect))
 }
 
 /// A kind at its places; constants that are given are not searched for.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use modelmill_codegen::Evaluator;
-use modelmill_identify::diagnose::{Candidate, Choice, Column, Effect, Source};
+use modelmill_identify::diagnose::{Candidate, Choice, Column, Effect, Source, Tangent};
 use modelmill_spec::edit::{EditFailure, NewEffect, add_to_model};
 use modelmill_spec::{ActsOn, DriveKind, EffectKind, Loaded, Mechanics, Mechanism, Search};
 
@@ -248,13 +248,10 @@ impl Chosen {
                     .map_or_else(Vec::new, |(_, c)| only(c))
             }
             Source::Tangent(changes) => {
-                let unknown: Vec<usize> = (0..model.base.len())
-                    .filter(|k| !model.is_known(*k))
-                    .collect();
-                let sum = |changes: &Vec<Column>| {
+                let sum = |changes: &Tangent| {
                     let mut sum = Column(vec![None; model.drives().len()]);
-                    for (k, change) in unknown.iter().zip(changes) {
-                        sum.add(model.nominal[*k], change);
+                    for (nominal, change) in model.nominal.iter().zip(&changes.base) {
+                        sum.add(*nominal, change);
                     }
                     sum
                 };

@@ -2,7 +2,7 @@
 
 use modelmill_codegen::{Derivation, Evaluator};
 use modelmill_identify::diagnose::{
-    Candidate, Choice, Column, Effect, EffectParameter, Sign, Source,
+    Candidate, Choice, Column, Effect, EffectParameter, Sign, Source, Tangent,
 };
 use modelmill_spec::{ActsOn, EffectKind, Mechanics, Search};
 use rayon::prelude::*;
@@ -29,8 +29,9 @@ pub(super) fn columns(
         vec![vec![1.0]; candidates.singles.len()]
     } else {
         let motions = Motions::new(model, all)?;
-        (candidates.singles.iter())
-            .map(|single| grid(single, motions.scale(single.spots[0].place)))
+        let scales = shared_scales(candidates, &motions);
+        (candidates.singles.iter().zip(scales))
+            .map(|(single, scale)| grid(single, scale))
             .collect()
     };
     // Nothing changes in a second round where no constant does.
@@ -73,9 +74,9 @@ pub(super) fn columns(
     }
     let (mut made, mut origins) = (Vec::new(), Vec::new());
     for (k, entry) in candidates.entries.iter().enumerate() {
-        if let Some(candidate) = candidate(candidates, entry, &found, &grids) {
+        if let Some((candidate, felt)) = candidate(candidates, entry, &found, &grids) {
             made.push(candidate);
-            origins.push(Origin::Entry(k));
+            origins.push(Origin::Entry(k, felt));
         }
     }
     if let Some((change, derivation)) = &candidates.tilt {
@@ -102,11 +103,31 @@ pub(super) fn columns(
     Ok((made, origins))
 }
 
+/// Largest rate and travel of the place of each single candidate. Places that may share a constant look for it on one grid,
+/// that of the place that moves most.
+fn shared_scales(candidates: &Candidates, motions: &Motions) -> Vec<[f64; 2]> {
+    let own = |single: &Single| motions.scale(single.spots[0].place);
+    let mut scales: Vec<[f64; 2]> = candidates.singles.iter().map(own).collect();
+    loop {
+        let before = scales.clone();
+        for entry in &candidates.entries {
+            let of_entry = entry.singles.iter().map(|k| scales[*k]);
+            let most = of_entry.fold([0.0_f64; 2], |m, s| [m[0].max(s[0]), m[1].max(s[1])]);
+            for k in &entry.singles {
+                scales[*k] = most;
+            }
+        }
+        if scales == before {
+            return scales;
+        }
+    }
+}
+
 /// Where a candidate comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Origin {
-    /// An entry of the candidates.
-    Entry(usize),
+    /// An entry of the candidates, and which of its parameters have an effect.
+    Entry(usize, Vec<bool>),
     /// A tilt of the base.
     Tilt,
     /// A delay of the forces.
@@ -132,12 +153,13 @@ fn changed(
     }
 }
 
-/// What each base column changes by with a tilt, for every axis about which one is felt.
+/// What each base column changes by with a tilt, those of known parameters included, for every axis about which one is
+/// felt.
 fn tilts(
     derivation: &Derivation,
     model: &Model,
     all: &Runs<'_>,
-) -> Outcome<(Vec<EffectParameter>, Vec<Vec<Column>>)> {
+) -> Outcome<(Vec<EffectParameter>, Vec<Tangent>)> {
     let mechanism = &derivation.mechanism;
     let usual: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     let own = &model.derivation.reduction;
@@ -159,10 +181,7 @@ fn tilts(
         let [before, after] = [tilted(-TILT)?, tilted(TILT)?];
         // The base columns in the order of the model.
         let mut of_axis = Vec::new();
-        for (k, retained) in own.retained.iter().enumerate() {
-            if model.is_known(k) {
-                continue;
-            }
+        for retained in &own.retained {
             let product = &own.products[*retained];
             let reduction = &derivation.reduction;
             let place = reduction
@@ -186,7 +205,10 @@ fn tilts(
                 unit: "rad".to_owned(),
                 sign: Sign::Any,
             });
-            changes.push(of_axis);
+            changes.push(Tangent {
+                base: of_axis,
+                held: Column(vec![None; model.drives().len()]),
+            });
         }
     }
     Ok((parameters, changes))
@@ -248,13 +270,13 @@ fn singles(
         .collect())
 }
 
-/// A candidate from the columns of its single places; `None` if it has no effect.
+/// A candidate from the columns of its single places, with which of its parameters have an effect; `None` if none has.
 fn candidate(
     candidates: &Candidates,
     entry: &Entry,
     found: &[Vec<Vec<Column>>],
     grids: &[Vec<f64>],
-) -> Option<Candidate> {
+) -> Option<(Candidate, Vec<bool>)> {
     let first = &candidates.singles[entry.singles[0]];
     let kind = &candidates.kinds[first.kind];
     let bears = bears(kind);
@@ -279,14 +301,16 @@ fn candidate(
         at: places.map(|spot| spot.name.clone()).collect(),
     };
     if first.sort == Sort::Carried {
-        return Some(Candidate {
+        let felt = vec![true; parameters.len()];
+        let candidate = Candidate {
             effect,
             parameters,
             searched: 0,
             bears,
             refines: kind.refines.clone(),
             source: Source::Carried,
-        });
+        };
+        return Some((candidate, felt));
     }
     let sum = |round: usize| -> Vec<Column> {
         let mut columns = found[entry.singles[0]][round].clone();
@@ -337,14 +361,18 @@ fn candidate(
         let mut keep = felt.iter();
         choice.columns.retain(|_| *keep.next().unwrap_or(&false));
     }
-    (!parameters.is_empty()).then(|| Candidate {
+    if parameters.is_empty() {
+        return None;
+    }
+    let candidate = Candidate {
         effect,
         parameters,
         searched: usize::from(searched.is_some()),
         bears,
         refines: kind.refines.clone(),
         source: Source::Columns(choices),
-    })
+    };
+    Some((candidate, felt))
 }
 
 /// Whether what a kind adds is part of what the drives carry.

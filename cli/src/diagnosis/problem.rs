@@ -3,14 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use modelmill_codegen::Evaluator;
-use modelmill_identify::diagnose::{Column, Diagnosis, Problem, Supply, diagnose, white_noise};
+use modelmill_identify::diagnose::{
+    Column, Diagnosis, Problem, Source, Supply, diagnose, white_noise,
+};
 use modelmill_spec::Loaded;
 
 use crate::data::Data;
-use crate::failure::Outcome;
+use crate::failure::{Failure, Outcome};
 use crate::model::Model;
 use crate::progress::watched;
 use crate::standstill::drive_rates;
+use crate::table::count;
 
 use super::candidates::{Candidates, candidates};
 use super::columns::{Origin, carried, columns, finer};
@@ -27,6 +30,9 @@ pub(crate) enum Held {
     /// All.
     All,
 }
+
+/// Samples that each recording must have.
+const FEWEST: usize = 60;
 
 /// What was asked and what was found.
 pub(crate) struct Answer {
@@ -81,17 +87,22 @@ struct Made<'a> {
 
 impl Supply for Made<'_> {
     fn finer(&self, candidate: usize, constant: f64) -> Option<Vec<Column>> {
-        let Origin::Entry(k) = self.origins[candidate] else {
+        let Origin::Entry(k, felt) = &self.origins[candidate] else {
             return None;
         };
-        let entry = &self.candidates.entries[k];
-        finer(self.candidates, self.model, self.all, entry, constant)
+        let entry = &self.candidates.entries[*k];
+        let columns = finer(self.candidates, self.model, self.all, entry, constant)?;
+        let kept = columns.into_iter().zip(felt).filter(|(_, felt)| **felt);
+        Some(kept.map(|(column, _)| column).collect())
     }
 
     fn carried(&self, load: &Column) -> Vec<(usize, Vec<Column>)> {
         // Poses without answer were reported when the recordings were evaluated for the first time.
         let made = carried(self.candidates, self.model, self.all, load).unwrap_or_default();
-        let place = |entry: usize| self.origins.iter().position(|o| *o == Origin::Entry(entry));
+        let place = |entry: usize| {
+            let is_its = |origin: &Origin| matches!(origin, Origin::Entry(k, _) if *k == entry);
+            self.origins.iter().position(is_its)
+        };
         made.into_iter()
             .filter_map(|(entry, columns)| Some((place(entry)?, columns)))
             .collect()
@@ -105,6 +116,25 @@ fn problem(
     all: &Runs<'_>,
 ) -> Outcome<(Problem, Vec<Origin>)> {
     let measured = stack(all, |one| Ok(one.run.measured()?.to_vec()))?;
+    if measured.iter().flatten().all(|force| *force == 0.0) {
+        return Err(Failure::Input(format!(
+            "{}: the measured forces are zero throughout, so that there is nothing to explain; record the forces of the \
+             drives, or name their columns with --map",
+            all.first()
+                .map_or("the recording", |(one, _)| one.run.file.as_str())
+        )));
+    }
+    for (one, _) in all {
+        let samples = one.time().len();
+        if samples < FEWEST {
+            return Err(Failure::Input(format!(
+                "{}: {} to be looked at, too few to tell effects from chance; give a longer recording or decimate less, \
+                 so that at least {FEWEST} are left",
+                one.run.file,
+                count(samples, "sample is left", "samples are left"),
+            )));
+        }
+    }
     let (columns, origins) = columns(candidates, model, all)?;
     let problem = Problem {
         layout: layout(model, all),
@@ -122,14 +152,30 @@ fn problem(
 
 /// Takes what is not free off the measured forces.
 fn hold(problem: &mut Problem, model: &Model, held: Held) {
+    let is_held = |k: usize| held == Held::All || model.is_known(k);
     let mut known = Column(vec![None; model.drives().len()]);
     let (mut free, mut bears) = (Vec::new(), Vec::new());
     for (k, column) in std::mem::take(&mut problem.base).into_iter().enumerate() {
-        if held == Held::All || model.is_known(k) {
+        if is_held(k) {
             known.add(model.nominal[k], &column);
         } else {
             free.push(column);
             bears.push(problem.base_bears[k]);
+        }
+    }
+    for candidate in &mut problem.candidates {
+        if let Source::Tangent(tangents) = &mut candidate.source {
+            for tangent in tangents {
+                let mut free = Vec::new();
+                for (k, change) in std::mem::take(&mut tangent.base).into_iter().enumerate() {
+                    if is_held(k) {
+                        tangent.held.add(model.nominal[k], &change);
+                    } else {
+                        free.push(change);
+                    }
+                }
+                tangent.base = free;
+            }
         }
     }
     problem.base = free;
@@ -145,7 +191,8 @@ fn friction(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Column>> {
     let rates = stack(all, |one| drive_rates(model, one))?;
     let mut friction = Vec::new();
     for (d, rate) in rates.iter().enumerate() {
-        let signs = rate.iter().map(|v| v.signum()).collect();
+        let sign = |v: &f64| if *v == 0.0 { 0.0 } else { v.signum() };
+        let signs = rate.iter().map(sign).collect();
         for values in [rate.clone(), signs, vec![1.0; rate.len()]] {
             let mut column = Column(vec![None; rates.len()]);
             column.0[d] = Some(values);

@@ -8,6 +8,7 @@ use modelmill_spec::edit::{EditFailure, NewEffect, NewParameter, add_to_model};
 use modelmill_spec::{EffectKind, Loaded};
 
 use crate::diagnosis::Answer;
+use crate::model;
 
 /// Significant digits of estimates that go into a model file.
 const DIGITS: usize = 5;
@@ -26,9 +27,14 @@ pub(crate) fn entries(answer: &Answer) -> Vec<NewEffect> {
     let entries = found.filter_map(|found| {
         let kinds = &answer.candidates.kinds;
         let kind = kinds.iter().find(|kind| kind.name == found.effect.kind)?;
-        Some(entry(found, kind, answer))
+        Some((entry(found, kind, answer), kind.places == Some(2)))
     });
-    apart(entries.collect())
+    // What couples two places may couple each with a third, and is no sum at either.
+    let (pairs, others): (Vec<_>, Vec<_>) = entries.partition(|(_, couples)| *couples);
+    let only = |entries: Vec<(NewEffect, bool)>| entries.into_iter().map(|(entry, _)| entry);
+    let mut made = apart(only(others).collect());
+    made.extend(only(pairs));
+    made
 }
 
 /// Entries of one kind that share places, such as friction at both drives and more of it at one, as entries that do not:
@@ -167,7 +173,14 @@ pub(crate) fn command(model: &str, effect: &NewEffect) -> String {
         let _ = write!(command, " --set {symbol}={value}");
     }
     command.push_str(" --in-place");
+    command.push_str(&with_libraries());
     command
+}
+
+/// Libraries of kinds of one's own, as the command line has them.
+fn with_libraries() -> String {
+    let option = |path: &PathBuf| format!(" --library {}", quoted(&path.display().to_string()));
+    model::libraries().iter().map(option).collect()
 }
 
 /// The command that looks for motion along which effects differ; values and constants are those of the effect and of what
@@ -190,7 +203,7 @@ pub(crate) fn separating(
     for one in beside {
         let _ = write!(command, " --beside {}", quoted(&named(one)));
     }
-    let _ = write!(command, "{more} --out separate.csv");
+    let _ = write!(command, "{more}{} --out separate.csv", with_libraries());
     command
 }
 

@@ -220,7 +220,8 @@ fn sentences(places: &Places, what: &str) -> String {
     } else if places.regions.is_empty() {
         let _ = writeln!(
             html,
-            "<p>{what} is spread evenly over coordinates, rates, loads and time.</p>"
+            "<p>No region of coordinates, rates, loads or time stands out in {}.</p>",
+            what.to_lowercase()
         );
     }
     html

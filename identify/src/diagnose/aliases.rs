@@ -38,7 +38,11 @@ impl Bench<'_> {
             let in_place = |bench: &Self, fewer: &[Pick], trial: &Trial| -> Option<f64> {
                 let left = bench.try_in(&table, fewer.to_vec()).squares;
                 let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
-                let is_near = worse < APART && left - trial.squares > STANDS_IN * (left - squares);
+                // What takes nothing off cannot be stood in for.
+                let own = left - squares;
+                let is_something = own > WITHIN * left;
+                let is_near = worse < APART && left - trial.squares > STANDS_IN * own;
+                let is_near = is_something && is_near;
                 (is_near && trial.wrong_sign.is_empty()).then_some(worse)
             };
             let mut found: Vec<Alias> = Vec::new();

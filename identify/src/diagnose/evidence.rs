@@ -41,7 +41,8 @@ pub struct Evidence {
     pub bic: f64,
     /// How many independent equations the residual before is worth.
     pub effective_samples: f64,
-    /// The squared error before, relative to what counts as noise.
+    /// The squared error before, relative to the variances by which channels are weighted: the larger of error and noise.
+    /// So it is about 1, and less only where there is nothing but rounding.
     pub above_noise: f64,
 }
 
@@ -98,18 +99,20 @@ impl Bench<'_> {
         let error_share = (spread / (n * (n - 1.0).max(1.0))).sqrt().max(1e-3);
         let shares_t = mean_share / error_share;
         let total: f64 = old.iter().sum();
-        let [old_fit, new_fit] = [before, after].map(|picks| {
+        let [old_rest, new_rest] = [before, after].map(|picks| {
             let (factors, _) = self.fit(picks, On::All);
-            let rest = self.rest(picks, &factors);
-            let squares = |d: &usize| self.weights[*d] * dot(&rest[*d], &rest[*d]);
-            let sum: f64 = channels.iter().map(squares).sum();
-            (sum, self.worth(&rest, channels))
+            self.rest(picks, &factors)
         });
+        let squares = |rest: &[Vec<f64>]| -> f64 {
+            let of = |d: &usize| self.weights[*d] * dot(&rest[*d], &rest[*d]);
+            channels.iter().map(of).sum()
+        };
+        let [old_squares, new_squares] = [squares(&old_rest), squares(&new_rest)];
         let count = |picks: &[Pick]| -> f64 {
             let freedoms = picks.iter().map(|p| self.freedoms(p));
             freedoms.sum::<usize>() as f64
         };
-        let worth = old_fit.1;
+        let worth = self.worth(&old_rest, channels);
         // The best of so many fits chance better than any one of them.
         let choices = (self.problem.candidates.len().max(1) as f64).ln();
         let price = |picks: &[Pick]| count(picks) * worth.ln() + 2.0 * picks.len() as f64 * choices;
@@ -117,10 +120,11 @@ impl Bench<'_> {
             gain: if total > 0.0 { n * mean / total } else { 0.0 },
             blocks_t: t,
             shares_t,
-            bic: worth * (old_fit.0 / new_fit.0.max(f64::MIN_POSITIVE)).ln()
+            bic: worth * (old_squares / new_squares.max(f64::MIN_POSITIVE)).ln()
                 - (price(after) - price(before)),
             effective_samples: worth,
-            above_noise: old_fit.0 / (channels.len() * self.problem.layout.samples()).max(1) as f64,
+            above_noise: old_squares
+                / (channels.len() * self.problem.layout.samples()).max(1) as f64,
         }
     }
 

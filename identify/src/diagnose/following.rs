@@ -58,8 +58,10 @@ impl Bench<'_> {
             Source::Tangent(parameters) => parameters
                 .iter()
                 .map(|changes| {
-                    let mut sum = Column(vec![None; self.weights.len()]);
-                    for (change, factor) in changes.iter().zip(factors.iter()) {
+                    let mut sum = changes.held.clone();
+                    sum.0.resize(self.weights.len(), None);
+                    // Factors of the base come first, then those of effects, which do not tilt.
+                    for (change, factor) in changes.base.iter().zip(factors.iter()) {
                         sum.add(*factor, change);
                     }
                     sum

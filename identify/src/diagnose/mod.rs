@@ -29,7 +29,7 @@ pub use evidence::Evidence;
 pub use noise::{effective_samples, white_noise};
 pub use problem::{
     Candidate, Choice, Column, Effect, EffectParameter, Layout, NoSupply, Problem, Sign, Source,
-    Stretch, Supply,
+    Stretch, Supply, Tangent,
 };
 
 use bench::{Bench, Pick};

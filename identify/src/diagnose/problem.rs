@@ -65,6 +65,9 @@ pub struct Layout {
     pub stretches: Vec<Stretch>,
 }
 
+/// Blocks that even a short stretch is cut into.
+const FEWEST_BLOCKS: usize = 6;
+
 impl Layout {
     /// Samples of each channel.
     pub fn samples(&self) -> usize {
@@ -87,7 +90,11 @@ impl Layout {
         let mut blocks = Vec::new();
         let mut start = 0;
         for stretch in &self.stretches {
-            let count = per_stretch.min(stretch.samples / 20).max(1);
+            // Of a short stretch a few short ones: of one block nothing is learned.
+            let count = per_stretch
+                .min((stretch.samples / 20).max(FEWEST_BLOCKS))
+                .min(stretch.samples)
+                .max(1);
             for k in 0..count {
                 let at = |k: usize| start + k * stretch.samples / count;
                 blocks.push(at(k)..at(k + 1));
@@ -143,12 +150,21 @@ pub struct Choice {
 pub enum Source {
     /// They are known, for each choice of the constants.
     Columns(Vec<Choice>),
-    /// A small change of a constant of the model: for each parameter, what every base column changes by.
-    Tangent(Vec<Vec<Column>>),
+    /// A small change of a constant of the model, for each parameter.
+    Tangent(Vec<Tangent>),
     /// All forces come later than the motion; the parameter is the delay, s.
     Delay,
     /// They depend on what the drives carry, which the fit says: see [`Supply::carried`].
     Carried,
+}
+
+/// What the forces change by with a constant of the model.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tangent {
+    /// What every column of the base changes by, in their order.
+    pub base: Vec<Column>,
+    /// What the forces of held parameters change by.
+    pub held: Column,
 }
 
 /// Columns that are made while the search goes on.
@@ -211,4 +227,31 @@ pub struct Problem {
     pub variables: Vec<(String, Vec<f64>)>,
     /// White noise of each channel's force.
     pub noise: Vec<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a single block no spread over blocks can be had.
+    #[test]
+    fn a_short_stretch_has_several_blocks() {
+        let stretch = |samples| Stretch {
+            name: String::new(),
+            samples,
+            step: 0.01,
+            sampled: 0.01,
+            is_check: false,
+        };
+        for (samples, blocks) in [(30, 6), (90, 6), (200, 10), (5000, 12), (3, 3)] {
+            let layout = Layout {
+                channels: Vec::new(),
+                stretches: vec![stretch(samples)],
+            };
+            let cut = layout.blocks(12);
+            assert_eq!(cut.len(), blocks);
+            assert!(cut.windows(2).all(|pair| pair[0].end == pair[1].start));
+            assert_eq!((cut[0].start, cut[blocks - 1].end), (0, samples));
+        }
+    }
 }

@@ -67,28 +67,38 @@ impl Bench<'_> {
             let (name, value) = (name.clone(), *value);
             let mut grid: Vec<f64> = choices.iter().map(|c| c.constants[0].1).collect();
             grid.sort_by(f64::total_cmp);
-            let low = grid
-                .iter()
-                .copied()
-                .filter(|x| *x < value)
-                .fold(0.7 * value, f64::max);
-            let high = grid
-                .iter()
-                .copied()
-                .filter(|x| *x > value)
-                .fold(1.4 * value, f64::min);
+            // Between its neighbours on the grid, but not far; beyond the grid's ends there is nothing to look for.
+            let below = grid.iter().copied().filter(|x| *x < value);
+            let above = grid.iter().copied().filter(|x| *x > value);
+            let (mut low, mut high) = (
+                below.fold(f64::NEG_INFINITY, f64::max),
+                above.fold(f64::INFINITY, f64::min),
+            );
+            // What is positive throughout is searched by its logarithm.
+            let is_positive = grid.first().is_some_and(|first| *first > 0.0);
+            if is_positive {
+                low = low.max(0.7 * value).max(grid[0]);
+                high = high.min(1.4 * value).min(grid[grid.len() - 1]);
+            }
+            low = if low.is_finite() { low } else { value };
+            high = if high.is_finite() { high } else { value };
+            if high <= low {
+                continue;
+            }
+            let scale = |x: f64| if is_positive { x.ln() } else { x };
+            let unscale = |x: f64| if is_positive { x.exp() } else { x };
             let mut others = picks.clone();
             others.remove(i);
             let (factors, _) = self.fit(&others, On::All);
             let rest = self.rest(&others, &factors);
             let which = self.columns(&others);
             let factor = Factored::new(&self.pool.gram(&which, &self.weights, On::All));
-            let at = |log: f64| -> Option<(f64, Vec<Column>)> {
-                let columns = supply.finer(candidate, log.exp())?;
+            let at = |x: f64| -> Option<(f64, Vec<Column>)> {
+                let columns = supply.finer(candidate, unscale(x))?;
                 let products = self.all_products(&columns, &which);
                 Some((self.explained(&columns, &products, &factor, &rest), columns))
             };
-            let Some(best) = golden(low.ln(), high.ln(), &at) else {
+            let Some(best) = golden(scale(low), scale(high), &at) else {
                 continue;
             };
             let own: Vec<Column> = picks[i]
@@ -98,11 +108,11 @@ impl Bench<'_> {
                 .collect();
             let products = self.all_products(&own, &which);
             let now = self.explained(&own, &products, &factor, &rest);
-            let (log, (explained, columns)) = best;
+            let (x, (explained, columns)) = best;
             if explained > now {
                 picks[i] = Pick {
                     candidate,
-                    constants: vec![(name, log.exp())],
+                    constants: vec![(name, unscale(x))],
                     rank: picks[i].rank,
                     columns: columns.into_iter().map(|c| self.pool.add(c)).collect(),
                 };

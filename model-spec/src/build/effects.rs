@@ -13,7 +13,7 @@ use crate::exact::{Exact, ParameterIdx};
 use crate::finite::{self, Why};
 use crate::formula::AstKind;
 use crate::kind_terms::{factors, unit_at};
-use crate::kinds::{Carries, check, library_entries};
+use crate::kinds::{Carries, check, library_entries, n_places};
 use crate::mechanism::{Action, Effect, EffectTerm, Parameter, Place};
 use crate::schema::{EffectEntry, EffectKindEntry, KindParameterEntry, ModelEntry};
 use crate::scope::{Sort, Wanted};
@@ -36,7 +36,15 @@ pub(super) fn effects(
         entries.clone().filter_map(|entry| entry.name.as_ref()),
         log,
     );
-    warn_of_twins(entries.clone(), log);
+    // What couples two places may couple each with a third.
+    let couples = |entry: &&EffectEntry| {
+        let kind = entry
+            .kind
+            .as_ref()
+            .and_then(|kind| kinds.get(kind.text.as_str()));
+        kind.is_some_and(|(kind, _)| n_places(kind) == Some(2))
+    };
+    warn_of_twins(entries.clone().filter(|entry| !couples(entry)), log);
     check_single(entries.clone(), &kinds, log);
     entries
         .filter_map(|entry| effect(entry, &kinds, symbols, scene, log))
