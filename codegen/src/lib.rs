@@ -11,6 +11,7 @@ mod exact;
 pub mod expr;
 pub mod field;
 mod finite;
+mod forms;
 mod inertia;
 mod linear;
 mod linear_loops;

@@ -72,16 +72,6 @@ impl Tree {
         path
     }
 
-    /// Components in the parent's frame of a vector given in the link's frame.
-    pub(crate) fn to_parent(&self, graph: &mut Graph, link: usize, v: &Vector) -> Vector {
-        let link = &self.links[link];
-        let mut v = graph.turn_out(&link.joint, v);
-        for turn in link.pre.iter().rev() {
-            v = graph.turn_out(turn, &v);
-        }
-        v
-    }
-
     /// Components in the link's frame of a vector given in the parent's frame.
     pub(crate) fn to_link(&self, graph: &mut Graph, link: usize, v: &Vector) -> Vector {
         let link = &self.links[link];

@@ -2,7 +2,7 @@
 //!
 //! The passes rewrite expressions into cheaper ones of equal value; the last one writes binary operations.
 
-mod cost;
+pub(crate) mod cost;
 mod factor_sums;
 mod flatten;
 mod program;

@@ -1,0 +1,304 @@
+//! The forms in which regressor and inverse dynamics can be written, and which of them costs least.
+//!
+//! All forms of a model have the same values. Costs are those of the expressions as they stand, before lowering; that is
+//! cheap to find and orders the forms as the finished programs do.
+
+use std::collections::BTreeMap;
+
+use modelmill_spec::Mechanism;
+
+use crate::DeriveError;
+use crate::exact::Monomial;
+use crate::expr::{ExprId, Graph};
+use crate::lower::cost::cost;
+use crate::newton_euler::{
+    self, Body, Depths, Element, Inertia, Motion, Side, Spread, Style, Wrench,
+};
+use crate::regressor::Equations;
+use crate::vector;
+
+/// How the columns of a regressor are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct ColumnForm {
+    pub(crate) style: Style,
+    pub(crate) depths: Depths,
+    /// Moments of inertia about a joint's own axis are written on the fixed side of the joint, and those about x and y
+    /// as second moments less that.
+    pub(crate) axial: bool,
+}
+
+impl ColumnForm {
+    /// As in the textbooks: each column by itself, link by link.
+    pub(crate) const PLAIN: Self = Self {
+        style: Style::PLAIN,
+        depths: Depths {
+            moments: 0,
+            forces: 0,
+        },
+        axial: false,
+    };
+
+    /// The wrenches of one product of value 1 among all products whose columns are written.
+    pub(crate) fn wrenches(
+        self,
+        graph: &mut Graph,
+        equations: &Equations,
+        motion: &Motion,
+        product: &Monomial,
+        products: &[Monomial],
+    ) -> Vec<(usize, Side, Wrench)> {
+        let bodies: Vec<(usize, Inertia)> = equations
+            .inertia
+            .of(product)
+            .map(|(link, inertia)| (link, *inertia))
+            .collect();
+        let mut wrenches = Vec::new();
+        for (link, inertia) in &bodies {
+            let only = single_moment(inertia).filter(|_| self.axial);
+            match only {
+                Some(2) => {
+                    let moment = motion.axial_moment(graph, *link);
+                    wrenches.push((*link, Side::Fixed, pure(moment)));
+                }
+                Some(axis) if has_axial_column(equations, *link, products) => {
+                    let mut second = [Graph::ZERO; 2];
+                    // The moment of inertia about x holds the second moment along y.
+                    second[1 - axis] = Graph::ONE;
+                    let body = Body {
+                        spread: Spread::Flat(second),
+                        ..Body::NONE
+                    };
+                    let flat = motion.wrench(graph, *link, &body);
+                    let axial = motion.axial_moment(graph, *link);
+                    let less = axial.map(|m| graph.neg(m));
+                    let depth = equations.tree.path(Some(*link)).len();
+                    if depth <= self.depths.moments {
+                        wrenches.push((*link, Side::Moving, flat));
+                        wrenches.push((*link, Side::Fixed, pure(less)));
+                    } else {
+                        let turn = self.style.turn(&equations.tree.links[*link]);
+                        let turned = graph.turn_out(turn, &flat.moment);
+                        let moment = graph.add_vectors(&[turned, less]);
+                        wrenches.push((*link, Side::Fixed, pure(moment)));
+                    }
+                }
+                _ => {
+                    let body = Body::new(inertia);
+                    let wrench = motion.wrench(graph, *link, &body);
+                    wrenches.push((*link, Side::Moving, wrench));
+                }
+            }
+        }
+        wrenches
+    }
+}
+
+fn pure(moment: vector::Vector) -> Wrench {
+    Wrench {
+        force: vector::ZERO,
+        moment,
+    }
+}
+
+/// The axis about which an inertia is a moment of inertia of 1, if it is nothing else.
+fn single_moment(inertia: &Inertia) -> Option<usize> {
+    let mut nonzero = (0..inertia.len()).filter(|i| inertia[*i] != Graph::ZERO);
+    let only = nonzero.next()?;
+    if nonzero.next().is_some() || inertia[only] != Graph::ONE {
+        return None;
+    }
+    [0, 3, 5]
+        .iter()
+        .position(|i| Element::Inertia(*i).index() == only)
+}
+
+/// Whether one of some products is the moment of inertia of a link about its joint's axis.
+fn has_axial_column(equations: &Equations, link: usize, products: &[Monomial]) -> bool {
+    products.iter().any(|product| {
+        let mut bodies = equations.inertia.of(product);
+        let only = bodies.next();
+        only.is_some_and(|(l, inertia)| l == link && single_moment(inertia) == Some(2))
+            && bodies.next().is_none()
+    })
+}
+
+/// How the inverse dynamics is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct TotalForm {
+    pub(crate) style: Style,
+    /// Second moments along joint axes are moved to what carries the joint.
+    pub(crate) flat: bool,
+    /// At the ends of the tree the inertia is turned rather than the motion.
+    pub(crate) turn_ends: bool,
+}
+
+impl TotalForm {
+    /// As in the textbooks.
+    pub(crate) const PLAIN: Self = Self {
+        style: Style::PLAIN,
+        flat: false,
+        turn_ends: false,
+    };
+
+    /// The wrenches of all links when every product has the value that `value` gives it.
+    pub(crate) fn wrenches(
+        self,
+        graph: &mut Graph,
+        equations: &Equations,
+        motion: &Motion,
+        value: &dyn Fn(&Monomial) -> ExprId,
+    ) -> Vec<(usize, Side, Wrench)> {
+        let inertia = equations.inertia.total(graph, value);
+        let mut bodies: BTreeMap<usize, Body> = inertia
+            .iter()
+            .map(|(link, inertia)| (*link, Body::new(inertia)))
+            .collect();
+        if self.flat {
+            newton_euler::flatten_along_axes(graph, &equations.tree, motion, &mut bodies);
+        }
+        newton_euler::wrenches(graph, &equations.tree, motion, &bodies, self.turn_ends)
+    }
+}
+
+/// Ways to write equations, one step after the other; a step that does not make them cheaper is taken back.
+///
+/// `write` gives the outputs of a form; `steps` holds for every pass the changes that it tries on the best form so far.
+fn improve<F: Copy>(
+    graph: &mut Graph,
+    plain: F,
+    steps: &[Vec<Box<dyn Fn(F) -> F>>],
+    mut write: impl FnMut(&mut Graph, F) -> Result<Vec<ExprId>, DeriveError>,
+) -> Result<Vec<ExprId>, DeriveError> {
+    let (mut form, mut best) = (plain, write(graph, plain)?);
+    let mut least = cost(graph, &best);
+    for changes in steps {
+        let before = form;
+        for change in changes {
+            let changed = change(before);
+            let outputs = write(graph, changed)?;
+            let cost = cost(graph, &outputs);
+            if cost < least {
+                (form, best, least) = (changed, outputs, cost);
+            }
+        }
+    }
+    Ok(best)
+}
+
+/// The motions that have been written already.
+#[derive(Default)]
+struct Motions(Vec<(Style, Motion)>);
+
+impl Motions {
+    fn of(&mut self, graph: &mut Graph, equations: &Equations, style: Style) -> &Motion {
+        let at = self.0.iter().position(|(s, _)| *s == style);
+        let at = at.unwrap_or_else(|| {
+            let (tree, gravity) = (&equations.tree, &equations.gravity);
+            let motion = newton_euler::forward(graph, tree, gravity, style);
+            self.0.push((style, motion));
+            self.0.len() - 1
+        });
+        &self.0[at].1
+    }
+}
+
+/// The passes of the recursions, by name, in the order in which they are tried.
+pub(crate) const PASSES: [&str; 5] = [
+    "parallel axes at once",
+    "acceleration of a joint's axis from its parent",
+    "offsets along an axis behind its joint",
+    "moments about a joint's axis on its fixed side",
+    "inertia turned rather than motion, forces read off in one frame",
+];
+
+/// The columns of some products, each by its drives, in the form that costs least after the first `n_passes` passes.
+pub(crate) fn columns(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    equations: &Equations,
+    products: &[Monomial],
+    n_passes: usize,
+) -> Result<Vec<Vec<ExprId>>, DeriveError> {
+    let tree = &equations.tree;
+    let depths = (0..tree.links.len()).map(|i| tree.path(Some(i)).len());
+    let deepest = depths.max().unwrap_or(0);
+    let mut steps: Vec<Vec<Box<dyn Fn(ColumnForm) -> ColumnForm>>> = styles()
+        .into_iter()
+        .map(|change| -> Vec<Box<dyn Fn(ColumnForm) -> ColumnForm>> {
+            vec![Box::new(move |form| ColumnForm {
+                style: change(form.style),
+                ..form
+            })]
+        })
+        .collect();
+    steps.push(vec![Box::new(|form| ColumnForm {
+        axial: true,
+        ..form
+    })]);
+    let to = |moments, forces| -> Box<dyn Fn(ColumnForm) -> ColumnForm> {
+        Box::new(move |form| ColumnForm {
+            depths: Depths { moments, forces },
+            ..form
+        })
+    };
+    let both = (2..=deepest).map(|depth| to(depth, depth));
+    let moments = (2..=deepest).map(|depth| to(depth, 0));
+    steps.push(both.chain(moments).collect());
+    steps.truncate(n_passes);
+    let mut motions = Motions::default();
+    let n_drives = mechanism.drives.len();
+    let outputs = improve(graph, ColumnForm::PLAIN, &steps, |graph, form| {
+        let motion = motions.of(graph, equations, form.style);
+        let columns = equations.columns_of(graph, mechanism, motion, products, form)?;
+        Ok(columns.into_iter().flatten().collect())
+    })?;
+    Ok(outputs.chunks(n_drives.max(1)).map(<[_]>::to_vec).collect())
+}
+
+/// The inverse dynamics in the form that costs least after the first `n_passes` passes.
+pub(crate) fn total(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    equations: &Equations,
+    value: &dyn Fn(&Monomial) -> ExprId,
+    n_passes: usize,
+) -> Result<Vec<ExprId>, DeriveError> {
+    let mut steps: Vec<Vec<Box<dyn Fn(TotalForm) -> TotalForm>>> = styles()
+        .into_iter()
+        .map(|change| -> Vec<Box<dyn Fn(TotalForm) -> TotalForm>> {
+            vec![Box::new(move |form| TotalForm {
+                style: change(form.style),
+                ..form
+            })]
+        })
+        .collect();
+    steps.push(vec![Box::new(|form| TotalForm { flat: true, ..form })]);
+    steps.push(vec![Box::new(|form| TotalForm {
+        turn_ends: true,
+        ..form
+    })]);
+    steps.truncate(n_passes);
+    let mut motions = Motions::default();
+    improve(graph, TotalForm::PLAIN, &steps, |graph, form| {
+        let motion = motions.of(graph, equations, form.style);
+        equations.inverse_dynamics(graph, mechanism, motion, value, form)
+    })
+}
+
+/// The changes of style, in the order of [`PASSES`].
+fn styles() -> [fn(Style) -> Style; 3] {
+    [
+        |style| Style {
+            across_parallel_axes: true,
+            ..style
+        },
+        |style| Style {
+            axis_column: true,
+            ..style
+        },
+        |style| Style {
+            offset_after_turn: true,
+            ..style
+        },
+    ]
+}
