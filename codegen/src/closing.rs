@@ -255,13 +255,26 @@ impl Closing {
         equations: &Equations,
         outputs: &[ExprId],
     ) -> Program {
+        self.program_at(graph, equations, outputs, &BTreeMap::new())
+    }
+
+    /// The same where some rates and accelerations are known, such as none at all.
+    pub(crate) fn program_at(
+        &self,
+        graph: &mut Graph,
+        equations: &Equations,
+        outputs: &[ExprId],
+        known: &BTreeMap<ExprId, ExprId>,
+    ) -> Program {
         let projection = &equations.projection;
-        let rates: BTreeMap<ExprId, ExprId> = projection
+        let passive_rates = graph.substitute(&projection.passive_rates, known);
+        let mut rates: BTreeMap<ExprId, ExprId> = projection
             .passive
             .iter()
-            .zip(&projection.passive_rates)
-            .map(|(p, rate)| (graph.atom(Atom::Rate(*p)), *rate))
+            .zip(passive_rates)
+            .map(|(p, rate)| (graph.atom(Atom::Rate(*p)), rate))
             .collect();
+        rates.extend(known);
         let accelerations = graph.substitute(&projection.passive_accelerations, &rates);
         let mut motion = rates;
         for (p, acceleration) in projection.passive.iter().zip(accelerations) {

@@ -263,9 +263,40 @@ pub(crate) fn total(
     value: &dyn Fn(&Monomial) -> ExprId,
     n_passes: usize,
 ) -> Result<Vec<ExprId>, DeriveError> {
-    let mut steps: Vec<Vec<Box<dyn Fn(TotalForm) -> TotalForm>>> = styles()
+    let mut steps = total_steps();
+    steps.truncate(n_passes);
+    let mut motions = Motions::default();
+    improve(graph, TotalForm::PLAIN, &steps, |graph, form| {
+        let motion = motions.of(graph, equations, form.style);
+        equations.inverse_dynamics(graph, mechanism, motion, value, form)
+    })
+}
+
+/// The generalised forces of all links under a gravity, finished by `finish`, in the form that costs least.
+pub(crate) fn best_total(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    equations: &Equations,
+    gravity: vector::Vector,
+    value: &dyn Fn(&Monomial) -> ExprId,
+    mut finish: impl FnMut(&mut Graph, &[ExprId]) -> Vec<ExprId>,
+) -> Result<Vec<ExprId>, DeriveError> {
+    let tree = &equations.tree;
+    let n = mechanism.coordinates.len();
+    improve(graph, TotalForm::PLAIN, &total_steps(), |graph, form| {
+        let motion = newton_euler::forward(graph, tree, &gravity, form.style);
+        let wrenches = form.wrenches(graph, equations, &motion, value);
+        let on_tree = newton_euler::backward(graph, tree, form.style, n, wrenches);
+        Ok(finish(graph, &on_tree))
+    })
+}
+
+type TotalChange = Box<dyn Fn(TotalForm) -> TotalForm>;
+
+fn total_steps() -> Vec<Vec<TotalChange>> {
+    let mut steps: Vec<Vec<TotalChange>> = styles()
         .into_iter()
-        .map(|change| -> Vec<Box<dyn Fn(TotalForm) -> TotalForm>> {
+        .map(|change| -> Vec<TotalChange> {
             vec![Box::new(move |form| TotalForm {
                 style: change(form.style),
                 ..form
@@ -277,12 +308,7 @@ pub(crate) fn total(
         turn_ends: true,
         ..form
     })]);
-    steps.truncate(n_passes);
-    let mut motions = Motions::default();
-    improve(graph, TotalForm::PLAIN, &steps, |graph, form| {
-        let motion = motions.of(graph, equations, form.style);
-        equations.inverse_dynamics(graph, mechanism, motion, value, form)
-    })
+    steps
 }
 
 /// The changes of style, in the order of [`PASSES`].

@@ -4,6 +4,7 @@ mod base;
 mod closing;
 mod closure;
 mod dyad;
+mod dynamics;
 mod emit;
 mod error;
 mod evaluate;
@@ -31,7 +32,8 @@ mod vector;
 use modelmill_spec::Mechanism;
 
 pub use base::BaseParameter;
-pub use emit::{Emitted, emit};
+pub use dynamics::Dynamics;
+pub use emit::{Emitted, emit, emit_with_dynamics};
 pub use error::DeriveError;
 pub use evaluate::{Evaluator, PoseFault, PoseReason, States};
 pub use exact::Monomial;

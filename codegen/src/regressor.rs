@@ -32,6 +32,12 @@ pub(crate) struct Equations {
     pub(crate) columns: Vec<Vec<ExprId>>,
 }
 
+/// Forces of effects: generalised ones by coordinate of the open tree, and those along the drives.
+pub(crate) struct EffectForces {
+    pub(crate) on_tree: Vec<ExprId>,
+    pub(crate) on_drives: Vec<ExprId>,
+}
+
 /// Derives the regressor of all products.
 pub(crate) fn equations(
     graph: &mut Graph,
@@ -107,7 +113,7 @@ impl Equations {
                         Graph::ZERO
                     }
                 };
-                self.forces(graph, mechanism, on_tree, &value)
+                self.forces(graph, mechanism, &on_tree, &value)
             })
             .collect()
     }
@@ -124,16 +130,59 @@ impl Equations {
         let wrenches = form.wrenches(graph, self, motion, value);
         let n = mechanism.coordinates.len();
         let on_tree = newton_euler::backward(graph, &self.tree, form.style, n, wrenches);
-        self.forces(graph, mechanism, on_tree, value)
+        self.forces(graph, mechanism, &on_tree, value)
     }
 
     fn forces(
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
-        mut on_tree: Vec<ExprId>,
+        on_tree: &[ExprId],
         value: &dyn Fn(&Monomial) -> ExprId,
     ) -> Result<Vec<ExprId>, DeriveError> {
+        let effects = self.effect_forces(graph, mechanism, value)?;
+        let on_tree: Vec<ExprId> = on_tree
+            .iter()
+            .zip(effects.on_tree)
+            .map(|(a, b)| graph.add(*a, b))
+            .collect();
+        let forces = self.projection.drive_forces(graph, &on_tree)?;
+        Ok(forces
+            .into_iter()
+            .zip(effects.on_drives)
+            .map(|(a, b)| graph.add(a, b))
+            .collect())
+    }
+
+    /// Generalised forces of the independent coordinates for those of the open tree and for forces along the drives.
+    pub(crate) fn on_active(
+        &self,
+        graph: &mut Graph,
+        on_tree: &[ExprId],
+        on_drives: &[ExprId],
+    ) -> Vec<ExprId> {
+        let projected = self.projection.project(graph, on_tree);
+        projected
+            .into_iter()
+            .enumerate()
+            .map(|(a, force)| {
+                let mut terms = vec![force];
+                for (row, force) in self.projection.drive_jacobian.iter().zip(on_drives) {
+                    terms.push(graph.mul(row[a], *force));
+                }
+                graph.add_all(&terms)
+            })
+            .collect()
+    }
+
+    /// What effects ask for.
+    pub(crate) fn effect_forces(
+        &self,
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        value: &dyn Fn(&Monomial) -> ExprId,
+    ) -> Result<EffectForces, DeriveError> {
+        let mut on_tree = vec![Graph::ZERO; mechanism.coordinates.len()];
         let mut on_drives = vec![Graph::ZERO; mechanism.drives.len()];
         for (e, effect) in mechanism.effects.iter().enumerate() {
             for (p, place) in effect.places.iter().enumerate() {
@@ -161,12 +210,7 @@ impl Equations {
                 }
             }
         }
-        let forces = self.projection.drive_forces(graph, &on_tree)?;
-        Ok(forces
-            .into_iter()
-            .zip(on_drives)
-            .map(|(a, b)| graph.add(a, b))
-            .collect())
+        Ok(EffectForces { on_tree, on_drives })
     }
 
     /// What an effect's parameter multiplies at one of its places.

@@ -7,6 +7,7 @@
 
 mod backward;
 mod body;
+mod composite;
 mod motion;
 mod project;
 
@@ -16,6 +17,7 @@ use crate::vector::{self, Turn, Vector};
 
 pub(crate) use backward::{Depths, backward, carry};
 pub(crate) use body::{Body, Spread, flatten_along_axes, wrenches};
+pub(crate) use composite::mass_matrix;
 pub(crate) use motion::{Motion, forward};
 
 /// What a link's inertia is linear in. The first moment stands twice: as the balance of forces sees it and as the

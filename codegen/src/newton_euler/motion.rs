@@ -218,14 +218,14 @@ impl Motion {
         x != Graph::ZERO || y != Graph::ZERO
     }
 
-    /// Angular velocity, last column of the field and angular acceleration about z on the fixed side of a joint; the
-    /// moment of a body that is a disc of moment of inertia 1 across the axis less the line along it.
+    /// The moment, on the fixed side of a joint, of a body with no more than a moment of inertia of 1 about its axis:
+    /// it does not depend on how far the joint has turned.
     pub(crate) fn axial_moment(&self, graph: &mut Graph, link: usize) -> Vector {
         let moved = &self.links[link];
         let [x, y, _] = moved.carried;
         let about = moved.omega[2];
         let (y_z, x_z) = (graph.mul(y, about), graph.mul(x, about));
-        [graph.neg(y_z), x_z, moved.alpha[2]]
+        [y_z, graph.neg(x_z), moved.alpha[2]]
     }
 
     /// Motion of a link in the axes of its joint's fixed side; `None` if these are not the parent's axes in other order.
