@@ -14,9 +14,10 @@ use crate::DeriveError;
 use crate::closing::Closing;
 use crate::exact::Monomial;
 use crate::expr::{Atom, ExprId, Graph, Node};
-use crate::forms::{self, TotalForm};
+use crate::forms::{self, Frames, TotalForm};
 use crate::lower::Program;
-use crate::newton_euler::{self, Body, Depths, Element, Style};
+use crate::lower::cost::cost;
+use crate::newton_euler::{self, Body, Element, Style};
 use crate::reduce::closed_form;
 use crate::regressor::Equations;
 
@@ -68,9 +69,7 @@ fn dynamics(
     let closing = Closing::new(graph, mechanism, equations, plan)?;
     let projection = &equations.projection;
     let n = mechanism.coordinates.len();
-    let still: Vec<ExprId> = (0..n)
-        .map(|i| graph.atom(Atom::Acceleration(i)))
-        .collect();
+    let still: Vec<ExprId> = (0..n).map(|i| graph.atom(Atom::Acceleration(i))).collect();
     // Passive coordinates accelerate even where the independent ones do not.
     let unaccelerated: BTreeMap<ExprId, ExprId> = projection
         .active
@@ -89,18 +88,29 @@ fn dynamics(
     let effects = equations.effect_forces(graph, mechanism, value)?;
     let effects = equations.on_active(graph, &effects.on_tree, &effects.on_drives);
     let bodies = |graph: &mut Graph,
-                      gravity: crate::vector::Vector,
-                      frozen: &BTreeMap<ExprId, ExprId>,
-                      more: &[ExprId]| {
-        forms::best_total(graph, mechanism, equations, gravity, value, |graph, on_tree| {
-            let outputs = equations.on_active(graph, on_tree, &[]);
-            let outputs: Vec<ExprId> = outputs
-                .into_iter()
-                .enumerate()
-                .map(|(a, force)| graph.add(force, more.get(a).copied().unwrap_or(Graph::ZERO)))
-                .collect();
-            graph.substitute(&outputs, frozen)
-        })
+                  gravity: crate::vector::Vector,
+                  frozen: &BTreeMap<ExprId, ExprId>,
+                  more: &[ExprId]| {
+        let weigh = |graph: &mut Graph, outputs: &[ExprId]| {
+            closing.weight(graph, equations, outputs, frozen)
+        };
+        forms::best_total(
+            graph,
+            mechanism,
+            equations,
+            gravity,
+            value,
+            &weigh,
+            |graph, on_tree| {
+                let outputs = equations.on_active(graph, on_tree, &[]);
+                let outputs: Vec<ExprId> = outputs
+                    .into_iter()
+                    .enumerate()
+                    .map(|(a, force)| graph.add(force, more.get(a).copied().unwrap_or(Graph::ZERO)))
+                    .collect();
+                graph.substitute(&outputs, frozen)
+            },
+        )
     };
     let coriolis = bodies(graph, none, &unaccelerated, &[])?;
     let gravity = bodies(graph, weight, &at_rest, &[])?;
@@ -229,20 +239,29 @@ fn mass_matrix(
             offset_after_turn: true,
             ..Style::PLAIN
         };
-        let depths = Depths {
-            moments: 0,
-            forces: 0,
-        };
-        let tree =
-            newton_euler::mass_matrix(graph, &equations.tree, style, depths, n, &bodies);
-        for b in 0..n_active {
-            let column: Vec<ExprId> = (0..n)
-                .map(|i| combined(graph, &tree[i], &motion[b]))
+        let mut least = usize::MAX;
+        for fixed_axes in [false, true] {
+            let gravity = &crate::vector::ZERO;
+            let frames = Frames::new(graph, &equations.tree, gravity, style, fixed_axes);
+            let bodies: Vec<(usize, Body)> = bodies
+                .iter()
+                .map(|(link, body)| (*link, frames.turned(graph, *link, body)))
                 .collect();
-            let projected = projection.project(graph, &column);
-            for a in 0..=b {
-                matrix[a][b] = projected[a];
-                matrix[b][a] = projected[a];
+            let of_tree = newton_euler::mass_matrix(graph, &frames.tree, style, n, &bodies);
+            let mut found = vec![vec![Graph::ZERO; n_active]; n_active];
+            for b in 0..n_active {
+                let column: Vec<ExprId> = (0..n)
+                    .map(|i| combined(graph, &of_tree[i], &motion[b]))
+                    .collect();
+                let projected = projection.project(graph, &column);
+                for a in 0..=b {
+                    found[a][b] = projected[a];
+                    found[b][a] = projected[a];
+                }
+            }
+            let cost = cost(graph, &found.concat());
+            if cost < least {
+                (least, matrix) = (cost, found);
             }
         }
     }
@@ -251,8 +270,8 @@ fn mass_matrix(
     if !is_symmetric {
         let form = TotalForm::PLAIN;
         let tree = &equations.tree;
-        let moved = newton_euler::forward(graph, tree, &crate::vector::ZERO, form.style);
-        let wrenches = form.wrenches(graph, equations, &moved, value);
+        let frames = Frames::new(graph, tree, &crate::vector::ZERO, form.style, false);
+        let wrenches = form.wrenches(graph, equations, &frames, value);
         let on_tree = newton_euler::backward(graph, tree, form.style, n, wrenches);
         let bodies = equations.on_active(graph, &on_tree, &[]);
         forces = forces

@@ -249,7 +249,8 @@ impl<'a> Evaluator<'a> {
                 .collect();
             let mut solution: Vec<f64> = (0..n)
                 .map(|a| {
-                    let driven = (0..n_drives).map(|d| jacobian[d * n + a][sample] * forces[d][sample]);
+                    let driven =
+                        (0..n_drives).map(|d| jacobian[d * n + a][sample] * forces[d][sample]);
                     driven.sum::<f64>() - bias[a][sample]
                 })
                 .collect();

@@ -1,7 +1,7 @@
 //! The forms in which regressor and inverse dynamics can be written, and which of them costs least.
 //!
-//! All forms of a model have the same values. Costs are those of the expressions as they stand, before lowering; that is
-//! cheap to find and orders the forms as the finished programs do.
+//! All forms of a model have the same values. What they cost says who calls: for open chains the expressions as they
+//! stand, since lowering finds little in them; for loops the finished programs.
 
 use std::collections::BTreeMap;
 
@@ -10,12 +10,12 @@ use modelmill_spec::Mechanism;
 use crate::DeriveError;
 use crate::exact::Monomial;
 use crate::expr::{ExprId, Graph};
-use crate::lower::cost::cost;
 use crate::newton_euler::{
     self, Body, Depths, Element, Inertia, Motion, Side, Spread, Style, Wrench,
 };
 use crate::regressor::Equations;
-use crate::vector;
+use crate::tree::Tree;
+use crate::vector::{self, Turn};
 
 /// How the columns of a regressor are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +25,8 @@ pub(crate) struct ColumnForm {
     /// Moments of inertia about a joint's own axis are written on the fixed side of the joint, and those about x and y
     /// as second moments less that.
     pub(crate) axial: bool,
+    /// Links with parallel axes share the axes of what carries the first of them; inertia is turned there.
+    pub(crate) fixed_axes: bool,
 }
 
 impl ColumnForm {
@@ -36,6 +38,7 @@ impl ColumnForm {
             forces: 0,
         },
         axial: false,
+        fixed_axes: false,
     };
 
     /// The wrenches of one product of value 1 among all products whose columns are written.
@@ -43,7 +46,7 @@ impl ColumnForm {
         self,
         graph: &mut Graph,
         equations: &Equations,
-        motion: &Motion,
+        frames: &Frames,
         product: &Monomial,
         products: &[Monomial],
     ) -> Vec<(usize, Side, Wrench)> {
@@ -52,6 +55,7 @@ impl ColumnForm {
             .of(product)
             .map(|(link, inertia)| (link, *inertia))
             .collect();
+        let (tree, motion) = (&frames.tree, &frames.motion);
         let mut wrenches = Vec::new();
         for (link, inertia) in &bodies {
             let only = single_moment(inertia).filter(|_| self.axial);
@@ -68,22 +72,23 @@ impl ColumnForm {
                         spread: Spread::Flat(second),
                         ..Body::NONE
                     };
+                    let body = frames.turned(graph, *link, &body);
                     let flat = motion.wrench(graph, *link, &body);
                     let axial = motion.axial_moment(graph, *link);
                     let less = axial.map(|m| graph.neg(m));
-                    let depth = equations.tree.path(Some(*link)).len();
+                    let depth = tree.path(Some(*link)).len();
                     if depth <= self.depths.moments {
                         wrenches.push((*link, Side::Moving, flat));
                         wrenches.push((*link, Side::Fixed, pure(less)));
                     } else {
-                        let turn = self.style.turn(&equations.tree.links[*link]);
+                        let turn = self.style.turn(&tree.links[*link]);
                         let turned = graph.turn_out(turn, &flat.moment);
                         let moment = graph.add_vectors(&[turned, less]);
                         wrenches.push((*link, Side::Fixed, pure(moment)));
                     }
                 }
                 _ => {
-                    let body = Body::new(inertia);
+                    let body = frames.turned(graph, *link, &Body::new(inertia));
                     let wrench = motion.wrench(graph, *link, &body);
                     wrenches.push((*link, Side::Moving, wrench));
                 }
@@ -130,6 +135,8 @@ pub(crate) struct TotalForm {
     pub(crate) flat: bool,
     /// At the ends of the tree the inertia is turned rather than the motion.
     pub(crate) turn_ends: bool,
+    /// As in [`ColumnForm`].
+    pub(crate) fixed_axes: bool,
 }
 
 impl TotalForm {
@@ -138,6 +145,7 @@ impl TotalForm {
         style: Style::PLAIN,
         flat: false,
         turn_ends: false,
+        fixed_axes: false,
     };
 
     /// The wrenches of all links when every product has the value that `value` gives it.
@@ -145,7 +153,7 @@ impl TotalForm {
         self,
         graph: &mut Graph,
         equations: &Equations,
-        motion: &Motion,
+        frames: &Frames,
         value: &dyn Fn(&Monomial) -> ExprId,
     ) -> Vec<(usize, Side, Wrench)> {
         let inertia = equations.inertia.total(graph, value);
@@ -153,12 +161,19 @@ impl TotalForm {
             .iter()
             .map(|(link, inertia)| (*link, Body::new(inertia)))
             .collect();
+        let (tree, motion) = (&frames.tree, &frames.motion);
         if self.flat {
             newton_euler::flatten_along_axes(graph, &equations.tree, motion, &mut bodies);
         }
-        newton_euler::wrenches(graph, &equations.tree, motion, &bodies, self.turn_ends)
+        for (link, body) in &mut bodies {
+            *body = frames.turned(graph, *link, body);
+        }
+        newton_euler::wrenches(graph, tree, motion, &bodies, self.turn_ends)
     }
 }
+
+/// What outputs cost.
+pub(crate) type Weigh<'a> = &'a dyn Fn(&mut Graph, &[ExprId]) -> usize;
 
 /// Ways to write equations, one step after the other; a step that does not make them cheaper is taken back.
 ///
@@ -167,16 +182,21 @@ fn improve<F: Copy>(
     graph: &mut Graph,
     plain: F,
     steps: &[Vec<Box<dyn Fn(F) -> F>>],
+    weigh: Weigh<'_>,
     mut write: impl FnMut(&mut Graph, F) -> Result<Vec<ExprId>, DeriveError>,
 ) -> Result<Vec<ExprId>, DeriveError> {
     let (mut form, mut best) = (plain, write(graph, plain)?);
-    let mut least = cost(graph, &best);
+    let mut least = weigh(graph, &best);
     for changes in steps {
         let before = form;
         for change in changes {
             let changed = change(before);
             let outputs = write(graph, changed)?;
-            let cost = cost(graph, &outputs);
+            // Much makes no difference for planar mechanisms, and weighing takes longest.
+            if outputs == best {
+                continue;
+            }
+            let cost = weigh(graph, &outputs);
             if cost < least {
                 (form, best, least) = (changed, outputs, cost);
             }
@@ -185,17 +205,22 @@ fn improve<F: Copy>(
     Ok(best)
 }
 
-/// The motions that have been written already.
+/// The frames that have been written already.
 #[derive(Default)]
-struct Motions(Vec<(Style, Motion)>);
+struct Written(Vec<((Style, bool), Frames)>);
 
-impl Motions {
-    fn of(&mut self, graph: &mut Graph, equations: &Equations, style: Style) -> &Motion {
-        let at = self.0.iter().position(|(s, _)| *s == style);
+impl Written {
+    fn of(
+        &mut self,
+        graph: &mut Graph,
+        equations: &Equations,
+        gravity: &vector::Vector,
+        key: (Style, bool),
+    ) -> &Frames {
+        let at = self.0.iter().position(|(k, _)| *k == key);
         let at = at.unwrap_or_else(|| {
-            let (tree, gravity) = (&equations.tree, &equations.gravity);
-            let motion = newton_euler::forward(graph, tree, gravity, style);
-            self.0.push((style, motion));
+            let frames = Frames::new(graph, &equations.tree, gravity, key.0, key.1);
+            self.0.push((key, frames));
             self.0.len() - 1
         });
         &self.0[at].1
@@ -204,12 +229,49 @@ impl Motions {
 
 /// The passes of the recursions, by name, in the order in which they are tried.
 pub(crate) const PASSES: [&str; 5] = [
-    "parallel axes at once",
+    "parallel axes at once, or in axes that do not turn",
     "acceleration of a joint's axis from its parent",
     "offsets along an axis behind its joint",
     "moments about a joint's axis on its fixed side",
     "inertia turned rather than motion, forces read off in one frame",
 ];
+
+/// The frames in which a form is written, and how they move.
+pub(crate) struct Frames {
+    pub(crate) tree: Tree,
+    /// How the axes of every link are turned there; nothing for the links' own axes.
+    turns: Vec<Turn>,
+    pub(crate) motion: Motion,
+}
+
+impl Frames {
+    pub(crate) fn new(
+        graph: &mut Graph,
+        tree: &Tree,
+        gravity: &vector::Vector,
+        style: Style,
+        fixed_axes: bool,
+    ) -> Self {
+        let (tree, turns) = if fixed_axes {
+            tree.in_fixed_axes(graph)
+        } else {
+            (tree.clone(), Vec::new())
+        };
+        let motion = newton_euler::forward(graph, &tree, gravity, style);
+        Self {
+            tree,
+            turns,
+            motion,
+        }
+    }
+
+    pub(crate) fn turned(&self, graph: &mut Graph, link: usize, body: &Body) -> Body {
+        match self.turns.get(link) {
+            Some(turn) => body.turned(graph, turn),
+            None => *body,
+        }
+    }
+}
 
 /// The columns of some products, each by its drives, in the form that costs least after the first `n_passes` passes.
 pub(crate) fn columns(
@@ -218,24 +280,32 @@ pub(crate) fn columns(
     equations: &Equations,
     products: &[Monomial],
     n_passes: usize,
+    weigh: Weigh<'_>,
 ) -> Result<Vec<Vec<ExprId>>, DeriveError> {
     let tree = &equations.tree;
     let depths = (0..tree.links.len()).map(|i| tree.path(Some(i)).len());
     let deepest = depths.max().unwrap_or(0);
-    let mut steps: Vec<Vec<Box<dyn Fn(ColumnForm) -> ColumnForm>>> = styles()
-        .into_iter()
-        .map(|change| -> Vec<Box<dyn Fn(ColumnForm) -> ColumnForm>> {
-            vec![Box::new(move |form| ColumnForm {
-                style: change(form.style),
-                ..form
-            })]
+    let styled = |change: fn(Style) -> Style| -> ColumnChange {
+        Box::new(move |form| ColumnForm {
+            style: change(form.style),
+            ..form
         })
-        .collect();
+    };
+    let in_fixed_axes: ColumnChange = Box::new(|form| ColumnForm {
+        fixed_axes: true,
+        ..form
+    });
+    let [across, axis_column, offset_after_turn] = styles().map(styled);
+    let mut steps: Vec<Vec<ColumnChange>> = vec![
+        vec![across, in_fixed_axes],
+        vec![axis_column],
+        vec![offset_after_turn],
+    ];
     steps.push(vec![Box::new(|form| ColumnForm {
         axial: true,
         ..form
     })]);
-    let to = |moments, forces| -> Box<dyn Fn(ColumnForm) -> ColumnForm> {
+    let to = |moments, forces| -> ColumnChange {
         Box::new(move |form| ColumnForm {
             depths: Depths { moments, forces },
             ..form
@@ -245,11 +315,12 @@ pub(crate) fn columns(
     let moments = (2..=deepest).map(|depth| to(depth, 0));
     steps.push(both.chain(moments).collect());
     steps.truncate(n_passes);
-    let mut motions = Motions::default();
+    let mut written = Written::default();
     let n_drives = mechanism.drives.len();
-    let outputs = improve(graph, ColumnForm::PLAIN, &steps, |graph, form| {
-        let motion = motions.of(graph, equations, form.style);
-        let columns = equations.columns_of(graph, mechanism, motion, products, form)?;
+    let outputs = improve(graph, ColumnForm::PLAIN, &steps, weigh, |graph, form| {
+        let key = (form.style, form.fixed_axes);
+        let frames = written.of(graph, equations, &equations.gravity, key);
+        let columns = equations.columns_of(graph, mechanism, frames, products, form)?;
         Ok(columns.into_iter().flatten().collect())
     })?;
     Ok(outputs.chunks(n_drives.max(1)).map(<[_]>::to_vec).collect())
@@ -262,13 +333,15 @@ pub(crate) fn total(
     equations: &Equations,
     value: &dyn Fn(&Monomial) -> ExprId,
     n_passes: usize,
+    weigh: Weigh<'_>,
 ) -> Result<Vec<ExprId>, DeriveError> {
     let mut steps = total_steps();
     steps.truncate(n_passes);
-    let mut motions = Motions::default();
-    improve(graph, TotalForm::PLAIN, &steps, |graph, form| {
-        let motion = motions.of(graph, equations, form.style);
-        equations.inverse_dynamics(graph, mechanism, motion, value, form)
+    let mut written = Written::default();
+    improve(graph, TotalForm::PLAIN, &steps, weigh, |graph, form| {
+        let key = (form.style, form.fixed_axes);
+        let frames = written.of(graph, equations, &equations.gravity, key);
+        equations.inverse_dynamics(graph, mechanism, frames, value, form)
     })
 }
 
@@ -279,30 +352,46 @@ pub(crate) fn best_total(
     equations: &Equations,
     gravity: vector::Vector,
     value: &dyn Fn(&Monomial) -> ExprId,
+    weigh: Weigh<'_>,
     mut finish: impl FnMut(&mut Graph, &[ExprId]) -> Vec<ExprId>,
 ) -> Result<Vec<ExprId>, DeriveError> {
-    let tree = &equations.tree;
     let n = mechanism.coordinates.len();
-    improve(graph, TotalForm::PLAIN, &total_steps(), |graph, form| {
-        let motion = newton_euler::forward(graph, tree, &gravity, form.style);
-        let wrenches = form.wrenches(graph, equations, &motion, value);
-        let on_tree = newton_euler::backward(graph, tree, form.style, n, wrenches);
-        Ok(finish(graph, &on_tree))
-    })
+    let mut written = Written::default();
+    improve(
+        graph,
+        TotalForm::PLAIN,
+        &total_steps(),
+        weigh,
+        |graph, form| {
+            let key = (form.style, form.fixed_axes);
+            let frames = written.of(graph, equations, &gravity, key);
+            let wrenches = form.wrenches(graph, equations, frames, value);
+            let on_tree = newton_euler::backward(graph, &frames.tree, form.style, n, wrenches);
+            Ok(finish(graph, &on_tree))
+        },
+    )
 }
 
+type ColumnChange = Box<dyn Fn(ColumnForm) -> ColumnForm>;
 type TotalChange = Box<dyn Fn(TotalForm) -> TotalForm>;
 
 fn total_steps() -> Vec<Vec<TotalChange>> {
-    let mut steps: Vec<Vec<TotalChange>> = styles()
-        .into_iter()
-        .map(|change| -> Vec<TotalChange> {
-            vec![Box::new(move |form| TotalForm {
-                style: change(form.style),
-                ..form
-            })]
+    let styled = |change: fn(Style) -> Style| -> TotalChange {
+        Box::new(move |form| TotalForm {
+            style: change(form.style),
+            ..form
         })
-        .collect();
+    };
+    let in_fixed_axes: TotalChange = Box::new(|form| TotalForm {
+        fixed_axes: true,
+        ..form
+    });
+    let [across, axis_column, offset_after_turn] = styles().map(styled);
+    let mut steps: Vec<Vec<TotalChange>> = vec![
+        vec![across, in_fixed_axes],
+        vec![axis_column],
+        vec![offset_after_turn],
+    ];
     steps.push(vec![Box::new(|form| TotalForm { flat: true, ..form })]);
     steps.push(vec![Box::new(|form| TotalForm {
         turn_ends: true,
@@ -311,7 +400,7 @@ fn total_steps() -> Vec<Vec<TotalChange>> {
     steps
 }
 
-/// The changes of style, in the order of [`PASSES`].
+/// The changes of style, in the order of [`PASSES`]; parallel axes are passed at once only where axes turn.
 fn styles() -> [fn(Style) -> Style; 3] {
     [
         |style| Style {

@@ -20,6 +20,7 @@ mod lower;
 mod magnitude;
 mod newton_euler;
 mod numeric_pose;
+mod passes;
 mod programs;
 mod projection;
 mod reduce;
@@ -38,6 +39,7 @@ pub use error::DeriveError;
 pub use evaluate::{Evaluator, PoseFault, PoseReason, States};
 pub use exact::Monomial;
 pub use lower::{Guard, Op, OperationCount, Program, Stage, ValueId};
+pub use passes::PassCount;
 pub use programs::{LoopPrograms, PassivePosition, Programs};
 pub use reduce::{Dependency, Method, Polynomial, Powers, RationalFunction, Reduction, Variable};
 

@@ -118,15 +118,14 @@ pub(crate) fn programs(
     };
     let base_expressions = crate::base::expressions(graph, reduction);
     let base_parameters = plain(graph, &base_expressions);
-    let regressor = forms::columns(graph, mechanism, equations, &retained, forms::PASSES.len())?;
+    let nothing = BTreeMap::new();
+    let weigh =
+        |graph: &mut Graph, outputs: &[ExprId]| closing.weight(graph, equations, outputs, &nothing);
+    let all_passes = forms::PASSES.len();
+    let regressor = forms::columns(graph, mechanism, equations, &retained, all_passes, &weigh)?;
     let regressor = row_by_row(&regressor);
-    let inverse_dynamics = forms::total(
-        graph,
-        mechanism,
-        equations,
-        &base_value,
-        forms::PASSES.len(),
-    )?;
+    let inverse_dynamics =
+        forms::total(graph, mechanism, equations, &base_value, all_passes, &weigh)?;
     let mut program = |outputs: &[ExprId]| closing.program(graph, equations, outputs);
     let regressor = program(&regressor);
     let inverse_dynamics = program(&inverse_dynamics);

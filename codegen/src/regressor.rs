@@ -10,9 +10,9 @@ use modelmill_spec::{
 use crate::DeriveError;
 use crate::exact::{self, Monomial};
 use crate::expr::{Atom, ExprId, Graph};
-use crate::forms::{ColumnForm, TotalForm};
+use crate::forms::{ColumnForm, Frames, TotalForm};
 use crate::inertia::InertiaByProduct;
-use crate::newton_euler::{self, Motion};
+use crate::newton_euler;
 use crate::projection::Projection;
 use crate::rod;
 use crate::tree::Tree;
@@ -83,9 +83,9 @@ pub(crate) fn equations(
         columns: Vec::new(),
     };
     let form = ColumnForm::PLAIN;
-    let motion = newton_euler::forward(graph, &equations.tree, &gravity, form.style);
+    let frames = Frames::new(graph, &equations.tree, &gravity, form.style, false);
     let products = equations.products.clone();
-    equations.columns = equations.columns_of(graph, mechanism, &motion, &products, form)?;
+    equations.columns = equations.columns_of(graph, mechanism, &frames, &products, form)?;
     Ok(equations)
 }
 
@@ -95,16 +95,16 @@ impl Equations {
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
-        motion: &Motion,
+        frames: &Frames,
         products: &[Monomial],
         form: ColumnForm,
     ) -> Result<Vec<Vec<ExprId>>, DeriveError> {
         let n = mechanism.coordinates.len();
-        let (tree, style) = (&self.tree, form.style);
+        let (tree, style) = (&frames.tree, form.style);
         products
             .iter()
             .map(|product| {
-                let wrenches = form.wrenches(graph, self, motion, product, products);
+                let wrenches = form.wrenches(graph, self, frames, product, products);
                 let on_tree = newton_euler::carry(graph, tree, style, n, form.depths, wrenches);
                 let value = |m: &Monomial| {
                     if m == product {
@@ -123,13 +123,13 @@ impl Equations {
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
-        motion: &Motion,
+        frames: &Frames,
         value: &dyn Fn(&Monomial) -> ExprId,
         form: TotalForm,
     ) -> Result<Vec<ExprId>, DeriveError> {
-        let wrenches = form.wrenches(graph, self, motion, value);
+        let wrenches = form.wrenches(graph, self, frames, value);
         let n = mechanism.coordinates.len();
-        let on_tree = newton_euler::backward(graph, &self.tree, form.style, n, wrenches);
+        let on_tree = newton_euler::backward(graph, &frames.tree, form.style, n, wrenches);
         self.forces(graph, mechanism, &on_tree, value)
     }
 

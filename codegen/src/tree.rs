@@ -56,6 +56,31 @@ impl Tree {
         Ok(tree)
     }
 
+    /// The same tree with every link's quantities in the axes of the fixed side of the first of its parallel joints, so
+    /// that nothing turns between parallel links; and the turn that takes each link's own axes there.
+    pub(crate) fn in_fixed_axes(&self, graph: &mut Graph) -> (Self, Vec<Turn>) {
+        let mut fixed = self.clone();
+        for (i, link) in fixed.links.iter_mut().enumerate() {
+            let own = &self.links[i];
+            link.joint = NO_TURN;
+            link.absolute = NO_TURN;
+            link.first_parallel = i;
+            let Some(parent) = own.parent else { continue };
+            let turned = &self.links[parent].absolute;
+            link.position = graph.turn_out(turned, &own.position);
+            if own.first_parallel == i {
+                link.pre.clear();
+                for turn in std::iter::once(turned).chain(&own.pre) {
+                    push_turn(&mut link.pre, turn);
+                }
+            } else {
+                link.pre.clear();
+            }
+        }
+        let turns = self.links.iter().map(|link| link.absolute.clone());
+        (fixed, turns.collect())
+    }
+
     pub(crate) fn link_of(&self, frame: FrameIdx) -> Option<usize> {
         self.of_frame[frame.0]
     }

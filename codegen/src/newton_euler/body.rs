@@ -6,7 +6,7 @@ use super::motion::LinkMotion;
 use super::{Element, Inertia, Motion, Side, Wrench, aligned_axis};
 use crate::expr::{ExprId, Graph, Rational};
 use crate::tree::Tree;
-use crate::vector::{self, Vector};
+use crate::vector::{self, Turn, Vector};
 
 /// The diagonal of the inertia.
 #[derive(Clone, Copy, Debug)]
@@ -51,45 +51,50 @@ impl Body {
         products: vector::ZERO,
     };
 
-    /// The body in axes from which its own are turned about z by an angle of the given cosine and sine; only for flat
-    /// spreads.
-    fn turned(&self, graph: &mut Graph, c: ExprId, s: ExprId) -> Option<Self> {
-        let Spread::Flat([xx, yy]) = self.spread else {
-            return None;
-        };
-        let turn = |graph: &mut Graph, x: ExprId, y: ExprId| {
-            let [cx, sy, sx, cy] = [(c, x), (s, y), (s, x), (c, y)].map(|(a, b)| graph.mul(a, b));
-            [graph.sub(cx, sy), graph.add(sx, cy)]
-        };
-        let vector = |graph: &mut Graph, v: &Vector| {
-            let [x, y] = turn(graph, v[0], v[1]);
-            [x, y, v[2]]
-        };
-        let force_moment = vector(graph, &self.force_moment);
-        let moment_moment = vector(graph, &self.moment_moment);
-        // Second moments are products of inertia with the sign changed: [xz, yz] turns as a vector.
+    /// The body in axes from which its own are turned about z.
+    pub(crate) fn turned(&self, graph: &mut Graph, turn: &Turn) -> Self {
+        let (c, s) = graph.cos_sin(&turn.sum, turn.pi12);
+        let force_moment = graph.turn_out(turn, &self.force_moment);
+        let moment_moment = graph.turn_out(turn, &self.moment_moment);
         let [yz, xz, xy] = self.products;
-        let [xz, yz] = turn(graph, xz, yz);
-        // The others turn by twice the angle about their mean.
+        let [xz, yz, _] = graph.turn_out(turn, &[xz, yz, Graph::ZERO]);
+        let mut turned = Self {
+            mass: self.mass,
+            force_moment,
+            moment_moment,
+            spread: self.spread,
+            products: [yz, xz, xy],
+        };
+        // What is left turns by twice the angle about its mean. Second moments turn as moments of inertia do, but
+        // products of inertia are second moments with the sign changed.
+        let (xx, yy, mixed) = match self.spread {
+            Spread::Moments([xx, yy, _]) => (xx, yy, xy),
+            Spread::Flat([xx, yy]) => (xx, yy, graph.neg(xy)),
+        };
+        if xx == yy && xy == Graph::ZERO {
+            return turned;
+        }
         let half = Rational::new(1, 2);
         let mean = graph.combine([(xx, half.clone()), (yy, half.clone())]);
         let apart = graph.combine([(xx, half.clone()), (yy, -&half)]);
         let twice = graph.scale(s, &Rational::integer(2));
         let (ss, sine) = (graph.mul(twice, s), graph.mul(twice, c));
         let cosine = graph.sub(Graph::ONE, ss);
-        let [ca, sxy, sa, cxy] = [(cosine, apart), (sine, xy), (sine, apart), (cosine, xy)]
-            .map(|(a, b)| graph.mul(a, b));
-        // With the product of inertia xy in place of the second moment, which is its opposite.
-        let apart = graph.add(ca, sxy);
-        let xy = graph.sub(cxy, sa);
-        let spread = Spread::Flat([graph.add(mean, apart), graph.sub(mean, apart)]);
-        Some(Self {
-            mass: self.mass,
-            force_moment,
-            moment_moment,
-            spread,
-            products: [yz, xz, xy],
-        })
+        let [ca, sm, sa, cm] = [
+            (cosine, apart),
+            (sine, mixed),
+            (sine, apart),
+            (cosine, mixed),
+        ]
+        .map(|(a, b)| graph.mul(a, b));
+        let apart = graph.sub(ca, sm);
+        let mixed = graph.add(sa, cm);
+        let (xx, yy) = (graph.add(mean, apart), graph.sub(mean, apart));
+        (turned.spread, turned.products[2]) = match self.spread {
+            Spread::Moments([_, _, zz]) => (Spread::Moments([xx, yy, zz]), mixed),
+            Spread::Flat(_) => (Spread::Flat([xx, yy]), graph.neg(mixed)),
+        };
+        turned
     }
 }
 
@@ -144,9 +149,11 @@ pub(crate) fn wrenches(
     for (i, body) in bodies {
         let is_end = !tree.links.iter().any(|link| link.parent == Some(*i));
         let mut on_fixed_side = || {
-            let joint = &tree.links[*i].joint;
-            let (c, s) = graph.cos_sin(&joint.sum, joint.pi12);
-            let body = body.turned(graph, c, s)?;
+            // Only the moments of flat bodies do without the angular acceleration.
+            let Spread::Flat(_) = body.spread else {
+                return None;
+            };
+            let body = body.turned(graph, &tree.links[*i].joint);
             let moved = motion.at(graph, tree, *i, Side::Fixed)?;
             Some(wrench(graph, &moved, &body))
         };

@@ -100,8 +100,13 @@ impl Moments {
             let (ss, sine) = (graph.mul(twice, s), graph.mul(twice, c));
             (graph.sub(Graph::ONE, ss), sine)
         };
-        let products = [(cosine, apart), (sine, mixed), (sine, apart), (cosine, mixed)]
-            .map(|(a, b)| graph.mul(a, b));
+        let products = [
+            (cosine, apart),
+            (sine, mixed),
+            (sine, apart),
+            (cosine, mixed),
+        ]
+        .map(|(a, b)| graph.mul(a, b));
         let apart = graph.sub(products[0], products[1]);
         turned.mixed[axis] = graph.add(products[2], products[3]);
         turned.square[i] = graph.add(mean, apart);
@@ -148,7 +153,6 @@ pub(crate) fn mass_matrix(
     graph: &mut Graph,
     tree: &Tree,
     style: Style,
-    depths: Depths,
     n_coordinates: usize,
     bodies: &[(usize, Body)],
 ) -> Vec<Vec<ExprId>> {
@@ -179,6 +183,10 @@ pub(crate) fn mass_matrix(
             [turns.collect(), link.slides.clone()]
         })
         .collect();
+    let depths = Depths {
+        moments: 0,
+        forces: 0,
+    };
     let mut terms = vec![vec![Vec::new(); n_coordinates]; n_coordinates];
     for (m, coordinates) in motions.iter().enumerate() {
         if coordinates.is_empty() {
