@@ -116,7 +116,7 @@ fn dynamics(
     let gravity = bodies(graph, weight, &at_rest, &[])?;
     let mut bias = bodies(graph, weight, &unaccelerated, &effects)?;
     bias.extend(projection.drive_jacobian.iter().flatten());
-    let mass_matrix = mass_matrix(graph, mechanism, equations, value, &effects)?;
+    let mass_matrix = mass_matrix(graph, mechanism, equations, value, &effects);
     let mut program = |outputs: &[ExprId], frozen: &BTreeMap<ExprId, ExprId>| {
         closing.program_at(graph, equations, outputs, frozen)
     };
@@ -167,7 +167,6 @@ fn degree_in_accelerations(graph: &Graph, roots: &[ExprId]) -> usize {
         let of = |id: ExprId| degree[id.index()];
         degree[i] = match graph.node(id) {
             Node::Atom(Atom::Acceleration(_)) => 1,
-            Node::Rational(_) | Node::Atom(_) => 0,
             Node::Sin(angle) | Node::Cos(angle) => {
                 let moves = |a: Atom| matches!(a, Atom::Acceleration(_));
                 if angle.atoms().any(moves) { NONE } else { 0 }
@@ -183,7 +182,7 @@ fn degree_in_accelerations(graph: &Graph, roots: &[ExprId]) -> usize {
                 .sum::<usize>()
                 .min(NONE),
             Node::Unary(_, c) if of(*c) > 0 => NONE,
-            Node::Unary(..) => 0,
+            Node::Rational(_) | Node::Atom(_) | Node::Unary(..) => 0,
         };
     }
     roots.iter().map(|r| degree[r.index()]).max().unwrap_or(0)
@@ -196,7 +195,7 @@ fn mass_matrix(
     equations: &Equations,
     value: &dyn Fn(&Monomial) -> ExprId,
     effects: &[ExprId],
-) -> Result<Vec<ExprId>, DeriveError> {
+) -> Vec<ExprId> {
     let projection = &equations.projection;
     let n = mechanism.coordinates.len();
     let n_active = projection.active.len();
@@ -290,5 +289,5 @@ fn mass_matrix(
             matrix[a][b] = graph.add(matrix[a][b], more);
         }
     }
-    Ok(matrix.into_iter().flatten().collect())
+    matrix.into_iter().flatten().collect()
 }

@@ -172,33 +172,46 @@ impl TotalForm {
     }
 }
 
+/// A change of a form.
+type Change<F> = Box<dyn Fn(F) -> F>;
+/// Families of changes.
+type Pass<F> = Vec<Vec<Change<F>>>;
+
 /// What outputs cost.
 pub(crate) type Weigh<'a> = &'a dyn Fn(&mut Graph, &[ExprId]) -> usize;
 
 /// Ways to write equations, one step after the other; a step that does not make them cheaper is taken back.
 ///
-/// `write` gives the outputs of a form; `steps` holds for every pass the changes that it tries on the best form so far.
+/// `write` gives the outputs of a form; `steps` holds for every pass the families of changes that it tries on the
+/// best form so far; the changes of a family go one way, and once they make it worse the rest is not tried.
 fn improve<F: Copy>(
     graph: &mut Graph,
     plain: F,
-    steps: &[Vec<Box<dyn Fn(F) -> F>>],
+    steps: &[Pass<F>],
     weigh: Weigh<'_>,
     mut write: impl FnMut(&mut Graph, F) -> Result<Vec<ExprId>, DeriveError>,
 ) -> Result<Vec<ExprId>, DeriveError> {
     let (mut form, mut best) = (plain, write(graph, plain)?);
     let mut least = weigh(graph, &best);
-    for changes in steps {
+    for pass in steps {
         let before = form;
-        for change in changes {
-            let changed = change(before);
-            let outputs = write(graph, changed)?;
-            // Much makes no difference for planar mechanisms, and weighing takes longest.
-            if outputs == best {
-                continue;
-            }
-            let cost = weigh(graph, &outputs);
-            if cost < least {
-                (form, best, least) = (changed, outputs, cost);
+        for family in pass {
+            let mut last = usize::MAX;
+            for change in family {
+                let changed = change(before);
+                let outputs = write(graph, changed)?;
+                // Much makes no difference for planar mechanisms, and weighing takes longest.
+                if outputs == best {
+                    continue;
+                }
+                let cost = weigh(graph, &outputs);
+                if cost < least {
+                    (form, best, least) = (changed, outputs, cost);
+                }
+                if cost > last {
+                    break;
+                }
+                last = cost;
             }
         }
     }
@@ -296,15 +309,15 @@ pub(crate) fn columns(
         ..form
     });
     let [across, axis_column, offset_after_turn] = styles().map(styled);
-    let mut steps: Vec<Vec<ColumnChange>> = vec![
-        vec![across, in_fixed_axes],
-        vec![axis_column],
-        vec![offset_after_turn],
+    let mut steps: Vec<Pass<ColumnForm>> = vec![
+        vec![vec![across], vec![in_fixed_axes]],
+        vec![vec![axis_column]],
+        vec![vec![offset_after_turn]],
     ];
-    steps.push(vec![Box::new(|form| ColumnForm {
+    steps.push(vec![vec![Box::new(|form| ColumnForm {
         axial: true,
         ..form
-    })]);
+    })]]);
     let to = |moments, forces| -> ColumnChange {
         Box::new(move |form| ColumnForm {
             depths: Depths { moments, forces },
@@ -313,7 +326,7 @@ pub(crate) fn columns(
     };
     let both = (2..=deepest).map(|depth| to(depth, depth));
     let moments = (2..=deepest).map(|depth| to(depth, 0));
-    steps.push(both.chain(moments).collect());
+    steps.push(vec![both.collect(), moments.collect()]);
     steps.truncate(n_passes);
     let mut written = Written::default();
     let n_drives = mechanism.drives.len();
@@ -372,10 +385,10 @@ pub(crate) fn best_total(
     )
 }
 
-type ColumnChange = Box<dyn Fn(ColumnForm) -> ColumnForm>;
-type TotalChange = Box<dyn Fn(TotalForm) -> TotalForm>;
+type ColumnChange = Change<ColumnForm>;
+type TotalChange = Change<TotalForm>;
 
-fn total_steps() -> Vec<Vec<TotalChange>> {
+fn total_steps() -> Vec<Pass<TotalForm>> {
     let styled = |change: fn(Style) -> Style| -> TotalChange {
         Box::new(move |form| TotalForm {
             style: change(form.style),
@@ -387,16 +400,19 @@ fn total_steps() -> Vec<Vec<TotalChange>> {
         ..form
     });
     let [across, axis_column, offset_after_turn] = styles().map(styled);
-    let mut steps: Vec<Vec<TotalChange>> = vec![
-        vec![across, in_fixed_axes],
-        vec![axis_column],
-        vec![offset_after_turn],
+    let mut steps: Vec<Pass<TotalForm>> = vec![
+        vec![vec![across], vec![in_fixed_axes]],
+        vec![vec![axis_column]],
+        vec![vec![offset_after_turn]],
     ];
-    steps.push(vec![Box::new(|form| TotalForm { flat: true, ..form })]);
-    steps.push(vec![Box::new(|form| TotalForm {
+    steps.push(vec![vec![Box::new(|form| TotalForm {
+        flat: true,
+        ..form
+    })]]);
+    steps.push(vec![vec![Box::new(|form| TotalForm {
         turn_ends: true,
         ..form
-    })]);
+    })]]);
     steps
 }
 

@@ -86,7 +86,8 @@ impl Case {
                 let values = found.mass.clone().singular_values();
                 values.max() / values.min()
             };
-            if condition > 1e8 {
+            // Parameters are anything: there may be no mass that resists.
+            if condition.is_nan() || condition > 1e8 {
                 continue;
             }
             let back = evaluator
@@ -133,7 +134,8 @@ impl Case {
                     .collect()
             };
             let still = accelerated(None);
-            let ways = directions(mechanism, &numbers, &still);
+            // The first is the actual motion, which there is none of.
+            let ways = &directions(mechanism, &numbers, &still)[1..];
             for a in 0..n {
                 let weight = numbers.virtual_power(&still, &ways[a], &load);
                 for b in 0..n {

@@ -11,11 +11,14 @@ fn count(program: &Program) -> OperationCount {
     program.count(Stage::State)
 }
 
-/// Additions and multiplications per call of inverse dynamics and base regressor, at most the best known ones.
+/// Additions and multiplications per call of inverse dynamics and base regressor, at most what has been reached.
+///
+/// The best known of others are 38 and 26 for the arm, 539 and 909 for the PUMA, 648 and 1256 for the Panda, 521 and 887
+/// for the RX-90.
 #[track_caller]
 fn check(name: &str, inverse_dynamics: usize, regressor: usize) {
     let programs = derived(name).programs;
-    for (what, program, best_known) in [
+    for (what, program, reached) in [
         (
             "inverse dynamics",
             &programs.inverse_dynamics,
@@ -25,12 +28,12 @@ fn check(name: &str, inverse_dynamics: usize, regressor: usize) {
     ] {
         let found = count(program);
         println!(
-            "{name}, {what}: {} + {} beside {best_known}",
+            "{name}, {what}: {} + {} beside {reached}",
             found.add, found.mul
         );
         assert!(
-            found.add + found.mul <= best_known,
-            "{name}, {what}: {found:?}, best known {best_known}"
+            found.add + found.mul <= reached,
+            "{name}, {what}: {found:?}, reached before {reached}"
         );
         assert_eq!(
             found.div, 0,
@@ -40,32 +43,33 @@ fn check(name: &str, inverse_dynamics: usize, regressor: usize) {
 }
 
 #[test]
-fn two_link_arm_is_at_most_the_best_known() {
+fn two_link_arm_is_at_most_what_was_reached() {
     check("two_link", 38, 26);
 }
 
 #[test]
-fn puma560_is_at_most_the_best_known() {
-    check("puma560", 539, 909);
+fn puma560_is_at_most_what_was_reached() {
+    check("puma560", 480, 675);
 }
 
 #[test]
-fn panda_is_at_most_the_best_known() {
-    check("panda", 648, 1256);
+fn panda_is_at_most_what_was_reached() {
+    check("panda", 549, 1036);
 }
 
 #[test]
-fn rx90_is_at_most_the_best_known() {
-    check("rx90", 521, 887);
+fn rx90_is_at_most_what_was_reached() {
+    check("rx90", 435, 587);
 }
 
 #[test]
-fn symmetric_five_bar_is_at_most_the_best_known() {
-    // The regressor of five columns with the loop solved inside: 130 additions and multiplications, 4 divisions.
+fn symmetric_five_bar_is_at_most_what_was_reached() {
+    // The regressor of five columns with the loop solved inside; others have 130 additions and multiplications, and 4
+    // divisions.
     let found = count(&derived("five_bar-tied-tool").programs.regressor);
     println!("symmetric five-bar, regressor: {found:?} beside 130 and 4 divisions");
-    assert!(found.add + found.mul <= 130, "{found:?}");
-    assert!(found.div <= 4, "{found:?}");
+    assert!(found.add + found.mul <= 119, "{found:?}");
+    assert!(found.div <= 2 && found.sqrt <= 1, "{found:?}");
 }
 
 /// H_min column by column, and the inverse dynamics, against the plain recursion's H: to 1e-12 of the largest entry.

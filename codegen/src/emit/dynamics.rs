@@ -10,14 +10,16 @@ use crate::Derivation;
 use crate::dynamics::Dynamics;
 use crate::lower::Program;
 
+/// How the result of a program is written.
+type Written<'a> = &'a dyn Fn(&Body<'_>) -> TokenStream;
+
 /// The struct `Dynamics`.
 pub(super) fn dynamics(derivation: &Derivation, dynamics: &Dynamics) -> TokenStream {
     let n = derivation.coordinates().0.len();
     let n_drives = derivation.mechanism.drives.len();
     let vector = quote! { [T; N_ACTIVE] };
     let matrix = quote! { [[T; N_ACTIVE]; N_ACTIVE] };
-    type Result<'a> = &'a dyn Fn(&Body<'_>) -> TokenStream;
-    let functions: [(&str, &Program, &str, Result<'_>, &TokenStream); 5] = [
+    let functions: [(&str, &Program, &str, Written<'_>, &TokenStream); 5] = [
         (
             "mass_matrix",
             &dynamics.mass_matrix,

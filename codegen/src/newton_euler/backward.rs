@@ -46,7 +46,7 @@ pub(super) fn back_along_axis(
     link: &Link,
     wrench: &Wrench,
 ) -> Vector {
-    let (_, along) = style.split_position(graph, link);
+    let (_, along) = style.split_position(link);
     let [mx, my, mz] = wrench.moment;
     let (x, y) = (
         graph.mul(along, wrench.force[1]),
@@ -65,7 +65,7 @@ fn to_parent(graph: &mut Graph, style: Style, link: &Link, side: Side, wrench: &
     }
     let force = turn_out_all(graph, &link.pre, &force);
     let turned = turn_out_all(graph, &link.pre, &moment);
-    let (across, _) = style.split_position(graph, link);
+    let (across, _) = style.split_position(link);
     let lever = graph.cross(&across, &force);
     let moment = graph.add_vectors(&[turned, lever]);
     Wrench { force, moment }

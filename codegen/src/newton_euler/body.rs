@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::motion::LinkMotion;
-use super::{Element, Inertia, Motion, Side, Wrench, aligned_axis};
+use super::{Element, Inertia, Motion, Side, Wrench};
 use crate::expr::{ExprId, Graph, Rational};
 use crate::tree::Tree;
 use crate::vector::{self, Turn, Vector};
@@ -108,7 +108,7 @@ pub(crate) fn flatten_along_axes(
 ) {
     for i in (0..tree.links.len()).rev() {
         let link = &tree.links[i];
-        let Some(axis) = aligned_axis(graph, link).map(|(axis, _)| axis) else {
+        let Some((axis, _)) = link.axis else {
             continue;
         };
         let Some(body) = bodies.get_mut(&i).filter(|_| motion.is_tilting(i)) else {

@@ -116,7 +116,7 @@ impl Moments {
 
     /// What a link carries, as its parent sees it.
     fn to_parent(self, graph: &mut Graph, style: Style, link: &Link) -> Self {
-        let (across, along) = style.split_position(graph, link);
+        let (across, along) = style.split_position(link);
         let mut moments = self.moved(graph, &[Graph::ZERO, Graph::ZERO, along]);
         for turn in link.pre.iter().chain([&link.joint]).rev() {
             moments = moments.turned(graph, turn);

@@ -107,26 +107,13 @@ impl Style {
     }
 
     /// A link's position in its parent's frame, but for what lies along its own axis, and that.
-    fn split_position(self, graph: &mut Graph, link: &Link) -> (Vector, ExprId) {
-        match aligned_axis(graph, link) {
-            Some((axis, positive)) if self.offset_after_turn => {
-                let mut across = link.position;
-                let along = std::mem::replace(&mut across[axis], Graph::ZERO);
-                (across, if positive { along } else { graph.neg(along) })
-            }
-            _ => (link.position, Graph::ZERO),
+    fn split_position(self, link: &Link) -> (Vector, ExprId) {
+        if self.offset_after_turn {
+            (link.across, link.along)
+        } else {
+            (link.position, Graph::ZERO)
         }
     }
-}
-
-/// Which axis of its parent's frame a link's joint is parallel to, and whether it points the same way.
-pub(crate) fn aligned_axis(graph: &mut Graph, link: &Link) -> Option<(usize, bool)> {
-    let z = turn_out_all(graph, &link.pre, &[Graph::ZERO, Graph::ZERO, Graph::ONE]);
-    let minus = graph.neg(Graph::ONE);
-    let mut nonzero = (0..3).filter(|i| z[*i] != Graph::ZERO);
-    let axis = nonzero.next()?;
-    let unit = z[axis] == Graph::ONE || z[axis] == minus;
-    (unit && nonzero.next().is_none()).then_some((axis, z[axis] == Graph::ONE))
 }
 
 /// Components behind several turns of a vector given before them.

@@ -1,6 +1,6 @@
 //! The forward recursion: motion of every link as expressions in coordinates, rates and accelerations.
 
-use super::{Side, Style, aligned_axis, turn_in_all};
+use super::{Side, Style, turn_in_all};
 use crate::expr::{Atom, ExprId, Graph, Rational};
 use crate::tree::{Link, Tree};
 use crate::vector::{self, Vector};
@@ -149,7 +149,7 @@ impl Motion {
         let turning = turning(style, link);
         let rate = weighted(graph, Atom::Rate, turning.iter().cloned());
         let turn_acceleration = weighted(graph, Atom::Acceleration, turning);
-        let mut moved = match aligned_axis(graph, first) {
+        let mut moved = match first.axis {
             Some((axis, positive)) if style.axis_column => {
                 let column = std::array::from_fn(|row| {
                     let entry = fixed.field[row][axis];
@@ -196,7 +196,7 @@ impl Motion {
     fn acceleration_before(&self, graph: &mut Graph, tree: &Tree, i: usize) -> Vector {
         let link = &tree.links[i];
         let parent = self.of(link.parent);
-        let (across, _) = self.style.split_position(graph, link);
+        let (across, _) = self.style.split_position(link);
         let mut there = parent.acceleration;
         for row in 0..3 {
             let moved = graph.dot(&parent.field[row], &across);
@@ -207,7 +207,7 @@ impl Motion {
 
     /// The same along the axis on to the origin, with the column of the field that belongs to the axis.
     fn on_axis(&self, graph: &mut Graph, link: &Link, there: &Vector, column: &Vector) -> Vector {
-        let (_, along) = self.style.split_position(graph, link);
+        let (_, along) = self.style.split_position(link);
         let moved = graph.scale_vector(along, column);
         graph.add_vectors(&[*there, moved])
     }

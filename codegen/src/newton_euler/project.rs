@@ -3,7 +3,7 @@
 //! shared by all wrenches that are projected in the same frame.
 
 use super::backward::{Rows, back_along_axis};
-use super::{Style, Wrench, aligned_axis, turn_in_all};
+use super::{Style, Wrench, turn_in_all};
 use crate::expr::{ExprId, Graph};
 use crate::tree::Tree;
 use crate::vector::{self, Vector};
@@ -92,7 +92,7 @@ fn points(graph: &mut Graph, tree: &Tree, path: &[usize]) -> Vec<Point> {
         let link = &tree.links[*i];
         let above = k.checked_sub(1).map(|k| path[k]);
         let meets = above.and_then(|above| {
-            let (axis, positive) = aligned_axis(graph, link)?;
+            let (axis, positive) = link.axis?;
             let mut left = link.position;
             let own = std::mem::replace(&mut left[axis], Graph::ZERO);
             let [x, y, z] = left;
@@ -152,7 +152,7 @@ fn arm(
     let mut above = joint;
     for i in &path[start + 1..] {
         let link = &tree.links[*i];
-        let (across, own) = style.split_position(graph, link);
+        let (across, own) = style.split_position(link);
         let turn = style.turn(&tree.links[above]).clone();
         if style.first(tree, *i) == *i {
             v = graph.turn_in(&turn, &v);
