@@ -146,8 +146,8 @@ pub(crate) fn carry(
     rows.sums(graph)
 }
 
-/// Leaves the generalised forces of the parallel joints from `i` up to the first; returns that first link with the
-/// wrench taken to its parent.
+/// Leaves the generalised forces of the parallel joints from `start` up to the first; returns that first link with the
+/// wrench taken to its parent. What stands on the fixed side, that of the first joint, is a moment alone.
 fn across(
     graph: &mut Graph,
     tree: &Tree,
