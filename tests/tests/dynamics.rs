@@ -158,7 +158,7 @@ fn check_energy(name: &str, force: f64, duration: f64, steps: u32) {
         swing = swing.max((energy(&x) - first - x[2 * n]).abs());
     }
     let scale = first.abs() + x[2 * n].abs() + 1.0;
-    println!("{name}: energy is off by {:.1e} of {scale:.3}", swing);
+    println!("{name}: energy is off by {swing:.1e} of {scale:.3}");
     assert!(swing < 1e-6 * scale, "{name}: {swing} of {scale}");
 }
 
