@@ -183,7 +183,7 @@ pub(crate) type Weigh<'a> = &'a dyn Fn(&mut Graph, &[ExprId]) -> usize;
 /// Ways to write equations, one step after the other; a step that does not make them cheaper is taken back.
 ///
 /// `write` gives the outputs of a form; `steps` holds for every pass the families of changes that it tries on the
-/// best form so far; the changes of a family go one way, and once they make it worse the rest is not tried.
+/// best form before it; the changes of a family go one way, and once they make it worse the rest is not tried.
 fn improve<F: Copy>(
     graph: &mut Graph,
     plain: F,
@@ -194,8 +194,8 @@ fn improve<F: Copy>(
     let (mut form, mut best) = (plain, write(graph, plain)?);
     let mut least = weigh(graph, &best);
     for pass in steps {
-        let before = form;
         for family in pass {
+            let before = form;
             let mut last = usize::MAX;
             for change in family {
                 let changed = change(before);
@@ -306,6 +306,10 @@ pub(crate) fn columns(
     };
     let in_fixed_axes: ColumnChange = Box::new(|form| ColumnForm {
         fixed_axes: true,
+        style: Style {
+            across_parallel_axes: false,
+            ..form.style
+        },
         ..form
     });
     let [across, axis_column, offset_after_turn] = styles().map(styled);
@@ -324,9 +328,19 @@ pub(crate) fn columns(
             ..form
         })
     };
-    let both = (2..=deepest).map(|depth| to(depth, depth));
-    let moments = (2..=deepest).map(|depth| to(depth, 0));
-    steps.push(vec![both.collect(), moments.collect()]);
+    // Frames near the base are cheap to reach and save little.
+    let both = (2.max(deepest / 2)..=deepest).map(|depth| to(depth, depth));
+    let moments: ColumnChange = Box::new(|form| ColumnForm {
+        depths: Depths {
+            forces: 0,
+            ..form.depths
+        },
+        ..form
+    });
+    steps.push(vec![both.collect(), vec![moments]]);
+    if !has_parallel_axes(tree) {
+        steps[0].clear();
+    }
     steps.truncate(n_passes);
     let mut written = Written::default();
     let n_drives = mechanism.drives.len();
@@ -348,7 +362,7 @@ pub(crate) fn total(
     n_passes: usize,
     weigh: Weigh<'_>,
 ) -> Result<Vec<ExprId>, DeriveError> {
-    let mut steps = total_steps();
+    let mut steps = total_steps(&equations.tree);
     steps.truncate(n_passes);
     let mut written = Written::default();
     improve(graph, TotalForm::PLAIN, &steps, weigh, |graph, form| {
@@ -373,7 +387,7 @@ pub(crate) fn best_total(
     improve(
         graph,
         TotalForm::PLAIN,
-        &total_steps(),
+        &total_steps(&equations.tree),
         weigh,
         |graph, form| {
             let key = (form.style, form.fixed_axes);
@@ -388,7 +402,13 @@ pub(crate) fn best_total(
 type ColumnChange = Change<ColumnForm>;
 type TotalChange = Change<TotalForm>;
 
-fn total_steps() -> Vec<Pass<TotalForm>> {
+/// Whether there is a link whose joint is parallel to its parent's.
+fn has_parallel_axes(tree: &Tree) -> bool {
+    let mut links = tree.links.iter().enumerate();
+    links.any(|(i, link)| link.first_parallel != i)
+}
+
+fn total_steps(tree: &Tree) -> Vec<Pass<TotalForm>> {
     let styled = |change: fn(Style) -> Style| -> TotalChange {
         Box::new(move |form| TotalForm {
             style: change(form.style),
@@ -397,6 +417,10 @@ fn total_steps() -> Vec<Pass<TotalForm>> {
     };
     let in_fixed_axes: TotalChange = Box::new(|form| TotalForm {
         fixed_axes: true,
+        style: Style {
+            across_parallel_axes: false,
+            ..form.style
+        },
         ..form
     });
     let [across, axis_column, offset_after_turn] = styles().map(styled);
@@ -405,6 +429,9 @@ fn total_steps() -> Vec<Pass<TotalForm>> {
         vec![vec![axis_column]],
         vec![vec![offset_after_turn]],
     ];
+    if !has_parallel_axes(tree) {
+        steps[0].clear();
+    }
     steps.push(vec![vec![Box::new(|form| TotalForm {
         flat: true,
         ..form

@@ -49,7 +49,7 @@ fn two_link_arm_is_at_most_what_was_reached() {
 
 #[test]
 fn puma560_is_at_most_what_was_reached() {
-    check("puma560", 480, 679);
+    check("puma560", 480, 675);
 }
 
 #[test]
@@ -59,7 +59,7 @@ fn panda_is_at_most_what_was_reached() {
 
 #[test]
 fn rx90_is_at_most_what_was_reached() {
-    check("rx90", 435, 587);
+    check("rx90", 435, 595);
 }
 
 #[test]
