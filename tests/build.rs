@@ -51,7 +51,10 @@ fn main() {
 fn module(mechanism: &Mechanism) -> String {
     let derivation = modelmill_codegen::derive(mechanism)
         .unwrap_or_else(|error| panic!("{}: {error}", mechanism.name));
-    modelmill_codegen::emit(&derivation).module()
+    match derivation.dynamics() {
+        Ok(dynamics) => modelmill_codegen::emit_with_dynamics(&derivation, &dynamics).module(),
+        Err(error) => panic!("{}: {error}", mechanism.name),
+    }
 }
 
 fn fixture_models() -> String {

@@ -25,15 +25,38 @@ impl std::fmt::Display for BuildError {
 
 impl std::error::Error for BuildError {}
 
+/// What is generated besides regressor and inverse dynamics.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Options {
+    /// The equation of motion (`Dynamics`): mass matrix, velocity terms, gravity, forward dynamics. It nearly doubles the
+    /// code, so that it is made on demand.
+    pub dynamics: bool,
+}
+
+impl Options {
+    /// With the equation of motion.
+    #[must_use]
+    pub fn with_dynamics(mut self) -> Self {
+        self.dynamics = true;
+        self
+    }
+}
+
 /// Generates a module for every model file that `pattern` names: a file, or a folder with `/*.toml`.
 ///
 /// Writes `models.rs` to the build's output folder, reruns when a model file or one that it extends changes, and ends the
 /// build with the model's own diagnostics if one is at fault.
 pub fn generate(pattern: &str) {
+    generate_with(pattern, Options::default());
+}
+
+/// Generates like [`generate`], with what `options` ask for.
+pub fn generate_with(pattern: &str, options: Options) {
     println!("cargo::rerun-if-changed=build.rs");
     let out = std::env::var_os("OUT_DIR").map(PathBuf::from);
     let result = match out {
-        Some(out) => try_generate(pattern, &out.join("models.rs")),
+        Some(out) => try_generate_with(pattern, options, &out.join("models.rs")),
         None => Err(BuildError(
             "OUT_DIR is not set: call this from a build script".to_owned(),
         )),
@@ -51,12 +74,20 @@ pub fn generate(pattern: &str) {
 /// # Errors
 /// Diagnostics of all faulty model files together.
 pub fn try_generate(pattern: &str, out: &Path) -> Result<(), BuildError> {
+    try_generate_with(pattern, Options::default(), out)
+}
+
+/// Generates like [`try_generate`], with what `options` ask for.
+///
+/// # Errors
+/// Diagnostics of all faulty model files together.
+pub fn try_generate_with(pattern: &str, options: Options, out: &Path) -> Result<(), BuildError> {
     let files = files(pattern)?;
     let mut text = String::new();
     let mut faults = String::new();
     let mut names = BTreeSet::new();
     for file in &files {
-        match module(file) {
+        match module(file, options) {
             Ok((name, module)) if names.insert(name.clone()) => text.push_str(&module),
             Ok((name, _)) => {
                 _ = writeln!(
@@ -99,7 +130,7 @@ fn files(pattern: &str) -> Result<Vec<PathBuf>, BuildError> {
     Ok(files)
 }
 
-fn module(file: &Path) -> Result<(String, String), BuildError> {
+fn module(file: &Path, options: Options) -> Result<(String, String), BuildError> {
     let loaded = modelmill_spec::load_file(file);
     let sources = match &loaded {
         Ok(loaded) => &loaded.sources,
@@ -115,8 +146,13 @@ fn module(file: &Path) -> Result<(String, String), BuildError> {
     }
     let derivation = modelmill_codegen::derive(&loaded.mechanism)
         .map_err(|error| BuildError(format!("{}: {error}\n", file.display())))?;
-    Ok((
-        loaded.mechanism.name.clone(),
-        modelmill_codegen::emit(&derivation).module(),
-    ))
+    let emitted = if options.dynamics {
+        let dynamics = derivation
+            .dynamics()
+            .map_err(|error| BuildError(format!("{}: {error}\n", file.display())))?;
+        modelmill_codegen::emit_with_dynamics(&derivation, &dynamics)
+    } else {
+        modelmill_codegen::emit(&derivation)
+    };
+    Ok((loaded.mechanism.name.clone(), emitted.module()))
 }

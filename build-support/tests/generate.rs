@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill_build::try_generate;
+use modelmill_build::{Options, try_generate, try_generate_with};
 
 const PENDULUM: &str = r#"
 schema = 1
@@ -93,5 +93,54 @@ fn an_empty_or_missing_folder_is_said() {
         generate(&folder.join("missing"))
             .unwrap_err()
             .contains("cannot read folder")
+    );
+}
+
+fn with_dynamics(folder: &Path) -> Result<String, String> {
+    let out = folder.join("models.rs");
+    let pattern = format!("{}/*.toml", folder.display());
+    try_generate_with(&pattern, Options::default().with_dynamics(), &out)
+        .map_err(|error| error.to_string())?;
+    Ok(std::fs::read_to_string(out).unwrap())
+}
+
+#[test]
+fn the_equation_of_motion_comes_on_demand() {
+    let folder = folder("dynamics", &[("pendulum.toml", PENDULUM)]);
+    assert!(!generate(&folder).unwrap().contains("pub fn mass_matrix"));
+    let text = with_dynamics(&folder).unwrap();
+    for method in [
+        "mass_matrix",
+        "coriolis",
+        "gravity",
+        "effects",
+        "bias",
+        "forward",
+    ] {
+        assert!(text.contains(&format!("pub fn {method}(")), "{method}");
+    }
+}
+
+#[test]
+fn an_effect_that_is_not_affine_in_accelerations_has_no_equation_of_motion() {
+    let effect = r#"
+effect = [{ kind = "odd", at = ["q"] }]
+
+[[effect_kind]]
+name = "odd"
+on = ["coordinate"]
+expression = "k*abs(acceleration)"
+says = "for a test"
+
+[effect_kind.parameters]
+k = { unit = { torque = "kg m^2" }, sign = "any" }
+"#;
+    let text = format!("{PENDULUM}{effect}");
+    let folder = folder("odd", &[("pendulum.toml", &text)]);
+    generate(&folder).unwrap_or_else(|error| panic!("the inverse dynamics holds: {error}"));
+    let error = with_dynamics(&folder).unwrap_err();
+    assert!(
+        error.contains("the effect `odd` is not affine in the accelerations"),
+        "{error}"
     );
 }

@@ -241,6 +241,9 @@ pub(crate) struct GenerateArgs {
     /// Write the source to this file instead of standard output
     #[arg(long, value_name = "FILE.rs")]
     pub(crate) out: Option<PathBuf>,
+    /// With the equation of motion: mass matrix, velocity terms, gravity, forward dynamics
+    #[arg(long)]
+    pub(crate) dynamics: bool,
 }
 
 /// Where the values of the base parameters come from.

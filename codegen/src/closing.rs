@@ -9,7 +9,8 @@ use crate::DeriveError;
 use crate::dyad::turn;
 use crate::expr::{AngleSum, Atom, ExprId, Graph, Node};
 use crate::finite;
-use crate::lower::{Definition, Program, Request, lower};
+use crate::lower::cost::cost;
+use crate::lower::{Definition, PASSES, Program, Request, lower_by};
 use crate::magnitude;
 use crate::programs::nominal_value;
 use crate::reduce::Plan;
@@ -30,6 +31,8 @@ pub(crate) struct Closing {
     regular: Vec<(ExprId, f64)>,
     /// Whether effects may have no finite value at some states.
     may_be_undefined: bool,
+    /// How many of the passes of lowering are used.
+    n_passes: usize,
 }
 
 /// An angle as a sum of known angles, a multiple of pi/12, and solved angles by position.
@@ -68,6 +71,7 @@ impl Closing {
             angle_of: BTreeMap::new(),
             regular: Vec::new(),
             may_be_undefined: finite::may_be_undefined(mechanism),
+            n_passes: PASSES.len(),
         };
         for id in &equations.projection.determinants {
             let limit = SINGULAR * magnitude::at_nominal(graph, mechanism, &[*id]);
@@ -134,6 +138,11 @@ impl Closing {
             }
         }
         Ok(closing)
+    }
+
+    /// Uses the first passes of lowering only, to see what the others do.
+    pub(crate) fn limit_passes(&mut self, n: usize) {
+        self.n_passes = n;
     }
 
     /// Whether every loop has a closed form.
@@ -255,13 +264,42 @@ impl Closing {
         equations: &Equations,
         outputs: &[ExprId],
     ) -> Program {
+        self.program_at(graph, equations, outputs, &BTreeMap::new())
+    }
+
+    /// What a program of some expressions costs. Expressions of an open chain are counted as they stand, since closing
+    /// does nothing to them and lowering finds little; that saves nearly all of the time.
+    pub(crate) fn weight(
+        &self,
+        graph: &mut Graph,
+        equations: &Equations,
+        outputs: &[ExprId],
+        known: &BTreeMap<ExprId, ExprId>,
+    ) -> usize {
+        if equations.projection.passive.is_empty() {
+            cost(graph, outputs)
+        } else {
+            self.program_at(graph, equations, outputs, known).weight()
+        }
+    }
+
+    /// The same where some rates and accelerations are known, such as none at all.
+    pub(crate) fn program_at(
+        &self,
+        graph: &mut Graph,
+        equations: &Equations,
+        outputs: &[ExprId],
+        known: &BTreeMap<ExprId, ExprId>,
+    ) -> Program {
         let projection = &equations.projection;
-        let rates: BTreeMap<ExprId, ExprId> = projection
+        let passive_rates = graph.substitute(&projection.passive_rates, known);
+        let mut rates: BTreeMap<ExprId, ExprId> = projection
             .passive
             .iter()
-            .zip(&projection.passive_rates)
-            .map(|(p, rate)| (graph.atom(Atom::Rate(*p)), *rate))
+            .zip(passive_rates)
+            .map(|(p, rate)| (graph.atom(Atom::Rate(*p)), rate))
             .collect();
+        rates.extend(known);
         let accelerations = graph.substitute(&projection.passive_accelerations, &rates);
         let mut motion = rates;
         for (p, acceleration) in projection.passive.iter().zip(accelerations) {
@@ -289,8 +327,9 @@ impl Closing {
                 (base, limit / factor.abs().to_f64())
             })
             .collect();
-        lower(
+        lower_by(
             graph,
+            self.n_passes,
             &Request {
                 may_be_undefined: self.may_be_undefined,
                 outputs,

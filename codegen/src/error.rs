@@ -79,6 +79,11 @@ pub enum DeriveError {
         /// The retained product.
         retained: String,
     },
+    /// An effect asks for a force that is not affine in the accelerations.
+    NotAffine {
+        /// Its name in the model file.
+        effect: String,
+    },
     /// The rank differs between two random sets of constants.
     RankChanged,
     /// The final proof at fresh points failed.
@@ -147,6 +152,10 @@ impl fmt::Display for DeriveError {
             Self::FactorNotRecovered { product, retained } => write!(
                 f,
                 "the factor between the columns of {product} and {retained} is no rational function of the constants of reasonable size"
+            ),
+            Self::NotAffine { effect } => write!(
+                f,
+                "the effect `{effect}` is not affine in the accelerations, so that there is no mass matrix; the inverse dynamics holds as it is"
             ),
             Self::RankChanged => f.write_str(
                 "the rank differs between random constants",

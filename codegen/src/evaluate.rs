@@ -12,7 +12,7 @@ use nalgebra::DMatrix;
 use crate::expr::Atom;
 use crate::lower::{Op, Program};
 use crate::programs::{LoopPrograms, PassivePosition};
-use crate::{Derivation, Programs};
+use crate::{Derivation, Dynamics, Programs};
 
 use machine::{Block, Machine, Scalar};
 
@@ -179,6 +179,88 @@ impl<'a> Evaluator<'a> {
     /// Coordinates and rates of the drives, then their Jacobian row by row: one vector each.
     pub fn drives(&self, states: &States<'_>) -> Result<Vec<Vec<f64>>, PoseFault> {
         self.run(&self.programs.drives, states, &[])
+    }
+
+    /// Mass matrix row by row: one vector per entry. Accelerations of the states are not read here and below.
+    pub fn mass_matrix(
+        &self,
+        dynamics: &Dynamics,
+        states: &States<'_>,
+        base: &[f64],
+    ) -> Result<Vec<Vec<f64>>, PoseFault> {
+        self.run(&dynamics.mass_matrix, states, base)
+    }
+
+    /// Generalised forces that rates alone ask for: one vector per independent coordinate.
+    pub fn coriolis(
+        &self,
+        dynamics: &Dynamics,
+        states: &States<'_>,
+        base: &[f64],
+    ) -> Result<Vec<Vec<f64>>, PoseFault> {
+        self.run(&dynamics.coriolis, states, base)
+    }
+
+    /// Generalised forces that weight alone asks for: one vector per independent coordinate.
+    pub fn gravity(
+        &self,
+        dynamics: &Dynamics,
+        states: &States<'_>,
+        base: &[f64],
+    ) -> Result<Vec<Vec<f64>>, PoseFault> {
+        self.run(&dynamics.gravity, states, base)
+    }
+
+    /// Generalised forces that effects ask for where nothing accelerates: one vector per independent coordinate.
+    pub fn effects(
+        &self,
+        dynamics: &Dynamics,
+        states: &States<'_>,
+        base: &[f64],
+    ) -> Result<Vec<Vec<f64>>, PoseFault> {
+        self.run(&dynamics.effects, states, base)
+    }
+
+    /// Forward dynamics: accelerations of the independent coordinates, one vector each, under the given forces of the
+    /// drives, one slice each.
+    pub fn forward_dynamics(
+        &self,
+        dynamics: &Dynamics,
+        states: &States<'_>,
+        base: &[f64],
+        forces: &[&[f64]],
+    ) -> Result<Vec<Vec<f64>>, PoseFault> {
+        let (n, n_drives) = (self.active.len(), self.mechanism.drives.len());
+        let mass = self.run(&dynamics.mass_matrix, states, base)?;
+        let rest = self.run(&dynamics.bias, states, base)?;
+        let (bias, jacobian) = rest.split_at(n);
+        let mut accelerations = vec![Vec::with_capacity(states.len()); n];
+        for sample in 0..states.len() {
+            let fault = |reason| PoseFault { sample, reason };
+            for (d, force) in forces.iter().enumerate() {
+                if !force[sample].is_finite() {
+                    let input = self.mechanism.drives[d].name.clone();
+                    return Err(fault(PoseReason::NotFinite { input }));
+                }
+            }
+            let mut matrix: Vec<Vec<f64>> = mass
+                .chunks(n.max(1))
+                .map(|row| row.iter().map(|entry| entry[sample]).collect())
+                .collect();
+            let mut solution: Vec<f64> = (0..n)
+                .map(|a| {
+                    let driven =
+                        (0..n_drives).map(|d| jacobian[d * n + a][sample] * forces[d][sample]);
+                    driven.sum::<f64>() - bias[a][sample]
+                })
+                .collect();
+            modelmill_runtime::solve(&mut matrix, &mut solution)
+                .map_err(|error| fault(error.into()))?;
+            for (column, value) in accelerations.iter_mut().zip(solution) {
+                column.push(value);
+            }
+        }
+        Ok(accelerations)
     }
 
     fn matrix(&self, program: &Program, states: &States<'_>) -> Result<DMatrix<f64>, PoseFault> {

@@ -11,6 +11,7 @@ use crate::DeriveError;
 use crate::closing::Closing;
 use crate::exact::Monomial;
 use crate::expr::{Atom, ExprId, Graph};
+use crate::forms;
 use crate::lower::{Program, Request, lower};
 use crate::magnitude;
 use crate::reduce::{Reduction, closed_form};
@@ -76,22 +77,12 @@ pub(crate) fn programs(
         .map(|(k, m)| ((*m).clone(), graph.atom(Atom::Base(k))))
         .collect();
     let base_value = |m: &Monomial| base.get(m).copied().unwrap_or(Graph::ZERO);
+    let retained: Vec<Monomial> = retained.into_iter().cloned().collect();
     let row_by_row = |columns: &[Vec<ExprId>]| -> Vec<ExprId> {
         (0..n_drives)
             .flat_map(|d| columns.iter().map(move |column| column[d]))
             .collect()
     };
-    let mut regressors = Vec::new();
-    let mut inverse_dynamics = Vec::new();
-    for style in equations.styles() {
-        let columns = retained
-            .iter()
-            .map(|m| equations.column(graph, mechanism, m, style))
-            .collect::<Result<Vec<_>, _>>()?;
-        regressors.push(row_by_row(&columns));
-        inverse_dynamics.push(equations.inverse_dynamics(graph, mechanism, &base_value, style)?);
-    }
-
     let projection = &equations.projection;
     let all: Vec<Vec<ExprId>> = reduction
         .products
@@ -125,11 +116,19 @@ pub(crate) fn programs(
             scales: plain(graph, &scales),
         }))
     };
-    let base = crate::base::expressions(graph, reduction);
-    let base_parameters = plain(graph, &base);
+    let base_expressions = crate::base::expressions(graph, reduction);
+    let base_parameters = plain(graph, &base_expressions);
+    let nothing = BTreeMap::new();
+    let weigh =
+        |graph: &mut Graph, outputs: &[ExprId]| closing.weight(graph, equations, outputs, &nothing);
+    let all_passes = forms::PASSES.len();
+    let regressor = forms::columns(graph, mechanism, equations, &retained, all_passes, &weigh)?;
+    let regressor = row_by_row(&regressor);
+    let inverse_dynamics =
+        forms::total(graph, mechanism, equations, &base_value, all_passes, &weigh)?;
     let mut program = |outputs: &[ExprId]| closing.program(graph, equations, outputs);
-    let regressor = cheapest(regressors.iter().map(|outputs| program(outputs)));
-    let inverse_dynamics = cheapest(inverse_dynamics.iter().map(|outputs| program(outputs)));
+    let regressor = program(&regressor);
+    let inverse_dynamics = program(&inverse_dynamics);
     Ok(Programs {
         passive_position,
         passive: program(&passive),
@@ -151,13 +150,6 @@ fn plain(graph: &mut Graph, outputs: &[ExprId]) -> Program {
         definitions: &[],
     };
     lower(graph, &request)
-}
-
-/// The program that costs least per state; the first of equals.
-fn cheapest(programs: impl Iterator<Item = Program>) -> Program {
-    programs
-        .min_by_key(Program::weight)
-        .expect("there is at least one way to write the equations")
 }
 
 /// Value of an expression at the nominal pose, with the file's constants; rates are zero.

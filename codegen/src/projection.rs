@@ -181,7 +181,7 @@ impl Projection {
     }
 
     /// Generalised forces of all coordinates, turned into those of the `y` and projected on the active ones.
-    fn project(&self, graph: &mut Graph, forces: &[ExprId]) -> Vec<ExprId> {
+    pub(crate) fn project(&self, graph: &mut Graph, forces: &[ExprId]) -> Vec<ExprId> {
         let n = self.rates_of.len();
         let in_y: Vec<ExprId> = (0..n)
             .map(|j| {

@@ -10,8 +10,9 @@ use modelmill_spec::{
 use crate::DeriveError;
 use crate::exact::{self, Monomial};
 use crate::expr::{Atom, ExprId, Graph};
+use crate::forms::{ColumnForm, Frames, TotalForm};
 use crate::inertia::InertiaByProduct;
-use crate::newton_euler::{self, Motion, Style};
+use crate::newton_euler;
 use crate::projection::Projection;
 use crate::rod;
 use crate::tree::Tree;
@@ -19,8 +20,8 @@ use crate::tree::Tree;
 /// The mechanism's equations before reduction.
 pub(crate) struct Equations {
     pub(crate) tree: Tree,
-    /// The links' motion in every style that differs for this tree.
-    motions: Vec<(Style, Motion)>,
+    /// Acceleration of free fall.
+    pub(crate) gravity: crate::vector::Vector,
     pub(crate) inertia: InertiaByProduct,
     pub(crate) projection: Projection,
     /// For every effect that is a rod, and each of its places: generalised forces of its three terms.
@@ -29,6 +30,12 @@ pub(crate) struct Equations {
     pub(crate) products: Vec<Monomial>,
     /// `columns[k][d]`: force of drive `d` for product `k`.
     pub(crate) columns: Vec<Vec<ExprId>>,
+}
+
+/// Forces of effects: generalised ones by coordinate of the open tree, and those along the drives.
+pub(crate) struct EffectForces {
+    pub(crate) on_tree: Vec<ExprId>,
+    pub(crate) on_drives: Vec<ExprId>,
 }
 
 /// Derives the regressor of all products.
@@ -42,17 +49,6 @@ pub(crate) fn equations(
         exact::expression(graph, &mechanism.gravity[1])?,
         exact::expression(graph, &mechanism.gravity[2])?,
     ];
-    let has_parallel_axes = tree
-        .links
-        .iter()
-        .enumerate()
-        .any(|(i, link)| link.first_parallel != i);
-    let styles = [Style::LinkByLink, Style::AcrossParallelAxes];
-    let motions = styles
-        .into_iter()
-        .filter(|style| *style == Style::LinkByLink || has_parallel_axes)
-        .map(|style| (style, newton_euler::forward(graph, &tree, &gravity, style)))
-        .collect();
     let inertia = InertiaByProduct::new(graph, mechanism, &tree)?;
     let projection = Projection::new(graph, mechanism, &tree)?;
     let mut rods = BTreeMap::new();
@@ -79,68 +75,47 @@ pub(crate) fn equations(
     let products: Vec<Monomial> = products.into_iter().collect();
     let mut equations = Equations {
         tree,
-        motions,
+        gravity,
         inertia,
         projection,
         rods,
         products,
         columns: Vec::new(),
     };
-    for product in equations.products.clone() {
-        let column = equations.column(graph, mechanism, &product, Style::LinkByLink)?;
-        equations.columns.push(column);
-    }
+    let form = ColumnForm::PLAIN;
+    let frames = Frames::new(graph, &equations.tree, &gravity, form.style, false);
+    let products = equations.products.clone();
+    equations.columns = equations.columns_of(graph, mechanism, &frames, &products, form)?;
     Ok(equations)
 }
 
 impl Equations {
-    /// The styles in which the equations can be written.
-    pub(crate) fn styles(&self) -> Vec<Style> {
-        self.motions.iter().map(|(style, _)| *style).collect()
-    }
-
-    fn motion(&self, style: Style) -> &Motion {
-        &self
-            .motions
-            .iter()
-            .find(|(s, _)| *s == style)
-            .unwrap_or(&self.motions[0])
-            .1
-    }
-
-    /// Forces of the drives for one product of value 1, all others 0.
-    pub(crate) fn column(
+    /// Forces of the drives for each of some products of value 1, all others 0.
+    pub(crate) fn columns_of(
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
-        product: &Monomial,
-        style: Style,
-    ) -> Result<Vec<ExprId>, DeriveError> {
-        let bodies: Vec<_> = self
-            .inertia
-            .of(product)
-            .map(|(link, inertia)| (link, *inertia))
-            .collect();
-        let motion = self.motion(style);
-        let wrenches: Vec<_> = bodies
-            .iter()
-            .map(|(link, inertia)| (*link, motion.wrench(graph, *link, inertia)))
-            .collect();
+        frames: &Frames,
+        products: &[Monomial],
+        form: ColumnForm,
+    ) -> Result<Vec<Vec<ExprId>>, DeriveError> {
         let n = mechanism.coordinates.len();
-        let on_tree = match style {
-            Style::LinkByLink => newton_euler::backward(graph, &self.tree, n, wrenches),
-            Style::AcrossParallelAxes => {
-                newton_euler::backward_across(graph, &self.tree, n, wrenches)
-            }
-        };
-        let value = |m: &Monomial| {
-            if m == product {
-                Graph::ONE
-            } else {
-                Graph::ZERO
-            }
-        };
-        self.forces(graph, mechanism, on_tree, &value)
+        let (tree, style) = (&frames.tree, form.style);
+        products
+            .iter()
+            .map(|product| {
+                let wrenches = form.wrenches(graph, self, frames, product, products);
+                let on_tree = newton_euler::carry(graph, tree, style, n, form.depths, wrenches);
+                let value = |m: &Monomial| {
+                    if m == product {
+                        Graph::ONE
+                    } else {
+                        Graph::ZERO
+                    }
+                };
+                self.forces(graph, mechanism, &on_tree, &value)
+            })
+            .collect()
     }
 
     /// Inverse dynamics: forces of the drives when every product has the value that `value` gives it.
@@ -148,27 +123,66 @@ impl Equations {
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
+        frames: &Frames,
         value: &dyn Fn(&Monomial) -> ExprId,
-        style: Style,
+        form: TotalForm,
     ) -> Result<Vec<ExprId>, DeriveError> {
-        let inertia = self.inertia.total(graph, value);
-        let motion = self.motion(style);
-        let wrenches: Vec<_> = inertia
-            .iter()
-            .map(|(link, inertia)| (*link, motion.wrench(graph, *link, inertia)))
-            .collect();
-        let on_tree =
-            newton_euler::backward(graph, &self.tree, mechanism.coordinates.len(), wrenches);
-        self.forces(graph, mechanism, on_tree, value)
+        let wrenches = form.wrenches(graph, self, frames, value);
+        let n = mechanism.coordinates.len();
+        let on_tree = newton_euler::backward(graph, &frames.tree, form.style, n, wrenches);
+        self.forces(graph, mechanism, &on_tree, value)
     }
 
     fn forces(
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
-        mut on_tree: Vec<ExprId>,
+        on_tree: &[ExprId],
         value: &dyn Fn(&Monomial) -> ExprId,
     ) -> Result<Vec<ExprId>, DeriveError> {
+        let effects = self.effect_forces(graph, mechanism, value)?;
+        let on_tree: Vec<ExprId> = on_tree
+            .iter()
+            .zip(effects.on_tree)
+            .map(|(a, b)| graph.add(*a, b))
+            .collect();
+        let forces = self.projection.drive_forces(graph, &on_tree)?;
+        Ok(forces
+            .into_iter()
+            .zip(effects.on_drives)
+            .map(|(a, b)| graph.add(a, b))
+            .collect())
+    }
+
+    /// Generalised forces of the independent coordinates for those of the open tree and for forces along the drives.
+    pub(crate) fn on_active(
+        &self,
+        graph: &mut Graph,
+        on_tree: &[ExprId],
+        on_drives: &[ExprId],
+    ) -> Vec<ExprId> {
+        let projected = self.projection.project(graph, on_tree);
+        projected
+            .into_iter()
+            .enumerate()
+            .map(|(a, force)| {
+                let mut terms = vec![force];
+                for (row, force) in self.projection.drive_jacobian.iter().zip(on_drives) {
+                    terms.push(graph.mul(row[a], *force));
+                }
+                graph.add_all(&terms)
+            })
+            .collect()
+    }
+
+    /// What effects ask for.
+    pub(crate) fn effect_forces(
+        &self,
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        value: &dyn Fn(&Monomial) -> ExprId,
+    ) -> Result<EffectForces, DeriveError> {
+        let mut on_tree = vec![Graph::ZERO; mechanism.coordinates.len()];
         let mut on_drives = vec![Graph::ZERO; mechanism.drives.len()];
         for (e, effect) in mechanism.effects.iter().enumerate() {
             for (p, place) in effect.places.iter().enumerate() {
@@ -196,12 +210,7 @@ impl Equations {
                 }
             }
         }
-        let forces = self.projection.drive_forces(graph, &on_tree)?;
-        Ok(forces
-            .into_iter()
-            .zip(on_drives)
-            .map(|(a, b)| graph.add(a, b))
-            .collect())
+        Ok(EffectForces { on_tree, on_drives })
     }
 
     /// What an effect's parameter multiplies at one of its places.

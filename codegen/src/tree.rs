@@ -7,7 +7,7 @@ use modelmill_spec::{Axis, FrameIdx, Mechanism, Step};
 
 use crate::DeriveError;
 use crate::exact;
-use crate::expr::{AngleSum, Atom, Graph, Rational};
+use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational};
 use crate::vector::{self, Turn, Vector, push_turn};
 
 /// A rigid frame that moves relative to its parent about or along its own z axis, or not at all.
@@ -29,6 +29,34 @@ pub(crate) struct Link {
     pub(crate) first_parallel: usize,
     /// Its rotation about z relative to the fixed side of that first link's joint.
     pub(crate) absolute: Turn,
+    /// Which axis of its parent's frame its joint is parallel to, and whether it points the same way.
+    pub(crate) axis: Option<(usize, bool)>,
+    /// The position but for what lies along such an axis, and that.
+    pub(crate) across: Vector,
+    pub(crate) along: ExprId,
+}
+
+impl Link {
+    /// Finds the axis of the joint in the parent's frame, and splits the position by it.
+    fn find_axis(&mut self, graph: &mut Graph) {
+        let z = [Graph::ZERO, Graph::ZERO, Graph::ONE];
+        let z = self
+            .pre
+            .iter()
+            .rev()
+            .fold(z, |v, turn| graph.turn_out(turn, &v));
+        let minus = graph.neg(Graph::ONE);
+        (self.across, self.along, self.axis) = (self.position, Graph::ZERO, None);
+        let mut nonzero = (0..3).filter(|i| z[*i] != Graph::ZERO);
+        if let (Some(axis), None) = (nonzero.next(), nonzero.next())
+            && (z[axis] == Graph::ONE || z[axis] == minus)
+        {
+            let positive = z[axis] == Graph::ONE;
+            let along = std::mem::replace(&mut self.across[axis], Graph::ZERO);
+            self.along = if positive { along } else { graph.neg(along) };
+            self.axis = Some((axis, positive));
+        }
+    }
 }
 
 /// All links; parents come before their children.
@@ -53,7 +81,38 @@ impl Tree {
             let link = builder.finish(&mut tree.links);
             tree.of_frame.push(Some(link));
         }
+        for link in &mut tree.links {
+            link.find_axis(graph);
+        }
         Ok(tree)
+    }
+
+    /// The same tree with every link's quantities in the axes of the fixed side of the first of its parallel joints, so
+    /// that nothing turns between parallel links; and the turn that takes each link's own axes there.
+    pub(crate) fn in_fixed_axes(&self, graph: &mut Graph) -> (Self, Vec<Turn>) {
+        let mut fixed = self.clone();
+        for (i, link) in fixed.links.iter_mut().enumerate() {
+            let own = &self.links[i];
+            link.joint = NO_TURN;
+            link.absolute = NO_TURN;
+            link.first_parallel = i;
+            let Some(parent) = own.parent else { continue };
+            let turned = &self.links[parent].absolute;
+            link.position = graph.turn_out(turned, &own.position);
+            if own.first_parallel == i {
+                link.pre.clear();
+                for turn in std::iter::once(turned).chain(&own.pre) {
+                    push_turn(&mut link.pre, turn);
+                }
+            } else {
+                link.pre.clear();
+            }
+        }
+        for link in &mut fixed.links {
+            link.find_axis(graph);
+        }
+        let turns = self.links.iter().map(|link| link.absolute.clone());
+        (fixed, turns.collect())
     }
 
     pub(crate) fn link_of(&self, frame: FrameIdx) -> Option<usize> {
@@ -70,16 +129,6 @@ impl Tree {
         }
         path.reverse();
         path
-    }
-
-    /// Components in the parent's frame of a vector given in the link's frame.
-    pub(crate) fn to_parent(&self, graph: &mut Graph, link: usize, v: &Vector) -> Vector {
-        let link = &self.links[link];
-        let mut v = graph.turn_out(&link.joint, v);
-        for turn in link.pre.iter().rev() {
-            v = graph.turn_out(turn, &v);
-        }
-        v
     }
 
     /// Components in the link's frame of a vector given in the parent's frame.
@@ -259,6 +308,9 @@ impl Builder {
             slides: done.slides,
             first_parallel,
             absolute,
+            axis: None,
+            across: done.position,
+            along: Graph::ZERO,
         });
     }
 

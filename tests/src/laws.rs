@@ -60,11 +60,11 @@ impl Case {
         Ok(Self { derivation, sample })
     }
 
-    fn mechanism(&self) -> &Mechanism {
+    pub(crate) fn mechanism(&self) -> &Mechanism {
         &self.derivation.mechanism
     }
 
-    fn breach(&self, what: &str) -> String {
+    pub(crate) fn breach(&self, what: &str) -> String {
         format!("{}: {what}", self.mechanism().name)
     }
 
@@ -342,7 +342,11 @@ impl Case {
 }
 
 /// All coordinates at a single state, passive ones from the evaluator.
-fn coordinates(evaluator: &Evaluator<'_>, mechanism: &Mechanism, one: &Sample) -> Vec<f64> {
+pub(crate) fn coordinates(
+    evaluator: &Evaluator<'_>,
+    mechanism: &Mechanism,
+    one: &Sample,
+) -> Vec<f64> {
     motion(evaluator, mechanism, one)
         .iter()
         .map(|q| q.0[0])
@@ -381,7 +385,11 @@ fn is_regular(mechanism: &Mechanism, coordinates: &[f64]) -> bool {
 }
 
 /// One motion per degree of freedom that keeps the loops closed, and the actual one.
-fn directions(mechanism: &Mechanism, numbers: &Numbers<'_>, motion: &[Jet]) -> Vec<Vec<f64>> {
+pub(crate) fn directions(
+    mechanism: &Mechanism,
+    numbers: &Numbers<'_>,
+    motion: &[Jet],
+) -> Vec<Vec<f64>> {
     let n = motion.len();
     let position: Vec<f64> = motion.iter().map(|q| q.0[0]).collect();
     let (passive, active): (Vec<usize>, Vec<usize>) =

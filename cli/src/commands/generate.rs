@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::args::GenerateArgs;
-use crate::failure::Outcome;
+use crate::failure::{Failure, Outcome};
 use crate::model;
 use crate::output::Target;
 use crate::table::count;
@@ -17,7 +17,15 @@ pub(crate) fn run(args: &GenerateArgs) -> Outcome {
         .as_ref()
         .map(|path| Target::new(path, model.files.iter().map(PathBuf::as_path)))
         .transpose()?;
-    let source = modelmill_codegen::emit(&model.derivation).file();
+    let derivation = &model.derivation;
+    let source = if args.dynamics {
+        let dynamics = derivation
+            .dynamics()
+            .map_err(|error| Failure::Input(format!("{}: {error}", model.path)))?;
+        modelmill_codegen::emit_with_dynamics(derivation, &dynamics).file()
+    } else {
+        modelmill_codegen::emit(derivation).file()
+    };
     match target {
         Some(target) => {
             target.write(&source)?;

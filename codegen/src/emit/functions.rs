@@ -70,23 +70,23 @@ pub(super) fn model(derivation: &Derivation) -> TokenStream {
 }
 
 /// A function of the state, as methods.
-struct Method<'a> {
-    name: &'a str,
-    doc: &'a str,
-    program: &'a Program,
+pub(super) struct Method<'a> {
+    pub(super) name: &'a str,
+    pub(super) doc: &'a str,
+    pub(super) program: &'a Program,
     /// Statements of the program and the expression of the result, with `fixed`, `state` and `passive` in scope.
-    statements: TokenStream,
-    result: TokenStream,
+    pub(super) statements: TokenStream,
+    pub(super) result: TokenStream,
     /// Where the fixed values and the model are.
-    fixed: TokenStream,
-    model: TokenStream,
+    pub(super) fixed: TokenStream,
+    pub(super) model: TokenStream,
     /// What the result is.
-    output: TokenStream,
+    pub(super) output: TokenStream,
 }
 
 impl Method<'_> {
     /// One method; where the passive coordinates are found by Newton's method, a second one that takes a guess.
-    fn tokens(&self, derivation: &Derivation) -> TokenStream {
+    pub(super) fn tokens(&self, derivation: &Derivation) -> TokenStream {
         let Self {
             name,
             doc,
@@ -117,10 +117,10 @@ impl Method<'_> {
         let (near, at) = (format_ident!("{name}_near"), format_ident!("{name}_at"));
         let cost = format!(
             " Cost: that of [`{}passive_position`] besides.",
-            if name == &"forces" {
-                "Model::"
-            } else {
+            if model.to_string() == "self" {
                 "Self::"
+            } else {
+                "Model::"
             }
         );
         let cost_near = cost.replace("passive_position", "passive_position_near");
@@ -329,7 +329,7 @@ pub(super) fn list(body: &Body<'_>, first: usize, n: usize) -> TokenStream {
 }
 
 /// Whether a program needs passive coordinates that Newton's method finds.
-fn reads_passive(derivation: &Derivation, program: &Program) -> bool {
+pub(super) fn reads_passive(derivation: &Derivation, program: &Program) -> bool {
     let (_, passive) = derivation.coordinates();
     matches!(
         derivation.programs.passive_position,

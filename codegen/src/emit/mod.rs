@@ -4,6 +4,7 @@
 //! for `f32` and `f64`.
 
 mod body;
+mod dynamics;
 mod functions;
 mod identifier;
 mod items;
@@ -12,7 +13,7 @@ mod newton;
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use crate::Derivation;
+use crate::{Derivation, Dynamics};
 
 /// Rust source of a module.
 #[derive(Clone, Debug)]
@@ -24,13 +25,23 @@ pub struct Emitted {
     items: TokenStream,
 }
 
-/// Writes the module of a derivation.
+/// Writes the module of a derivation: regressor and inverse dynamics.
 pub fn emit(derivation: &Derivation) -> Emitted {
     Emitted {
         name: derivation.mechanism.name.clone(),
         doc: items::module_doc(derivation),
         items: items::items(derivation),
     }
+}
+
+/// Writes the module of a derivation with its equation of motion besides: mass matrix, forward dynamics and what belongs
+/// to them.
+pub fn emit_with_dynamics(derivation: &Derivation, dynamics: &Dynamics) -> Emitted {
+    let mut emitted = emit(derivation);
+    emitted
+        .items
+        .extend(dynamics::dynamics(derivation, dynamics));
+    emitted
 }
 
 impl Emitted {

@@ -2,7 +2,7 @@
 //!
 //! The passes rewrite expressions into cheaper ones of equal value; the last one writes binary operations.
 
-mod cost;
+pub(crate) mod cost;
 mod factor_sums;
 mod flatten;
 mod program;
@@ -38,27 +38,45 @@ pub(crate) struct Request<'a> {
     pub(crate) definitions: &'a [Definition],
 }
 
+/// The passes of lowering, by name, in their order.
+pub(crate) const PASSES: [&str; 3] = [
+    "common factors out of sums",
+    "common pairs of terms and factors once",
+    "nested sums and products opened first",
+];
+
 /// Lowers the expressions of a request to a program.
 pub(crate) fn lower(graph: &Graph, request: &Request<'_>) -> Program {
+    lower_by(graph, PASSES.len(), request)
+}
+
+/// Lowers them with the first passes of [`PASSES`] only.
+pub(crate) fn lower_by(graph: &Graph, n_passes: usize, request: &Request<'_>) -> Program {
     let mut roots: Vec<ExprId> = request.outputs.to_vec();
     roots.extend(request.reachable);
     roots.extend(request.regular.iter().map(|(id, _)| *id));
     for definition in request.definitions {
         roots.extend(definition.operands());
     }
-    // The passes go through the whole arena again and again, so that only what is needed should be in it.
-    let (mut best_graph, mut best) = graph.compacted(&roots);
-    let mut best_cost = cost::cost(&best_graph, &best);
+    // Costs are the finished programs', so that no pass is kept that does not pay. The passes go through the whole arena again and again, so that only what is needed should be in it.
+    let (mut graph, mut next) = graph.compacted(&roots);
+    let mut best = schedule::schedule(&graph, &next, request);
     for _ in 0..4 {
-        let (mut graph, mut next) = best_graph.compacted(&best);
-        next = flatten::flatten(&mut graph, &next);
-        next = factor_sums::factor_sums(&mut graph, &next);
-        (graph, next) = share::share(&graph, &next);
-        let cost = cost::cost(&graph, &next);
-        if cost >= best_cost {
+        (graph, next) = graph.compacted(&next);
+        if n_passes > 2 {
+            next = flatten::flatten(&mut graph, &next);
+        }
+        if n_passes > 0 {
+            next = factor_sums::factor_sums(&mut graph, &next);
+        }
+        if n_passes > 1 {
+            (graph, next) = share::share(&graph, &next);
+        }
+        let program = schedule::schedule(&graph, &next, request);
+        if program.weight() >= best.weight() {
             break;
         }
-        (best_graph, best, best_cost) = (graph, next, cost);
+        best = program;
     }
-    schedule::schedule(&best_graph, &best, request)
+    best
 }

@@ -1,0 +1,210 @@
+//! The backward recursion: wrenches go down to the base, and leave their moment or force at each joint.
+
+use super::project::project;
+use super::{Side, Style, Wrench, turn_out_all};
+use crate::expr::{ExprId, Graph, Rational};
+use crate::tree::{Link, Tree};
+use crate::vector::Vector;
+
+/// Generalised forces of the coordinates, as terms that are still to be added.
+pub(super) struct Rows(Vec<Vec<(ExprId, Rational)>>);
+
+impl Rows {
+    fn new(n_coordinates: usize) -> Self {
+        Self(vec![Vec::new(); n_coordinates])
+    }
+
+    /// Leaves a moment about a link's axis and a force along it.
+    pub(super) fn leave(&mut self, link: &Link, moment: ExprId, force: ExprId) {
+        for (coordinate, n) in &link.turns {
+            self.0[*coordinate].push((moment, Rational::integer(i64::from(*n))));
+        }
+        for (coordinate, k) in &link.slides {
+            self.0[*coordinate].push((force, k.clone()));
+        }
+    }
+
+    fn sums(self, graph: &mut Graph) -> Vec<ExprId> {
+        self.0.into_iter().map(|terms| graph.sum(&terms)).collect()
+    }
+}
+
+fn join(graph: &mut Graph, total: &mut Option<Wrench>, wrench: Wrench) {
+    *total = Some(match *total {
+        None => wrench,
+        Some(there) => Wrench {
+            force: graph.add_vectors(&[there.force, wrench.force]),
+            moment: graph.add_vectors(&[there.moment, wrench.moment]),
+        },
+    });
+}
+
+/// The moment about the point on a link's axis that its position leads to across the axis.
+pub(super) fn back_along_axis(
+    graph: &mut Graph,
+    style: Style,
+    link: &Link,
+    wrench: &Wrench,
+) -> Vector {
+    let (_, along) = style.split_position(link);
+    let [mx, my, mz] = wrench.moment;
+    let (x, y) = (
+        graph.mul(along, wrench.force[1]),
+        graph.mul(along, wrench.force[0]),
+    );
+    [graph.sub(mx, x), graph.add(my, y), mz]
+}
+
+/// A wrench on a link, taken to its parent.
+fn to_parent(graph: &mut Graph, style: Style, link: &Link, side: Side, wrench: &Wrench) -> Wrench {
+    let mut moment = back_along_axis(graph, style, link, wrench);
+    let mut force = wrench.force;
+    if side == Side::Moving {
+        force = graph.turn_out(&link.joint, &force);
+        moment = graph.turn_out(&link.joint, &moment);
+    }
+    let force = turn_out_all(graph, &link.pre, &force);
+    let turned = turn_out_all(graph, &link.pre, &moment);
+    let (across, _) = style.split_position(link);
+    let lever = graph.cross(&across, &force);
+    let moment = graph.add_vectors(&[turned, lever]);
+    Wrench { force, moment }
+}
+
+/// Generalised force of every coordinate for the sum of the given wrenches, `n_coordinates` expressions.
+pub(crate) fn backward(
+    graph: &mut Graph,
+    tree: &Tree,
+    style: Style,
+    n_coordinates: usize,
+    wrenches: impl IntoIterator<Item = (usize, Side, Wrench)>,
+) -> Vec<ExprId> {
+    let n = tree.links.len();
+    let mut total: [Vec<Option<Wrench>>; 2] = [vec![None; n], vec![None; n]];
+    for (link, side, wrench) in wrenches {
+        join(graph, &mut total[side as usize][link], wrench);
+    }
+    let mut rows = Rows::new(n_coordinates);
+    for i in (0..n).rev() {
+        let link = &tree.links[i];
+        for side in [Side::Moving, Side::Fixed] {
+            let Some(wrench) = total[side as usize][i] else {
+                continue;
+            };
+            rows.leave(link, wrench.moment[2], wrench.force[2]);
+            if let Some(parent) = link.parent {
+                let wrench = to_parent(graph, style, link, side, &wrench);
+                join(graph, &mut total[Side::Moving as usize][parent], wrench);
+            }
+        }
+    }
+    rows.sums(graph)
+}
+
+/// Up to which depth wrenches are carried from link to link; from there they are projected on all axes above.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Depths {
+    /// Of wrenches that are a moment alone.
+    pub(crate) moments: usize,
+    /// Of all others.
+    pub(crate) forces: usize,
+}
+
+/// Generalised forces of one wrench by itself.
+pub(crate) fn carry(
+    graph: &mut Graph,
+    tree: &Tree,
+    style: Style,
+    n_coordinates: usize,
+    depths: Depths,
+    wrenches: impl IntoIterator<Item = (usize, Side, Wrench)>,
+) -> Vec<ExprId> {
+    let mut rows = Rows::new(n_coordinates);
+    for (start, side, wrench) in wrenches {
+        let depth = if wrench.has_force() {
+            depths.forces
+        } else {
+            depths.moments
+        };
+        let mut at = Some((start, side, wrench));
+        while let Some((i, side, wrench)) = at {
+            let link = &tree.links[i];
+            if side == Side::Moving && tree.path(Some(i)).len() <= depth {
+                rows.leave(link, wrench.moment[2], wrench.force[2]);
+                project(graph, tree, style, i, &wrench, &mut rows);
+                break;
+            }
+            let (first, wrench) = if style.across_parallel_axes {
+                across(graph, tree, style, i, side, wrench, &mut rows)
+            } else {
+                rows.leave(link, wrench.moment[2], wrench.force[2]);
+                (i, to_parent(graph, style, link, side, &wrench))
+            };
+            at = tree.links[first].parent.map(|p| (p, Side::Moving, wrench));
+        }
+    }
+    rows.sums(graph)
+}
+
+/// Leaves the generalised forces of the parallel joints from `start` up to the first; returns that first link with the
+/// wrench taken to its parent. What stands on the fixed side, that of the first joint, is a moment alone.
+fn across(
+    graph: &mut Graph,
+    tree: &Tree,
+    style: Style,
+    start: usize,
+    side: Side,
+    wrench: Wrench,
+    rows: &mut Rows,
+) -> (usize, Wrench) {
+    let first = style.first(tree, start);
+    // About z: from joint to joint, since only one component of the force is needed there.
+    let (mut force, mut about_z) = (wrench.force, wrench.moment[2]);
+    let mut arms: Vec<Vector> = Vec::new();
+    let mut i = start;
+    let mut here = side;
+    loop {
+        let joint = &tree.links[i];
+        rows.leave(joint, about_z, wrench.force[2]);
+        if i == first {
+            break;
+        }
+        if here == Side::Moving {
+            force = graph.turn_out(&joint.joint, &force);
+        }
+        here = Side::Moving;
+        force = turn_out_all(graph, &joint.pre, &force);
+        let [px, py, _] = joint.position;
+        let (x, y) = (graph.mul(px, force[1]), graph.mul(py, force[0]));
+        about_z = graph.combine([
+            (about_z, Rational::ONE),
+            (x, Rational::ONE),
+            (y, Rational::MINUS_ONE),
+        ]);
+        let parent = joint
+            .parent
+            .expect("a link below the first parallel one has a parent");
+        arms.push(graph.turn_out(&tree.links[parent].absolute, &joint.position));
+        i = parent;
+    }
+    // About x and y: at once.
+    let [force, turned] = match side {
+        Side::Moving => {
+            let absolute = &tree.links[start].absolute;
+            [wrench.force, wrench.moment].map(|v| graph.turn_out(absolute, &v))
+        }
+        Side::Fixed => [wrench.force, wrench.moment],
+    };
+    let arm = graph.add_vectors(&arms);
+    let lever = graph.cross(&arm, &force);
+    let moment = [
+        graph.add(turned[0], lever[0]),
+        graph.add(turned[1], lever[1]),
+        about_z,
+    ];
+    let wrench = Wrench { force, moment };
+    (
+        first,
+        to_parent(graph, style, &tree.links[first], Side::Fixed, &wrench),
+    )
+}

@@ -1,0 +1,223 @@
+//! Inertia of one link in the form that suits its motion, and the wrench that moves it.
+
+use std::collections::BTreeMap;
+
+use super::motion::LinkMotion;
+use super::{Element, Inertia, Motion, Side, Wrench};
+use crate::expr::{ExprId, Graph, Rational};
+use crate::tree::Tree;
+use crate::vector::{self, Turn, Vector};
+
+/// The diagonal of the inertia.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Spread {
+    /// Moments of inertia about x, y and z.
+    Moments(Vector),
+    /// Second moments of mass along x and y, where that along z is zero.
+    Flat([ExprId; 2]),
+}
+
+/// Inertia of one link.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Body {
+    pub(crate) mass: ExprId,
+    /// First moment, as forces and as moments see it.
+    pub(crate) force_moment: Vector,
+    pub(crate) moment_moment: Vector,
+    pub(crate) spread: Spread,
+    /// Products of inertia yz, xz, xy: opposite to x, y, z.
+    pub(crate) products: Vector,
+}
+
+impl Body {
+    pub(crate) fn new(inertia: &Inertia) -> Self {
+        let element = |e: Element| inertia[e.index()];
+        let inertia = |i| element(Element::Inertia(i));
+        Self {
+            mass: element(Element::Mass),
+            force_moment: [0, 1, 2].map(|i| element(Element::ForceMoment(i))),
+            moment_moment: [0, 1, 2].map(|i| element(Element::MomentMoment(i))),
+            spread: Spread::Moments([0, 3, 5].map(inertia)),
+            products: [4, 2, 1].map(inertia),
+        }
+    }
+
+    /// A body without inertia.
+    pub(crate) const NONE: Self = Self {
+        mass: Graph::ZERO,
+        force_moment: vector::ZERO,
+        moment_moment: vector::ZERO,
+        spread: Spread::Moments(vector::ZERO),
+        products: vector::ZERO,
+    };
+
+    /// The body in axes from which its own are turned about z.
+    pub(crate) fn turned(&self, graph: &mut Graph, turn: &Turn) -> Self {
+        let (c, s) = graph.cos_sin(&turn.sum, turn.pi12);
+        let force_moment = graph.turn_out(turn, &self.force_moment);
+        let moment_moment = graph.turn_out(turn, &self.moment_moment);
+        let [yz, xz, xy] = self.products;
+        let [xz, yz, _] = graph.turn_out(turn, &[xz, yz, Graph::ZERO]);
+        let mut turned = Self {
+            mass: self.mass,
+            force_moment,
+            moment_moment,
+            spread: self.spread,
+            products: [yz, xz, xy],
+        };
+        // What is left turns by twice the angle about its mean. Second moments turn as moments of inertia do, but
+        // products of inertia are second moments with the sign changed.
+        let (xx, yy, mixed) = match self.spread {
+            Spread::Moments([xx, yy, _]) => (xx, yy, xy),
+            Spread::Flat([xx, yy]) => (xx, yy, graph.neg(xy)),
+        };
+        if xx == yy && xy == Graph::ZERO {
+            return turned;
+        }
+        let half = Rational::new(1, 2);
+        let mean = graph.combine([(xx, half.clone()), (yy, half.clone())]);
+        let apart = graph.combine([(xx, half.clone()), (yy, -&half)]);
+        let twice = graph.scale(s, &Rational::integer(2));
+        let (ss, sine) = (graph.mul(twice, s), graph.mul(twice, c));
+        let cosine = graph.sub(Graph::ONE, ss);
+        let [ca, sm, sa, cm] = [
+            (cosine, apart),
+            (sine, mixed),
+            (sine, apart),
+            (cosine, mixed),
+        ]
+        .map(|(a, b)| graph.mul(a, b));
+        let apart = graph.sub(ca, sm);
+        let mixed = graph.add(sa, cm);
+        let (xx, yy) = (graph.add(mean, apart), graph.sub(mean, apart));
+        (turned.spread, turned.products[2]) = match self.spread {
+            Spread::Moments([_, _, zz]) => (Spread::Moments([xx, yy, zz]), mixed),
+            Spread::Flat(_) => (Spread::Flat([xx, yy]), graph.neg(mixed)),
+        };
+        turned
+    }
+}
+
+/// Moves second moments along a joint's axis to what carries it. A line along the axis without mass and first moment
+/// moves alike on both sides of the joint, so forces stay the same and one number less is multiplied.
+pub(crate) fn flatten_along_axes(
+    graph: &mut Graph,
+    tree: &Tree,
+    motion: &Motion,
+    bodies: &mut BTreeMap<usize, Body>,
+) {
+    for i in (0..tree.links.len()).rev() {
+        let link = &tree.links[i];
+        let Some((axis, _)) = link.axis else {
+            continue;
+        };
+        let Some(body) = bodies.get_mut(&i).filter(|_| motion.is_tilting(i)) else {
+            continue;
+        };
+        let Spread::Moments([xx, yy, zz]) = body.spread else {
+            continue;
+        };
+        let half = Rational::new(1, 2);
+        let mut moment = |less: ExprId, a: ExprId, b: ExprId| {
+            let terms = [(a, half.clone()), (b, half.clone()), (less, -&half)];
+            graph.combine(terms)
+        };
+        let (x, y, z) = (moment(xx, yy, zz), moment(yy, xx, zz), moment(zz, xx, yy));
+        body.spread = Spread::Flat([x, y]);
+        let Some(parent) = link.parent else { continue };
+        let parent = bodies.entry(parent).or_insert(Body::NONE);
+        if let Spread::Moments(moments) = &mut parent.spread {
+            for (k, moment) in moments.iter_mut().enumerate() {
+                if k != axis {
+                    *moment = graph.add(*moment, z);
+                }
+            }
+        }
+    }
+}
+
+/// Wrenches of all bodies; those at the ends of the tree on the fixed side of their joints if `turn_ends`, since there
+/// it is cheaper to turn the inertia than all of the motion.
+pub(crate) fn wrenches(
+    graph: &mut Graph,
+    tree: &Tree,
+    motion: &Motion,
+    bodies: &BTreeMap<usize, Body>,
+    turn_ends: bool,
+) -> Vec<(usize, Side, Wrench)> {
+    let mut wrenches = Vec::new();
+    for (i, body) in bodies {
+        let is_end = !tree.links.iter().any(|link| link.parent == Some(*i));
+        let mut on_fixed_side = || {
+            // Only the moments of flat bodies do without the angular acceleration.
+            let Spread::Flat(_) = body.spread else {
+                return None;
+            };
+            let body = body.turned(graph, &tree.links[*i].joint);
+            let moved = motion.at(graph, tree, *i, Side::Fixed)?;
+            Some(wrench(graph, &moved, &body))
+        };
+        let found = if turn_ends && is_end {
+            on_fixed_side().map(|wrench| (*i, Side::Fixed, wrench))
+        } else {
+            None
+        };
+        wrenches.push(found.unwrap_or_else(|| {
+            let moved = motion.links[*i].clone();
+            (*i, Side::Moving, wrench(graph, &moved, body))
+        }));
+    }
+    wrenches
+}
+
+impl Motion {
+    /// The wrench that moves a body along with `link`.
+    pub(crate) fn wrench(&self, graph: &mut Graph, link: usize, body: &Body) -> Wrench {
+        wrench(graph, &self.links[link], body)
+    }
+}
+
+fn wrench(graph: &mut Graph, moved: &LinkMotion, body: &Body) -> Wrench {
+    let LinkMotion {
+        omega,
+        alpha,
+        acceleration,
+        field,
+        differences,
+        ..
+    } = moved;
+    let mut force = graph.scale_vector(body.mass, acceleration);
+    for i in 0..3 {
+        let swung = graph.dot(&field[i], &body.force_moment);
+        force[i] = graph.add(force[i], swung);
+    }
+    let lever = graph.cross(&body.moment_moment, acceleration);
+    let off = body.products;
+    let moment = std::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        let against = graph.neg(field[k][i]);
+        let mut terms = vec![
+            graph.mul(off[k], against),
+            graph.mul(off[j], field[j][i]),
+            graph.mul(off[i], differences[i]),
+            lever[i],
+        ];
+        match body.spread {
+            Spread::Moments(diagonal) => {
+                let spread = graph.sub(diagonal[k], diagonal[j]);
+                let product = graph.mul(omega[j], omega[k]);
+                terms.push(graph.mul(diagonal[i], alpha[i]));
+                terms.push(graph.mul(spread, product));
+            }
+            // With second moments: moment_i = field_kj e_jj - field_jk e_kk.
+            Spread::Flat(second) => {
+                let second = [second[0], second[1], Graph::ZERO];
+                terms.push(graph.mul(field[k][j], second[j]));
+                let other = graph.mul(field[j][k], second[k]);
+                terms.push(graph.neg(other));
+            }
+        }
+        graph.add_all(&terms)
+    });
+    Wrench { force, moment }
+}

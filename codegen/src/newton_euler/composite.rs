@@ -1,0 +1,223 @@
+//! Inertia of the tree as its joints feel it: composite bodies (Walker and Orin 1982).
+//!
+//! All links below a joint, held as they stand, are one body. The wrench that accelerates it about or along that joint
+//! alone, read off at the joints above, gives a column of the mass matrix; what lies below follows by symmetry.
+
+use super::{Body, Depths, Side, Spread, Style, Wrench, carry};
+use crate::expr::{ExprId, Graph, Rational};
+use crate::tree::{Link, Tree};
+use crate::vector::{self, Turn, Vector};
+
+/// Mass, first moment and second moments of mass (xx, yy, zz; yz, xz, xy) about the origin of a frame.
+#[derive(Clone, Copy)]
+struct Moments {
+    mass: ExprId,
+    first: Vector,
+    square: Vector,
+    mixed: Vector,
+}
+
+impl Moments {
+    const NONE: Self = Self {
+        mass: Graph::ZERO,
+        first: vector::ZERO,
+        square: vector::ZERO,
+        mixed: vector::ZERO,
+    };
+
+    fn of(graph: &mut Graph, body: &Body) -> Self {
+        let square = match body.spread {
+            Spread::Flat([x, y]) => [x, y, Graph::ZERO],
+            Spread::Moments(moments) => std::array::from_fn(|i| {
+                let half = Rational::new(1, 2);
+                let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+                graph.combine([
+                    (moments[j], half.clone()),
+                    (moments[k], half.clone()),
+                    (moments[i], -&half),
+                ])
+            }),
+        };
+        Self {
+            mass: body.mass,
+            first: body.moment_moment,
+            square,
+            // Products of inertia are second moments with the sign changed.
+            mixed: body.products.map(|p| graph.neg(p)),
+        }
+    }
+
+    fn plus(&self, graph: &mut Graph, other: &Self) -> Self {
+        Self {
+            mass: graph.add(self.mass, other.mass),
+            first: graph.add_vectors(&[self.first, other.first]),
+            square: graph.add_vectors(&[self.square, other.square]),
+            mixed: graph.add_vectors(&[self.mixed, other.mixed]),
+        }
+    }
+
+    /// About a point from which the present one is at `arm`.
+    fn moved(&self, graph: &mut Graph, arm: &Vector) -> Self {
+        let mut moved = *self;
+        for i in 0..3 {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            let carried = graph.mul(self.mass, arm[i]);
+            moved.first[i] = graph.add(self.first[i], carried);
+            // arm first' + first arm' + mass arm arm'; the first two terms are equal on the diagonal.
+            let both = graph.add(self.first[i], moved.first[i]);
+            let square = graph.mul(arm[i], both);
+            moved.square[i] = graph.add(self.square[i], square);
+            let heavy = graph.mul(self.mass, arm[j]);
+            let heavy = graph.add(self.first[j], heavy);
+            let (a, b) = (graph.mul(arm[k], heavy), graph.mul(arm[j], self.first[k]));
+            moved.mixed[i] = graph.add_all(&[self.mixed[i], a, b]);
+        }
+        moved
+    }
+
+    /// In the frame in which the present one is turned.
+    fn turned(&self, graph: &mut Graph, turn: &Turn) -> Self {
+        let axis = turn.axis as usize;
+        let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+        let (c, s) = graph.cos_sin(&turn.sum, turn.pi12);
+        let mut turned = *self;
+        turned.first = graph.turn_out(turn, &self.first);
+        // The mixed moments with the axis turn as a vector: mixed[j] belongs to axis and i, mixed[i] to axis and j.
+        let mut beside = vector::ZERO;
+        (beside[i], beside[j]) = (self.mixed[j], self.mixed[i]);
+        let beside = graph.turn_out(turn, &beside);
+        (turned.mixed[j], turned.mixed[i]) = (beside[i], beside[j]);
+        // The others turn by twice the angle about their mean.
+        let half = Rational::new(1, 2);
+        let (x, y) = (self.square[i], self.square[j]);
+        let mean = graph.combine([(x, half.clone()), (y, half.clone())]);
+        let apart = graph.combine([(x, half.clone()), (y, -&half)]);
+        let mixed = self.mixed[axis];
+        let (cosine, sine) = if turn.sum.is_empty() {
+            graph.cos_sin(&turn.sum, 2 * turn.pi12)
+        } else {
+            let twice = graph.scale(s, &Rational::integer(2));
+            let (ss, sine) = (graph.mul(twice, s), graph.mul(twice, c));
+            (graph.sub(Graph::ONE, ss), sine)
+        };
+        let products = [
+            (cosine, apart),
+            (sine, mixed),
+            (sine, apart),
+            (cosine, mixed),
+        ]
+        .map(|(a, b)| graph.mul(a, b));
+        let apart = graph.sub(products[0], products[1]);
+        turned.mixed[axis] = graph.add(products[2], products[3]);
+        turned.square[i] = graph.add(mean, apart);
+        turned.square[j] = graph.sub(mean, apart);
+        turned
+    }
+
+    /// What a link carries, as its parent sees it.
+    fn to_parent(self, graph: &mut Graph, style: Style, link: &Link) -> Self {
+        let (across, along) = style.split_position(link);
+        let mut moments = self.moved(graph, &[Graph::ZERO, Graph::ZERO, along]);
+        for turn in link.pre.iter().chain([&link.joint]).rev() {
+            moments = moments.turned(graph, turn);
+        }
+        moments.moved(graph, &across)
+    }
+
+    /// The wrench that turns the body about z with acceleration 1.
+    fn turning(&self, graph: &mut Graph) -> Wrench {
+        let [x, y, _] = self.first;
+        let [yz, xz, _] = self.mixed;
+        Wrench {
+            force: [graph.neg(y), x, Graph::ZERO],
+            moment: [
+                graph.neg(xz),
+                graph.neg(yz),
+                graph.add(self.square[0], self.square[1]),
+            ],
+        }
+    }
+
+    /// The wrench that slides it along z with acceleration 1.
+    fn sliding(&self, graph: &mut Graph) -> Wrench {
+        let [x, y, _] = self.first;
+        Wrench {
+            force: [Graph::ZERO, Graph::ZERO, self.mass],
+            moment: [y, graph.neg(x), Graph::ZERO],
+        }
+    }
+}
+
+/// Mass matrix of the open tree by its coordinates, by rows.
+pub(crate) fn mass_matrix(
+    graph: &mut Graph,
+    tree: &Tree,
+    style: Style,
+    n_coordinates: usize,
+    bodies: &[(usize, Body)],
+) -> Vec<Vec<ExprId>> {
+    let n = tree.links.len();
+    let mut composite = vec![Moments::NONE; n];
+    for (link, body) in bodies {
+        let moments = Moments::of(graph, body);
+        composite[*link] = composite[*link].plus(graph, &moments);
+    }
+    for i in (0..n).rev() {
+        if let Some(parent) = tree.links[i].parent {
+            let carried = composite[i].to_parent(graph, style, &tree.links[i]);
+            composite[parent] = composite[parent].plus(graph, &carried);
+        }
+    }
+    // Every link's turning and sliding as a coordinate of its own: turning first, then sliding.
+    let mut apart = tree.clone();
+    for (i, link) in apart.links.iter_mut().enumerate() {
+        link.turns = vec![(2 * i, 1)];
+        link.slides = vec![(2 * i + 1, Rational::ONE)];
+    }
+    let motions: Vec<Vec<(usize, Rational)>> = tree
+        .links
+        .iter()
+        .flat_map(|link| {
+            let turns = link.turns.iter();
+            let turns = turns.map(|(c, n)| (*c, Rational::integer(i64::from(*n))));
+            [turns.collect(), link.slides.clone()]
+        })
+        .collect();
+    let depths = Depths {
+        moments: 0,
+        forces: 0,
+    };
+    let mut terms = vec![vec![Vec::new(); n_coordinates]; n_coordinates];
+    for (m, coordinates) in motions.iter().enumerate() {
+        if coordinates.is_empty() {
+            continue;
+        }
+        let moments = composite[m / 2];
+        let wrench = if m % 2 == 0 {
+            moments.turning(graph)
+        } else {
+            moments.sliding(graph)
+        };
+        let wrench = [(m / 2, Side::Moving, wrench)];
+        let column = carry(graph, &apart, style, 2 * n, depths, wrench);
+        for (k, entry) in column.into_iter().enumerate() {
+            // A link's turning and sliding see each other from both sides; each pair counts once.
+            if k / 2 == m / 2 && k > m {
+                continue;
+            }
+            for (c, f) in &motions[k] {
+                for (d, g) in coordinates {
+                    let factor = f * g;
+                    terms[*c][*d].push((entry, factor.clone()));
+                    if k != m {
+                        terms[*d][*c].push((entry, factor));
+                    }
+                }
+            }
+        }
+    }
+    terms
+        .into_iter()
+        .map(|row| row.into_iter().map(|terms| graph.sum(&terms)).collect())
+        .collect()
+}

@@ -1,0 +1,171 @@
+//! Forces of all joints above a link, read off in the link's own frame: `z_i . (M + (o - c_i) x F)` with the axis of
+//! joint i and a point on it (virtual power). Axes through one point share the moment about it, and axes and points are
+//! shared by all wrenches that are projected in the same frame.
+
+use super::backward::{Rows, back_along_axis};
+use super::{Style, Wrench, turn_in_all};
+use crate::expr::{ExprId, Graph};
+use crate::tree::Tree;
+use crate::vector::{self, Vector};
+
+/// Leaves the forces of a wrench at all joints above `at`.
+pub(super) fn project(
+    graph: &mut Graph,
+    tree: &Tree,
+    style: Style,
+    at: usize,
+    wrench: &Wrench,
+    rows: &mut Rows,
+) {
+    let path = tree.path(Some(at));
+    let Some((_, above)) = path.split_last() else {
+        return;
+    };
+    let moment = back_along_axis(graph, style, &tree.links[at], wrench);
+    let points = points(graph, tree, &path);
+    let mut rest = above;
+    while let Some(last) = rest.last() {
+        let n = rest
+            .iter()
+            .rev()
+            .take_while(|i| points[**i].group == points[*last].group)
+            .count();
+        let (further, group) = rest.split_at(rest.len() - n);
+        rest = further;
+        let arm = if wrench.has_force() {
+            arm(graph, tree, style, *last, points[*last].along, &path)
+        } else {
+            vector::ZERO
+        };
+        let axes: Vec<Vector> = group
+            .iter()
+            .map(|i| direction(graph, tree, style, *i, at))
+            .collect();
+        // One axis alone: the screw's two halves; several: the moment about their point.
+        let shared = (group.len() > 1).then(|| {
+            let lever = graph.cross(&arm, &wrench.force);
+            graph.add_vectors(&[moment, lever])
+        });
+        for (i, axis) in group.iter().zip(&axes) {
+            let link = &tree.links[*i];
+            let about = match shared {
+                Some(moment) => graph.dot(axis, &moment),
+                None => {
+                    let speed = graph.cross(axis, &arm);
+                    let turned = graph.dot(axis, &moment);
+                    let moved = graph.dot(&speed, &wrench.force);
+                    graph.add(turned, moved)
+                }
+            };
+            let along = if link.slides.is_empty() {
+                Graph::ZERO
+            } else {
+                graph.dot(axis, &wrench.force)
+            };
+            rows.leave(link, about, along);
+        }
+    }
+}
+
+/// A point on a joint's axis.
+#[derive(Clone, Copy)]
+struct Point {
+    /// Axes with the same number go through the same point.
+    group: usize,
+    /// Where it lies on the axis, from the link's origin.
+    along: ExprId,
+}
+
+/// A point for every joint on a path, by link; neighbouring axes that meet share one.
+fn points(graph: &mut Graph, tree: &Tree, path: &[usize]) -> Vec<Point> {
+    let mut points = vec![
+        Point {
+            group: 0,
+            along: Graph::ZERO
+        };
+        tree.links.len()
+    ];
+    // Whether the point of the group may still be moved along its only axis.
+    let mut is_free = true;
+    for (k, i) in path.iter().enumerate() {
+        points[*i].group = k;
+        let link = &tree.links[*i];
+        let above = k.checked_sub(1).map(|k| path[k]);
+        let meets = above.and_then(|above| {
+            let (axis, positive) = link.axis?;
+            let mut left = link.position;
+            let own = std::mem::replace(&mut left[axis], Graph::ZERO);
+            let [x, y, z] = left;
+            let fits = is_free || points[above].along == z;
+            // A point must stay on both axes: a slide would take it along.
+            let slides = !link.slides.is_empty() || !tree.links[above].slides.is_empty();
+            let meets = axis != 2 && x == Graph::ZERO && y == Graph::ZERO && fits && !slides;
+            meets.then(|| (above, z, if positive { graph.neg(own) } else { own }))
+        });
+        match meets {
+            Some((above, at, along)) => {
+                points[above].along = at;
+                points[*i] = Point {
+                    group: points[above].group,
+                    along,
+                };
+                is_free = false;
+            }
+            None => is_free = true,
+        }
+    }
+    points
+}
+
+/// Direction of a joint's axis in the frame of a link below it.
+fn direction(graph: &mut Graph, tree: &Tree, style: Style, joint: usize, at: usize) -> Vector {
+    let z = [Graph::ZERO, Graph::ZERO, Graph::ONE];
+    if joint == at {
+        return z;
+    }
+    let first = style.first(tree, at);
+    // Parallel axes are the same in the frames of all of them.
+    if style.first(tree, joint) == first {
+        return z;
+    }
+    let Some(parent) = tree.links[first].parent else {
+        return z;
+    };
+    let above = direction(graph, tree, style, joint, parent);
+    let fixed = turn_in_all(graph, &tree.links[first].pre, &above);
+    graph.turn_in(style.turn(&tree.links[at]), &fixed)
+}
+
+/// From a point on the axis of `joint`, given by its place along it, to the point of the last link of `path` that is
+/// reached before its offset along its own axis, in that link's frame.
+fn arm(
+    graph: &mut Graph,
+    tree: &Tree,
+    style: Style,
+    joint: usize,
+    along: ExprId,
+    path: &[usize],
+) -> Vector {
+    let start = path.iter().position(|i| *i == joint).unwrap_or(0);
+    // On the fixed side of the first of parallel joints; turned on only where these end.
+    let mut v = [Graph::ZERO, Graph::ZERO, graph.neg(along)];
+    let mut above = joint;
+    for i in &path[start + 1..] {
+        let link = &tree.links[*i];
+        let (across, own) = style.split_position(link);
+        let turn = style.turn(&tree.links[above]).clone();
+        if style.first(tree, *i) == *i {
+            v = graph.turn_in(&turn, &v);
+            v = graph.add_vectors(&[v, across]);
+            v = turn_in_all(graph, &link.pre, &v);
+        } else {
+            let across = graph.turn_out(&turn, &across);
+            v = graph.add_vectors(&[v, across]);
+        }
+        if Some(i) != path.last() {
+            v[2] = graph.add(v[2], own);
+        }
+        above = *i;
+    }
+    graph.turn_in(style.turn(&tree.links[above]), &v)
+}
