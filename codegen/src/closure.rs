@@ -6,6 +6,7 @@ use crate::DeriveError;
 use crate::exact;
 use crate::expr::{AngleSum, Atom, ExprId, Graph};
 use crate::linear_loops::Relation;
+use crate::spatial;
 use crate::tree::Tree;
 use crate::vector::{self, Turn, Vector, push_turn};
 
@@ -18,6 +19,8 @@ pub(crate) struct Closure {
     pub(crate) residual: Vec<ExprId>,
     /// The same as a chain of vectors turned about one axis, if the loop is planar.
     pub(crate) chain: Option<Vec<Leg>>,
+    /// Equations that hold where it closes, each without one or another of its coordinates; empty if it is planar.
+    pub(crate) equations: Vec<ExprId>,
     /// Relations that solve it outright; empty if there are none.
     pub(crate) relations: Vec<Relation>,
     /// Coordinates on which it depends, sorted.
@@ -33,13 +36,14 @@ pub(crate) struct Leg {
 }
 
 /// A stretch of a path: a vector given in a frame that `turns` lead to.
-struct Stretch {
-    turns: Vec<Turn>,
-    vector: Vector,
+#[derive(Clone)]
+pub(crate) struct Stretch {
+    pub(crate) turns: Vec<Turn>,
+    pub(crate) vector: Vector,
 }
 
 /// Position of a point in a frame up its tree, as stretches: `start` turns stand in front of all.
-fn stretches(tree: &Tree, links: &[usize], start: &[Turn], at: &Vector) -> Vec<Stretch> {
+pub(crate) fn stretches(tree: &Tree, links: &[usize], start: &[Turn], at: &Vector) -> Vec<Stretch> {
     let mut turns = start.to_vec();
     let mut path = Vec::new();
     for &i in links {
@@ -73,7 +77,7 @@ fn fixed_turns(tree: &Tree, links: &[usize]) -> Option<Vec<Turn>> {
     None
 }
 
-fn sum_of(graph: &mut Graph, path: &[Stretch]) -> Vector {
+pub(crate) fn sum_of(graph: &mut Graph, path: &[Stretch]) -> Vector {
     let vectors: Vec<Vector> = path
         .iter()
         .map(|stretch| {
@@ -109,14 +113,14 @@ pub(crate) fn position_in_base(
 }
 
 /// The paths of two points from the frame that both hang on, and the points' positions in their own frames.
-struct Between<'a> {
-    paths: [&'a [usize]; 2],
-    at: [Vector; 2],
+pub(crate) struct Between<'a> {
+    pub(crate) paths: [&'a [usize]; 2],
+    pub(crate) at: [Vector; 2],
 }
 
 impl Between<'_> {
     /// The vector from the second point to the first as stretches, in the common frame turned by `start`.
-    fn stretches(&self, graph: &mut Graph, tree: &Tree, start: &[Turn]) -> Vec<Stretch> {
+    pub(crate) fn stretches(&self, graph: &mut Graph, tree: &Tree, start: &[Turn]) -> Vec<Stretch> {
         let [first, second] = [0, 1].map(|i| stretches(tree, self.paths[i], start, &self.at[i]));
         let mut path = first;
         for mut stretch in second {
@@ -128,7 +132,7 @@ impl Between<'_> {
 }
 
 /// Turns the other way, in the opposite order.
-fn inverse(turns: &[Turn]) -> Vec<Turn> {
+pub(crate) fn inverse(turns: &[Turn]) -> Vec<Turn> {
     turns
         .iter()
         .rev()
@@ -207,7 +211,11 @@ pub(crate) fn closures(
                 at: [point_at(graph, a)?, point_at(graph, b)?],
             };
             let path = between.stretches(graph, tree, &inverse(&into));
-            Ok(close(graph, l.name.clone(), &path))
+            let mut closure = close(graph, l.name.clone(), &path);
+            if closure.chain.is_none() {
+                closure.equations = spatial::equations(graph, tree, &between);
+            }
+            Ok(closure)
         })
         .collect()
 }
@@ -252,6 +260,7 @@ fn close(graph: &mut Graph, name: String, path: &[Stretch]) -> Closure {
         name,
         residual,
         chain,
+        equations: Vec::new(),
         relations: Vec::new(),
         coordinates,
     }

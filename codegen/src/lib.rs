@@ -24,6 +24,7 @@ mod reduce;
 mod regressor;
 pub mod review;
 mod rod;
+mod spatial;
 mod tree;
 mod vector;
 

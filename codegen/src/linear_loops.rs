@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::closure::{Closure, coordinates_of};
 use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Node, Tape};
-use crate::field::{Element, MODULUS, Stream};
+use crate::field::{Element, Stream};
 use crate::numeric_pose::Loops;
 
 /// A passive angle that equals `sum + pi12 * pi/12`.
@@ -260,7 +260,7 @@ fn closes(graph: &mut Graph, residual: &[ExprId], relations: &[Relation]) -> boo
     let atoms = graph.atoms(&closed);
     let mut stream = Stream::new(2);
     (0..8).all(|_| {
-        let mut point = FieldPoint::<MODULUS>::default();
+        let mut point = FieldPoint::<Element>::default();
         for atom in &atoms {
             point.values.insert(*atom, stream.element());
             point.angles.insert(*atom, stream.circle());

@@ -8,8 +8,10 @@ use super::branches;
 use crate::closure::Closure;
 use crate::dyad::{self, Solved};
 use crate::expr::{AngleSum, Atom, Domain, ExprId, FieldPoint, Graph, Tape};
+use crate::field::Number;
 use crate::programs::nominal_value;
 use crate::projection::Projection;
+use crate::spatial;
 
 /// A way to solve all loops one after the other, each for at most two coordinates.
 #[derive(Clone, Debug)]
@@ -17,7 +19,7 @@ pub(crate) struct Plan {
     pub(crate) steps: Vec<PlanStep>,
 }
 
-/// One loop of a plan.
+/// One loop of a plan, or one of its coordinates.
 #[derive(Clone, Debug)]
 pub(crate) struct PlanStep {
     pub(crate) unknown: Vec<usize>,
@@ -65,12 +67,15 @@ pub(crate) fn plan(
             choices(closure, &free, projection, unknowns)
                 .into_iter()
                 .find_map(|unknown| solve(graph, mechanism, closure, unknown))
-                .map(|step| (position, step))
+                .map(|found| (position, found))
         });
-        let (position, step) = next?;
+        let (position, mut found) = next?;
         let index = todo.remove(position);
         known.extend(&projection.closures[index].coordinates);
-        steps.push(step);
+        if unknowns == Unknowns::Any {
+            found.reverse();
+        }
+        steps.extend(found);
     }
     if unknowns == Unknowns::Any {
         steps.reverse();
@@ -93,23 +98,40 @@ fn choices(
         };
         return if all { vec![related] } else { Vec::new() };
     }
+    let size = if closure.chain.is_some() {
+        2
+    } else {
+        closure.residual.len()
+    };
     if unknowns == Unknowns::Passive {
-        return if free.len() == 2 {
+        return if free.len() == size {
             vec![free.to_vec()]
         } else {
             Vec::new()
         };
     }
-    let mut pairs: Vec<Vec<usize>> = Vec::new();
-    for (i, a) in free.iter().enumerate() {
-        pairs.extend(free[i + 1..].iter().map(|b| vec![*a, *b]));
-    }
-    pairs.sort_by_key(|pair| {
-        pair.iter()
+    let mut sets = subsets(free, size);
+    sets.sort_by_key(|set| {
+        set.iter()
             .filter(|c| !projection.passive.contains(c))
             .count()
     });
-    pairs
+    sets
+}
+
+/// All subsets of some size, in order.
+fn subsets(of: &[usize], size: usize) -> Vec<Vec<usize>> {
+    if size == 0 {
+        return vec![Vec::new()];
+    }
+    let with = |i: usize| {
+        let rest = subsets(&of[i + 1..], size - 1);
+        rest.into_iter().map(move |mut set| {
+            set.insert(0, of[i]);
+            set
+        })
+    };
+    (0..of.len()).flat_map(with).collect()
 }
 
 fn solve(
@@ -117,14 +139,28 @@ fn solve(
     mechanism: &Mechanism,
     closure: &Closure,
     unknown: Vec<usize>,
-) -> Option<PlanStep> {
+) -> Option<Vec<PlanStep>> {
+    if closure.chain.is_none() && closure.relations.is_empty() {
+        let steps = spatial::solve(
+            graph,
+            mechanism,
+            &closure.equations,
+            &closure.residual,
+            &unknown,
+        )?;
+        let step = |(coordinate, solved)| PlanStep {
+            unknown: vec![coordinate],
+            solved,
+        };
+        return Some(steps.into_iter().map(step).collect());
+    }
     let mut solved = dyad::solve(graph, closure, &unknown, true)?;
     if let Some(root) = solved.root
         && nominal_value(graph, mechanism, root.witness).is_some_and(|x| x < 0.0)
     {
         solved = dyad::solve(graph, closure, &unknown, false)?;
     }
-    Some(PlanStep { unknown, solved })
+    Some(vec![PlanStep { unknown, solved }])
 }
 
 /// A step of a plan in the field.
@@ -164,7 +200,7 @@ impl SolveStep {
     }
 
     /// Sets the unknown coordinates of a point whose other coordinates are set; `None` if the loop does not close there.
-    pub(super) fn solve<const P: u64>(&self, point: &mut FieldPoint<P>) -> Option<()> {
+    pub(super) fn solve<N: Number>(&self, point: &mut FieldPoint<N>) -> Option<()> {
         let values = self.tape.evaluate(point)?;
         let numbers = &values[2 * self.angles.len()..];
         for (i, value) in self.numbers.iter().zip(numbers) {
