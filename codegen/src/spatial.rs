@@ -183,8 +183,7 @@ impl Circular {
         let atom = Atom::Coordinate(coordinate);
         let slope = graph.differentiate(&[equation], atom);
         let bend = graph.differentiate(&slope, atom);
-        let [at_zero, slope, bend] =
-            at_zero(graph, &[equation, slope[0], bend[0]], coordinate)[..]
+        let [at_zero, slope, bend] = at_zero(graph, &[equation, slope[0], bend[0]], coordinate)[..]
         else {
             return None;
         };

@@ -197,7 +197,10 @@ mod tests {
             let a: Element = stream.element();
             assert_eq!(Extended::from(a).hashed(seed), a.hashed(seed).into());
             assert_eq!(Extended::from(a).bits(seed), Number::bits(a, seed));
-            let b = Extended { re: a, im: stream.element() };
+            let b = Extended {
+                re: a,
+                im: stream.element(),
+            };
             assert_eq!(b.hashed(seed), b.hashed(seed));
             assert_ne!(b.hashed(seed), (-b).hashed(seed));
         }

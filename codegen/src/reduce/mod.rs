@@ -431,7 +431,10 @@ struct Factors<'a> {
 }
 
 impl reconstruct::Oracle for Factors<'_> {
-    fn constants<const P: u64>(&self, stream: &mut Stream) -> Result<FieldPoint<Element<P>>, DeriveError> {
+    fn constants<const P: u64>(
+        &self,
+        stream: &mut Stream,
+    ) -> Result<FieldPoint<Element<P>>, DeriveError> {
         self.regressor.sampler.constants(stream)
     }
 

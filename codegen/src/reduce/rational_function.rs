@@ -272,7 +272,10 @@ pub(crate) fn monomial_value<const P: u64>(
     })
 }
 
-fn polynomial_value<const P: u64>(p: &Polynomial, point: &FieldPoint<Element<P>>) -> Option<Element<P>> {
+fn polynomial_value<const P: u64>(
+    p: &Polynomial,
+    point: &FieldPoint<Element<P>>,
+) -> Option<Element<P>> {
     p.iter().try_fold(Element::ZERO, |sum, (powers, k)| {
         Some(sum + Element::from_rational(k)? * monomial_value(powers, point)?)
     })

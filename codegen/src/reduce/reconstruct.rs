@@ -17,7 +17,10 @@ const MOST_POINTS: usize = 26;
 /// A black box in every prime field.
 pub(crate) trait Oracle {
     /// Random constants.
-    fn constants<const P: u64>(&self, stream: &mut Stream) -> Result<FieldPoint<Element<P>>, DeriveError>;
+    fn constants<const P: u64>(
+        &self,
+        stream: &mut Stream,
+    ) -> Result<FieldPoint<Element<P>>, DeriveError>;
     /// Values of all functions at given constants.
     fn values<const P: u64>(
         &mut self,
