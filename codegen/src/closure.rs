@@ -17,9 +17,12 @@ pub(crate) struct Closure {
     pub(crate) name: String,
     /// Difference of the two positions in the plane of the loop (2) or in the frame of its root (3); all zero.
     pub(crate) residual: Vec<ExprId>,
+    /// How many of these are independent of each other and of those of loops before.
+    pub(crate) n_independent: usize,
     /// The same as a chain of vectors turned about one axis, if the loop is planar.
     pub(crate) chain: Option<Vec<Leg>>,
-    /// Equations that hold where it closes, each without one or another of its coordinates; empty if it is planar.
+    /// Equations that hold where it closes, each without one or another of its coordinates; empty if all loops are
+    /// planar.
     pub(crate) equations: Vec<ExprId>,
     /// Relations that solve it outright; empty if there are none.
     pub(crate) relations: Vec<Relation>,
@@ -193,31 +196,43 @@ pub(crate) fn closures(
     mechanism: &Mechanism,
     tree: &Tree,
 ) -> Result<Vec<Closure>, DeriveError> {
-    mechanism
+    let paths: Vec<[Vec<usize>; 2]> = mechanism
         .loops
         .iter()
         .map(|l| {
-            let [a, b] = l.joins.map(|p| &mechanism.points[p.0]);
-            let path = |frame: FrameIdx| tree.path(tree.link_of(frame));
-            let (pa, pb) = (path(a.frame), path(b.frame));
-            let common = pa.iter().zip(&pb).take_while(|(x, y)| x == y).count();
-            let (pa, pb) = (&pa[common..], &pb[common..]);
-            // What stands still before the first turning joint leads into the plane of the loop, if it has one.
-            let into = fixed_turns(tree, pa)
-                .or_else(|| fixed_turns(tree, pb))
-                .unwrap_or_default();
-            let between = Between {
-                paths: [pa, pb],
-                at: [point_at(graph, a)?, point_at(graph, b)?],
-            };
-            let path = between.stretches(graph, tree, &inverse(&into));
-            let mut closure = close(graph, l.name.clone(), &path);
-            if closure.chain.is_none() {
+            let [a, b] = l.joins.map(|p| {
+                let frame: FrameIdx = mechanism.points[p.0].frame;
+                tree.path(tree.link_of(frame))
+            });
+            let common = a.iter().zip(&b).take_while(|(x, y)| x == y).count();
+            [a[common..].to_vec(), b[common..].to_vec()]
+        })
+        .collect();
+    let mut all = Vec::new();
+    for (l, [pa, pb]) in mechanism.loops.iter().zip(&paths) {
+        let [a, b] = l.joins.map(|p| &mechanism.points[p.0]);
+        // What stands still before the first turning joint leads into the plane of the loop, if it has one.
+        let into = fixed_turns(tree, pa)
+            .or_else(|| fixed_turns(tree, pb))
+            .unwrap_or_default();
+        let between = Between {
+            paths: [pa, pb],
+            at: [point_at(graph, a)?, point_at(graph, b)?],
+        };
+        let path = between.stretches(graph, tree, &inverse(&into));
+        all.push((close(graph, l.name.clone(), &path), between));
+    }
+    // Planar loops among spatial ones may have to be solved together with them.
+    let is_spatial = all.iter().any(|(closure, _)| closure.chain.is_none());
+    Ok(all
+        .into_iter()
+        .map(|(mut closure, between)| {
+            if is_spatial {
                 closure.equations = spatial::equations(graph, tree, &between);
             }
-            Ok(closure)
+            closure
         })
-        .collect()
+        .collect())
 }
 
 fn close(graph: &mut Graph, name: String, path: &[Stretch]) -> Closure {
@@ -258,6 +273,7 @@ fn close(graph: &mut Graph, name: String, path: &[Stretch]) -> Closure {
     let coordinates = coordinates_of(graph, &residual);
     Closure {
         name,
+        n_independent: residual.len(),
         residual,
         chain,
         equations: Vec::new(),

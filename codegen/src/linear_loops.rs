@@ -107,7 +107,8 @@ fn poses(
     /// How often the reach is halved where loops cannot be followed, as near the end of a slide.
     const HALVINGS: u32 = 6;
     let loops = Loops::solved_for(graph, mechanism, residual, unknown.to_vec(), given);
-    let nominal = loops.nominal()?;
+    // A loop that leaves some of them free keeps to relations of many kinds.
+    let nominal = loops.nominal().filter(|q| loops.is_regular(q))?;
     (0..=HALVINGS).find_map(|k| {
         let reach = MOVE / f64::from(1_u32 << k);
         let mut stream = Stream::new(1);

@@ -79,10 +79,11 @@ fn square(graph: &mut Graph, path: &[Stretch]) -> ExprId {
     graph.sum(&terms)
 }
 
-/// Solves a loop for all of `unknown`, one coordinate after the other; every other coordinate is known.
+/// Solves one or more loops for all of `unknown`, one coordinate after the other; every other coordinate is known.
 ///
-/// Square roots have the sign that they have at the nominal pose. Returns `None` where no order is found, or where what
-/// is found does not close the loop.
+/// Where no equation holds a single unknown, a slide that stands in one linearly, with a known factor, is eliminated and
+/// follows at the end. Square roots have the sign that they have at the nominal pose. Returns `None` where no order is
+/// found, or where what is found does not close the loops.
 pub(crate) fn solve(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -91,19 +92,15 @@ pub(crate) fn solve(
     unknown: &[usize],
 ) -> Option<Vec<(usize, Solved)>> {
     let mut left: BTreeSet<usize> = unknown.iter().copied().collect();
-    let mut steps = Vec::new();
-    let inside: Vec<(ExprId, BTreeSet<usize>)> = equations
+    let (mut steps, mut last) = (Vec::new(), Vec::new());
+    let mut open: Vec<(ExprId, BTreeSet<usize>)> = equations
         .iter()
-        .map(|e| (*e, crate::closure::coordinates_of(graph, &[*e])))
-        .map(|(e, coordinates)| {
-            let inside = coordinates.into_iter().filter(|c| left.contains(c));
-            (e, inside.collect())
-        })
+        .map(|e| (*e, unknowns_of(graph, *e, &left)))
         .collect();
     while !left.is_empty() {
         let mut ways: Vec<Way> = Vec::new();
         for &coordinate in &left {
-            let own: Vec<ExprId> = inside
+            let own: Vec<ExprId> = open
                 .iter()
                 .filter(|(_, all)| all.intersection(&left).eq([&coordinate]))
                 .map(|(e, _)| *e)
@@ -112,11 +109,62 @@ pub(crate) fn solve(
         }
         let best = ways
             .into_iter()
-            .min_by_key(|way| (way.solved.root.is_some(), way.size, way.coordinate))?;
-        left.remove(&best.coordinate);
-        steps.push((best.coordinate, best.solved));
+            .min_by_key(|way| (way.solved.root.is_some(), way.size, way.coordinate));
+        if let Some(best) = best {
+            left.remove(&best.coordinate);
+            steps.push((best.coordinate, best.solved));
+            continue;
+        }
+        let (coordinate, value) = eliminable(graph, mechanism, &open, &left)?;
+        left.remove(&coordinate);
+        let all: Vec<ExprId> = open.iter().map(|(e, _)| *e).collect();
+        let at = graph.atom(Atom::Coordinate(coordinate));
+        let all = graph.substitute(&all, &BTreeMap::from([(at, value)]));
+        let mut rest: Vec<ExprId> = Vec::new();
+        for e in all {
+            if !is_zero(graph, e) && !rest.contains(&e) {
+                rest.push(e);
+            }
+        }
+        open = rest
+            .into_iter()
+            .map(|e| (e, unknowns_of(graph, e, &left)))
+            .collect();
+        last.insert(0, (coordinate, of_length(coordinate, value)));
     }
+    steps.extend(last);
     closes(graph, residual, &steps).then_some(steps)
+}
+
+fn unknowns_of(graph: &Graph, equation: ExprId, left: &BTreeSet<usize>) -> BTreeSet<usize> {
+    let all = crate::closure::coordinates_of(graph, &[equation]);
+    all.into_iter().filter(|c| left.contains(c)).collect()
+}
+
+/// A slide that stands linearly, with a known factor, in the equation with the fewest unknowns, and what it equals.
+fn eliminable(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    open: &[(ExprId, BTreeSet<usize>)],
+    left: &BTreeSet<usize>,
+) -> Option<(usize, ExprId)> {
+    let mut order: Vec<&(ExprId, BTreeSet<usize>)> = open.iter().collect();
+    order.sort_by_key(|(e, all)| (all.intersection(left).count(), *e));
+    order.into_iter().find_map(|(equation, all)| {
+        let inside = all.intersection(left).copied();
+        let slides: Vec<usize> = inside
+            .filter(|c| mechanism.coordinates[*c].motion == Motion::Prismatic)
+            .collect();
+        slides.into_iter().find_map(|slide| {
+            let slope = graph.differentiate(&[*equation], Atom::Coordinate(slide))[0];
+            if !unknowns_of(graph, slope, left).is_empty() || !is_regular(graph, mechanism, slope) {
+                return None;
+            }
+            let rest = at_zero(graph, &[*equation], slide)[0];
+            let ratio = graph.div(rest, slope);
+            Some((slide, graph.neg(ratio)))
+        })
+    })
 }
 
 /// One way to solve for a coordinate.
@@ -241,6 +289,15 @@ fn of_angle(coordinate: usize, cos_sin: [ExprId; 2]) -> Solved {
     }
 }
 
+fn of_length(coordinate: usize, value: ExprId) -> Solved {
+    Solved {
+        angles: Vec::new(),
+        relations: Vec::new(),
+        lengths: vec![(coordinate, value)],
+        root: None,
+    }
+}
+
 /// Two equations give cosine and sine without a root.
 fn both(
     graph: &mut Graph,
@@ -281,12 +338,7 @@ fn slide(
     };
     let half = Rational::new(1, 2);
     let (p, q) = (graph.scale(bend, &half), graph.scale(slope, &half));
-    let length = |value| Solved {
-        angles: Vec::new(),
-        relations: Vec::new(),
-        lengths: vec![(coordinate, value)],
-        root: None,
-    };
+    let length = |value| of_length(coordinate, value);
     if is_zero(graph, p) {
         if !is_regular(graph, mechanism, slope) {
             return None;

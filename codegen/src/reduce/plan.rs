@@ -11,6 +11,7 @@ use crate::expr::{AngleSum, Atom, Domain, ExprId, FieldPoint, Graph, Tape};
 use crate::field::Number;
 use crate::programs::nominal_value;
 use crate::projection::Projection;
+use crate::solvable;
 use crate::spatial;
 
 /// A way to solve all loops one after the other, each for at most two coordinates.
@@ -48,7 +49,9 @@ pub(crate) fn plan(
     unknowns: Unknowns,
 ) -> Option<Plan> {
     let mut steps: Vec<PlanStep> = Vec::new();
-    let mut todo: Vec<usize> = (0..projection.closures.len()).collect();
+    let mut todo: Vec<usize> = (0..projection.closures.len())
+        .filter(|i| projection.closures[*i].n_independent > 0)
+        .collect();
     let mut known: BTreeSet<usize> = projection.active.iter().copied().collect();
     while !todo.is_empty() {
         let next = todo.iter().enumerate().find_map(|(position, index)| {
@@ -69,7 +72,14 @@ pub(crate) fn plan(
                 .find_map(|unknown| solve(graph, mechanism, closure, unknown))
                 .map(|found| (position, found))
         });
-        let (position, mut found) = next?;
+        let Some((position, mut found)) = next else {
+            let mut found = together(graph, mechanism, projection, unknowns, &todo, &known)?;
+            if unknowns == Unknowns::Any {
+                found.reverse();
+            }
+            steps.extend(found);
+            break;
+        };
         let index = todo.remove(position);
         known.extend(&projection.closures[index].coordinates);
         if unknowns == Unknowns::Any {
@@ -101,7 +111,7 @@ fn choices(
     let size = if closure.chain.is_some() {
         2
     } else {
-        closure.residual.len()
+        closure.n_independent
     };
     if unknowns == Unknowns::Passive {
         return if free.len() == size {
@@ -117,6 +127,61 @@ fn choices(
             .count()
     });
     sets
+}
+
+/// Solves several loops together.
+fn together(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    projection: &Projection,
+    unknowns: Unknowns,
+    todo: &[usize],
+    known: &BTreeSet<usize>,
+) -> Option<Vec<PlanStep>> {
+    let closures: Vec<&Closure> = todo.iter().map(|i| &projection.closures[*i]).collect();
+    if closures
+        .iter()
+        .any(|c| c.equations.is_empty() || !c.relations.is_empty())
+    {
+        return None;
+    }
+    let mut equations: Vec<ExprId> = closures.iter().flat_map(|c| c.equations.clone()).collect();
+    equations.sort_unstable();
+    equations.dedup();
+    let residual: Vec<ExprId> = closures.iter().flat_map(|c| c.residual.clone()).collect();
+    let mut free: BTreeSet<usize> = closures
+        .iter()
+        .flat_map(|c| c.coordinates.clone())
+        .collect();
+    let size = closures.iter().map(|c| c.n_independent).sum();
+    let sets = match unknowns {
+        Unknowns::Passive => {
+            free.retain(|c| !known.contains(c));
+            let free: Vec<usize> = free.into_iter().collect();
+            if free.len() == size {
+                vec![free]
+            } else {
+                Vec::new()
+            }
+        }
+        Unknowns::Any => {
+            let free: Vec<usize> = free.into_iter().collect();
+            solvable::promising(graph, mechanism, &equations, &residual, &free, size)
+        }
+    };
+    sets.into_iter().find_map(|unknown| {
+        let steps = spatial::solve(graph, mechanism, &equations, &residual, &unknown)?;
+        Some(single_steps(steps))
+    })
+}
+
+/// Coordinates solved for one by one as steps of a plan.
+fn single_steps(steps: Vec<(usize, Solved)>) -> Vec<PlanStep> {
+    let step = |(coordinate, solved)| PlanStep {
+        unknown: vec![coordinate],
+        solved,
+    };
+    steps.into_iter().map(step).collect()
 }
 
 /// All subsets of some size, in order.
@@ -148,11 +213,7 @@ fn solve(
             &closure.residual,
             &unknown,
         )?;
-        let step = |(coordinate, solved)| PlanStep {
-            unknown: vec![coordinate],
-            solved,
-        };
-        return Some(steps.into_iter().map(step).collect());
+        return Some(single_steps(steps));
     }
     let mut solved = dyad::solve(graph, closure, &unknown, true)?;
     if let Some(root) = solved.root
