@@ -173,7 +173,6 @@ agrees! {
     emps_agrees_with_the_evaluator: emps "emps";
     five_bar_agrees_with_the_evaluator: five_bar "five_bar" passive;
     four_bar_agrees_with_the_evaluator: four_bar "four_bar" passive;
-    gough_stewart_tied_agrees_with_the_evaluator: gough_stewart_tied "gough_stewart_tied" passive;
     panda_agrees_with_the_evaluator: panda "panda";
     parallelogram_agrees_with_the_evaluator: parallelogram "parallelogram";
     puma560_agrees_with_the_evaluator: puma560 "puma560";
