@@ -111,7 +111,7 @@ fn looks_solvable(mut equations: Vec<(u64, Vec<(u64, u64)>)>, unknown: u64) -> b
         let single = equations
             .iter()
             .map(|(all, _)| all & left)
-            .find(|all| all.count_ones() == 1);
+            .find(|all| all.is_power_of_two());
         if let Some(single) = single {
             left &= !single;
             continue;

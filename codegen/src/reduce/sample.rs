@@ -89,7 +89,7 @@ impl Sampler {
             .ok_or_else(none)?;
         let parts: [fn(&Extended<P>) -> Element<P>; 2] = [|x| x.re, |x| x.im];
         let is_split = values.iter().any(|x| x.im != Element::ZERO);
-        let shown = &parts[..1 + usize::from(is_split)];
+        let shown = &parts[..=usize::from(is_split)];
         Ok(shown
             .iter()
             .flat_map(|part| values.iter().map(part))

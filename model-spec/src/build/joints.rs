@@ -15,16 +15,21 @@ use crate::values::AxisName;
 /// The coordinates of joints with several, each with whether it is an angle.
 pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&Formula, bool)> {
     let mut all: Vec<(&Formula, bool)> = Vec::new();
-    let kinds: [(&Option<List<Formula>>, fn(usize) -> bool); 4] = [
-        (&joint.cylindrical, |i| i == 0),
-        (&joint.universal, |_| true),
-        (&joint.spherical, |_| true),
-        (&joint.free, |i| i > 2),
-    ];
-    for (list, is_angle) in kinds {
+    // How many of the first coordinates are lengths; an angle leads in a cylindrical joint.
+    for (list, n_lengths) in [
+        (&joint.universal, 0),
+        (&joint.spherical, 0),
+        (&joint.free, 3),
+    ] {
         let entries = list.iter().flat_map(|list| &list.entries).enumerate();
-        all.extend(entries.map(|(i, formula)| (formula, is_angle(i))));
+        all.extend(entries.map(|(i, formula)| (formula, i >= n_lengths)));
     }
+    let cylindrical = joint.cylindrical.iter().flat_map(|list| &list.entries);
+    all.extend(
+        cylindrical
+            .enumerate()
+            .map(|(i, formula)| (formula, i == 0)),
+    );
     all
 }
 
