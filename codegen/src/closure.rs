@@ -6,6 +6,7 @@ use crate::DeriveError;
 use crate::exact;
 use crate::expr::{AngleSum, Atom, ExprId, Graph};
 use crate::linear_loops::Relation;
+use crate::spatial;
 use crate::tree::Tree;
 use crate::vector::{self, Turn, Vector, push_turn};
 
@@ -16,8 +17,13 @@ pub(crate) struct Closure {
     pub(crate) name: String,
     /// Difference of the two positions in the plane of the loop (2) or in the frame of its root (3); all zero.
     pub(crate) residual: Vec<ExprId>,
+    /// How many of these are independent of each other and of those of loops before.
+    pub(crate) n_independent: usize,
     /// The same as a chain of vectors turned about one axis, if the loop is planar.
     pub(crate) chain: Option<Vec<Leg>>,
+    /// Equations that hold where it closes, each without one or another of its coordinates; empty if all loops are
+    /// planar.
+    pub(crate) equations: Vec<ExprId>,
     /// Relations that solve it outright; empty if there are none.
     pub(crate) relations: Vec<Relation>,
     /// Coordinates on which it depends, sorted.
@@ -33,13 +39,14 @@ pub(crate) struct Leg {
 }
 
 /// A stretch of a path: a vector given in a frame that `turns` lead to.
-struct Stretch {
-    turns: Vec<Turn>,
-    vector: Vector,
+#[derive(Clone)]
+pub(crate) struct Stretch {
+    pub(crate) turns: Vec<Turn>,
+    pub(crate) vector: Vector,
 }
 
 /// Position of a point in a frame up its tree, as stretches: `start` turns stand in front of all.
-fn stretches(tree: &Tree, links: &[usize], start: &[Turn], at: &Vector) -> Vec<Stretch> {
+pub(crate) fn stretches(tree: &Tree, links: &[usize], start: &[Turn], at: &Vector) -> Vec<Stretch> {
     let mut turns = start.to_vec();
     let mut path = Vec::new();
     for &i in links {
@@ -73,7 +80,7 @@ fn fixed_turns(tree: &Tree, links: &[usize]) -> Option<Vec<Turn>> {
     None
 }
 
-fn sum_of(graph: &mut Graph, path: &[Stretch]) -> Vector {
+pub(crate) fn sum_of(graph: &mut Graph, path: &[Stretch]) -> Vector {
     let vectors: Vec<Vector> = path
         .iter()
         .map(|stretch| {
@@ -109,14 +116,14 @@ pub(crate) fn position_in_base(
 }
 
 /// The paths of two points from the frame that both hang on, and the points' positions in their own frames.
-struct Between<'a> {
-    paths: [&'a [usize]; 2],
-    at: [Vector; 2],
+pub(crate) struct Between<'a> {
+    pub(crate) paths: [&'a [usize]; 2],
+    pub(crate) at: [Vector; 2],
 }
 
 impl Between<'_> {
     /// The vector from the second point to the first as stretches, in the common frame turned by `start`.
-    fn stretches(&self, graph: &mut Graph, tree: &Tree, start: &[Turn]) -> Vec<Stretch> {
+    pub(crate) fn stretches(&self, graph: &mut Graph, tree: &Tree, start: &[Turn]) -> Vec<Stretch> {
         let [first, second] = [0, 1].map(|i| stretches(tree, self.paths[i], start, &self.at[i]));
         let mut path = first;
         for mut stretch in second {
@@ -128,7 +135,7 @@ impl Between<'_> {
 }
 
 /// Turns the other way, in the opposite order.
-fn inverse(turns: &[Turn]) -> Vec<Turn> {
+pub(crate) fn inverse(turns: &[Turn]) -> Vec<Turn> {
     turns
         .iter()
         .rev()
@@ -189,27 +196,43 @@ pub(crate) fn closures(
     mechanism: &Mechanism,
     tree: &Tree,
 ) -> Result<Vec<Closure>, DeriveError> {
-    mechanism
+    let paths: Vec<[Vec<usize>; 2]> = mechanism
         .loops
         .iter()
         .map(|l| {
-            let [a, b] = l.joins.map(|p| &mechanism.points[p.0]);
-            let path = |frame: FrameIdx| tree.path(tree.link_of(frame));
-            let (pa, pb) = (path(a.frame), path(b.frame));
-            let common = pa.iter().zip(&pb).take_while(|(x, y)| x == y).count();
-            let (pa, pb) = (&pa[common..], &pb[common..]);
-            // What stands still before the first turning joint leads into the plane of the loop, if it has one.
-            let into = fixed_turns(tree, pa)
-                .or_else(|| fixed_turns(tree, pb))
-                .unwrap_or_default();
-            let between = Between {
-                paths: [pa, pb],
-                at: [point_at(graph, a)?, point_at(graph, b)?],
-            };
-            let path = between.stretches(graph, tree, &inverse(&into));
-            Ok(close(graph, l.name.clone(), &path))
+            let [a, b] = l.joins.map(|p| {
+                let frame: FrameIdx = mechanism.points[p.0].frame;
+                tree.path(tree.link_of(frame))
+            });
+            let common = a.iter().zip(&b).take_while(|(x, y)| x == y).count();
+            [a[common..].to_vec(), b[common..].to_vec()]
         })
-        .collect()
+        .collect();
+    let mut all = Vec::new();
+    for (l, [pa, pb]) in mechanism.loops.iter().zip(&paths) {
+        let [a, b] = l.joins.map(|p| &mechanism.points[p.0]);
+        // What stands still before the first turning joint leads into the plane of the loop, if it has one.
+        let into = fixed_turns(tree, pa)
+            .or_else(|| fixed_turns(tree, pb))
+            .unwrap_or_default();
+        let between = Between {
+            paths: [pa, pb],
+            at: [point_at(graph, a)?, point_at(graph, b)?],
+        };
+        let path = between.stretches(graph, tree, &inverse(&into));
+        all.push((close(graph, l.name.clone(), &path), between));
+    }
+    // Planar loops among spatial ones may have to be solved together with them.
+    let is_spatial = all.iter().any(|(closure, _)| closure.chain.is_none());
+    Ok(all
+        .into_iter()
+        .map(|(mut closure, between)| {
+            if is_spatial {
+                closure.equations = spatial::equations(graph, tree, &between);
+            }
+            closure
+        })
+        .collect())
 }
 
 fn close(graph: &mut Graph, name: String, path: &[Stretch]) -> Closure {
@@ -250,8 +273,10 @@ fn close(graph: &mut Graph, name: String, path: &[Stretch]) -> Closure {
     let coordinates = coordinates_of(graph, &residual);
     Closure {
         name,
+        n_independent: residual.len(),
         residual,
         chain,
+        equations: Vec::new(),
         relations: Vec::new(),
         coordinates,
     }

@@ -27,6 +27,9 @@ mod reduce;
 mod regressor;
 pub mod review;
 mod rod;
+mod solvable;
+mod spatial;
+mod torn;
 mod tree;
 mod vector;
 

@@ -1,5 +1,6 @@
 //! Small linear systems of expressions, by cofactors, block by block.
 //!
+//! Blocks that are too large for that are torn apart first.
 //! No pivot is ever divided by except the determinant of a block, so that a regular system has no spurious singularity.
 
 use std::collections::HashMap;
@@ -9,9 +10,10 @@ use petgraph::graph::{DiGraph, NodeIndex, UnGraph};
 
 use crate::DeriveError;
 use crate::expr::{ExprId, Graph, Rational};
+use crate::torn;
 
 /// The largest block that is solved by cofactors.
-const LARGEST_BLOCK: usize = 8;
+pub(crate) const LARGEST_BLOCK: usize = 10;
 
 /// The solution of a linear system, and what must not vanish for it to exist.
 pub(crate) struct Solution {
@@ -49,57 +51,89 @@ pub(crate) fn solve(
             }
         }
         solved.extend(&columns);
-        if rows.len() > LARGEST_BLOCK {
-            return Err(DeriveError::TooLarge {
-                what: what.to_owned(),
-                size: rows.len(),
-                limit: LARGEST_BLOCK,
-            });
-        }
         let block: Vec<Vec<ExprId>> = rows
             .iter()
             .map(|r| columns.iter().map(|c| matrix[*r][*c]).collect())
             .collect();
-        let all = (1u32 << rows.len()) - 1;
-        let mut minors = Minors {
-            matrix: &block,
-            known: HashMap::new(),
+        let block_rhs: Vec<Vec<ExprId>> = rows.iter().map(|r| rhs[*r].clone()).collect();
+        let found = if rows.len() > LARGEST_BLOCK {
+            let (found, regular) =
+                torn::solve(graph, &block, &block_rhs).ok_or_else(|| DeriveError::TooLarge {
+                    what: what.to_owned(),
+                    size: rows.len(),
+                    limit: LARGEST_BLOCK,
+                })?;
+            determinants.extend(regular.into_iter().filter(|d| d.index() > 1));
+            found
+        } else {
+            let (found, determinant) =
+                by_cofactors(graph, &block, &block_rhs).ok_or_else(singular)?;
+            if determinant.index() > 1 {
+                determinants.push(determinant);
+            }
+            found
         };
-        let determinant = minors.minor(graph, all, all);
-        if determinant == Graph::ZERO {
-            return Err(singular());
-        }
-        let inverse = graph.pow(determinant, -1);
-        if determinant.index() > 1 {
-            determinants.push(determinant);
-        }
-        for k in 0..n_rhs {
-            if rows.iter().all(|r| rhs[*r][k] == Graph::ZERO) {
-                continue;
-            }
-            for (j, column) in columns.iter().enumerate() {
-                let mut terms = Vec::new();
-                for (i, row) in rows.iter().enumerate() {
-                    if rhs[*row][k] == Graph::ZERO {
-                        continue;
-                    }
-                    let minor = minors.minor(graph, all & !(1 << i), all & !(1 << j));
-                    let sign = if (i + j) % 2 == 0 {
-                        Rational::ONE
-                    } else {
-                        Rational::MINUS_ONE
-                    };
-                    terms.push((graph.mul(minor, rhs[*row][k]), sign));
-                }
-                let numerator = graph.sum(&terms);
-                values[*column][k] = graph.mul(numerator, inverse);
-            }
+        for (column, value) in columns.iter().zip(found) {
+            values[*column] = value;
         }
     }
     Ok(Solution {
         values,
         determinants,
     })
+}
+
+/// Solves a small system by cofactors: one row of values per unknown, and the determinant. `None` if that is zero.
+pub(crate) fn by_cofactors(
+    graph: &mut Graph,
+    block: &[Vec<ExprId>],
+    rhs: &[Vec<ExprId>],
+) -> Option<(Vec<Vec<ExprId>>, ExprId)> {
+    let (n, n_rhs) = (block.len(), rhs.first().map_or(0, Vec::len));
+    let all = (1u32 << n) - 1;
+    let mut minors = Minors {
+        matrix: block,
+        known: HashMap::new(),
+    };
+    let determinant = minors.minor(graph, all, all);
+    if determinant == Graph::ZERO {
+        return None;
+    }
+    let inverse = graph.pow(determinant, -1);
+    let mut values = vec![vec![Graph::ZERO; n_rhs]; n];
+    for k in 0..n_rhs {
+        if rhs.iter().all(|row| row[k] == Graph::ZERO) {
+            continue;
+        }
+        for (j, value) in values.iter_mut().enumerate() {
+            let mut terms = Vec::new();
+            for (i, row) in rhs.iter().enumerate() {
+                if row[k] == Graph::ZERO {
+                    continue;
+                }
+                let minor = minors.minor(graph, all & !(1 << i), all & !(1 << j));
+                let sign = if (i + j) % 2 == 0 {
+                    Rational::ONE
+                } else {
+                    Rational::MINUS_ONE
+                };
+                terms.push((graph.mul(minor, row[k]), sign));
+            }
+            let numerator = graph.sum(&terms);
+            value[k] = graph.mul(numerator, inverse);
+        }
+    }
+    Some((values, determinant))
+}
+
+/// The determinant of a small matrix.
+pub(crate) fn determinant(graph: &mut Graph, matrix: &[Vec<ExprId>]) -> ExprId {
+    let all = (1u32 << matrix.len()) - 1;
+    let mut minors = Minors {
+        matrix,
+        known: HashMap::new(),
+    };
+    minors.minor(graph, all, all)
 }
 
 /// Rows with the columns that they determine, such that a block needs only the columns of blocks before it

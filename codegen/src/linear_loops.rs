@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::closure::{Closure, coordinates_of};
 use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Node, Tape};
-use crate::field::{Element, MODULUS, Stream};
+use crate::field::{Element, Stream};
 use crate::numeric_pose::Loops;
 
 /// A passive angle that equals `sum + pi12 * pi/12`.
@@ -107,7 +107,8 @@ fn poses(
     /// How often the reach is halved where loops cannot be followed, as near the end of a slide.
     const HALVINGS: u32 = 6;
     let loops = Loops::solved_for(graph, mechanism, residual, unknown.to_vec(), given);
-    let nominal = loops.nominal()?;
+    // A loop that leaves some of them free keeps to relations of many kinds.
+    let nominal = loops.nominal().filter(|q| loops.is_regular(q))?;
     (0..=HALVINGS).find_map(|k| {
         let reach = MOVE / f64::from(1_u32 << k);
         let mut stream = Stream::new(1);
@@ -260,7 +261,7 @@ fn closes(graph: &mut Graph, residual: &[ExprId], relations: &[Relation]) -> boo
     let atoms = graph.atoms(&closed);
     let mut stream = Stream::new(2);
     (0..8).all(|_| {
-        let mut point = FieldPoint::<MODULUS>::default();
+        let mut point = FieldPoint::<Element>::default();
         for atom in &atoms {
             point.values.insert(*atom, stream.element());
             point.angles.insert(*atom, stream.circle());

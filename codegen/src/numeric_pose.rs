@@ -62,7 +62,8 @@ impl<'a> Loops<'a> {
         Some(q)
     }
 
-    fn as_written(&self) -> Vec<f64> {
+    /// Coordinates of the nominal pose as the model file has them, loops closed by its reader.
+    pub(crate) fn as_written(&self) -> Vec<f64> {
         let coordinates = self.mechanism.coordinates.iter();
         coordinates.map(|c| c.nominal).collect()
     }
@@ -100,32 +101,48 @@ impl<'a> Loops<'a> {
         Some(q)
     }
 
+    /// Residuals, and their derivatives by the unknown coordinates, one column each.
+    pub(crate) fn linearise(&self, q: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let value = |atom: Atom| match atom {
+            Atom::Constant(i) => self.mechanism.constants[i].value,
+            Atom::Coordinate(i) => q[i],
+            Atom::Pi => std::f64::consts::PI,
+            _ => 0.0,
+        };
+        let values = self.tape.evaluate(&F64(value))?;
+        let (residual, jacobian) = values.split_at(self.n_residuals);
+        Some((
+            DVector::from_column_slice(residual),
+            DMatrix::from_column_slice(self.n_residuals, self.unknown.len(), jacobian),
+        ))
+    }
+
+    /// Whether the loops determine the unknown coordinates at a pose.
+    pub(crate) fn is_regular(&self, q: &[f64]) -> bool {
+        const SINGULAR: f64 = 1e-9;
+        let Some((_, mut jacobian)) = self.linearise(q) else {
+            return false;
+        };
+        for (mut column, one) in jacobian.column_iter_mut().zip(&self.scales) {
+            column *= *one;
+        }
+        let values = jacobian.svd(false, false).singular_values;
+        values.len() == self.unknown.len() && values.min() > SINGULAR * values.max()
+    }
+
     /// Closes the loops by moving the unknown coordinates.
     fn close(&self, q: &mut [f64]) -> Option<()> {
         if self.unknown.is_empty() {
             return Some(());
         }
         for _ in 0..30 {
-            let values = {
-                let value = |atom: Atom| match atom {
-                    Atom::Constant(i) => self.mechanism.constants[i].value,
-                    Atom::Coordinate(i) => q[i],
-                    Atom::Pi => std::f64::consts::PI,
-                    _ => 0.0,
-                };
-                self.tape.evaluate(&F64(value))?
-            };
-            let (residual, jacobian) = values.split_at(self.n_residuals);
-            let mut jacobian =
-                DMatrix::from_column_slice(self.n_residuals, self.unknown.len(), jacobian);
+            let (residual, mut jacobian) = self.linearise(q)?;
             for (mut column, one) in jacobian.column_iter_mut().zip(&self.scales) {
                 column *= *one;
             }
             let svd = jacobian.svd(true, true);
             let smallest = 1e-12 * svd.singular_values.amax();
-            let step = svd
-                .solve(&DVector::from_column_slice(residual), smallest)
-                .ok()?;
+            let step = svd.solve(&residual, smallest).ok()?;
             for ((p, one), dx) in self.unknown.iter().zip(&self.scales).zip(step.iter()) {
                 q[*p] -= one * dx;
             }

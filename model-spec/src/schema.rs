@@ -141,14 +141,25 @@ record! {
 }
 
 record! {
-    /// A joint, revolute or prismatic.
+    /// A joint: exactly one of the kinds, with a name for each of its coordinates.
     JointEntry = "a joint" {
-        /// Angle of a revolute joint.
+        /// Angle of a revolute joint about `axis`.
         "revolute" revolute: optional Formula,
-        /// Displacement of a prismatic joint.
+        /// Displacement of a prismatic joint along `axis`.
         "prismatic" prismatic: optional Formula,
-        /// Axis of the joint; z if left away.
+        /// Angle and displacement of a cylindrical joint, about and along `axis`.
+        "cylindrical" cylindrical: optional List<Formula>,
+        /// Two angles of a universal joint, about the first of its `axes` and then about the second, turned by the first.
+        "universal" universal: optional List<Formula>,
+        /// Three angles of a spherical joint, about its `axes` one after the other, each turned by those before.
+        "spherical" spherical: optional List<Formula>,
+        /// Six coordinates of a free body: its position along x, y and z, then three angles as those of a spherical
+        /// joint.
+        "free" free: optional List<Formula>,
+        /// Axis of a revolute, prismatic or cylindrical joint; z if left away.
         "axis" axis: optional AxisName,
+        /// Axes of a universal, spherical or free joint, such as `yz` or `zyx`; `xy` or `zyx` if left away.
+        "axes" axes: optional Text,
     }
 }
 

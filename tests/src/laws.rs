@@ -60,6 +60,21 @@ impl Case {
         Ok(Self { derivation, sample })
     }
 
+    /// Derives a mechanism and draws `n` states near its nominal pose, which must be regular; drives may act on passive
+    /// coordinates.
+    pub fn near_nominal(mechanism: &Mechanism, n: usize, reach: f64) -> Result<Self, String> {
+        let derivation = modelmill_codegen::derive(mechanism)
+            .map_err(|error| format!("{}: {error}", mechanism.name))?;
+        let mut stream = Stream::new(mechanism.name.len() as u64 + 78);
+        let drawn = Sample::random(mechanism, n, reach, &mut stream);
+        let sample = drawn.reachable(&Evaluator::new(&derivation));
+        if sample.len() < n / 2 {
+            let n = sample.len();
+            return Err(format!("{}: only {n} states in reach", mechanism.name));
+        }
+        Ok(Self { derivation, sample })
+    }
+
     pub(crate) fn mechanism(&self) -> &Mechanism {
         &self.derivation.mechanism
     }

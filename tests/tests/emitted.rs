@@ -167,6 +167,9 @@ macro_rules! agrees {
 }
 
 agrees! {
+    arm_four_bar_agrees_with_the_evaluator: arm_four_bar "arm_four_bar" passive;
+    arm_parallelogram_agrees_with_the_evaluator: arm_parallelogram "arm_parallelogram" passive;
+    delta_agrees_with_the_evaluator: delta "delta" passive;
     emps_agrees_with_the_evaluator: emps "emps";
     five_bar_agrees_with_the_evaluator: five_bar "five_bar" passive;
     four_bar_agrees_with_the_evaluator: four_bar "four_bar" passive;
@@ -178,6 +181,8 @@ agrees! {
     spidermill_agrees_with_the_evaluator: spidermill "spidermill" passive;
     spidermill_paper_agrees_with_the_evaluator: spidermill_paper "spidermill-paper" passive;
     stanford_agrees_with_the_evaluator: stanford "stanford";
+    slider_crank_agrees_with_the_evaluator: slider_crank "slider_crank" passive;
+    three_rpr_agrees_with_the_evaluator: three_rpr "three_rpr" passive;
     three_rrr_agrees_with_the_evaluator: three_rrr "three_rrr" passive;
     two_link_agrees_with_the_evaluator: two_link "two_link";
 }

@@ -56,4 +56,11 @@ ranks! {
     three_rrr_has_19_and_13_without_gravity: "three_rrr" => 19, "three_rrr-weightless" => 13;
     tied_three_rrr_has_9_and_7_without_gravity:
         "three_rrr-tied" => 9, "three_rrr-tied-weightless" => 7;
+    gough_stewart_has_88_and_64_without_gravity:
+        "gough_stewart" => 88, "gough_stewart-weightless" => 64;
+    tied_gough_stewart_has_23_and_19_without_gravity:
+        "gough_stewart_tied" => 23, "gough_stewart_tied-weightless" => 19;
+    delta_has_34_and_28_without_gravity: "delta" => 34, "delta-weightless" => 28;
+    tied_delta_has_12_and_10_without_gravity:
+        "delta_tied" => 12, "delta_tied-weightless" => 10;
 }

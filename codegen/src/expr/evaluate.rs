@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{AngleSum, Atom, ExprId, Graph, Node, Rational, Unary};
-use crate::field::{self, Element, MODULUS};
+use crate::field::{Element, Number, Stream};
 
 /// A number system in which expressions can be evaluated. `None` means that the value does not exist there:
 /// a division by zero, a root that is not in the field, a function that the domain does not know.
@@ -168,77 +168,88 @@ impl<F: Fn(Atom) -> f64> Domain for F64<F> {
     }
 }
 
-/// Evaluation in the prime field.
+/// Evaluation in a prime field or its quadratic extension.
 ///
 /// Functions that are not algebraic are opaque: equal arguments get equal random values. They keep the laws that
 /// matter for dependence: `sign` is odd with square 1, `abs(x) = x sign(x)`, `tanh` is odd.
 #[derive(Clone, Debug, Default)]
-pub struct FieldPoint<const P: u64 = MODULUS> {
+pub struct FieldPoint<N = Element> {
     /// Values of atoms outside sines and cosines of sums of angles.
-    pub values: BTreeMap<Atom, Element<P>>,
+    pub values: BTreeMap<Atom, N>,
     /// Cosine and sine of atoms in sums of angles.
-    pub angles: BTreeMap<Atom, (Element<P>, Element<P>)>,
+    pub angles: BTreeMap<Atom, (N, N)>,
     /// Seed of the opaque functions.
     pub seed: u64,
     /// Seed of the choice between the two roots of a square.
     pub root_seed: u64,
 }
 
-impl<const P: u64> FieldPoint<P> {
-    fn sign(&self, a: Element<P>) -> Element<P> {
+impl<N: Number> FieldPoint<N> {
+    /// The same point over a larger field.
+    pub fn extended<M: From<N>>(&self) -> FieldPoint<M> {
+        let values = self.values.iter().map(|(atom, x)| (*atom, M::from(*x)));
+        let circle = |(c, s): (N, N)| (M::from(c), M::from(s));
+        let angles = self.angles.iter().map(|(atom, cs)| (*atom, circle(*cs)));
+        FieldPoint {
+            values: values.collect(),
+            angles: angles.collect(),
+            seed: self.seed,
+            root_seed: self.root_seed,
+        }
+    }
+
+    fn sign(&self, a: N) -> N {
         let (key, odd) = canonical(a);
-        let value = if field::hashed(self.seed, key).representative() & 1 == 0 {
-            Element::ONE
+        let value = if key.bits(self.seed) & 1 == 0 {
+            N::ONE
         } else {
-            -Element::ONE
+            -N::ONE
         };
-        if a == Element::ZERO {
-            Element::ZERO
+        if a == N::ZERO {
+            N::ZERO
         } else if odd {
             -value
         } else {
             value
         }
     }
-}
 
-impl<const P: u64> FieldPoint<P> {
     /// Cosine and sine of an opaque angle: even and odd, on the unit circle.
-    fn opaque_circle(&self, a: Element<P>) -> (Element<P>, Element<P>) {
+    fn opaque_circle(&self, a: N) -> (N, N) {
         let (key, odd) = canonical(a);
-        let seed = field::hashed(self.seed ^ 0x0073_696E, key).representative();
-        let (c, s) = field::Stream::new(seed).circle::<P>();
+        let seed = key.bits(self.seed ^ 0x0073_696E);
+        let (c, s) = N::draw_circle(&mut Stream::new(seed));
         (c, if odd { -s } else { s })
     }
 }
 
 /// The smaller of `a` and `-a`, and whether it was `-a`.
-fn canonical<const P: u64>(a: Element<P>) -> (Element<P>, bool) {
+fn canonical<N: Number>(a: N) -> (N, bool) {
     if (-a) < a { (-a, true) } else { (a, false) }
 }
 
-impl<const P: u64> Domain for FieldPoint<P> {
-    type Value = Element<P>;
-    fn rational(&self, value: &Rational) -> Option<Element<P>> {
+impl<N: Number> Domain for FieldPoint<N> {
+    type Value = N;
+    fn rational(&self, value: &Rational) -> Option<N> {
         if value.is_one() {
-            return Some(Element::ONE);
+            return Some(N::ONE);
         }
-        Element::from_rational(value)
+        N::from_rational(value)
     }
-    fn add(&self, a: &Element<P>, b: &Element<P>) -> Element<P> {
+    fn add(&self, a: &N, b: &N) -> N {
         *a + *b
     }
-    fn mul(&self, a: &Element<P>, b: &Element<P>) -> Element<P> {
+    fn mul(&self, a: &N, b: &N) -> N {
         *a * *b
     }
-    fn power(&self, a: &Element<P>, n: i32) -> Option<Element<P>> {
+    fn power(&self, a: &N, n: i32) -> Option<N> {
         a.integer_power(n)
     }
-    fn unary(&self, function: Unary, a: &Element<P>) -> Option<Element<P>> {
+    fn unary(&self, function: Unary, a: &N) -> Option<N> {
         match function {
             // One fixed choice per radicand: equal radicands must have equal roots.
             Unary::Sqrt => a.square_root().map(|root| {
-                let flip = field::hashed(self.root_seed, *a).representative() & 1 == 1;
+                let flip = a.bits(self.root_seed) & 1 == 1;
                 if flip {
                     -canonical(root).0
                 } else {
@@ -249,19 +260,19 @@ impl<const P: u64> Domain for FieldPoint<P> {
             Unary::Abs => Some(*a * self.sign(*a)),
             Unary::Tanh => {
                 let (key, odd) = canonical(*a);
-                let value = field::hashed(self.seed ^ 0x7461_6E68, key);
+                let value = key.hashed(self.seed ^ 0x7461_6E68);
                 Some(if odd { -value } else { value })
             }
-            Unary::Exp => Some(field::hashed(self.seed ^ 0x0065_7870, *a)),
+            Unary::Exp => Some(a.hashed(self.seed ^ 0x0065_7870)),
             Unary::Cos => Some(self.opaque_circle(*a).0),
             Unary::Sin => Some(self.opaque_circle(*a).1),
         }
     }
-    fn atom(&self, atom: Atom) -> Option<Element<P>> {
+    fn atom(&self, atom: Atom) -> Option<N> {
         self.values.get(&atom).copied()
     }
-    fn cos_sin(&self, angle: &AngleSum) -> Option<(Element<P>, Element<P>)> {
-        let mut total = (Element::ONE, Element::ZERO);
+    fn cos_sin(&self, angle: &AngleSum) -> Option<(N, N)> {
+        let mut total = (N::ONE, N::ZERO);
         for (atom, n) in angle.terms() {
             let (c, s) = *self.angles.get(atom)?;
             let s = if *n < 0 { -s } else { s };

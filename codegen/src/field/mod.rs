@@ -4,10 +4,16 @@
 //! roots in all of them: the sines and cosines of all multiples of pi/12 exist there, and most roots that a model file
 //! writes down. One field finds everything but long coefficients; the others lend them more digits.
 
+mod extension;
+mod number;
+
 use std::ops::{Add, Mul, Neg, Sub};
 
 use num_bigint::BigInt;
 use num_traits::{Signed, ToPrimitive};
+
+pub use extension::Extended;
+pub use number::Number;
 
 use crate::expr::Rational;
 
@@ -90,21 +96,18 @@ impl<const P: u64> Element<P> {
         if self.0 == 0 {
             return None;
         }
-        // Extended Euclid: far fewer steps than a power of 61 bits.
-        let (mut r0, mut r1) = (i128::from(P), i128::from(self.0));
-        let (mut t0, mut t1) = (0i128, 1i128);
+        // Extended Euclid: far fewer steps than a power of 61 bits. The cofactors stay below the modulus.
+        let (mut r0, mut r1) = (P, self.0);
+        let (mut t0, mut t1) = (0_i64, 1_i64);
         while r1 != 0 {
             let q = r0 / r1;
             (r0, r1) = (r1, r0 - q * r1);
+            let q = i64::try_from(q).expect("a quotient below 2^61");
             (t0, t1) = (t1, t0 - q * t1);
         }
-        u64::try_from(t0.rem_euclid(i128::from(P))).ok().map(Self)
-    }
-
-    /// Integer power; `None` for a negative power of 0.
-    pub fn integer_power(self, exponent: i32) -> Option<Self> {
-        let base = if exponent < 0 { self.inverse()? } else { self };
-        Some(base.power(u64::from(exponent.unsigned_abs())))
+        // Two folds of a number between -P and P.
+        let inverse = Self(t0.unsigned_abs() % P);
+        Some(if t0 < 0 { -inverse } else { inverse })
     }
 
     /// A square root if there is one.

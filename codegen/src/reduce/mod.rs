@@ -103,7 +103,7 @@ pub(crate) fn independent_functions(
     let tape = Tape::new(graph, roots);
     let atoms = graph.atoms(roots);
     let mut stream = Stream::new(SEED);
-    let mut constants = FieldPoint::<MODULUS> {
+    let mut constants = FieldPoint::<Element> {
         seed: stream.bits(),
         root_seed: stream.bits(),
         ..FieldPoint::default()
@@ -275,7 +275,7 @@ impl SampledRegressor {
     /// The rows of H at one random point.
     fn point<const P: u64>(
         &self,
-        constants: &FieldPoint<P>,
+        constants: &FieldPoint<Element<P>>,
         stream: &mut Stream,
     ) -> Result<Vec<Vec<Element<P>>>, DeriveError> {
         let values = self.sampler.draw(constants, stream)?;
@@ -288,7 +288,7 @@ impl SampledRegressor {
     /// Rows of W for one set of constants, reduced, until they show nothing new or `rank` is reached.
     fn echelon<const P: u64>(
         &self,
-        constants: &FieldPoint<P>,
+        constants: &FieldPoint<Element<P>>,
         order: &[usize],
         rank: Option<usize>,
         stream: &mut Stream,
@@ -431,13 +431,16 @@ struct Factors<'a> {
 }
 
 impl reconstruct::Oracle for Factors<'_> {
-    fn constants<const P: u64>(&self, stream: &mut Stream) -> Result<FieldPoint<P>, DeriveError> {
+    fn constants<const P: u64>(
+        &self,
+        stream: &mut Stream,
+    ) -> Result<FieldPoint<Element<P>>, DeriveError> {
         self.regressor.sampler.constants(stream)
     }
 
     fn values<const P: u64>(
         &mut self,
-        constants: &FieldPoint<P>,
+        constants: &FieldPoint<Element<P>>,
     ) -> Result<Vec<Element<P>>, DeriveError> {
         let Pattern { pivots, wanted, .. } = self.pattern;
         let rank = Some(pivots.len());

@@ -8,8 +8,11 @@ use super::branches;
 use crate::closure::Closure;
 use crate::dyad::{self, Solved};
 use crate::expr::{AngleSum, Atom, Domain, ExprId, FieldPoint, Graph, Tape};
+use crate::field::Number;
 use crate::programs::nominal_value;
 use crate::projection::Projection;
+use crate::solvable;
+use crate::spatial;
 
 /// A way to solve all loops one after the other, each for at most two coordinates.
 #[derive(Clone, Debug)]
@@ -17,7 +20,7 @@ pub(crate) struct Plan {
     pub(crate) steps: Vec<PlanStep>,
 }
 
-/// One loop of a plan.
+/// One loop of a plan, or one of its coordinates.
 #[derive(Clone, Debug)]
 pub(crate) struct PlanStep {
     pub(crate) unknown: Vec<usize>,
@@ -46,7 +49,9 @@ pub(crate) fn plan(
     unknowns: Unknowns,
 ) -> Option<Plan> {
     let mut steps: Vec<PlanStep> = Vec::new();
-    let mut todo: Vec<usize> = (0..projection.closures.len()).collect();
+    let mut todo: Vec<usize> = (0..projection.closures.len())
+        .filter(|i| projection.closures[*i].n_independent > 0)
+        .collect();
     let mut known: BTreeSet<usize> = projection.active.iter().copied().collect();
     while !todo.is_empty() {
         let next = todo.iter().enumerate().find_map(|(position, index)| {
@@ -65,12 +70,22 @@ pub(crate) fn plan(
             choices(closure, &free, projection, unknowns)
                 .into_iter()
                 .find_map(|unknown| solve(graph, mechanism, closure, unknown))
-                .map(|step| (position, step))
+                .map(|found| (position, found))
         });
-        let (position, step) = next?;
+        let Some((position, mut found)) = next else {
+            let mut found = together(graph, mechanism, projection, unknowns, &todo, &known)?;
+            if unknowns == Unknowns::Any {
+                found.reverse();
+            }
+            steps.extend(found);
+            break;
+        };
         let index = todo.remove(position);
         known.extend(&projection.closures[index].coordinates);
-        steps.push(step);
+        if unknowns == Unknowns::Any {
+            found.reverse();
+        }
+        steps.extend(found);
     }
     if unknowns == Unknowns::Any {
         steps.reverse();
@@ -93,23 +108,95 @@ fn choices(
         };
         return if all { vec![related] } else { Vec::new() };
     }
+    let size = if closure.chain.is_some() {
+        2
+    } else {
+        closure.n_independent
+    };
     if unknowns == Unknowns::Passive {
-        return if free.len() == 2 {
+        return if free.len() == size {
             vec![free.to_vec()]
         } else {
             Vec::new()
         };
     }
-    let mut pairs: Vec<Vec<usize>> = Vec::new();
-    for (i, a) in free.iter().enumerate() {
-        pairs.extend(free[i + 1..].iter().map(|b| vec![*a, *b]));
-    }
-    pairs.sort_by_key(|pair| {
-        pair.iter()
+    let mut sets = subsets(free, size);
+    sets.sort_by_key(|set| {
+        set.iter()
             .filter(|c| !projection.passive.contains(c))
             .count()
     });
-    pairs
+    sets
+}
+
+/// Solves several loops together.
+fn together(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    projection: &Projection,
+    unknowns: Unknowns,
+    todo: &[usize],
+    known: &BTreeSet<usize>,
+) -> Option<Vec<PlanStep>> {
+    let closures: Vec<&Closure> = todo.iter().map(|i| &projection.closures[*i]).collect();
+    if closures
+        .iter()
+        .any(|c| c.equations.is_empty() || !c.relations.is_empty())
+    {
+        return None;
+    }
+    let mut equations: Vec<ExprId> = closures.iter().flat_map(|c| c.equations.clone()).collect();
+    equations.sort_unstable();
+    equations.dedup();
+    let residual: Vec<ExprId> = closures.iter().flat_map(|c| c.residual.clone()).collect();
+    let mut free: BTreeSet<usize> = closures
+        .iter()
+        .flat_map(|c| c.coordinates.clone())
+        .collect();
+    let size = closures.iter().map(|c| c.n_independent).sum();
+    let sets = match unknowns {
+        Unknowns::Passive => {
+            free.retain(|c| !known.contains(c));
+            let free: Vec<usize> = free.into_iter().collect();
+            if free.len() == size {
+                vec![free]
+            } else {
+                Vec::new()
+            }
+        }
+        Unknowns::Any => {
+            let free: Vec<usize> = free.into_iter().collect();
+            solvable::promising(graph, mechanism, &equations, &residual, &free, size)
+        }
+    };
+    sets.into_iter().find_map(|unknown| {
+        let steps = spatial::solve(graph, mechanism, &equations, &residual, &unknown)?;
+        Some(single_steps(steps))
+    })
+}
+
+/// Coordinates solved for one by one as steps of a plan.
+fn single_steps(steps: Vec<(usize, Solved)>) -> Vec<PlanStep> {
+    let step = |(coordinate, solved)| PlanStep {
+        unknown: vec![coordinate],
+        solved,
+    };
+    steps.into_iter().map(step).collect()
+}
+
+/// All subsets of some size, in order.
+fn subsets(of: &[usize], size: usize) -> Vec<Vec<usize>> {
+    if size == 0 {
+        return vec![Vec::new()];
+    }
+    let with = |i: usize| {
+        let rest = subsets(&of[i + 1..], size - 1);
+        rest.into_iter().map(move |mut set| {
+            set.insert(0, of[i]);
+            set
+        })
+    };
+    (0..of.len()).flat_map(with).collect()
 }
 
 fn solve(
@@ -117,14 +204,24 @@ fn solve(
     mechanism: &Mechanism,
     closure: &Closure,
     unknown: Vec<usize>,
-) -> Option<PlanStep> {
+) -> Option<Vec<PlanStep>> {
+    if closure.chain.is_none() && closure.relations.is_empty() {
+        let steps = spatial::solve(
+            graph,
+            mechanism,
+            &closure.equations,
+            &closure.residual,
+            &unknown,
+        )?;
+        return Some(single_steps(steps));
+    }
     let mut solved = dyad::solve(graph, closure, &unknown, true)?;
     if let Some(root) = solved.root
         && nominal_value(graph, mechanism, root.witness).is_some_and(|x| x < 0.0)
     {
         solved = dyad::solve(graph, closure, &unknown, false)?;
     }
-    Some(PlanStep { unknown, solved })
+    Some(vec![PlanStep { unknown, solved }])
 }
 
 /// A step of a plan in the field.
@@ -164,7 +261,7 @@ impl SolveStep {
     }
 
     /// Sets the unknown coordinates of a point whose other coordinates are set; `None` if the loop does not close there.
-    pub(super) fn solve<const P: u64>(&self, point: &mut FieldPoint<P>) -> Option<()> {
+    pub(super) fn solve<N: Number>(&self, point: &mut FieldPoint<N>) -> Option<()> {
         let values = self.tape.evaluate(point)?;
         let numbers = &values[2 * self.angles.len()..];
         for (i, value) in self.numbers.iter().zip(numbers) {

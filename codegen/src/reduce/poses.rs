@@ -6,7 +6,7 @@ use modelmill_spec::{Mechanism, Motion};
 use super::plan::{Plan, SolveStep};
 use crate::DeriveError;
 use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Tape, Unary};
-use crate::field::Stream;
+use crate::field::{Element, Number, Stream};
 
 /// How often a draw is repeated until all square roots exist.
 pub(super) const MOST_DRAWS: usize = 4000;
@@ -47,7 +47,7 @@ impl Poses {
     pub(super) fn constants<const P: u64>(
         &self,
         stream: &mut Stream,
-    ) -> Result<FieldPoint<P>, DeriveError> {
+    ) -> Result<FieldPoint<Element<P>>, DeriveError> {
         (0..MOST_DRAWS)
             .find_map(|_| {
                 let mut point = FieldPoint {
@@ -66,24 +66,26 @@ impl Poses {
             .ok_or(DeriveError::NoPointFound { draws: MOST_DRAWS })
     }
 
-    /// Some values for all coordinates, loops still open.
-    pub(super) fn open<const P: u64>(
+    /// Some values for all coordinates, loops still open. They lie in the prime field, over whichever field the loops
+    /// are closed.
+    pub(super) fn open<const P: u64, N: Number + From<Element<P>>>(
         &self,
-        constants: &FieldPoint<P>,
+        constants: &FieldPoint<Element<P>>,
         stream: &mut Stream,
-    ) -> FieldPoint<P> {
-        let mut point = constants.clone();
+    ) -> FieldPoint<N> {
+        let mut point = constants.extended();
         for (i, motion) in &self.coordinates {
             if *motion == Motion::Revolute {
-                point.angles.insert(Atom::Coordinate(*i), stream.circle());
+                let angle = N::draw_circle(stream);
+                point.angles.insert(Atom::Coordinate(*i), angle);
             }
-            point.values.insert(Atom::Coordinate(*i), stream.element());
+            point.values.insert(Atom::Coordinate(*i), N::draw(stream));
         }
         point
     }
 
     /// The loops of a point closed; `None` if they do not close for its free coordinates.
-    pub(super) fn close<const P: u64>(&self, mut point: FieldPoint<P>) -> Option<FieldPoint<P>> {
+    pub(super) fn close<N: Number>(&self, mut point: FieldPoint<N>) -> Option<FieldPoint<N>> {
         for step in &self.steps {
             step.solve(&mut point)?;
         }

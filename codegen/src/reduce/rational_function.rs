@@ -23,7 +23,7 @@ pub enum Variable {
 
 impl Variable {
     /// Its value at a point of the field.
-    pub(crate) fn value<const P: u64>(self, point: &FieldPoint<P>) -> Option<Element<P>> {
+    pub(crate) fn value<const P: u64>(self, point: &FieldPoint<Element<P>>) -> Option<Element<P>> {
         match self {
             Self::Constant(i) => point.values.get(&Atom::Constant(i)).copied(),
             Self::Cos(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.0),
@@ -149,7 +149,7 @@ impl RationalFunction {
     }
 
     /// Its value at a point of the field; `None` where the denominator vanishes.
-    pub(crate) fn value<const P: u64>(&self, point: &FieldPoint<P>) -> Option<Element<P>> {
+    pub(crate) fn value<const P: u64>(&self, point: &FieldPoint<Element<P>>) -> Option<Element<P>> {
         let denominator = polynomial_value(&self.denominator, point)?.inverse()?;
         Some(polynomial_value(&self.numerator, point)? * denominator)
     }
@@ -265,14 +265,17 @@ fn with_fewest_terms(mut p: Polynomial) -> Polynomial {
 
 pub(crate) fn monomial_value<const P: u64>(
     powers: &Powers,
-    point: &FieldPoint<P>,
+    point: &FieldPoint<Element<P>>,
 ) -> Option<Element<P>> {
     powers.iter().try_fold(Element::ONE, |product, (v, n)| {
         Some(product * v.value(point)?.power(u64::from(*n)))
     })
 }
 
-fn polynomial_value<const P: u64>(p: &Polynomial, point: &FieldPoint<P>) -> Option<Element<P>> {
+fn polynomial_value<const P: u64>(
+    p: &Polynomial,
+    point: &FieldPoint<Element<P>>,
+) -> Option<Element<P>> {
     p.iter().try_fold(Element::ZERO, |sum, (powers, k)| {
         Some(sum + Element::from_rational(k)? * monomial_value(powers, point)?)
     })

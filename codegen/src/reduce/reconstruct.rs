@@ -17,11 +17,14 @@ const MOST_POINTS: usize = 26;
 /// A black box in every prime field.
 pub(crate) trait Oracle {
     /// Random constants.
-    fn constants<const P: u64>(&self, stream: &mut Stream) -> Result<FieldPoint<P>, DeriveError>;
+    fn constants<const P: u64>(
+        &self,
+        stream: &mut Stream,
+    ) -> Result<FieldPoint<Element<P>>, DeriveError>;
     /// Values of all functions at given constants.
     fn values<const P: u64>(
         &mut self,
-        constants: &FieldPoint<P>,
+        constants: &FieldPoint<Element<P>>,
     ) -> Result<Vec<Element<P>>, DeriveError>;
 }
 
@@ -179,7 +182,7 @@ fn set(point: &mut FieldPoint, (index, in_angle): Occurrence, t: Element) {
 
 /// Random points of one field with the values of all functions, shared between the fits.
 struct Samples<const P: u64> {
-    points: Vec<(FieldPoint<P>, Vec<Element<P>>)>,
+    points: Vec<(FieldPoint<Element<P>>, Vec<Element<P>>)>,
 }
 
 /// An ansatz for one function.

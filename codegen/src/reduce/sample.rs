@@ -12,13 +12,15 @@ use super::plan::{Unknowns, plan};
 use super::poses::{MOST_DRAWS, Poses};
 use crate::DeriveError;
 use crate::expr::{Atom, ExprId, FieldPoint, Graph, Tape};
-use crate::field::{Element, Stream};
+use crate::field::{Element, Extended, Number, Stream};
 use crate::projection::Projection;
 
 /// Draws points.
 pub(super) struct Sampler {
     poses: Poses,
     n_drives: usize,
+    /// Whether poses or outputs take roots of what moves.
+    has_roots: bool,
     active: Vec<usize>,
     passive: Vec<usize>,
     rates: Tape,
@@ -50,6 +52,7 @@ impl Sampler {
         }
         Ok(Self {
             poses,
+            has_roots: !branches.is_empty(),
             n_drives: mechanism.drives.len(),
             active: projection.active.clone(),
             passive: projection.passive.clone(),
@@ -63,35 +66,49 @@ impl Sampler {
     pub(super) fn constants<const P: u64>(
         &self,
         stream: &mut Stream,
-    ) -> Result<FieldPoint<P>, DeriveError> {
+    ) -> Result<FieldPoint<Element<P>>, DeriveError> {
         self.poses.constants(stream)
     }
 
-    /// Values of the outputs at a random point of motion, for the given constants.
+    /// Values of the outputs at a random point of motion, for the given constants: once, or once for each of the two
+    /// parts of numbers of the quadratic extension. Factors that do not depend on the motion lie in the prime field, so
+    /// that each part keeps to the same linear relations.
     pub(super) fn draw<const P: u64>(
         &self,
-        constants: &FieldPoint<P>,
+        constants: &FieldPoint<Element<P>>,
         stream: &mut Stream,
     ) -> Result<Vec<Element<P>>, DeriveError> {
-        (0..MOST_DRAWS)
-            .find_map(|_| self.try_draw(constants, stream))
-            .ok_or(DeriveError::NoPointFound { draws: MOST_DRAWS })
+        let none = || DeriveError::NoPointFound { draws: MOST_DRAWS };
+        if !self.has_roots {
+            return (0..MOST_DRAWS)
+                .find_map(|_| self.try_draw::<P, Element<P>>(constants, stream))
+                .ok_or_else(none);
+        }
+        let values = (0..MOST_DRAWS)
+            .find_map(|_| self.try_draw::<P, Extended<P>>(constants, stream))
+            .ok_or_else(none)?;
+        let parts: [fn(&Extended<P>) -> Element<P>; 2] = [|x| x.re, |x| x.im];
+        let is_split = values.iter().any(|x| x.im != Element::ZERO);
+        let shown = &parts[..=usize::from(is_split)];
+        Ok(shown
+            .iter()
+            .flat_map(|part| values.iter().map(part))
+            .collect())
     }
 
-    fn try_draw<const P: u64>(
+    fn try_draw<const P: u64, N: Number + From<Element<P>>>(
         &self,
-        constants: &FieldPoint<P>,
+        constants: &FieldPoint<Element<P>>,
         stream: &mut Stream,
-    ) -> Option<Vec<Element<P>>> {
-        let mut point = self.poses.open(constants, stream);
+    ) -> Option<Vec<N>> {
+        let mut point: FieldPoint<N> = self.poses.open(constants, stream);
+        let mut draw = |atom: Atom| point.values.insert(atom, N::draw(stream));
         for a in &self.active {
-            point.values.insert(Atom::Rate(*a), stream.element());
-            point
-                .values
-                .insert(Atom::Acceleration(*a), stream.element());
+            draw(Atom::Rate(*a));
+            draw(Atom::Acceleration(*a));
         }
         for d in 0..self.n_drives {
-            point.values.insert(Atom::Load(d), stream.element());
+            draw(Atom::Load(d));
         }
         let mut point = self.poses.close(point)?;
         for (p, value) in self.passive.iter().zip(self.rates.evaluate(&point)?) {

@@ -2,20 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use num_traits::One;
-
 use crate::angle::{angle, length};
 use crate::build::Places;
+use crate::build::joints;
 use crate::build::symbols::{Symbols, vector};
 use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::exact::{Angle, Exact, Length};
 use crate::formula::Formula;
 use crate::mechanism::{Axis, Convention, Frame, FrameIdx, Point, PointIdx, Step};
-use crate::schema::{DhEntry, FrameEntry, JointEntry, ModelEntry, TransformEntry};
+use crate::schema::{DhEntry, FrameEntry, ModelEntry, TransformEntry};
 use crate::scope::{Scope, Sort, Wanted};
 use crate::suggest;
 use crate::unit::Dimension;
-use crate::values::AxisName;
 use crate::values::Name;
 
 /// The frames with their names.
@@ -251,7 +249,7 @@ fn placement(entry: &FrameEntry, symbols: &Symbols, log: &mut Log) -> (Vec<Step>
             transform_steps(transform, symbols, &mut steps, &mut text, log);
         }
         if let Some(joint) = &entry.joint {
-            joint_step(joint, symbols, &mut steps, &mut text, log);
+            joints::steps(joint, symbols, &mut steps, &mut text, log);
         }
         (without_zeros(steps), Convention::Transform(text.join(" ")))
     }
@@ -280,7 +278,7 @@ fn dh_row(dh: &DhEntry, symbols: &Symbols, log: &mut Log) -> DhRow {
     }
 }
 
-fn length_or_zero(
+pub(super) fn length_or_zero(
     formula: Option<&Formula>,
     symbols: &Symbols,
     what: &str,
@@ -294,7 +292,7 @@ fn length_or_zero(
         })
 }
 
-fn angle_or_zero(formula: Option<&Formula>, symbols: &Symbols, log: &mut Log) -> Angle {
+pub(super) fn angle_or_zero(formula: Option<&Formula>, symbols: &Symbols, log: &mut Log) -> Angle {
     formula
         .and_then(|formula| angle(formula, &symbols.scope, log))
         .unwrap_or_else(Angle::zero)
@@ -355,58 +353,6 @@ fn fixed(formula: &Formula, motion: &str) -> Diagnostic {
     .help(format!(
         "put the coordinate into `joint = {{ {motion} = \"...\" }}`"
     ))
-}
-
-fn joint_step(
-    joint: &JointEntry,
-    symbols: &Symbols,
-    steps: &mut Vec<Step>,
-    text: &mut Vec<String>,
-    log: &mut Log,
-) {
-    let (axis, minus, shown) = match joint.axis.unwrap_or(AxisName::Z) {
-        AxisName::X => (Axis::X, false, "x"),
-        AxisName::Y => (Axis::Y, false, "y"),
-        AxisName::Z => (Axis::Z, false, "z"),
-        AxisName::MinusX => (Axis::X, true, "-x"),
-        AxisName::MinusY => (Axis::Y, true, "-y"),
-        AxisName::MinusZ => (Axis::Z, true, "-z"),
-    };
-    match (&joint.revolute, &joint.prismatic) {
-        (Some(formula), None) => {
-            let mut about = angle_or_zero(Some(formula), symbols, log);
-            if minus {
-                if !about.pi.is_one() {
-                    about.pi = -about.pi; // Half a turn is the same either way.
-                }
-                for term in &mut about.terms {
-                    term.1 = -term.1;
-                }
-            }
-            text.push(format!("revolute({}, {shown})", formula.text));
-            steps.push(Step::Rotate(axis, about));
-        }
-        (None, Some(formula)) => {
-            let mut along = length_or_zero(Some(formula), symbols, "the length of a joint", log);
-            if minus {
-                along.offset = match along.offset {
-                    Exact::Rational(value) => Exact::Rational(-value),
-                    other => Exact::Negative(Box::new(other)),
-                };
-                for term in &mut along.coordinates {
-                    term.1 = -term.1.clone();
-                }
-            }
-            text.push(format!("prismatic({}, {shown})", formula.text));
-            steps.push(Step::Translate(axis, along));
-        }
-        _ if log.syntax_broken || joint.faulty => {}
-        _ => log.push(
-            Diagnostic::error(joint.span, "this joint does not say how it moves")
-                .label("expected either `revolute` or `prismatic`")
-                .help("for example `joint = { revolute = \"q1\", axis = \"z\" }`; leave `joint` away where nothing moves"),
-        ),
-    }
 }
 
 fn without_zeros(steps: Vec<Step>) -> Vec<Step> {

@@ -8,6 +8,7 @@ mod bodies;
 mod effect_places;
 mod effects;
 mod frames;
+mod joints;
 mod limits;
 mod mechanics;
 mod retain;

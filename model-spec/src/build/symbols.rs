@@ -424,6 +424,13 @@ fn joint_formulas(model: &ModelEntry) -> (Vec<&Ast>, Vec<&Ast>) {
         if let Some(joint) = &frame.joint {
             angles.extend(joint.revolute.iter().map(|formula| &formula.ast));
             lengths.extend(joint.prismatic.iter().map(|formula| &formula.ast));
+            for (formula, is_angle) in crate::build::joints::coordinates(joint) {
+                if is_angle {
+                    angles.push(&formula.ast);
+                } else {
+                    lengths.push(&formula.ast);
+                }
+            }
         }
     }
     (angles, lengths)

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use super::super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
 use crate::expr::print::parse::parse;
 use crate::expr::{Atom, FieldPoint, Rational};
-use crate::field::{MODULUS, Stream};
+use crate::field::{Element, Stream};
 use crate::review::tests::model;
 
 fn multiply(a: &Polynomial, b: &Polynomial) -> Polynomial {
@@ -87,7 +87,7 @@ proptest! {
         let mechanism = model("spidermill-paper");
         let function = RationalFunction::new(numerator, denominator);
         let mut stream = Stream::new(3);
-        let mut at = FieldPoint::<MODULUS>::default();
+        let mut at = FieldPoint::<Element>::default();
         let mut names = BTreeMap::new();
         for (i, c) in mechanism.constants.iter().enumerate() {
             at.values.insert(Atom::Constant(i), stream.element());
@@ -100,7 +100,7 @@ proptest! {
         }
         if !function.is_zero() {
             let (number, rest) = function.split_number();
-            let number = crate::field::Element::from_rational(&number).expect("a small number");
+            let number = Element::from_rational(&number).expect("a small number");
             prop_assert_eq!(rest.value(&at).map(|v| v * number), expected);
         }
     }
@@ -179,7 +179,7 @@ fn even_powers_of_cosines_become_sines_where_that_is_shorter() {
         assert_eq!(sines.map(|(_, n)| *n).max(), Some(power_of_sine));
         let mut stream = Stream::new(7);
         for _ in 0..4 {
-            let mut point = FieldPoint::<MODULUS>::default();
+            let mut point = FieldPoint::<Element>::default();
             for i in 0..2 {
                 point.values.insert(Atom::Constant(i), stream.element());
                 point.angles.insert(Atom::Constant(i), stream.circle());

@@ -1,0 +1,243 @@
+//! Joints as elementary motions: one rotation or translation per coordinate.
+
+use num_traits::One;
+
+use crate::build::frames::{angle_or_zero, length_or_zero};
+use crate::build::symbols::Symbols;
+use crate::diagnostic::{Diagnostic, Log};
+use crate::exact::Exact;
+use crate::formula::Formula;
+use crate::mechanism::{Axis, Step};
+use crate::record::List;
+use crate::schema::JointEntry;
+use crate::values::AxisName;
+
+/// The coordinates of joints with several, each with whether it is an angle.
+pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&Formula, bool)> {
+    let mut all: Vec<(&Formula, bool)> = Vec::new();
+    // How many of the first coordinates are lengths; an angle leads in a cylindrical joint.
+    for (list, n_lengths) in [
+        (&joint.universal, 0),
+        (&joint.spherical, 0),
+        (&joint.free, 3),
+    ] {
+        let entries = list.iter().flat_map(|list| &list.entries).enumerate();
+        all.extend(entries.map(|(i, formula)| (formula, i >= n_lengths)));
+    }
+    let cylindrical = joint.cylindrical.iter().flat_map(|list| &list.entries);
+    all.extend(
+        cylindrical
+            .enumerate()
+            .map(|(i, formula)| (formula, i == 0)),
+    );
+    all
+}
+
+/// Appends the motions of a joint to `steps`, and what it is for people to `text`.
+pub(super) fn steps(
+    joint: &JointEntry,
+    symbols: &Symbols,
+    steps: &mut Vec<Step>,
+    text: &mut Vec<String>,
+    log: &mut Log,
+) {
+    let n_kinds = [joint.revolute.is_some(), joint.prismatic.is_some()]
+        .into_iter()
+        .chain(
+            [
+                &joint.cylindrical,
+                &joint.universal,
+                &joint.spherical,
+                &joint.free,
+            ]
+            .map(Option::is_some),
+        )
+        .filter(|given| *given)
+        .count();
+    if n_kinds != 1 {
+        if !log.syntax_broken && !joint.faulty {
+            log.push(
+                Diagnostic::error(joint.span, "this joint does not say how it moves")
+                    .label("expected one of `revolute`, `prismatic`, `cylindrical`, `universal`, `spherical`, `free`")
+                    .help("for example `joint = { revolute = \"q1\", axis = \"z\" }`; leave `joint` away where nothing moves"),
+            );
+        }
+        return;
+    }
+    let (axis, minus, shown) = axis_of(joint);
+    let mut builder = Builder {
+        symbols,
+        steps,
+        log,
+    };
+    if let Some(formula) = &joint.revolute {
+        text.push(format!("revolute({}, {shown})", formula.text));
+        builder.rotate(axis, minus, formula);
+    } else if let Some(formula) = &joint.prismatic {
+        text.push(format!("prismatic({}, {shown})", formula.text));
+        builder.translate(axis, minus, formula);
+    } else if let Some([angle, length]) =
+        builder.entries(joint.cylindrical.as_ref(), "an angle and a displacement")
+    {
+        text.push(format!(
+            "cylindrical({}, {}, {shown})",
+            angle.text, length.text
+        ));
+        builder.rotate(axis, minus, &angle);
+        builder.translate(axis, minus, &length);
+    } else if let Some(angles) = builder.entries::<2>(joint.universal.as_ref(), "two angles") {
+        builder.turns("universal", joint, &angles, text);
+    } else if let Some(angles) = builder.entries::<3>(joint.spherical.as_ref(), "three angles") {
+        builder.turns("spherical", joint, &angles, text);
+    } else if let Some([x, y, z, a, b, c]) = builder.entries(
+        joint.free.as_ref(),
+        "three coordinates of its position and three angles",
+    ) {
+        text.push(format!("translation({}, {}, {})", x.text, y.text, z.text));
+        for (axis, formula) in [(Axis::X, x), (Axis::Y, y), (Axis::Z, z)] {
+            builder.translate(axis, false, &formula);
+        }
+        builder.turns("spherical", joint, &[a, b, c], text);
+    }
+    reject_unused(joint, log);
+}
+
+/// Says where an axis or axes are given that the joint has no use for.
+fn reject_unused(joint: &JointEntry, log: &mut Log) {
+    let one = joint.revolute.is_some() || joint.prismatic.is_some() || joint.cylindrical.is_some();
+    let (unused, wanted) = if one {
+        (
+            joint.axes.as_ref().map(|axes| axes.span),
+            "`axis`, such as `axis = \"x\"`",
+        )
+    } else {
+        let given = joint.axis.map(|_| joint.span);
+        (given, "`axes`, such as `axes = \"xy\"`")
+    };
+    if let Some(span) = unused {
+        let (has, several) = if one {
+            ("one axis", "`axes`")
+        } else {
+            ("several axes", "`axis`")
+        };
+        log.push(
+            Diagnostic::error(
+                span,
+                format!("this joint has {has}, {several} says nothing of it"),
+            )
+            .label(format!("expected {wanted}")),
+        );
+    }
+}
+
+fn axis_of(joint: &JointEntry) -> (Axis, bool, &'static str) {
+    match joint.axis.unwrap_or(AxisName::Z) {
+        AxisName::X => (Axis::X, false, "x"),
+        AxisName::Y => (Axis::Y, false, "y"),
+        AxisName::Z => (Axis::Z, false, "z"),
+        AxisName::MinusX => (Axis::X, true, "-x"),
+        AxisName::MinusY => (Axis::Y, true, "-y"),
+        AxisName::MinusZ => (Axis::Z, true, "-z"),
+    }
+}
+
+struct Builder<'a> {
+    symbols: &'a Symbols,
+    steps: &'a mut Vec<Step>,
+    log: &'a mut Log,
+}
+
+impl Builder<'_> {
+    /// The coordinates of a joint with `N` of them; another number is reported.
+    fn entries<const N: usize>(
+        &mut self,
+        list: Option<&List<Formula>>,
+        expected: &str,
+    ) -> Option<[Formula; N]> {
+        let list = list?;
+        let found: Option<[Formula; N]> = list.entries.clone().try_into().ok();
+        if found.is_none() && !list.faulty {
+            self.log.push(
+                Diagnostic::error(
+                    list.span,
+                    format!("this joint has {N} coordinates, not {}", list.entries.len()),
+                )
+                .label(format!("expected {expected}")),
+            );
+        }
+        found
+    }
+
+    fn rotate(&mut self, axis: Axis, minus: bool, formula: &Formula) {
+        let mut about = angle_or_zero(Some(formula), self.symbols, self.log);
+        if minus {
+            if !about.pi.is_one() {
+                about.pi = -about.pi; // Half a turn is the same either way.
+            }
+            for term in &mut about.terms {
+                term.1 = -term.1;
+            }
+        }
+        self.steps.push(Step::Rotate(axis, about));
+    }
+
+    fn translate(&mut self, axis: Axis, minus: bool, formula: &Formula) {
+        let mut along = length_or_zero(
+            Some(formula),
+            self.symbols,
+            "the length of a joint",
+            self.log,
+        );
+        if minus {
+            along.offset = match along.offset {
+                Exact::Rational(value) => Exact::Rational(-value),
+                other => Exact::Negative(Box::new(other)),
+            };
+            for term in &mut along.coordinates {
+                term.1 = -term.1.clone();
+            }
+        }
+        self.steps.push(Step::Translate(axis, along));
+    }
+
+    /// Rotations about several axes, one after the other.
+    fn turns(
+        &mut self,
+        kind: &str,
+        joint: &JointEntry,
+        angles: &[Formula],
+        text: &mut Vec<String>,
+    ) {
+        let given = joint.axes.as_ref();
+        let usual = if angles.len() == 2 { "xy" } else { "zyx" };
+        let written = given.map_or(usual, |axes| axes.text.as_str());
+        let axes: Vec<Option<Axis>> = written
+            .chars()
+            .map(|letter| match letter {
+                'x' => Some(Axis::X),
+                'y' => Some(Axis::Y),
+                'z' => Some(Axis::Z),
+                _ => None,
+            })
+            .collect();
+        let is_fine = axes.len() == angles.len()
+            && axes.iter().all(Option::is_some)
+            && axes.windows(2).all(|pair| pair[0] != pair[1]);
+        if !is_fine {
+            let span = given.map_or(joint.span, |axes| axes.span);
+            self.log.push(
+                Diagnostic::error(span, "these are not the axes of this joint")
+                    .label(format!(
+                        "expected {} of the letters x, y and z, no two neighbours alike",
+                        angles.len()
+                    ))
+                    .help(format!("for example `axes = \"{usual}\"`")),
+            );
+        }
+        let names: Vec<&str> = angles.iter().map(|angle| angle.text.as_str()).collect();
+        text.push(format!("{kind}({}, {written})", names.join(", ")));
+        for (axis, angle) in axes.into_iter().zip(angles) {
+            self.rotate(axis.unwrap_or(Axis::Z), false, angle);
+        }
+    }
+}
