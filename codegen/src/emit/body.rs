@@ -55,15 +55,34 @@ impl<'a> Body<'a> {
 
     /// Statements and final expression of the fixed stage: an array.
     pub(super) fn fixed(&self) -> TokenStream {
-        let statements = self.statements(Stage::Fixed);
+        let statements = self.statements(Stage::Fixed, false);
         let values = self.handed.iter().map(|v| &self.names[v.index()]);
-        quote! { #(#statements)* [#(#values),*] }
+        quote! { let n = &One::<T>::new(); #(#statements)* [#(#values),*] }
     }
 
-    /// Statements of the state stage, with guards as early returns; `fixed` is the array of [`Self::fixed`].
+    /// Statements of the state stage, with guards as early returns; `fixed` is the array of [`Self::fixed`], and `n` the
+    /// arithmetic.
     pub(super) fn state(&self) -> TokenStream {
-        let statements = self.statements(Stage::State);
+        let statements = self.statements(Stage::State, false);
         quote! { #(#statements)* }
+    }
+
+    /// The same with each output put into `outputs` as soon as it is known, so that none is kept for long; those that are
+    /// zero are left as they are.
+    pub(super) fn state_with_outputs(&self) -> TokenStream {
+        let fixed = self.program.outputs.iter().enumerate().filter(|(_, v)| {
+            let op = &self.program.ops[v.index()];
+            let zero = matches!(op, Op::Number(x) if x.is_zero());
+            self.program.stages[v.index()] == Stage::Fixed && !zero
+        });
+        let fixed = fixed.map(|(k, v)| self.put(k, *v));
+        let statements = self.statements(Stage::State, true);
+        quote! { #(#fixed)* #(#statements)* }
+    }
+
+    fn put(&self, k: usize, v: ValueId) -> TokenStream {
+        let value = self.operand(Stage::State, v);
+        quote! { outputs.put(#k, #value); }
     }
 
     /// An output, after the statements of the state stage.
@@ -78,11 +97,18 @@ impl<'a> Body<'a> {
 
     /// Statements of the fixed stage alone.
     pub(super) fn fixed_statements(&self) -> TokenStream {
-        let statements = self.statements(Stage::Fixed);
-        quote! { #(#statements)* }
+        let statements = self.statements(Stage::Fixed, false);
+        quote! { let n = &One::<T>::new(); #(#statements)* }
     }
 
-    fn statements(&self, stage: Stage) -> Vec<TokenStream> {
+    fn statements(&self, stage: Stage, put: bool) -> Vec<TokenStream> {
+        let mut puts: Vec<Vec<usize>> = vec![Vec::new(); self.program.ops.len()];
+        for (k, v) in self.program.outputs.iter().enumerate() {
+            if put && self.program.stages[v.index()] == stage {
+                puts[v.index()].push(k);
+            }
+        }
+        let mut late = Vec::new();
         let mut statements = Vec::new();
         let mut guards: Vec<&Guard> = self.program.guards.iter().collect();
         let emit_guards =
@@ -99,8 +125,18 @@ impl<'a> Body<'a> {
             if self.program.stages[i] == stage && !matches!(op, Op::Number(_)) {
                 statements.extend(self.statement(stage, i, op));
             }
+            // A cosine is written with the sine after it; what needs it comes then.
+            let paired = matches!((op, self.program.ops.get(i + 1)), (Op::Cos(a), Some(Op::Sin(b))) if a == b);
+            if paired {
+                late.extend(puts[i].iter().map(|k| (*k, i)));
+                continue;
+            }
             if stage == Stage::State {
                 emit_guards(i, &mut statements, &mut guards);
+            }
+            for (k, i) in late.drain(..).chain(puts[i].iter().map(|k| (*k, i))) {
+                let v = ValueId(u32::try_from(i).expect("program below 4G operations"));
+                statements.push(self.put(k, v));
             }
         }
         statements
@@ -123,34 +159,34 @@ impl<'a> Body<'a> {
             Op::Unary(function, a) => {
                 let a = get(a);
                 match function {
-                    Unary::Sqrt => quote! { #a.sqrt() },
-                    Unary::Sign => quote! { #a.sign() },
-                    Unary::Abs => quote! { #a.abs() },
-                    Unary::Tanh => quote! { #a.tanh() },
-                    Unary::Exp => quote! { #a.exp() },
-                    Unary::Sin => quote! { #a.sin_cos().0 },
-                    Unary::Cos => quote! { #a.sin_cos().1 },
+                    Unary::Sqrt => quote! { n.sqrt(#a) },
+                    Unary::Sign => quote! { n.sign(#a) },
+                    Unary::Abs => quote! { n.abs(#a) },
+                    Unary::Tanh => quote! { n.tanh(#a) },
+                    Unary::Exp => quote! { n.exp(#a) },
+                    Unary::Sin => quote! { n.sin_cos(#a).0 },
+                    Unary::Cos => quote! { n.sin_cos(#a).1 },
                 }
             }
             Op::Atan2(y, x) => {
                 let (y, x) = (get(y), get(x));
-                quote! { #y.atan2(#x) }
+                quote! { n.atan2(#y, #x) }
             }
             // The sine is written together with its cosine, which stands right before it if both are needed.
             Op::Sin(a) if i > 0 && self.program.ops[i - 1] == Op::Cos(*a) => {
                 let (a, cosine) = (get(a), &self.names[i - 1]);
-                return Some(quote! { let (#name, #cosine) = #a.sin_cos(); });
+                return Some(quote! { let (#name, #cosine) = n.sin_cos(#a); });
             }
             Op::Sin(a) => {
                 let a = get(a);
-                quote! { #a.sin_cos().0 }
+                quote! { n.sin_cos(#a).0 }
             }
             Op::Cos(a) => {
                 if matches!(self.program.ops.get(i + 1), Some(Op::Sin(b)) if b == a) {
                     return None;
                 }
                 let a = get(a);
-                quote! { #a.sin_cos().1 }
+                quote! { n.sin_cos(#a).1 }
             }
         };
         Some(quote! { let #name = #value; })
@@ -159,17 +195,12 @@ impl<'a> Body<'a> {
     fn guard(&self, guard: Guard) -> TokenStream {
         let value = self.operand(Stage::State, guard.value());
         match guard {
-            // Written so that what is no number fails as well.
-            Guard::Reachable(_) => {
-                quote! { if !(#value >= T::from_f64(0.0)) { return Err(PoseError::OutOfReach); } }
-            }
+            Guard::Reachable(_) => quote! { n.reachable(#value)?; },
             Guard::Regular(_, limit) => {
                 let limit = Literal::f64_unsuffixed(limit);
-                quote! { if !(#value.abs() > T::from_f64(#limit)) { return Err(PoseError::Singular); } }
+                quote! { n.regular(#value, #limit)?; }
             }
-            Guard::Finite(_) => {
-                quote! { if !#value.is_finite() { return Err(PoseError::Undefined); } }
-            }
+            Guard::Finite(_) => quote! { n.finite(#value)?; },
         }
     }
 
@@ -183,7 +214,7 @@ impl<'a> Body<'a> {
                 .iter()
                 .position(|h| *h == v)
                 .expect("a fixed value that is used is handed over");
-            return quote! { fixed[#place] };
+            return quote! { n.of(fixed[#place]) };
         }
         let name = &self.names[v.index()];
         quote! { #name }
@@ -194,12 +225,12 @@ fn binary(a: &TokenStream, operator: &TokenStream, b: &TokenStream) -> TokenStre
     quote! { #a #operator #b }
 }
 
-/// A number as a value of the type parameter.
-pub(super) fn number(value: &Rational) -> TokenStream {
+/// A number as a value of the program.
+fn number(value: &Rational) -> TokenStream {
     let magnitude = Literal::f64_unsuffixed(value.to_f64().abs());
     if value.is_negative() {
-        quote! { T::from_f64(-#magnitude) }
+        quote! { n.number(-#magnitude) }
     } else {
-        quote! { T::from_f64(#magnitude) }
+        quote! { n.number(#magnitude) }
     }
 }
