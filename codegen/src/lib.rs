@@ -30,7 +30,7 @@ mod vector;
 use modelmill_spec::Mechanism;
 
 pub use base::BaseParameter;
-pub use emit::{Emitted, emit};
+pub use emit::{Emitted, EmittedFile, emit, emit_c, emit_python};
 pub use error::DeriveError;
 pub use evaluate::{Evaluator, PoseFault, PoseReason, States};
 pub use exact::Monomial;

@@ -241,9 +241,16 @@ where
         n,
         visit: |block: Block<'_, T::Line, OUTPUTS>| {
             for (column, line) in outputs.iter_mut().zip(block.outputs) {
-                let to = column.iter_mut().skip(block.first).take(block.len);
-                for (to, from) in to.zip(line.as_ref()) {
-                    *to = *from;
+                let to = column.get_mut(block.first..block.first + block.len);
+                let (Some(to), line) = (to, line.as_ref()) else {
+                    continue;
+                };
+                if to.len() == line.len() {
+                    to.copy_from_slice(line);
+                } else {
+                    for (to, from) in to.iter_mut().zip(line) {
+                        *to = *from;
+                    }
                 }
             }
         },

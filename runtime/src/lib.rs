@@ -11,6 +11,8 @@ mod numbers;
 mod parallel;
 mod real;
 mod solve;
+#[cfg(feature = "source")]
+pub mod source;
 #[cfg(feature = "std")]
 mod wide;
 

@@ -39,6 +39,25 @@ pub trait Numbers {
     /// Angle of the point (`x`, `y`) in rad.
     fn atan2(&self, y: Self::Value, x: Self::Value) -> Self::Value;
 
+    /// `a * b + c`, rounded once where the machine does so at no cost.
+    #[allow(clippy::inline_always, reason = "an instruction or two")]
+    #[inline(always)]
+    fn mul_add(&self, a: Self::Value, b: Self::Value, c: Self::Value) -> Self::Value {
+        a * b + c
+    }
+    /// `a * b - c`, as [`Self::mul_add`].
+    #[allow(clippy::inline_always, reason = "an instruction or two")]
+    #[inline(always)]
+    fn mul_sub(&self, a: Self::Value, b: Self::Value, c: Self::Value) -> Self::Value {
+        a * b - c
+    }
+    /// `c - a * b`, as [`Self::mul_add`].
+    #[allow(clippy::inline_always, reason = "an instruction or two")]
+    #[inline(always)]
+    fn sub_mul(&self, c: Self::Value, a: Self::Value, b: Self::Value) -> Self::Value {
+        c - a * b
+    }
+
     /// Asks that a value is not negative.
     ///
     /// # Errors

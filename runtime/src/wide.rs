@@ -1,17 +1,30 @@
 //! Programs in the widest vectors of the machine, by way of `pulp`, which asks the machine at run time and keeps the
 //! instructions behind a safe face: 512 bits with AVX-512, 256 with AVX2, 128 with NEON, else one number at a time.
 //!
-//! No operation is fused or reordered, and sine and cosine are those of one number: results are the same on every machine,
-//! and the same as those of one state, to the last bit.
+//! Products are fused with the sums that they go into where the machine has an instruction for that, so that results agree
+//! with those of one state, and between machines, to rounding.
 
 use core::cell::Cell;
 use core::ops::{Add, Div, Mul, Neg, Sub};
+use std::sync::OnceLock;
 
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::blocks::{BlockError, Blocks, Job, Line, Line32, Line64, Program, Vectors};
 use crate::lanes::{Angle, LARGEST_ANGLE, reduced_sin_cos};
 use crate::{Numbers, Outputs, PoseError, Real};
+
+/// The widest vectors of the machine, or narrower ones if the environment variable `MODELMILL_VECTORS` asks for `256` bits
+/// or `none`, so that the figures of another machine can be seen on this one.
+fn vectors() -> Arch {
+    static CHOSEN: OnceLock<Arch> = OnceLock::new();
+    *CHOSEN.get_or_init(|| match std::env::var("MODELMILL_VECTORS").as_deref() {
+        Ok("none") => Arch::Scalar,
+        #[cfg(target_arch = "x86_64")]
+        Ok("256") => pulp::x86::V3::try_new().map_or(Arch::Scalar, Arch::V3),
+        _ => Arch::new(),
+    })
+}
 
 /// A job inside the vectors that `pulp` chose.
 struct Chosen<J, T>(J, core::marker::PhantomData<T>);
@@ -20,7 +33,7 @@ macro_rules! wide {
     (
         $float:ty, $line:ident, $value:ident, $numbers:ident, $put:ident, $vectors:ident,
         $floats:ident, $mask:ident, $lanes:ident, $splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident,
-        $sqrt:ident, $abs:ident, $less:ident, $greater:ident, $at_least:ident, $and:ident, $not:ident, $first:ident,
+        $fused:ident, $fused_less:ident, $sqrt:ident, $abs:ident, $less:ident, $greater:ident, $at_least:ident, $and:ident, $not:ident, $first:ident,
         $select:ident, $of_slice:ident, $of_slice_mut:ident
     ) => {
         /// As many numbers as a vector holds.
@@ -110,6 +123,18 @@ macro_rules! wide {
                 let (simd, largest) = (self.simd, <$float as Real>::from_f64(LARGEST_ANGLE));
                 self.hold(simd.$less(simd.$abs(angle.v), simd.$splat(largest)));
                 angle.sin_cos()
+            }
+            #[inline(always)]
+            fn mul_add(&self, a: $value<S>, b: $value<S>, c: $value<S>) -> $value<S> {
+                self.value(self.simd.$fused(a.v, b.v, c.v))
+            }
+            #[inline(always)]
+            fn mul_sub(&self, a: $value<S>, b: $value<S>, c: $value<S>) -> $value<S> {
+                self.value(self.simd.$fused(a.v, b.v, self.simd.$neg(c.v)))
+            }
+            #[inline(always)]
+            fn sub_mul(&self, c: $value<S>, a: $value<S>, b: $value<S>) -> $value<S> {
+                self.value(self.simd.$fused_less(a.v, b.v, c.v))
             }
             #[inline(always)]
             fn sqrt(&self, x: $value<S>) -> $value<S> {
@@ -231,7 +256,7 @@ macro_rules! wide {
         impl Blocks for $float {
             type Line = $line;
             fn run<J: Job<Self>>(job: J) -> Result<(), BlockError> {
-                Arch::new().dispatch(Chosen(job, core::marker::PhantomData))
+                vectors().dispatch(Chosen(job, core::marker::PhantomData))
             }
         }
     };
@@ -265,6 +290,8 @@ wide!(
     mul_f64s,
     div_f64s,
     neg_f64s,
+    mul_add_e_f64s,
+    negate_mul_add_e_f64s,
     sqrt_f64s,
     abs_f64s,
     less_than_f64s,
@@ -293,6 +320,8 @@ wide!(
     mul_f32s,
     div_f32s,
     neg_f32s,
+    mul_add_e_f32s,
+    negate_mul_add_e_f32s,
     sqrt_f32s,
     abs_f32s,
     less_than_f32s,
@@ -340,6 +369,22 @@ impl<S: Simd> Angle for Wide64<S> {
         Self {
             simd: self.simd,
             v: self.simd.splat_f64s(x),
+        }
+    }
+
+    #[inline(always)]
+    fn plus_product(self, a: Self, b: Self) -> Self {
+        Self {
+            simd: self.simd,
+            v: self.simd.mul_add_e_f64s(a.v, b.v, self.v),
+        }
+    }
+
+    #[inline(always)]
+    fn less_product(self, a: Self, b: Self) -> Self {
+        Self {
+            simd: self.simd,
+            v: self.simd.negate_mul_add_e_f64s(a.v, b.v, self.v),
         }
     }
 

@@ -12,6 +12,8 @@ pub(super) struct Body<'a> {
     /// How an input is written.
     input: &'a dyn Fn(Atom) -> TokenStream,
     names: Vec<Ident>,
+    /// Products that are written inside the only sum or difference that needs them.
+    fused: Vec<bool>,
     /// Fixed values that the state stage needs, with their place in the array that hands them over.
     handed: Vec<ValueId>,
 }
@@ -44,6 +46,7 @@ impl<'a> Body<'a> {
             program,
             input,
             names,
+            fused: fused(program),
             handed,
         }
     }
@@ -145,6 +148,12 @@ impl<'a> Body<'a> {
     fn statement(&self, stage: Stage, i: usize, op: &Op) -> Option<TokenStream> {
         let name = &self.names[i];
         let get = |v: &ValueId| self.operand(stage, *v);
+        if self.fused[i] {
+            return None;
+        }
+        if let Some(value) = self.fused_sum(stage, op) {
+            return Some(quote! { let #name = #value; });
+        }
         let value = match op {
             Op::Number(_) => return None,
             Op::Input(atom) => (self.input)(*atom),
@@ -192,6 +201,31 @@ impl<'a> Body<'a> {
         Some(quote! { let #name = #value; })
     }
 
+    /// A sum or difference with the product that is written inside it.
+    fn fused_sum(&self, stage: Stage, op: &Op) -> Option<TokenStream> {
+        let get = |v: &ValueId| self.operand(stage, *v);
+        let product = |v: &ValueId| match &self.program.ops[v.index()] {
+            Op::Mul(x, y) if self.fused[v.index()] => Some((get(x), get(y))),
+            _ => None,
+        };
+        match op {
+            Op::Add(a, b) => {
+                let (other, (x, y)) = product(b).map(|p| (a, p)).or_else(|| Some((b, product(a)?)))?;
+                let other = get(other);
+                Some(quote! { n.mul_add(#x, #y, #other) })
+            }
+            Op::Sub(a, b) => {
+                if let Some((x, y)) = product(b) {
+                    let a = get(a);
+                    return Some(quote! { n.sub_mul(#a, #x, #y) });
+                }
+                let ((x, y), b) = (product(a)?, get(b));
+                Some(quote! { n.mul_sub(#x, #y, #b) })
+            }
+            _ => None,
+        }
+    }
+
     fn guard(&self, guard: Guard) -> TokenStream {
         let value = self.operand(Stage::State, guard.value());
         match guard {
@@ -219,6 +253,36 @@ impl<'a> Body<'a> {
         let name = &self.names[v.index()];
         quote! { #name }
     }
+}
+
+/// Products of the state stage that one sum or difference needs and nothing else; of two, the later one.
+fn fused(program: &Program) -> Vec<bool> {
+    let mut uses = vec![0; program.ops.len()];
+    for op in &program.ops {
+        op.for_each_operand(|v| uses[v.index()] += 1);
+    }
+    let kept = program.outputs.iter().copied();
+    for v in kept.chain(program.guards.iter().map(|g| g.value())) {
+        uses[v.index()] += 2;
+    }
+    let mut fused = vec![false; program.ops.len()];
+    for (op, stage) in program.ops.iter().zip(&program.stages) {
+        let (Op::Add(a, b) | Op::Sub(a, b)) = op else {
+            continue;
+        };
+        let single = |v: ValueId| {
+            let i = v.index();
+            *stage == Stage::State
+                && uses[i] == 1
+                && program.stages[i] == Stage::State
+                && matches!(program.ops[i], Op::Mul(..))
+        };
+        let (early, late) = if a.index() < b.index() { (a, b) } else { (b, a) };
+        if let Some(product) = [late, early].into_iter().find(|v| single(**v)) {
+            fused[product.index()] = true;
+        }
+    }
+    fused
 }
 
 fn binary(a: &TokenStream, operator: &TokenStream, b: &TokenStream) -> TokenStream {

@@ -5,10 +5,17 @@
 
 mod blocks;
 mod body;
+mod c;
+mod foreign;
 mod functions;
 mod identifier;
 mod items;
 mod newton;
+mod python;
+
+pub use c::emit_c;
+pub use foreign::EmittedFile;
+pub use python::emit_python;
 
 use proc_macro2::TokenStream;
 use quote::quote;
