@@ -29,7 +29,11 @@ pub trait Program<T: Real, const INPUTS: usize, const OUTPUTS: usize> {
     ///
     /// # Errors
     /// What is wrong with the pose.
-    fn complete(&self, _inputs: &mut [T; INPUTS], _last: Option<&[T; INPUTS]>) -> Result<(), PoseError> {
+    fn complete(
+        &self,
+        _inputs: &mut [T; INPUTS],
+        _last: Option<&[T; INPUTS]>,
+    ) -> Result<(), PoseError> {
         Ok(())
     }
 
@@ -366,11 +370,9 @@ where
             {
                 (len, fault) = (k, Some(reason));
             }
-            let regular =
-                fault.is_none() && vectors.line(self.program, &inputs, &mut self.outputs);
+            let regular = fault.is_none() && vectors.line(self.program, &inputs, &mut self.outputs);
             if !regular
-                && let Err((k, reason)) =
-                    one_by_one(self.program, &inputs, &mut self.outputs, len)
+                && let Err((k, reason)) = one_by_one(self.program, &inputs, &mut self.outputs, len)
             {
                 (len, fault) = (k, Some(reason));
             }
@@ -408,7 +410,13 @@ fn load<T: Blocks>(line: &mut T::Line, array: &[T], first: usize, len: usize) {
 
 /// State `k` of a line.
 fn column<T: Blocks, const INPUTS: usize>(inputs: &[T::Line; INPUTS], k: usize) -> [T; INPUTS] {
-    core::array::from_fn(|i| inputs[i].as_ref()[k])
+    core::array::from_fn(|i| {
+        inputs[i]
+            .as_ref()
+            .get(k)
+            .copied()
+            .unwrap_or(T::from_f64(0.0))
+    })
 }
 
 /// Completes the inputs of a line; which state has none, and why.
@@ -458,7 +466,9 @@ where
             .and_then(|()| program.run(&One::new(), &state, &mut found))
             .map_err(|reason| (k, reason))?;
         for (line, value) in outputs.iter_mut().zip(&found) {
-            line.as_mut()[k] = *value;
+            if let Some(to) = line.as_mut().get_mut(k) {
+                *to = *value;
+            }
         }
     }
     Ok(())

@@ -46,7 +46,9 @@ pub(crate) fn sin_cos_once(angle: f64) -> (f64, f64) {
 }
 
 /// A number, or a vector of numbers, that the kernel below works on.
-pub(crate) trait Angle: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+pub(crate) trait Angle:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
     /// A number as a value like `self`.
     fn like(self, x: f64) -> Self;
     /// `self + a * b`, rounded once or twice.
@@ -103,7 +105,9 @@ pub(crate) fn reduced_sin_cos<A: Angle>(x: A) -> (A, A) {
     const PIO2_1: f64 = 1.570_796_326_734_125_614_17;
     const PIO2_2: f64 = 6.077_100_506_303_965_976_60e-11;
     const PIO2_2T: f64 = 2.022_266_248_795_950_631_54e-21;
-    let shifted = x.like(ROUND).plus_product(x, x.like(core::f64::consts::FRAC_2_PI));
+    let shifted = x
+        .like(ROUND)
+        .plus_product(x, x.like(core::f64::consts::FRAC_2_PI));
     let turns = shifted - x.like(ROUND);
     // The first product is exact, and so is the difference; what the second one loses goes into the tail.
     let first = x.less_product(turns, x.like(PIO2_1));

@@ -19,8 +19,8 @@ mod wide;
 use core::fmt;
 
 pub use lanes::{LARGEST_ANGLE, sin_cos_lanes};
-pub use numbers::{Numbers, One, Outputs};
 pub use loops::{Loops, Scales, correct, follow, settle};
+pub use numbers::{Numbers, One, Outputs};
 pub use real::Real;
 pub use solve::solve;
 

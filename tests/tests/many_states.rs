@@ -32,7 +32,9 @@ macro_rules! check {
             qdd: std::array::from_fn(|k| qdd[k][i]),
         };
         // Up to the first state that has no answer.
-        let n = (0..203).take_while(|i| dynamics.forces(&state(*i)).is_ok()).count();
+        let n = (0..203)
+            .take_while(|i| dynamics.forces(&state(*i)).is_ok())
+            .count();
         assert!(n > 10, "{n}");
         let upto = |n: usize| $model::States {
             q: std::array::from_fn(|k| &q[k][..n]),
@@ -48,20 +50,30 @@ macro_rules! check {
             dynamics.forces_of_many(&upto(n), &mut columns).unwrap();
             let mut columns = in_parallel.iter_mut();
             let mut columns = std::array::from_fn(|_| &mut columns.next().unwrap()[..]);
-            dynamics.forces_of_many_in_parallel(&upto(n), &mut columns).unwrap();
+            dynamics
+                .forces_of_many_in_parallel(&upto(n), &mut columns)
+                .unwrap();
         }
         assert_eq!(forces, in_parallel);
         model.regressor_of_many(&upto(n), &mut regressor).unwrap();
         let [mut found, mut expected] = [Vec::new(), Vec::new()];
         let [mut found_h, mut expected_h] = [Vec::new(), Vec::new()];
         for i in 0..n {
-            let (one, h) = (dynamics.forces(&state(i)).unwrap(), model.regressor(&state(i)).unwrap());
+            let (one, h) = (
+                dynamics.forces(&state(i)).unwrap(),
+                model.regressor(&state(i)).unwrap(),
+            );
             expected.extend(one.map(f64::from));
             found.extend(forces.iter().map(|f| f64::from(f[i])));
             expected_h.extend(h.as_flattened().iter().map(|x| f64::from(*x)));
-            found_h.extend((0..$model::N_DRIVES * $model::N_BASE).map(|k| f64::from(regressor[k * n + i])));
+            found_h.extend(
+                (0..$model::N_DRIVES * $model::N_BASE).map(|k| f64::from(regressor[k * n + i])),
+            );
         }
-        for error in [difference(&found, &expected), difference(&found_h, &expected_h)] {
+        for error in [
+            difference(&found, &expected),
+            difference(&found_h, &expected_h),
+        ] {
             assert!(error < $tolerance, "{}: {error}", $name);
         }
         if n < 203 {
@@ -69,7 +81,9 @@ macro_rules! check {
             let mut forces = vec![vec![0.0 as $float; 203]; $model::N_DRIVES];
             let mut columns = forces.iter_mut();
             let mut columns = std::array::from_fn(|_| &mut columns.next().unwrap()[..]);
-            let fault = dynamics.forces_of_many(&upto(203), &mut columns).unwrap_err();
+            let fault = dynamics
+                .forces_of_many(&upto(203), &mut columns)
+                .unwrap_err();
             assert_eq!(fault, BlockError::At { sample: n, reason });
         }
     }};
@@ -119,7 +133,10 @@ fn what_is_no_number_is_found_where_it_stands() {
         let reason = PoseError::NotFinite("q3");
         assert_eq!(result, Err(BlockError::At { sample: at, reason }));
         let (_, regular) = forces_with(21, at, 0.3);
-        assert_eq!(forces[6][..at], regular[6][..at]);
+        if at > 0 {
+            let error = difference(&forces[6][..at], &regular[6][..at]);
+            assert!(error < 1e-14, "{error}");
+        }
         let text = result.unwrap_err().to_string();
         assert_eq!(text, format!("at sample {at}: `q3` is no finite number"));
     }
@@ -177,6 +194,10 @@ fn narrower_vectors_agree_too() {
             .env("MODELMILL_VECTORS", vectors)
             .output()
             .unwrap();
-        assert!(output.status.success(), "{vectors}: {}", String::from_utf8_lossy(&output.stdout));
+        assert!(
+            output.status.success(),
+            "{vectors}: {}",
+            String::from_utf8_lossy(&output.stdout)
+        );
     }
 }

@@ -21,11 +21,15 @@ pub(crate) fn run(args: &GenerateArgs) -> Outcome {
     };
     if let Some(files) = crate_files {
         let Some(folder) = &args.out else {
-            return Err(Failure::Usage("--out names the folder of the crate".to_owned()));
+            return Err(Failure::Usage(
+                "--out names the folder of the crate".to_owned(),
+            ));
         };
         write_crate(folder, &files)?;
         let what = match args.language {
-            Language::Python => "a Python module: build it there with `maturin build --release`, or `cargo build --release`",
+            Language::Python => {
+                "a Python module: build it there with `maturin build --release`, or `cargo build --release`"
+            }
             _ => "a C library and its header: build it there with `cargo build --release`",
         };
         terminal::note(&format!("{}: a crate that makes {what}", folder.display()));

@@ -45,18 +45,25 @@ pub(super) fn states(load: bool) -> TokenStream {
 /// The adapter that the runtime runs, and the methods over many states.
 pub(super) fn items(function: &Function<'_>) -> TokenStream {
     let Function {
-        derivation, name, owner, ..
+        derivation,
+        name,
+        owner,
+        ..
     } = function;
     let program = program(function);
     let adapter = adapter(name);
     let owner = format_ident!("{owner}");
     let inputs = slices(function);
-    let [many, parallel, blocks] =
-        ["of_many", "of_many_in_parallel", "in_blocks"].map(|suffix| format_ident!("{name}_{suffix}"));
+    let [many, parallel, blocks] = ["of_many", "of_many_in_parallel", "in_blocks"]
+        .map(|suffix| format_ident!("{name}_{suffix}"));
     let one = format!("[`Self::{name}`]");
-    let vectors = format!(" {one} at many states, in the widest vectors of the machine if the runtime has its feature `std`.");
-    let all_cores = format!(" [`Self::{many}`] on all cores, if the runtime has its feature `rayon`.");
-    let in_blocks = format!(" {one} at many states, shown block by block; nothing is kept between blocks.");
+    let vectors = format!(
+        " {one} at many states, in the widest vectors of the machine if the runtime has its feature `std`."
+    );
+    let all_cores =
+        format!(" [`Self::{many}`] on all cores, if the runtime has its feature `rayon`.");
+    let in_blocks =
+        format!(" {one} at many states, shown block by block; nothing is kept between blocks.");
     let n_outputs = function.n_outputs;
     let n_drives = derivation.mechanism.drives.len();
     let matrix = n_outputs != n_drives;
@@ -175,11 +182,12 @@ fn program(function: &Function<'_>) -> TokenStream {
     });
     let complete = newton.then(|| {
         let last = passive_of(quote! { last });
+        let last_q = (0..n).map(|k| quote! { last[#k] });
         // Of `self.model`, or of `self`, behind the adapter's reference.
         let model: TokenStream = if model.to_string() == "self" {
             quote! { self.0 }
         } else {
-            quote! { self.0.model }
+            quote! { (&self.0.model) }
         };
         let set = (0..passive.len()).map(|k| {
             let place = next + k;
@@ -194,8 +202,10 @@ fn program(function: &Function<'_>) -> TokenStream {
                 last: Option<&[T; #n_inputs]>,
             ) -> Result<(), PoseError> {
                 let q = #q;
-                let passive = match last {
-                    Some(last) => #model.passive_position_near(&q, &#last)?,
+                // Followed from the state before, in a straight line; where that fails, from the nominal pose.
+                let near = last.and_then(|last| follow(#model, &[#(#last_q),*], &#last, &q).ok());
+                let passive = match near {
+                    Some(passive) => passive,
                     None => #model.passive_position(&q)?,
                 };
                 #(#set)*

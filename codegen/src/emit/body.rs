@@ -210,7 +210,9 @@ impl<'a> Body<'a> {
         };
         match op {
             Op::Add(a, b) => {
-                let (other, (x, y)) = product(b).map(|p| (a, p)).or_else(|| Some((b, product(a)?)))?;
+                let (other, (x, y)) = product(b)
+                    .map(|p| (a, p))
+                    .or_else(|| Some((b, product(a)?)))?;
                 let other = get(other);
                 Some(quote! { n.mul_add(#x, #y, #other) })
             }
@@ -277,7 +279,11 @@ fn fused(program: &Program) -> Vec<bool> {
                 && program.stages[i] == Stage::State
                 && matches!(program.ops[i], Op::Mul(..))
         };
-        let (early, late) = if a.index() < b.index() { (a, b) } else { (b, a) };
+        let (early, late) = if a.index() < b.index() {
+            (a, b)
+        } else {
+            (b, a)
+        };
         if let Some(product) = [late, early].into_iter().find(|v| single(**v)) {
             fused[product.index()] = true;
         }

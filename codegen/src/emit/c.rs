@@ -11,11 +11,17 @@ use crate::Derivation;
 /// What a function returns, with its name in the header after the prefix, and its meaning.
 const STATUS: [(&str, &str); 8] = [
     ("OK", "all is well"),
-    ("OUT_OF_REACH", "the loops cannot close: the pose is out of reach"),
+    (
+        "OUT_OF_REACH",
+        "the loops cannot close: the pose is out of reach",
+    ),
     ("SINGULAR", "the pose is singular"),
     ("UNDEFINED", "a term of the model has no finite value there"),
     ("NOT_FINITE", "an input is no finite number"),
-    ("NOT_PREPARED", "the structure was not filled by the function that prepares it"),
+    (
+        "NOT_PREPARED",
+        "the structure was not filled by the function that prepares it",
+    ),
     ("NULL_POINTER", "an argument is a null pointer"),
     ("LENGTH", "arrays of different lengths"),
 ];
@@ -134,7 +140,11 @@ fn items(face: &Face<'_>) -> TokenStream {
         };
     };
     let single = |name: &str, owner: &str, method: &str, output: TokenStream| {
-        let (name, owner, method) = (function(name), format_ident!("{owner}"), format_ident!("{method}"));
+        let (name, owner, method) = (
+            function(name),
+            format_ident!("{owner}"),
+            format_ident!("{method}"),
+        );
         quote! {
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn #name(dynamics: *const #dynamics, #state_arguments, output: *mut f64) -> i32 {
@@ -153,9 +163,19 @@ fn items(face: &Face<'_>) -> TokenStream {
             }
         }
     };
-    let forces = single("inverse_dynamics", "dynamics", "forces", quote! { [f64; #n_drives] });
+    let forces = single(
+        "inverse_dynamics",
+        "dynamics",
+        "forces",
+        quote! { [f64; #n_drives] },
+    );
     let n_entries = n_drives * n_base;
-    let regressor = single("regressor", "model", "regressor", quote! { [[f64; #n_base]; #n_drives] });
+    let regressor = single(
+        "regressor",
+        "model",
+        "regressor",
+        quote! { [[f64; #n_base]; #n_drives] },
+    );
     let near = face.newton.then(|| {
         let (name, n) = (function("inverse_dynamics_near"), face.n_passive());
         quote! {
@@ -231,8 +251,18 @@ fn items(face: &Face<'_>) -> TokenStream {
             }
         }
     });
-    let [default_geometry, nominal_parameters, base_parameters, prepare] =
-        ["default_geometry", "nominal_parameters", "base_parameters", "prepare"].map(function);
+    let [
+        default_geometry,
+        nominal_parameters,
+        base_parameters,
+        prepare,
+    ] = [
+        "default_geometry",
+        "nominal_parameters",
+        "base_parameters",
+        "prepare",
+    ]
+    .map(function);
     let status_constants = STATUS.iter().enumerate().map(|(k, (name, _))| {
         let (name, k) = (format_ident!("{name}"), i32::try_from(k).unwrap_or(0));
         quote! { const #name: i32 = #k; }
@@ -241,7 +271,7 @@ fn items(face: &Face<'_>) -> TokenStream {
         #![cfg_attr(not(feature = "std"), no_std)]
         #![allow(non_camel_case_types, clippy::missing_safety_doc, reason = "the header says what pointers must point to")]
 
-        mod model;
+        pub mod model;
 
         use modelmill_runtime::PoseError;
         use modelmill_runtime::blocks::BlockError;
@@ -392,22 +422,40 @@ fn header(face: &Face<'_>) -> String {
         text.push('\n');
     };
     let plain = |s: &str| s.replace("*/", "* /");
-    line(&format!("/* {}: {}.", name, plain(mechanism.title.as_deref().unwrap_or(&mechanism.name))));
+    line(&format!(
+        "/* {}: {}.",
+        name,
+        plain(mechanism.title.as_deref().unwrap_or(&mechanism.name))
+    ));
     line(" *");
     line(" * Inverse dynamics tau = H_min(q, q', q'') p_min, written by modelmill; do not edit.");
     line(" *");
-    line(" * Prepare once, then call; nothing allocates, locks or throws, and all of it is reentrant:");
+    line(
+        " * Prepare once, then call; nothing allocates, locks or throws, and all of it is reentrant:",
+    );
     line(" *");
-    line(&format!(" *     double geometry[{upper}_N_CONSTANTS], parameters[{upper}_N_PARAMETERS], base[{upper}_N_BASE];"));
+    line(&format!(
+        " *     double geometry[{upper}_N_CONSTANTS], parameters[{upper}_N_PARAMETERS], base[{upper}_N_BASE];"
+    ));
     line(&format!(" *     {name}_dynamics dynamics;"));
     line(&format!(" *     {name}_default_geometry(geometry);"));
     line(&format!(" *     {name}_nominal_parameters(parameters);"));
-    line(&format!(" *     {name}_base_parameters(geometry, parameters, base);"));
-    line(&format!(" *     {name}_prepare(&dynamics, geometry, base);"));
+    line(&format!(
+        " *     {name}_base_parameters(geometry, parameters, base);"
+    ));
+    line(&format!(
+        " *     {name}_prepare(&dynamics, geometry, base);"
+    ));
     line(" *");
-    line(" * SI units. Pointers must be aligned and point to as many numbers as the declaration says; arrays that are read and");
-    line(" * written must not overlap. Functions return a status; results are only written when it is OK. */");
-    line(&format!("#ifndef {upper}_H\n#define {upper}_H\n\n#include <stddef.h>\n#include <stdint.h>\n"));
+    line(
+        " * SI units. Pointers must be aligned and point to as many numbers as the declaration says; arrays that are read and",
+    );
+    line(
+        " * written must not overlap. Functions return a status; results are only written when it is OK. */",
+    );
+    line(&format!(
+        "#ifndef {upper}_H\n#define {upper}_H\n\n#include <stddef.h>\n#include <stdint.h>\n"
+    ));
     for (what, n) in [
         ("ACTIVE", face.n_active()),
         ("PASSIVE", face.n_passive()),
@@ -428,22 +476,53 @@ fn header(face: &Face<'_>) -> String {
             line(&format!("#define {upper}_{prefix}_{name} {k}"));
         }
     };
-    let identifier = |s: &str| super::identifier::of_field(s).to_string().trim_start_matches("r#").to_owned();
+    let identifier = |s: &str| {
+        super::identifier::of_field(s)
+            .to_string()
+            .trim_start_matches("r#")
+            .to_owned()
+    };
     let coordinate = |i: &usize| identifier(&mechanism.coordinates[*i].name);
-    places("Coordinates", "COORDINATE", &mut active.iter().map(coordinate));
+    places(
+        "Coordinates",
+        "COORDINATE",
+        &mut active.iter().map(coordinate),
+    );
     if face.newton {
-        places("Passive coordinates", "PASSIVE", &mut passive.iter().map(coordinate));
+        places(
+            "Passive coordinates",
+            "PASSIVE",
+            &mut passive.iter().map(coordinate),
+        );
     }
-    places("Drives", "DRIVE", &mut mechanism.drives.iter().map(|d| identifier(&d.name)));
-    places("Known quantities", "CONSTANT", &mut mechanism.constants.iter().map(|c| identifier(&c.name)));
-    places("Dynamic parameters", "PARAMETER", &mut mechanism.parameters.iter().map(|p| identifier(&p.name)));
+    places(
+        "Drives",
+        "DRIVE",
+        &mut mechanism.drives.iter().map(|d| identifier(&d.name)),
+    );
+    places(
+        "Known quantities",
+        "CONSTANT",
+        &mut mechanism.constants.iter().map(|c| identifier(&c.name)),
+    );
+    places(
+        "Dynamic parameters",
+        "PARAMETER",
+        &mut mechanism.parameters.iter().map(|p| identifier(&p.name)),
+    );
     line("\n/* Base parameters, in order:");
     for base in face.derivation.base_parameters() {
-        line(&plain(&format!(" * {} = {} ({})", base.name, base.expression, base.unit)));
+        line(&plain(&format!(
+            " * {} = {} ({})",
+            base.name, base.expression, base.unit
+        )));
     }
     line(" */\n\n#ifdef __cplusplus\nextern \"C\" {\n#endif\n");
     line("/* A prepared model. Its content is its own. */");
-    line(&format!("typedef struct {name}_dynamics {{\n  uint64_t ready;\n  uint64_t room[{}];\n}} {name}_dynamics;\n", words(face)));
+    line(&format!(
+        "typedef struct {name}_dynamics {{\n  uint64_t ready;\n  uint64_t room[{}];\n}} {name}_dynamics;\n",
+        words(face)
+    ));
     let state: String = face.state().iter().fold(String::new(), |mut s, (part, n)| {
         _ = write!(s, "const double {part}[{n}], ");
         s
@@ -453,27 +532,54 @@ fn header(face: &Face<'_>) -> String {
         s
     });
     line("/* The model file's values. */");
-    line(&format!("int32_t {name}_default_geometry(double geometry[{upper}_N_CONSTANTS]);"));
-    line(&format!("int32_t {name}_nominal_parameters(double parameters[{upper}_N_PARAMETERS]);"));
+    line(&format!(
+        "int32_t {name}_default_geometry(double geometry[{upper}_N_CONSTANTS]);"
+    ));
+    line(&format!(
+        "int32_t {name}_nominal_parameters(double parameters[{upper}_N_PARAMETERS]);"
+    ));
     line("\n/* Base parameters of physical ones. */");
-    line(&format!("int32_t {name}_base_parameters(const double *geometry, const double *parameters, double base[{upper}_N_BASE]);"));
+    line(&format!(
+        "int32_t {name}_base_parameters(const double *geometry, const double *parameters, double base[{upper}_N_BASE]);"
+    ));
     line("\n/* Computes what depends on geometry and base parameters alone. */");
-    line(&format!("int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const double base[{upper}_N_BASE]);"));
+    line(&format!(
+        "int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const double base[{upper}_N_BASE]);"
+    ));
     line("\n/* Forces of the drives, N or N m. */");
-    line(&format!("int32_t {name}_inverse_dynamics(const {name}_dynamics *dynamics, {state}double forces[{upper}_N_DRIVES]);"));
+    line(&format!(
+        "int32_t {name}_inverse_dynamics(const {name}_dynamics *dynamics, {state}double forces[{upper}_N_DRIVES]);"
+    ));
     line("\n/* H_min row by row: one row per drive, one column per base parameter. */");
-    line(&format!("int32_t {name}_regressor(const {name}_dynamics *dynamics, {state}double regressor[{}]);", face.n_drives() * face.n_base()));
+    line(&format!(
+        "int32_t {name}_regressor(const {name}_dynamics *dynamics, {state}double regressor[{}]);",
+        face.n_drives() * face.n_base()
+    ));
     if face.newton {
         line("\n/* Passive coordinates of a pose, followed from the nominal pose. */");
-        line(&format!("int32_t {name}_passive_position(const {name}_dynamics *dynamics, const double q[{upper}_N_ACTIVE], double passive[{upper}_N_PASSIVE]);"));
-        line("\n/* Forces, with the passive coordinates of a pose near by, such as the last cycle's; they become those of this state. */");
-        line(&format!("int32_t {name}_inverse_dynamics_near(const {name}_dynamics *dynamics, {state}double passive[{upper}_N_PASSIVE], double forces[{upper}_N_DRIVES]);"));
+        line(&format!(
+            "int32_t {name}_passive_position(const {name}_dynamics *dynamics, const double q[{upper}_N_ACTIVE], double passive[{upper}_N_PASSIVE]);"
+        ));
+        line(
+            "\n/* Forces, with the passive coordinates of a pose near by, such as the last cycle's; they become those of this state. */",
+        );
+        line(&format!(
+            "int32_t {name}_inverse_dynamics_near(const {name}_dynamics *dynamics, {state}double passive[{upper}_N_PASSIVE], double forces[{upper}_N_DRIVES]);"
+        ));
     }
-    line("\n/* The same for n states at once, in the widest vectors of the machine. Number i of coordinate k stands at k * n + i, and");
-    line(" * so do results (the regressor's entries row by row). Where a state has no answer, its number goes to `failed`, which may");
+    line(
+        "\n/* The same for n states at once, in the widest vectors of the machine. Number i of coordinate k stands at k * n + i, and",
+    );
+    line(
+        " * so do results (the regressor's entries row by row). Where a state has no answer, its number goes to `failed`, which may",
+    );
     line(" * be NULL, and all results before it are in place. */");
-    line(&format!("int32_t {name}_inverse_dynamics_many(const {name}_dynamics *dynamics, size_t n, {states}double *forces, size_t *failed);"));
-    line(&format!("int32_t {name}_regressor_many(const {name}_dynamics *dynamics, size_t n, {states}double *regressor, size_t *failed);"));
+    line(&format!(
+        "int32_t {name}_inverse_dynamics_many(const {name}_dynamics *dynamics, size_t n, {states}double *forces, size_t *failed);"
+    ));
+    line(&format!(
+        "int32_t {name}_regressor_many(const {name}_dynamics *dynamics, size_t n, {states}double *regressor, size_t *failed);"
+    ));
     line("\n#ifdef __cplusplus\n}\n#endif\n\n#endif");
     text
 }

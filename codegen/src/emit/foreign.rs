@@ -78,7 +78,9 @@ impl<'a> Face<'a> {
             parts.push(("load", self.n_drives()));
         }
         let parts = parts.into_iter();
-        parts.map(|(name, n)| (format_ident!("{name}"), n)).collect()
+        parts
+            .map(|(name, n)| (format_ident!("{name}"), n))
+            .collect()
     }
 
     /// The emitted module as a file.
@@ -91,7 +93,10 @@ impl<'a> Face<'a> {
 
     /// A function that makes `Geometry` or `Parameters` of an array, and its inverse.
     pub(super) fn record(function: &str, record: &str, names: &[&str]) -> TokenStream {
-        let (from, to) = (format_ident!("{function}"), format_ident!("{function}_values"));
+        let (from, to) = (
+            format_ident!("{function}"),
+            format_ident!("{function}_values"),
+        );
         let record = format_ident!("{record}");
         let n = names.len();
         let fields: Vec<Ident> = names.iter().map(|name| of_field(name)).collect();

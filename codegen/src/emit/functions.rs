@@ -90,7 +90,10 @@ enum Kind {
     /// An expression of the program's outputs.
     Single(TokenStream),
     /// An array that begins as zeros; the program is also run over many states.
-    Blocks { zeros: TokenStream, owner: &'static str },
+    Blocks {
+        zeros: TokenStream,
+        owner: &'static str,
+    },
 }
 
 impl Method<'_> {
@@ -272,7 +275,9 @@ fn drives(derivation: &Derivation) -> Function {
         doc: "Lengths or angles of the drives, their rates, and their Jacobian.",
         program,
         body: &body,
-        kind: Kind::Single(quote! { Drives { coordinate: #lengths, rate: #speeds, jacobian: #jacobian } }),
+        kind: Kind::Single(
+            quote! { Drives { coordinate: #lengths, rate: #speeds, jacobian: #jacobian } },
+        ),
         fixed: quote! { self.drives },
         model: quote! { self },
         output: quote! { Drives<T> },

@@ -90,11 +90,12 @@ fn items(face: &Face<'_>) -> TokenStream {
     let doc_forces = "Forces of the drives, N or N m, for base parameters `p`. `parallel` uses all cores; `geometry` names known \
                       quantities that differ from the model file's.";
     let doc_regressor = "H_min: one row per drive, one column per base parameter. `parallel` and `geometry` as in `inverse_dynamics`.";
-    let doc_base = "Base parameters of physical ones; those that are not named are the model file's.";
+    let doc_base =
+        "Base parameters of physical ones; those that are not named are the model file's.";
     quote! {
         #![allow(clippy::needless_pass_by_value, reason = "pyo3 hands arguments over")]
 
-        mod model;
+        pub mod model;
 
         use std::collections::BTreeMap;
 
