@@ -5,7 +5,7 @@ use std::error::Error;
 use modelmill_identify::LeastSquares;
 use modelmill_identify::derivatives::prepare;
 
-use crate::control::{CYCLE, Recording};
+use crate::control::Recording;
 use crate::spidermill_with_friction as model;
 
 /// Cut-off of the low-pass on the readings, Hz.
@@ -15,8 +15,6 @@ const ENDS: usize = 150;
 
 /// Base parameters that explain the forces best.
 pub(crate) fn identify(recording: &Recording) -> Result<[f64; model::N_BASE], Box<dyn Error>> {
-    // Forces are held for one cycle, so they belong to its middle.
-    let middle: Vec<f64> = recording.t.iter().map(|t| t - 0.5 * CYCLE).collect();
     let mut states = Vec::new();
     for q in &recording.q {
         states.push(prepare(&recording.t, q, CUTOFF, 4)?);
@@ -24,11 +22,11 @@ pub(crate) fn identify(recording: &Recording) -> Result<[f64; model::N_BASE], Bo
     // The same filter on the forces keeps both sides of the equations in step.
     let mut forces = Vec::new();
     for force in &recording.forces {
-        forces.push(prepare(&middle, force, CUTOFF, 4)?.q);
+        forces.push(prepare(&recording.t, force, CUTOFF, 4)?.q);
     }
     let n = recording.t.len();
     let inner = ENDS..n - ENDS;
-    // The mean of two neighbours is the motion half a cycle later, where the force is.
+    // Forces are held for one cycle, so they belong to its middle: there the motion is the mean of two neighbours.
     let halfway =
         |x: &[f64]| -> Vec<f64> { inner.clone().map(|i| 0.5 * (x[i] + x[i + 1])).collect() };
     let [q, qd, qdd] = [0, 1, 2]
