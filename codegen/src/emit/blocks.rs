@@ -44,12 +44,7 @@ pub(super) fn states(load: bool) -> TokenStream {
 
 /// The adapter that the runtime runs, and the methods over many states.
 pub(super) fn items(function: &Function<'_>) -> TokenStream {
-    let Function {
-        derivation,
-        name,
-        owner,
-        ..
-    } = function;
+    let Function { name, owner, .. } = function;
     let program = program(function);
     let adapter = adapter(name);
     let owner = format_ident!("{owner}");
@@ -65,8 +60,8 @@ pub(super) fn items(function: &Function<'_>) -> TokenStream {
     let in_blocks =
         format!(" {one} at many states, shown block by block; nothing is kept between blocks.");
     let n_outputs = function.n_outputs;
-    let n_drives = derivation.mechanism.drives.len();
-    let matrix = n_outputs != n_drives;
+    // The forces have a row per drive and no columns.
+    let matrix = *name != "forces";
     let (layout, parameter, columns) = if matrix {
         (
             " One column of all states after the other: first those of the first drive, one per base parameter.",
