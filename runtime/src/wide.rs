@@ -3,6 +3,10 @@
 //!
 //! Products are fused with the sums that they go into where the machine has an instruction for that, so that results agree
 //! with those of one state, and between machines, to rounding.
+#![allow(
+    clippy::inline_always,
+    reason = "a function of its own would be compiled for the narrowest vectors"
+)]
 
 use core::cell::Cell;
 use core::ops::{Add, Div, Mul, Neg, Sub};

@@ -43,6 +43,7 @@ pub(super) fn states(load: bool) -> TokenStream {
 }
 
 /// The adapter that the runtime runs, and the methods over many states.
+#[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 pub(super) fn items(function: &Function<'_>) -> TokenStream {
     let Function { name, owner, .. } = function;
     let program = program(function);
@@ -138,6 +139,7 @@ fn adapter(name: &str) -> proc_macro2::Ident {
 }
 
 /// The program as the runtime knows it: numbers in a row go in and out.
+#[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 fn program(function: &Function<'_>) -> TokenStream {
     let Function {
         derivation,

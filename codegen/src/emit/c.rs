@@ -103,6 +103,7 @@ fn fixed_values(program: &crate::Program) -> usize {
     fixed.filter(|stage| **stage == crate::Stage::Fixed).count()
 }
 
+#[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 fn items(face: &Face<'_>) -> TokenStream {
     let function = |name: &str| format_ident!("{}_{name}", face.name);
     let (dynamics, words) = (function("dynamics"), words(face));
@@ -411,6 +412,7 @@ fn items(face: &Face<'_>) -> TokenStream {
     }
 }
 
+#[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 fn header(face: &Face<'_>) -> String {
     let name = &face.name;
     let upper = name.to_uppercase();

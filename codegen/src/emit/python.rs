@@ -7,6 +7,7 @@ use super::foreign::{EmittedFile, Face, source};
 use crate::Derivation;
 
 /// The files of the crate. It needs `modelmill-runtime` in the folder `modelmill-runtime` beside its manifest.
+#[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 pub fn emit_python(derivation: &Derivation) -> Vec<EmittedFile> {
     let face = Face::new(derivation);
     let name = &face.name;
@@ -59,6 +60,7 @@ module-name = \"{name}\"
     ]
 }
 
+#[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 fn items(face: &Face<'_>) -> TokenStream {
     let module = format_ident!("{}", face.name);
     let mechanism = &face.derivation.mechanism;

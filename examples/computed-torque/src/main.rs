@@ -44,7 +44,10 @@ fn report(rig: &modelmill_rig::Rig, task: &Reference) -> Result<Vec<String>, Box
     // The robot's own recording, while the nominal model controls it along another motion.
     let recording = run(rig, &with, &Reference::exciting())?;
     let base = identify(&recording)?;
-    let known = spidermill_with_friction::InverseDynamics::new(&Default::default(), &base);
+    let known = spidermill_with_friction::InverseDynamics::new(
+        &spidermill_with_friction::Geometry::default(),
+        &base,
+    );
     let identified = Controller::identified(&known);
 
     let mut lines =
