@@ -65,9 +65,11 @@ pub(crate) enum Command {
         modelmill equations model-spec/models/panda.toml --format json | jq .rank"
     )]
     Equations(EquationsArgs),
-    /// Write the model as Rust source, the same that `cargo build` makes
+    /// Write the model as Rust source, the same that `cargo build` makes, or as a crate for C or Python
     #[command(after_help = "Examples (from the project's root):\n  \
-        modelmill generate model-spec/models/scara.toml --out scara.rs")]
+        modelmill generate model-spec/models/scara.toml --out scara.rs\n  \
+        modelmill generate model-spec/models/panda.toml --language c --out panda-c\n  \
+        modelmill generate model-spec/models/panda.toml --language python --out panda-python")]
     Generate(GenerateArgs),
     /// Compute the model's forces along a recording
     #[command(after_help = "Examples (from the project's root):\n  \
@@ -238,12 +240,26 @@ pub(crate) struct EquationsArgs {
 pub(crate) struct GenerateArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Write the source to this file instead of standard output
-    #[arg(long, value_name = "FILE.rs")]
+    /// Write the source to this file instead of standard output; with --language c or python, a crate to this folder
+    #[arg(long, value_name = "FILE.rs|DIR", required_if_eq_any([("language", "c"), ("language", "python")]))]
     pub(crate) out: Option<PathBuf>,
     /// With the equation of motion: mass matrix, velocity terms, gravity, forward dynamics
-    #[arg(long)]
+    #[arg(long, conflicts_with = "language")]
     pub(crate) dynamics: bool,
+    /// What to make: a Rust module, or a crate that builds a C library with its header, or a Python module
+    #[arg(long, value_enum, default_value = "rust")]
+    pub(crate) language: Language,
+}
+
+/// Languages that models are emitted for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Language {
+    /// A module for `no_std` and `std`
+    Rust,
+    /// A static and a shared library, and a header
+    C,
+    /// A module for numpy arrays
+    Python,
 }
 
 /// Where the values of the base parameters come from.

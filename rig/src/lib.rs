@@ -9,6 +9,8 @@
 //! 3. [`Tracker`] - poses, rates and accelerations of all bodies, redundant loops included;
 //! 4. [`forces`] - what the drives must supply, with all effects;
 //! 5. [`simulate`] - the readings of the sensors.
+//!
+//! A [`Plant`] is the way back: forces of the drives go in, motion comes out, for controllers.
 #![allow(
     non_snake_case,
     reason = "physical quantities carry their frames, as in p_WB_W"
@@ -28,6 +30,7 @@ mod massive;
 mod merge;
 mod noise;
 mod pair;
+mod plant;
 mod pose;
 mod rig;
 mod sensor;
@@ -42,6 +45,7 @@ pub use load::{Loaded, fault, load, load_file, parse, span};
 pub use log::Log;
 pub use modelmill_spec::Failure;
 pub use pair::{Anchor, Pair};
+pub use plant::{Plant, PlantError};
 pub use pose::{BodyMotion, Pose};
 pub use rig::{Body, Coordinate, Drive, Joint, LumpedMass, Point, Rig};
 pub use sensor::{Channel, Sensors};

@@ -3,15 +3,24 @@
 //! There is no allocation and no unsafe code here, and without the feature `std` no standard library either.
 #![cfg_attr(not(feature = "std"), no_std)]
 
+pub mod blocks;
 mod lanes;
 mod loops;
+mod numbers;
+#[cfg(feature = "rayon")]
+mod parallel;
 mod real;
 mod solve;
+#[cfg(feature = "source")]
+pub mod source;
+#[cfg(feature = "std")]
+mod wide;
 
 use core::fmt;
 
 pub use lanes::{LARGEST_ANGLE, sin_cos_lanes};
 pub use loops::{Loops, Scales, correct, follow, settle};
+pub use numbers::{Numbers, One, Outputs};
 pub use real::Real;
 pub use solve::solve;
 

@@ -77,7 +77,7 @@ macro_rules! real {
             }
             #[inline]
             fn sin_cos(self) -> (Self, Self) {
-                self.sin_cos()
+                $sincos(self)
             }
             #[inline]
             fn sqrt(self) -> Self {
@@ -148,9 +148,17 @@ macro_rules! real {
     };
 }
 
+/// Through `f64`, and rounded once more.
+#[inline]
+#[allow(clippy::cast_possible_truncation)]
+fn sin_cos_single(angle: f32) -> (f32, f32) {
+    let (sin, cos) = crate::lanes::sin_cos_once(f64::from(angle));
+    (sin as f32, cos as f32)
+}
+
 real!(
     f64,
-    libm::sincos,
+    crate::lanes::sin_cos_once,
     libm::sqrt,
     libm::atan2,
     libm::tanh,
@@ -158,7 +166,7 @@ real!(
 );
 real!(
     f32,
-    libm::sincosf,
+    sin_cos_single,
     libm::sqrtf,
     libm::atan2f,
     libm::tanhf,

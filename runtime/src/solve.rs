@@ -10,43 +10,70 @@ pub fn solve<T: Real, Row: AsRef<[T]> + AsMut<[T]>>(
     matrix: &mut [Row],
     rhs: &mut [T],
 ) -> Result<(), PoseError> {
-    let n = rhs.len();
+    // Nothing is indexed, so that nothing can panic: what is not there is read as zero, and a pivot of zero is an error.
     let zero = T::from_f64(0.0);
+    let entry = |row: &Row, column: usize| row.as_ref().get(column).copied().unwrap_or(zero);
+    let n = rhs.len();
     for column in 0..n {
-        let mut pivot = column;
-        for row in column + 1..n {
-            if matrix[row].as_ref()[column].abs() > matrix[pivot].as_ref()[column].abs() {
-                pivot = row;
+        let mut pivot = (column, zero);
+        for (row, values) in matrix.iter().enumerate().take(n).skip(column) {
+            let size = entry(values, column).abs();
+            // What is no number fails this comparison.
+            if size > pivot.1 {
+                pivot = (row, size);
             }
         }
-        matrix.swap(column, pivot);
-        rhs.swap(column, pivot);
-        let (above, below) = matrix.split_at_mut(column + 1);
-        let lead_row = above[column].as_ref();
-        let lead = lead_row[column];
+        if pivot.0 != column {
+            exchange(matrix, column, pivot.0);
+            exchange(rhs, column, pivot.0);
+        }
+        let (Some((above, below)), Some((rhs_above, rhs_below))) = (
+            matrix.split_at_mut_checked(column + 1),
+            rhs.split_at_mut_checked(column + 1),
+        ) else {
+            return Err(PoseError::Singular);
+        };
+        let (Some(lead_row), Some(lead_rhs)) = (above.last(), rhs_above.last()) else {
+            return Err(PoseError::Singular);
+        };
+        let lead = entry(lead_row, column);
         let regular = lead.abs() > zero;
-        // A pivot that is no number fails this comparison too.
         if !regular {
             return Err(PoseError::Singular);
         }
-        for (k, row) in below.iter_mut().enumerate() {
-            let row = row.as_mut();
-            let factor = row[column] / lead;
-            for (x, above) in row.iter_mut().zip(lead_row).skip(column + 1) {
+        for (row, value) in below.iter_mut().zip(rhs_below) {
+            let factor = entry(row, column) / lead;
+            let rest = row.as_mut().iter_mut().zip(lead_row.as_ref());
+            for (x, above) in rest.skip(column + 1) {
                 *x = *x - factor * *above;
             }
-            rhs[column + 1 + k] = rhs[column + 1 + k] - factor * rhs[column];
+            *value = *value - factor * *lead_rhs;
         }
     }
     for row in (0..n).rev() {
-        let coefficients = matrix[row].as_ref();
-        let mut value = rhs[row];
-        for k in row + 1..n {
-            value = value - coefficients[k] * rhs[k];
+        let Some((rest, known)) = rhs.split_at_mut_checked(row + 1) else {
+            return Err(PoseError::Singular);
+        };
+        let (Some(value), Some(coefficients)) = (rest.last_mut(), matrix.get(row)) else {
+            return Err(PoseError::Singular);
+        };
+        let coefficients = coefficients.as_ref().iter().skip(row);
+        let mut sum = *value;
+        for (coefficient, known) in coefficients.clone().skip(1).zip(known) {
+            sum = sum - *coefficient * *known;
         }
-        rhs[row] = value / coefficients[row];
+        *value = coefficients.copied().next().map_or(zero, |c| sum / c);
     }
     Ok(())
+}
+
+/// `swap` without an index that could be out of range.
+fn exchange<X>(values: &mut [X], low: usize, high: usize) {
+    if let Some((front, back)) = values.split_at_mut_checked(high)
+        && let (Some(a), Some(b)) = (front.get_mut(low), back.first_mut())
+    {
+        core::mem::swap(a, b);
+    }
 }
 
 #[cfg(test)]

@@ -12,6 +12,8 @@ pub(super) struct Body<'a> {
     /// How an input is written.
     input: &'a dyn Fn(Atom) -> TokenStream,
     names: Vec<Ident>,
+    /// Products that are written inside the only sum or difference that needs them.
+    fused: Vec<bool>,
     /// Fixed values that the state stage needs, with their place in the array that hands them over.
     handed: Vec<ValueId>,
 }
@@ -44,6 +46,7 @@ impl<'a> Body<'a> {
             program,
             input,
             names,
+            fused: fused(program),
             handed,
         }
     }
@@ -55,15 +58,34 @@ impl<'a> Body<'a> {
 
     /// Statements and final expression of the fixed stage: an array.
     pub(super) fn fixed(&self) -> TokenStream {
-        let statements = self.statements(Stage::Fixed);
+        let statements = self.statements(Stage::Fixed, false);
         let values = self.handed.iter().map(|v| &self.names[v.index()]);
-        quote! { #(#statements)* [#(#values),*] }
+        quote! { let n = &One::<T>::new(); #(#statements)* [#(#values),*] }
     }
 
-    /// Statements of the state stage, with guards as early returns; `fixed` is the array of [`Self::fixed`].
+    /// Statements of the state stage, with guards as early returns; `fixed` is the array of [`Self::fixed`], and `n` the
+    /// arithmetic.
     pub(super) fn state(&self) -> TokenStream {
-        let statements = self.statements(Stage::State);
+        let statements = self.statements(Stage::State, false);
         quote! { #(#statements)* }
+    }
+
+    /// The same with each output put into `outputs` as soon as it is known, so that none is kept for long; those that are
+    /// zero are left as they are.
+    pub(super) fn state_with_outputs(&self) -> TokenStream {
+        let fixed = self.program.outputs.iter().enumerate().filter(|(_, v)| {
+            let op = &self.program.ops[v.index()];
+            let zero = matches!(op, Op::Number(x) if x.is_zero());
+            self.program.stages[v.index()] == Stage::Fixed && !zero
+        });
+        let fixed = fixed.map(|(k, v)| self.put(k, *v));
+        let statements = self.statements(Stage::State, true);
+        quote! { #(#fixed)* #(#statements)* }
+    }
+
+    fn put(&self, k: usize, v: ValueId) -> TokenStream {
+        let value = self.operand(Stage::State, v);
+        quote! { outputs.put(#k, #value); }
     }
 
     /// An output, after the statements of the state stage.
@@ -78,11 +100,18 @@ impl<'a> Body<'a> {
 
     /// Statements of the fixed stage alone.
     pub(super) fn fixed_statements(&self) -> TokenStream {
-        let statements = self.statements(Stage::Fixed);
-        quote! { #(#statements)* }
+        let statements = self.statements(Stage::Fixed, false);
+        quote! { let n = &One::<T>::new(); #(#statements)* }
     }
 
-    fn statements(&self, stage: Stage) -> Vec<TokenStream> {
+    fn statements(&self, stage: Stage, put: bool) -> Vec<TokenStream> {
+        let mut puts: Vec<Vec<usize>> = vec![Vec::new(); self.program.ops.len()];
+        for (k, v) in self.program.outputs.iter().enumerate() {
+            if put && self.program.stages[v.index()] == stage {
+                puts[v.index()].push(k);
+            }
+        }
+        let mut late = Vec::new();
         let mut statements = Vec::new();
         let mut guards: Vec<&Guard> = self.program.guards.iter().collect();
         let emit_guards =
@@ -99,8 +128,18 @@ impl<'a> Body<'a> {
             if self.program.stages[i] == stage && !matches!(op, Op::Number(_)) {
                 statements.extend(self.statement(stage, i, op));
             }
+            // A cosine is written with the sine after it; what needs it comes then.
+            let paired = matches!((op, self.program.ops.get(i + 1)), (Op::Cos(a), Some(Op::Sin(b))) if a == b);
+            if paired {
+                late.extend(puts[i].iter().map(|k| (*k, i)));
+                continue;
+            }
             if stage == Stage::State {
                 emit_guards(i, &mut statements, &mut guards);
+            }
+            for (k, i) in late.drain(..).chain(puts[i].iter().map(|k| (*k, i))) {
+                let v = ValueId(u32::try_from(i).expect("program below 4G operations"));
+                statements.push(self.put(k, v));
             }
         }
         statements
@@ -109,6 +148,12 @@ impl<'a> Body<'a> {
     fn statement(&self, stage: Stage, i: usize, op: &Op) -> Option<TokenStream> {
         let name = &self.names[i];
         let get = |v: &ValueId| self.operand(stage, *v);
+        if self.fused[i] {
+            return None;
+        }
+        if let Some(value) = self.fused_sum(stage, op) {
+            return Some(quote! { let #name = #value; });
+        }
         let value = match op {
             Op::Number(_) => return None,
             Op::Input(atom) => (self.input)(*atom),
@@ -123,53 +168,75 @@ impl<'a> Body<'a> {
             Op::Unary(function, a) => {
                 let a = get(a);
                 match function {
-                    Unary::Sqrt => quote! { #a.sqrt() },
-                    Unary::Sign => quote! { #a.sign() },
-                    Unary::Abs => quote! { #a.abs() },
-                    Unary::Tanh => quote! { #a.tanh() },
-                    Unary::Exp => quote! { #a.exp() },
-                    Unary::Sin => quote! { #a.sin_cos().0 },
-                    Unary::Cos => quote! { #a.sin_cos().1 },
+                    Unary::Sqrt => quote! { n.sqrt(#a) },
+                    Unary::Sign => quote! { n.sign(#a) },
+                    Unary::Abs => quote! { n.abs(#a) },
+                    Unary::Tanh => quote! { n.tanh(#a) },
+                    Unary::Exp => quote! { n.exp(#a) },
+                    Unary::Sin => quote! { n.sin_cos(#a).0 },
+                    Unary::Cos => quote! { n.sin_cos(#a).1 },
                 }
             }
             Op::Atan2(y, x) => {
                 let (y, x) = (get(y), get(x));
-                quote! { #y.atan2(#x) }
+                quote! { n.atan2(#y, #x) }
             }
             // The sine is written together with its cosine, which stands right before it if both are needed.
             Op::Sin(a) if i > 0 && self.program.ops[i - 1] == Op::Cos(*a) => {
                 let (a, cosine) = (get(a), &self.names[i - 1]);
-                return Some(quote! { let (#name, #cosine) = #a.sin_cos(); });
+                return Some(quote! { let (#name, #cosine) = n.sin_cos(#a); });
             }
             Op::Sin(a) => {
                 let a = get(a);
-                quote! { #a.sin_cos().0 }
+                quote! { n.sin_cos(#a).0 }
             }
             Op::Cos(a) => {
                 if matches!(self.program.ops.get(i + 1), Some(Op::Sin(b)) if b == a) {
                     return None;
                 }
                 let a = get(a);
-                quote! { #a.sin_cos().1 }
+                quote! { n.sin_cos(#a).1 }
             }
         };
         Some(quote! { let #name = #value; })
     }
 
+    /// A sum or difference with the product that is written inside it.
+    fn fused_sum(&self, stage: Stage, op: &Op) -> Option<TokenStream> {
+        let get = |v: &ValueId| self.operand(stage, *v);
+        let product = |v: &ValueId| match &self.program.ops[v.index()] {
+            Op::Mul(x, y) if self.fused[v.index()] => Some((get(x), get(y))),
+            _ => None,
+        };
+        match op {
+            Op::Add(a, b) => {
+                let (other, (x, y)) = product(b)
+                    .map(|p| (a, p))
+                    .or_else(|| Some((b, product(a)?)))?;
+                let other = get(other);
+                Some(quote! { n.mul_add(#x, #y, #other) })
+            }
+            Op::Sub(a, b) => {
+                if let Some((x, y)) = product(b) {
+                    let a = get(a);
+                    return Some(quote! { n.sub_mul(#a, #x, #y) });
+                }
+                let ((x, y), b) = (product(a)?, get(b));
+                Some(quote! { n.mul_sub(#x, #y, #b) })
+            }
+            _ => None,
+        }
+    }
+
     fn guard(&self, guard: Guard) -> TokenStream {
         let value = self.operand(Stage::State, guard.value());
         match guard {
-            // Written so that what is no number fails as well.
-            Guard::Reachable(_) => {
-                quote! { if !(#value >= T::from_f64(0.0)) { return Err(PoseError::OutOfReach); } }
-            }
+            Guard::Reachable(_) => quote! { n.reachable(#value)?; },
             Guard::Regular(_, limit) => {
                 let limit = Literal::f64_unsuffixed(limit);
-                quote! { if !(#value.abs() > T::from_f64(#limit)) { return Err(PoseError::Singular); } }
+                quote! { n.regular(#value, #limit)?; }
             }
-            Guard::Finite(_) => {
-                quote! { if !#value.is_finite() { return Err(PoseError::Undefined); } }
-            }
+            Guard::Finite(_) => quote! { n.finite(#value)?; },
         }
     }
 
@@ -183,23 +250,57 @@ impl<'a> Body<'a> {
                 .iter()
                 .position(|h| *h == v)
                 .expect("a fixed value that is used is handed over");
-            return quote! { fixed[#place] };
+            return quote! { n.of(fixed[#place]) };
         }
         let name = &self.names[v.index()];
         quote! { #name }
     }
 }
 
+/// Products of the state stage that one sum or difference needs and nothing else; of two, the later one.
+fn fused(program: &Program) -> Vec<bool> {
+    let mut uses = vec![0; program.ops.len()];
+    for op in &program.ops {
+        op.for_each_operand(|v| uses[v.index()] += 1);
+    }
+    let kept = program.outputs.iter().copied();
+    for v in kept.chain(program.guards.iter().map(|g| g.value())) {
+        uses[v.index()] += 2;
+    }
+    let mut fused = vec![false; program.ops.len()];
+    for (op, stage) in program.ops.iter().zip(&program.stages) {
+        let (Op::Add(a, b) | Op::Sub(a, b)) = op else {
+            continue;
+        };
+        let single = |v: ValueId| {
+            let i = v.index();
+            *stage == Stage::State
+                && uses[i] == 1
+                && program.stages[i] == Stage::State
+                && matches!(program.ops[i], Op::Mul(..))
+        };
+        let (early, late) = if a.index() < b.index() {
+            (a, b)
+        } else {
+            (b, a)
+        };
+        if let Some(product) = [late, early].into_iter().find(|v| single(**v)) {
+            fused[product.index()] = true;
+        }
+    }
+    fused
+}
+
 fn binary(a: &TokenStream, operator: &TokenStream, b: &TokenStream) -> TokenStream {
     quote! { #a #operator #b }
 }
 
-/// A number as a value of the type parameter.
-pub(super) fn number(value: &Rational) -> TokenStream {
+/// A number as a value of the program.
+fn number(value: &Rational) -> TokenStream {
     let magnitude = Literal::f64_unsuffixed(value.to_f64().abs());
     if value.is_negative() {
-        quote! { T::from_f64(-#magnitude) }
+        quote! { n.number(-#magnitude) }
     } else {
-        quote! { T::from_f64(#magnitude) }
+        quote! { n.number(#magnitude) }
     }
 }

@@ -4,7 +4,7 @@ use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
 use super::body::Body;
-use super::functions::{Method, list, reads_passive, rows};
+use super::functions::{Kind, Method, list, reads_passive, rows};
 use super::items::{count, input};
 use crate::Derivation;
 use crate::dynamics::Dynamics;
@@ -73,8 +73,8 @@ pub(super) fn dynamics(derivation: &Derivation, dynamics: &Dynamics) -> TokenStr
             name,
             doc: &format!("{doc} {}.", count(program)),
             program,
-            statements: body.state(),
-            result: result(&body),
+            body: &body,
+            kind: Kind::Single(result(&body)),
             fixed: quote! { self.#field },
             model: quote! { self.model },
             output: output.clone(),
@@ -127,7 +127,7 @@ fn forward(
     let statements = body.state();
     let (bias, jacobian) = (list(&body, 0, n), rows(&body, n, n_drives, n));
     let accelerate = quote! {
-        let fixed = &self.bias;
+        let (n, fixed) = (&One::<T>::new(), &self.bias);
         #statements
         let bias: [T; N_ACTIVE] = #bias;
         let jacobian: [[T; N_ACTIVE]; N_DRIVES] = #jacobian;

@@ -3,6 +3,7 @@
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
+use super::blocks;
 use super::body::Body;
 use super::items::{count, input};
 use super::newton::newton;
@@ -74,14 +75,25 @@ pub(super) struct Method<'a> {
     pub(super) name: &'a str,
     pub(super) doc: &'a str,
     pub(super) program: &'a Program,
-    /// Statements of the program and the expression of the result, with `fixed`, `state` and `passive` in scope.
-    pub(super) statements: TokenStream,
-    pub(super) result: TokenStream,
+    /// The program with its fixed values in `fixed`.
+    pub(super) body: &'a Body<'a>,
+    pub(super) kind: Kind,
     /// Where the fixed values and the model are.
     pub(super) fixed: TokenStream,
     pub(super) model: TokenStream,
     /// What the result is.
     pub(super) output: TokenStream,
+}
+
+/// How the result of a function comes about.
+pub(super) enum Kind {
+    /// An expression of the program's outputs.
+    Single(TokenStream),
+    /// An array that begins as zeros; the program is also run over many states.
+    Blocks {
+        zeros: TokenStream,
+        owner: &'static str,
+    },
 }
 
 impl Method<'_> {
@@ -90,16 +102,53 @@ impl Method<'_> {
         let Self {
             name,
             doc,
-            statements,
-            result,
+            body,
             fixed,
             model,
             output,
             ..
         } = self;
-        let method = format_ident!("{name}");
+        let (method, program) = (format_ident!("{name}"), format_ident!("{name}_program"));
         let doc = format!(" {doc}");
-        if !reads_passive(derivation, self.program) {
+        let newton = reads_passive(derivation, self.program);
+        let passive_parameter = newton.then(|| quote! { passive: &[N::Value; N_PASSIVE], });
+        let passive_argument = newton.then(|| quote! { passive, });
+        let (compute, program) = match &self.kind {
+            Kind::Single(result) => {
+                let statements = body.state();
+                let compute = quote! {
+                    let (n, fixed) = (&One::<T>::new(), &#fixed);
+                    #statements
+                    Ok(#result)
+                };
+                (compute, TokenStream::new())
+            }
+            Kind::Blocks { zeros, .. } => {
+                let statements = body.state_with_outputs();
+                let compute = quote! {
+                    let mut result = #zeros;
+                    self.#program(&One::new(), state, #passive_argument &mut result)?;
+                    Ok(result)
+                };
+                let program = quote! {
+                    /// The program, for one state or as many as a vector holds; outputs begin as zeros.
+                    #[inline(always)]
+                    fn #program<N: Numbers<Scalar = T>>(
+                        &self,
+                        n: &N,
+                        state: &State<N::Value>,
+                        #passive_parameter
+                        outputs: &mut impl Outputs<N::Value>,
+                    ) -> Result<(), PoseError> {
+                        let fixed = &#fixed;
+                        #statements
+                        Ok(())
+                    }
+                };
+                (compute, program)
+            }
+        };
+        if !newton {
             return quote! {
                 #[doc = #doc]
                 ///
@@ -108,10 +157,10 @@ impl Method<'_> {
                 pub fn #method(&self, state: &State<T>) -> Result<#output, PoseError> {
                     self.input?;
                     state.check()?;
-                    let fixed = &#fixed;
-                    #statements
-                    Ok(#result)
+                    #compute
                 }
+
+                #program
             };
         }
         let (near, at) = (format_ident!("{name}_near"), format_ident!("{name}_at"));
@@ -157,11 +206,28 @@ impl Method<'_> {
             }
 
             fn #at(&self, state: &State<T>, passive: &[T; N_PASSIVE]) -> Result<#output, PoseError> {
-                let fixed = &#fixed;
-                #statements
-                Ok(#result)
+                #compute
             }
+
+            #program
         }
+    }
+
+    /// The function over many states, as items beside the type that has it.
+    fn blocks(&self, derivation: &Derivation) -> TokenStream {
+        let Kind::Blocks { owner, .. } = &self.kind else {
+            return TokenStream::new();
+        };
+        let n_outputs = self.program.outputs.len();
+        let newton = reads_passive(derivation, self.program);
+        blocks::items(&blocks::Function {
+            derivation,
+            name: self.name,
+            owner,
+            model: &self.model,
+            n_outputs,
+            newton,
+        })
     }
 }
 
@@ -170,7 +236,6 @@ fn regressor(derivation: &Derivation) -> Function {
     let input = input(derivation);
     let body = Body::new(program, &input);
     let (n, fixed) = (body.n_fixed(), body.fixed());
-    let n_drives = derivation.mechanism.drives.len();
     let method = Method {
         name: "regressor",
         doc: &format!(
@@ -178,14 +243,17 @@ fn regressor(derivation: &Derivation) -> Function {
             count(program)
         ),
         program,
-        statements: body.state(),
-        result: rows(&body, 0, n_drives, derivation.reduction.retained.len()),
+        body: &body,
+        kind: Kind::Blocks {
+            zeros: quote! { [[T::from_f64(0.0); N_BASE]; N_DRIVES] },
+            owner: "Model",
+        },
         fixed: quote! { self.regressor },
         model: quote! { self },
         output: quote! { [[T; N_BASE]; N_DRIVES] },
     };
     Function {
-        items: TokenStream::new(),
+        items: method.blocks(derivation),
         field: quote! { regressor: [T; #n], },
         init: quote! { regressor: { #fixed }, },
         finish: TokenStream::new(),
@@ -206,8 +274,10 @@ fn drives(derivation: &Derivation) -> Function {
         name: "drives",
         doc: "Lengths or angles of the drives, their rates, and their Jacobian.",
         program,
-        statements: body.state(),
-        result: quote! { Drives { coordinate: #lengths, rate: #speeds, jacobian: #jacobian } },
+        body: &body,
+        kind: Kind::Single(
+            quote! { Drives { coordinate: #lengths, rate: #speeds, jacobian: #jacobian } },
+        ),
         fixed: quote! { self.drives },
         model: quote! { self },
         output: quote! { Drives<T> },
@@ -246,8 +316,8 @@ fn passive(derivation: &Derivation) -> Option<Function> {
         name: "passive",
         doc: "Passive coordinates with their rates and accelerations.",
         program,
-        statements: body.state(),
-        result: quote! { Passive { q: #q, qd: #qd, qdd: #qdd } },
+        body: &body,
+        kind: Kind::Single(quote! { Passive { q: #q, qd: #qd, qdd: #qdd } }),
         fixed: quote! { self.motion },
         model: quote! { self },
         output: quote! { Passive<T> },
@@ -282,12 +352,16 @@ pub(super) fn inverse_dynamics(derivation: &Derivation) -> TokenStream {
         name: "forces",
         doc: &format!("Forces of the drives, N or N m. {}.", count(program)),
         program,
-        statements: body.state(),
-        result: list(&body, 0, derivation.mechanism.drives.len()),
+        body: &body,
+        kind: Kind::Blocks {
+            zeros: quote! { [T::from_f64(0.0); N_DRIVES] },
+            owner: "InverseDynamics",
+        },
         fixed: quote! { self.fixed },
         model: quote! { self.model },
         output: quote! { [T; N_DRIVES] },
     };
+    let blocks = method.blocks(derivation);
     let method = method.tokens(derivation);
     let needs_model = reads_passive(derivation, program);
     let model_field = needs_model.then(|| quote! { model: Model<T>, });
@@ -312,6 +386,8 @@ pub(super) fn inverse_dynamics(derivation: &Derivation) -> TokenStream {
 
             #method
         }
+
+        #blocks
     }
 }
 

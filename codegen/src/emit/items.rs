@@ -97,7 +97,12 @@ pub(super) fn items(derivation: &Derivation) -> TokenStream {
     )
     .then(|| quote! { use ::modelmill_runtime::{Scales, correct, follow, settle}; });
     quote! {
-        use ::modelmill_runtime::{BaseParameter, PoseError, Quantity, Real, check_finite};
+        use ::modelmill_runtime::blocks::{
+            Block, BlockError, Blocks, Program, columns_of, fill_columns, fill_columns_in_parallel, visit_blocks,
+        };
+        use ::modelmill_runtime::{
+            BaseParameter, Numbers, One, Outputs, PoseError, Quantity, Real, check_finite,
+        };
         #newton
 
         #tables
@@ -226,7 +231,7 @@ fn geometry_check(derivation: &Derivation) -> TokenStream {
     }
 }
 
-fn uses_load(derivation: &Derivation) -> bool {
+pub(super) fn uses_load(derivation: &Derivation) -> bool {
     let programs = &derivation.programs;
     [&programs.regressor, &programs.inverse_dynamics]
         .iter()
@@ -245,6 +250,7 @@ fn state(derivation: &Derivation) -> TokenStream {
         }
     });
     let check_load = uses_load(derivation).then(|| quote! { check_finite(&self.load, &DRIVES)?; });
+    let states = super::blocks::states(uses_load(derivation));
     let mechanism = &derivation.mechanism;
     let (active, _) = derivation.coordinates();
     let [rates, accelerations] = ["_d", "_dd"].map(|suffix| {
@@ -265,6 +271,8 @@ fn state(derivation: &Derivation) -> TokenStream {
             pub qdd: [T; N_ACTIVE],
             #load
         }
+
+        #states
 
         impl<T: Real> State<T> {
             /// Names the first entry that is no finite number.

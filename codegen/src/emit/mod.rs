@@ -3,12 +3,20 @@
 //! The module depends on `modelmill-runtime` alone. It is `no_std`, allocates nothing, contains no unsafe code, and works
 //! for `f32` and `f64`.
 
+mod blocks;
 mod body;
+mod c;
 mod dynamics;
+mod foreign;
 mod functions;
 mod identifier;
 mod items;
 mod newton;
+mod python;
+
+pub use c::emit_c;
+pub use foreign::EmittedFile;
+pub use python::emit_python;
 
 use proc_macro2::TokenStream;
 use quote::quote;

@@ -51,13 +51,13 @@ pub(super) fn newton(derivation: &Derivation) -> Option<Function> {
                 q: &[T; N_ACTIVE],
                 passive: &[T; N_PASSIVE],
             ) -> ([T; N_PASSIVE], [[T; N_PASSIVE]; N_PASSIVE]) {
-                let fixed = &self.residual;
+                let (n, fixed) = (&One::<T>::new(), &self.residual);
                 #statements
                 (#values, #jacobian)
             }
 
             fn scales(&self, q: &[T; N_ACTIVE], passive: &[T; N_PASSIVE]) -> Scales<[T; N_ACTIVE], [T; N_PASSIVE]> {
-                let fixed = &self.scales;
+                let (n, fixed) = (&One::<T>::new(), &self.scales);
                 #scale_statements
                 Scales { residual: #of_residual, passive: #of_passive, active: #of_active }
             }

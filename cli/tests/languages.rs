@@ -1,0 +1,189 @@
+//! Crates for other languages: what `generate --language` writes is built and held against the reference tables.
+//!
+//! The C library also proves that emitted code cannot panic: built without the standard library, it holds no trace of the
+//! machinery that a panic needs.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn project() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// A folder of this test for everything that it writes; what was built there once is only checked for changes.
+fn folder(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("languages")
+        .join(name)
+}
+
+fn run(command: &mut Command) -> String {
+    let output = command
+        .output()
+        .unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    assert!(
+        output.status.success(),
+        "{command:?}:\n{}{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn there(program: &str) -> bool {
+    Command::new(program).arg("--version").output().is_ok()
+}
+
+/// Writes the crate of a bundled model.
+fn written(model: &str, language: &str) -> PathBuf {
+    let out = folder(&format!("{model}-{language}"));
+    let file = project().join(format!("model-spec/models/{model}.toml"));
+    run(Command::new(env!("CARGO_BIN_EXE_modelmill"))
+        .arg("generate")
+        .arg(file)
+        .args(["--language", language, "--out"])
+        .arg(&out));
+    // The versions of the project's own lock file, so that nothing newer is asked for.
+    std::fs::copy(project().join("Cargo.lock"), out.join("Cargo.lock")).unwrap();
+    out
+}
+
+/// Writes the crate of a bundled model and builds it.
+fn built(model: &str, language: &str, options: &[&str]) -> PathBuf {
+    let out = written(model, language);
+    run(Command::new(env!("CARGO"))
+        .args(["build", "--release", "--quiet", "--target-dir"])
+        .arg(folder("target"))
+        .args(options)
+        .current_dir(&out));
+    out
+}
+
+fn tables() -> PathBuf {
+    project().join("tests/fixtures/reference")
+}
+
+#[test]
+fn the_c_library_gives_the_torques_of_the_table() {
+    if !there("cc") {
+        println!("skipped: there is no C compiler `cc` on this machine");
+        return;
+    }
+    for options in [&[][..], &["--no-default-features"]] {
+        let out = built("panda", "c", options);
+        let program = folder("panda-c-test");
+        run(Command::new("cc")
+            .args(["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-I"])
+            .arg(out.join("include"))
+            .arg(project().join("cli/tests/languages/panda.c"))
+            .arg(folder("target").join("release/libpanda.a"))
+            .args(["-lm", "-lpthread", "-ldl", "-o"])
+            .arg(&program));
+        assert_eq!(run(Command::new(program).arg(tables())), "agrees\n");
+    }
+}
+
+/// Symbols of a library that panicking needs.
+fn panics(library: &str) -> Vec<String> {
+    let output = Command::new("nm")
+        .arg(folder("target").join("release").join(library))
+        .output();
+    let text = String::from_utf8_lossy(&output.expect("nm ran before").stdout).into_owned();
+    let symbols = text
+        .lines()
+        .filter(|line| line.contains("panic") || line.contains("unwind"));
+    symbols.map(str::to_owned).collect()
+}
+
+#[test]
+fn emitted_code_cannot_panic() {
+    if !there("nm") {
+        println!("skipped: there is no `nm` on this machine");
+        return;
+    }
+    // Open chains, loops in closed form, and loops by Newton's method.
+    for model in ["rx90", "five_bar", "three_rrr"] {
+        built(model, "c", &["--no-default-features"]);
+        let found = panics(&format!("lib{model}.a"));
+        assert!(found.is_empty(), "{model}: {found:?}");
+    }
+    // The standard library does hold such symbols: the test would see them.
+    built("two_link", "c", &[]);
+    assert!(!panics("libtwo_link.a").is_empty());
+}
+
+/// A Python that has numpy, or at least one without.
+fn python() -> Option<String> {
+    let named = std::env::var("MODELMILL_PEERS_PYTHON").ok();
+    named.or_else(|| there("python3").then(|| "python3".to_owned()))
+}
+
+#[test]
+fn the_python_module_gives_the_torques_of_the_table() {
+    let Some(python) = python() else {
+        println!("skipped: there is no python3 on this machine");
+        return;
+    };
+    if !Command::new(&python)
+        .args(["-c", "import numpy"])
+        .output()
+        .is_ok_and(|o| o.status.success())
+    {
+        println!("skipped: {python} has no numpy; MODELMILL_PEERS_PYTHON names another one");
+        return;
+    }
+    if !cfg!(target_os = "linux") {
+        println!(
+            "skipped: the module is built by cargo alone, which other systems' linkers need options for"
+        );
+        return;
+    }
+    let out = written("panda", "python");
+    let fetched = Command::new(env!("CARGO"))
+        .arg("fetch")
+        .current_dir(&out)
+        .output();
+    if !fetched.is_ok_and(|output| output.status.success()) {
+        println!("skipped: the crates pyo3 and numpy cannot be had here");
+        return;
+    }
+    built("panda", "python", &[]);
+    let module = folder("module");
+    std::fs::create_dir_all(&module).unwrap();
+    std::fs::copy(
+        folder("target").join("release/libpanda.so"),
+        module.join("panda.so"),
+    )
+    .unwrap();
+    let says = run(Command::new(&python)
+        .arg(project().join("cli/tests/languages/panda.py"))
+        .arg(&module)
+        .arg(tables()));
+    println!("{says}");
+    assert!(says.starts_with("agrees with the table"), "{says}");
+}
+
+#[test]
+fn a_folder_that_holds_something_else_is_left_alone() {
+    let out = folder("occupied");
+    std::fs::create_dir_all(&out).unwrap();
+    std::fs::write(out.join("Cargo.toml"), "[package]\n").unwrap();
+    let file = project().join("model-spec/models/two_link.toml");
+    let command = |out: &Path| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_modelmill"));
+        command
+            .arg("generate")
+            .arg(&file)
+            .args(["--language", "c", "--out"])
+            .arg(out);
+        command.output().unwrap()
+    };
+    let output = command(&out);
+    assert_eq!(output.status.code(), Some(2));
+    let says = String::from_utf8_lossy(&output.stderr);
+    assert!(says.contains("something else is there"), "{says}");
+    assert_eq!(
+        std::fs::read_to_string(out.join("Cargo.toml")).unwrap(),
+        "[package]\n"
+    );
+}

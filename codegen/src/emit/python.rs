@@ -1,0 +1,268 @@
+//! A crate that makes a Python module of a model, with PyO3: functions of numpy arrays, one state or many.
+
+use proc_macro2::TokenStream;
+use quote::{format_ident, quote};
+
+use super::foreign::{EmittedFile, Face, source};
+use crate::Derivation;
+
+/// The files of the crate. It needs `modelmill-runtime` in the folder `modelmill-runtime` beside its manifest.
+#[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
+pub fn emit_python(derivation: &Derivation) -> Vec<EmittedFile> {
+    let face = Face::new(derivation);
+    let name = &face.name;
+    let package = name.trim_start_matches('_');
+    let cargo = format!(
+        "# Written by modelmill. `maturin build --release` makes a wheel of it; without maturin, `cargo build --release` makes
+# target/release/lib{name}.so, which Python imports under the name {name}.so.
+[package]
+name = \"model-{package}\"
+version = \"0.1.0\"
+edition = \"2024\"
+publish = false
+
+[lib]
+name = \"{name}\"
+crate-type = [\"cdylib\"]
+
+[dependencies]
+modelmill-runtime = {{ path = \"modelmill-runtime\", features = [\"rayon\"] }}
+numpy = \"0.30\"
+pyo3 = {{ version = \"0.30\", features = [\"extension-module\", \"abi3-py39\"] }}
+
+[workspace]
+"
+    );
+    let pyproject = format!(
+        "[build-system]
+requires = [\"maturin>=1.7,<2\"]
+build-backend = \"maturin\"
+
+[project]
+name = \"model-{package}\"
+version = \"0.1.0\"
+requires-python = \">=3.9\"
+dependencies = [\"numpy\"]
+
+[tool.maturin]
+module-name = \"{name}\"
+"
+    );
+    let file = |path: &str, text: String| EmittedFile {
+        path: path.to_owned(),
+        text,
+    };
+    vec![
+        file("Cargo.toml", cargo),
+        file("pyproject.toml", pyproject),
+        source("src/lib.rs", "The model for Python.", &items(&face)),
+        face.module(),
+    ]
+}
+
+#[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
+fn items(face: &Face<'_>) -> TokenStream {
+    let module = format_ident!("{}", face.name);
+    let mechanism = &face.derivation.mechanism;
+    let title = format!(
+        "{}.\n\nInverse dynamics tau = H_min(q, q', q'') p_min. Arrays of one state have one number per coordinate; arrays \
+         of n states have shape (coordinates, n) and are read as they lie in memory, and so are results: forces (drives, n), \
+         regressor (drives, base parameters, n).",
+        mechanism.title.as_deref().unwrap_or(&mechanism.name)
+    );
+    let (constants, parameters) = (face.constants(), face.parameters());
+    let (n_active, n_drives, n_base) = (face.n_active(), face.n_drives(), face.n_base());
+    let records = [
+        Face::record("geometry", "Geometry", &constants),
+        Face::record("parameters", "Parameters", &parameters),
+    ];
+    let parts = face.state();
+    let names: Vec<_> = parts.iter().map(|(name, _)| name).collect();
+    let sizes: Vec<_> = parts.iter().map(|(_, n)| n).collect();
+    let texts = names.iter().map(ToString::to_string);
+    let texts: Vec<String> = texts.collect();
+    let arguments = quote! { #(#names: PyReadonlyArrayDyn<'py, f64>),* };
+    let states = quote! {
+        let many = Many::of(&[#((&#names, #texts, #sizes)),*])?;
+        #(let #names = slice(&#names, #texts)?;)*
+        let n = many.n;
+        let states = model::States { #(#names: columns::<#sizes>(#names, n)),* };
+    };
+    let regressor_entries = n_drives * n_base;
+    let doc_forces = "Forces of the drives, N or N m, for base parameters `p`. `parallel` uses all cores; `geometry` names known \
+                      quantities that differ from the model file's.";
+    let doc_regressor = "H_min: one row per drive, one column per base parameter. `parallel` and `geometry` as in `inverse_dynamics`.";
+    let doc_base =
+        "Base parameters of physical ones; those that are not named are the model file's.";
+    quote! {
+        #![allow(clippy::needless_pass_by_value, reason = "pyo3 hands arguments over")]
+
+        pub mod model;
+
+        use std::collections::BTreeMap;
+
+        use modelmill_runtime::PoseError;
+        use modelmill_runtime::blocks::BlockError;
+        use numpy::{PyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+        use pyo3::exceptions::{PyKeyError, PyValueError};
+        use pyo3::prelude::*;
+
+        #(#records)*
+
+        /// Values with some replaced by name.
+        fn replaced<const N: usize>(
+            mut values: [f64; N], names: &[&str], by: Option<BTreeMap<String, f64>>,
+        ) -> PyResult<[f64; N]> {
+            for (name, value) in by.unwrap_or_default() {
+                let place = names.iter().position(|n| *n == name);
+                let place = place.and_then(|k| values.get_mut(k)).ok_or_else(|| {
+                    PyKeyError::new_err(format!("no `{name}`; there are {}", names.join(", ")))
+                })?;
+                *place = value;
+            }
+            Ok(values)
+        }
+
+        fn geometry_of(by: Option<BTreeMap<String, f64>>) -> PyResult<model::Geometry<f64>> {
+            let names = model::CONSTANTS.map(|c| c.name);
+            Ok(geometry(&replaced(geometry_values(), &names, by)?))
+        }
+
+        fn value_error(text: String) -> PyErr {
+            PyValueError::new_err(text)
+        }
+
+        fn of_pose(error: PoseError) -> PyErr {
+            value_error(error.to_string())
+        }
+
+        /// How many states arrays hold, and whether results have an axis for them.
+        struct Many {
+            n: usize,
+            axis: bool,
+        }
+
+        impl Many {
+            fn of(arrays: &[(&PyReadonlyArrayDyn<'_, f64>, &str, usize)]) -> PyResult<Self> {
+                let shape = arrays.first().map_or(&[][..], |a| a.0.shape());
+                let axis = shape.len() == 2;
+                let n = if axis { shape[1] } else { 1 };
+                for (array, name, rows) in arrays {
+                    let expected: &[usize] = if axis { &[*rows, n] } else { &[*rows] };
+                    if array.shape() != expected {
+                        return Err(value_error(format!(
+                            "{name} has shape {:?}; expected {expected:?}", array.shape()
+                        )));
+                    }
+                }
+                Ok(Self { n, axis })
+            }
+
+            fn shape(&self, first: &[usize]) -> Vec<usize> {
+                let mut shape = first.to_vec();
+                shape.extend(self.axis.then_some(self.n));
+                shape
+            }
+
+            fn error(&self, error: BlockError) -> PyErr {
+                match error {
+                    BlockError::At { reason, .. } if !self.axis => of_pose(reason),
+                    other => value_error(other.to_string()),
+                }
+            }
+        }
+
+        fn slice<'a>(array: &'a PyReadonlyArrayDyn<'_, f64>, name: &str) -> PyResult<&'a [f64]> {
+            array.as_slice().map_err(|_| {
+                value_error(format!("{name} does not lie row by row in memory: pass numpy.ascontiguousarray({name})"))
+            })
+        }
+
+        fn columns<const N: usize>(all: &[f64], n: usize) -> [&[f64]; N] {
+            std::array::from_fn(|k| all.get(k * n..(k + 1) * n).unwrap_or_default())
+        }
+
+        fn base_of(p: &PyReadonlyArray1<'_, f64>) -> PyResult<[f64; #n_base]> {
+            let p = p.as_array();
+            if p.len() != #n_base {
+                return Err(value_error(format!("p has {} numbers; there are {} base parameters", p.len(), #n_base)));
+            }
+            Ok(std::array::from_fn(|k| p[k]))
+        }
+
+        #[doc = #doc_forces]
+        #[pyfunction]
+        #[pyo3(signature = (#(#names,)* p, *, geometry=None, parallel=false))]
+        fn inverse_dynamics<'py>(
+            py: Python<'py>, #arguments, p: PyReadonlyArray1<'py, f64>,
+            geometry: Option<BTreeMap<String, f64>>, parallel: bool,
+        ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+            #states
+            let dynamics = model::InverseDynamics::new(&geometry_of(geometry)?, &base_of(&p)?);
+            let forces = PyArray::zeros(py, many.shape(&[#n_drives]), false);
+            let mut to = forces.readwrite();
+            let to = to.as_slice_mut().map_err(|error| value_error(error.to_string()))?;
+            let done = py.detach(|| {
+                let mut to = modelmill_runtime::blocks::columns_of::<f64, #n_drives>(to, n)?;
+                if parallel {
+                    dynamics.forces_of_many_in_parallel(&states, &mut to)
+                } else {
+                    dynamics.forces_of_many(&states, &mut to)
+                }
+            });
+            done.map_err(|error| many.error(error))?;
+            Ok(forces)
+        }
+
+        #[doc = #doc_regressor]
+        #[pyfunction]
+        #[pyo3(signature = (#(#names,)* *, geometry=None, parallel=false))]
+        fn regressor<'py>(
+            py: Python<'py>, #arguments, geometry: Option<BTreeMap<String, f64>>, parallel: bool,
+        ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+            #states
+            let model = model::Model::new(&geometry_of(geometry)?);
+            debug_assert_eq!(#regressor_entries, model::N_DRIVES * model::N_BASE);
+            let regressor = PyArray::zeros(py, many.shape(&[#n_drives, #n_base]), false);
+            let mut to = regressor.readwrite();
+            let to = to.as_slice_mut().map_err(|error| value_error(error.to_string()))?;
+            let done = py.detach(|| {
+                if parallel {
+                    model.regressor_of_many_in_parallel(&states, to)
+                } else {
+                    model.regressor_of_many(&states, to)
+                }
+            });
+            done.map_err(|error| many.error(error))?;
+            Ok(regressor)
+        }
+
+        #[doc = #doc_base]
+        #[pyfunction]
+        #[pyo3(signature = (parameters=None, geometry=None))]
+        fn base_parameters<'py>(
+            py: Python<'py>, parameters: Option<BTreeMap<String, f64>>, geometry: Option<BTreeMap<String, f64>>,
+        ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+            let names = model::PARAMETERS.map(|c| c.name);
+            let values = replaced(parameters_values(), &names, parameters)?;
+            let base = model::base_parameters(&geometry_of(geometry)?, &self::parameters(&values));
+            Ok(PyArray1::from_slice(py, &base))
+        }
+
+        #[doc = #title]
+        #[pymodule]
+        fn #module(m: &Bound<'_, PyModule>) -> PyResult<()> {
+            m.add_function(wrap_pyfunction!(inverse_dynamics, m)?)?;
+            m.add_function(wrap_pyfunction!(regressor, m)?)?;
+            m.add_function(wrap_pyfunction!(base_parameters, m)?)?;
+            m.add("COORDINATES", model::ACTIVE.to_vec())?;
+            m.add("DRIVES", model::DRIVES.to_vec())?;
+            let base = model::BASE_PARAMETERS.map(|b| (b.name, b.expression, b.unit));
+            m.add("BASE_PARAMETERS", base.to_vec())?;
+            m.add("CONSTANTS", BTreeMap::from(model::CONSTANTS.map(|c| (c.name, c.value))))?;
+            m.add("PARAMETERS", BTreeMap::from(model::PARAMETERS.map(|c| (c.name, c.value))))?;
+            debug_assert_eq!(model::N_ACTIVE, #n_active);
+            Ok(())
+        }
+    }
+}

@@ -1,0 +1,476 @@
+//! Programs over many states at once: structure of arrays in, structure of arrays out.
+//!
+//! States go through in lines of one cache line each (8 `f64`, 16 `f32`). With the feature `std` the program runs in the
+//! widest vectors of the machine, which is asked at run time ([`crate::wide`]); without it, one state at a time. A line in
+//! which anything is out of the ordinary, such as a number that is none, a pose that is out of reach or an angle of more
+//! than a hundred thousand turns, is looked at again one by one: so there is one definition of what is wrong, that of one state.
+
+use core::fmt;
+
+use crate::{One, Outputs, PoseError, Real, check_finite};
+
+/// A straight-line program of a model, for states given as `INPUTS` numbers each.
+pub trait Program<T: Real, const INPUTS: usize, const OUTPUTS: usize> {
+    /// Names of the inputs.
+    fn names(&self) -> [&'static str; INPUTS];
+
+    /// Runs the program for as many states as `numbers` holds in a value.
+    ///
+    /// # Errors
+    /// What is wrong with the pose.
+    fn run<N: crate::Numbers<Scalar = T>>(
+        &self,
+        numbers: &N,
+        inputs: &[N::Value; INPUTS],
+        outputs: &mut impl Outputs<N::Value>,
+    ) -> Result<(), PoseError>;
+
+    /// Finds inputs that follow from the others, for one state after the other; `last` holds those of the state before.
+    ///
+    /// # Errors
+    /// What is wrong with the pose.
+    fn complete(
+        &self,
+        _inputs: &mut [T; INPUTS],
+        _last: Option<&[T; INPUTS]>,
+    ) -> Result<(), PoseError> {
+        Ok(())
+    }
+
+    /// How many of the last inputs [`Self::complete`] finds; their slices come in empty.
+    const COMPLETED: usize = 0;
+}
+
+/// A line of numbers as long as a cache line.
+pub trait Line<T>: Copy + AsRef<[T]> + AsMut<[T]> {
+    /// How many numbers.
+    const LENGTH: usize;
+    /// The same number throughout.
+    fn filled(x: T) -> Self;
+}
+
+macro_rules! line {
+    ($name:ident, $float:ty, $length:literal) => {
+        #[doc = concat!("A cache line of `", stringify!($float), "`.")]
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[repr(C, align(64))]
+        pub struct $name(pub [$float; $length]);
+
+        impl AsRef<[$float]> for $name {
+            #[inline]
+            fn as_ref(&self) -> &[$float] {
+                &self.0
+            }
+        }
+
+        impl AsMut<[$float]> for $name {
+            #[inline]
+            fn as_mut(&mut self) -> &mut [$float] {
+                &mut self.0
+            }
+        }
+
+        impl Line<$float> for $name {
+            const LENGTH: usize = $length;
+            #[inline]
+            fn filled(x: $float) -> Self {
+                Self([x; $length])
+            }
+        }
+    };
+}
+line!(Line64, f64, 8);
+line!(Line32, f32, 16);
+
+/// Numbers that programs can take many of at once; `f32` and `f64` are.
+pub trait Blocks: Real {
+    /// A cache line of them.
+    type Line: Line<Self>;
+
+    /// Runs a job in the widest vectors of the machine.
+    ///
+    /// # Errors
+    /// What the job finds wrong.
+    fn run<J: Job<Self>>(job: J) -> Result<(), BlockError>;
+}
+
+/// What runs inside vectors of one width.
+pub trait Job<T: Blocks> {
+    /// Does it all; `vectors` runs a program over a line.
+    ///
+    /// # Errors
+    /// What is found wrong.
+    fn with<V: Vectors<T>>(self, vectors: V) -> Result<(), BlockError>;
+}
+
+/// Vectors of one width, and the instructions for them.
+pub trait Vectors<T: Blocks>: Copy {
+    /// Runs a program over all of a line; whether every lane was regular.
+    fn line<P: Program<T, INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
+        self,
+        program: &P,
+        inputs: &[T::Line; INPUTS],
+        outputs: &mut [T::Line; OUTPUTS],
+    ) -> bool;
+}
+
+/// One state after the other.
+#[derive(Clone, Copy, Debug)]
+pub struct Singly;
+
+impl<T: Blocks> Vectors<T> for Singly {
+    #[inline]
+    fn line<P: Program<T, INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
+        self,
+        _program: &P,
+        _inputs: &[T::Line; INPUTS],
+        _outputs: &mut [T::Line; OUTPUTS],
+    ) -> bool {
+        // Every line is looked at one by one.
+        false
+    }
+}
+
+#[cfg(not(feature = "std"))]
+mod singly {
+    use super::{BlockError, Blocks, Job, Line32, Line64, Singly};
+
+    impl Blocks for f64 {
+        type Line = Line64;
+        fn run<J: Job<Self>>(job: J) -> Result<(), BlockError> {
+            job.with(Singly)
+        }
+    }
+
+    impl Blocks for f32 {
+        type Line = Line32;
+        fn run<J: Job<Self>>(job: J) -> Result<(), BlockError> {
+            job.with(Singly)
+        }
+    }
+}
+
+/// Why many states have no answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BlockError {
+    /// At a state, the first of those that have none.
+    At {
+        /// Which state.
+        sample: usize,
+        /// Why.
+        reason: PoseError,
+    },
+    /// Arrays of different lengths.
+    Length {
+        /// Name of the input, or `output`.
+        array: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length that it should have.
+        expected: usize,
+    },
+}
+
+impl fmt::Display for BlockError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::At { sample, reason } => write!(f, "at sample {sample}: {reason}"),
+            Self::Length {
+                array,
+                found,
+                expected,
+            } => write!(
+                f,
+                "the array of `{array}` has {found} numbers where {expected} are expected"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for BlockError {}
+
+/// The states of one line, and what a program says of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Block<'a, L, const OUTPUTS: usize> {
+    /// Number of the first state.
+    pub first: usize,
+    /// How many states; what stands behind them in each line means nothing.
+    pub len: usize,
+    /// One line per output.
+    pub outputs: &'a [L; OUTPUTS],
+}
+
+/// Runs a program over states, one slice per input, and shows the outputs line by line.
+///
+/// # Errors
+/// Slices of different lengths, before anything runs; else the first state without an answer, after all before it have
+/// been shown.
+pub fn visit_blocks<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
+    program: &P,
+    inputs: &[&[T]; INPUTS],
+    visit: impl FnMut(Block<'_, T::Line, OUTPUTS>),
+) -> Result<(), BlockError>
+where
+    P: Program<T, INPUTS, OUTPUTS>,
+{
+    let n = length(program, inputs)?;
+    T::run(Lines {
+        program,
+        inputs,
+        outputs: [T::Line::filled(T::from_f64(0.0)); OUTPUTS],
+        n,
+        visit,
+    })
+}
+
+/// Runs a program over states and writes each output to a slice of its own.
+///
+/// # Errors
+/// Slices of different lengths, before anything runs; else the first state without an answer, with the results of all
+/// before it in place.
+pub fn fill_columns<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
+    program: &P,
+    inputs: &[&[T]; INPUTS],
+    outputs: &mut [&mut [T]; OUTPUTS],
+) -> Result<(), BlockError>
+where
+    P: Program<T, INPUTS, OUTPUTS>,
+{
+    let n = length(program, inputs)?;
+    same_length("output", outputs.iter().map(|o| o.len()), n)?;
+    T::run(Lines {
+        program,
+        inputs,
+        outputs: [T::Line::filled(T::from_f64(0.0)); OUTPUTS],
+        n,
+        visit: |block: Block<'_, T::Line, OUTPUTS>| {
+            for (column, line) in outputs.iter_mut().zip(block.outputs) {
+                let to = column.get_mut(block.first..block.first + block.len);
+                let (Some(to), line) = (to, line.as_ref()) else {
+                    continue;
+                };
+                if to.len() == line.len() {
+                    to.copy_from_slice(line);
+                } else {
+                    for (to, from) in to.iter_mut().zip(line) {
+                        *to = *from;
+                    }
+                }
+            }
+        },
+    })
+}
+
+/// [`fill_columns`] on all cores if the feature `rayon` is on, else on one.
+///
+/// # Errors
+/// As [`fill_columns`]; of the results, all before the first state without an answer are in place.
+pub fn fill_columns_in_parallel<T, P, const INPUTS: usize, const OUTPUTS: usize>(
+    program: &P,
+    inputs: &[&[T]; INPUTS],
+    outputs: &mut [&mut [T]; OUTPUTS],
+) -> Result<(), BlockError>
+where
+    T: Blocks + Send + Sync,
+    P: Program<T, INPUTS, OUTPUTS> + Sync,
+{
+    #[cfg(feature = "rayon")]
+    {
+        let n = length(program, inputs)?;
+        same_length("output", outputs.iter().map(|o| o.len()), n)?;
+        crate::parallel::fill(program, inputs, outputs, n)
+    }
+    #[cfg(not(feature = "rayon"))]
+    fill_columns(program, inputs, outputs)
+}
+
+/// Cuts an array into columns of equal length, one per output.
+///
+/// # Errors
+/// An array whose length is not `OUTPUTS` times that of the first input.
+pub fn columns_of<'a, T, const OUTPUTS: usize>(
+    array: &'a mut [T],
+    n: usize,
+) -> Result<[&'a mut [T]; OUTPUTS], BlockError> {
+    let expected = OUTPUTS * n;
+    same_length("output", core::iter::once(array.len()), expected)?;
+    let mut rest = array;
+    Ok(core::array::from_fn(|_| {
+        let (column, after) = core::mem::take(&mut rest)
+            .split_at_mut_checked(n)
+            .unwrap_or_default();
+        rest = after;
+        column
+    }))
+}
+
+/// The common length of all inputs.
+fn length<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
+    program: &P,
+    inputs: &[&[T]; INPUTS],
+) -> Result<usize, BlockError>
+where
+    P: Program<T, INPUTS, OUTPUTS>,
+{
+    let n = inputs.iter().map(|i| i.len()).max().unwrap_or(0);
+    let given = INPUTS.saturating_sub(P::COMPLETED);
+    for (input, array) in inputs.iter().zip(program.names()).take(given) {
+        same_length(array, core::iter::once(input.len()), n)?;
+    }
+    Ok(n)
+}
+
+fn same_length(
+    array: &'static str,
+    mut lengths: impl Iterator<Item = usize>,
+    expected: usize,
+) -> Result<(), BlockError> {
+    let other = lengths.find(|found| *found != expected);
+    other.map_or(Ok(()), |found| {
+        Err(BlockError::Length {
+            array,
+            found,
+            expected,
+        })
+    })
+}
+
+/// All states, line by line.
+struct Lines<'a, T: Blocks, P, F, const INPUTS: usize, const OUTPUTS: usize> {
+    program: &'a P,
+    inputs: &'a [&'a [T]; INPUTS],
+    outputs: [T::Line; OUTPUTS],
+    n: usize,
+    visit: F,
+}
+
+impl<T: Blocks, P, F, const INPUTS: usize, const OUTPUTS: usize> Job<T>
+    for Lines<'_, T, P, F, INPUTS, OUTPUTS>
+where
+    P: Program<T, INPUTS, OUTPUTS>,
+    F: FnMut(Block<'_, T::Line, OUTPUTS>),
+{
+    #[allow(
+        clippy::inline_always,
+        reason = "a function of its own would be compiled for the narrowest vectors"
+    )]
+    #[inline(always)]
+    fn with<V: Vectors<T>>(mut self, vectors: V) -> Result<(), BlockError> {
+        let mut inputs = [T::Line::filled(T::from_f64(0.0)); INPUTS];
+        let mut last = None;
+        let mut first = 0;
+        while first < self.n {
+            let mut len = T::Line::LENGTH.min(self.n - first);
+            for (line, array) in inputs.iter_mut().zip(self.inputs) {
+                load(line, array, first, len);
+            }
+            let mut fault = None;
+            if P::COMPLETED > 0
+                && let Err((k, reason)) = complete(self.program, &mut inputs, len, &mut last)
+            {
+                (len, fault) = (k, Some(reason));
+            }
+            let regular = fault.is_none() && vectors.line(self.program, &inputs, &mut self.outputs);
+            if !regular
+                && let Err((k, reason)) = one_by_one(self.program, &inputs, &mut self.outputs, len)
+            {
+                (len, fault) = (k, Some(reason));
+            }
+            (self.visit)(Block {
+                first,
+                len,
+                outputs: &self.outputs,
+            });
+            if let Some(reason) = fault {
+                let sample = first + len;
+                return Err(BlockError::At { sample, reason });
+            }
+            first += len;
+        }
+        Ok(())
+    }
+}
+
+/// Fills a line with `len` numbers of an array; the last one is repeated up to the line's end.
+#[allow(clippy::inline_always, reason = "as above")]
+#[inline(always)]
+fn load<T: Blocks>(line: &mut T::Line, array: &[T], first: usize, len: usize) {
+    let line = line.as_mut();
+    let Some(from) = array.get(first..first + len) else {
+        return;
+    };
+    if from.len() == line.len() {
+        line.copy_from_slice(from);
+    } else if let Some(last) = from.last() {
+        for (k, to) in line.iter_mut().enumerate() {
+            *to = *from.get(k).unwrap_or(last);
+        }
+    }
+}
+
+/// State `k` of a line.
+fn column<T: Blocks, const INPUTS: usize>(inputs: &[T::Line; INPUTS], k: usize) -> [T; INPUTS] {
+    core::array::from_fn(|i| {
+        inputs[i]
+            .as_ref()
+            .get(k)
+            .copied()
+            .unwrap_or(T::from_f64(0.0))
+    })
+}
+
+/// Completes the inputs of a line; which state has none, and why.
+#[inline(never)]
+fn complete<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
+    program: &P,
+    inputs: &mut [T::Line; INPUTS],
+    len: usize,
+    last: &mut Option<[T; INPUTS]>,
+) -> Result<(), (usize, PoseError)>
+where
+    P: Program<T, INPUTS, OUTPUTS>,
+{
+    for k in 0..len {
+        let mut state = column::<T, INPUTS>(inputs, k);
+        if let Err(reason) = program.complete(&mut state, last.as_ref()) {
+            return Err((k, reason));
+        }
+        let given = INPUTS.saturating_sub(P::COMPLETED);
+        for (line, value) in inputs.iter_mut().zip(&state).skip(given) {
+            // What lies behind the last state resembles it.
+            for to in line.as_mut().iter_mut().skip(k) {
+                *to = *value;
+            }
+        }
+        *last = Some(state);
+    }
+    Ok(())
+}
+
+/// The states of a line one after the other: which one has no answer, and why.
+#[cold]
+#[inline(never)]
+fn one_by_one<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
+    program: &P,
+    inputs: &[T::Line; INPUTS],
+    outputs: &mut [T::Line; OUTPUTS],
+    len: usize,
+) -> Result<(), (usize, PoseError)>
+where
+    P: Program<T, INPUTS, OUTPUTS>,
+{
+    let names = program.names();
+    for k in 0..len {
+        let state = column::<T, INPUTS>(inputs, k);
+        let mut found = [T::from_f64(0.0); OUTPUTS];
+        check_finite(&state, &names)
+            .and_then(|()| program.run(&One::new(), &state, &mut found))
+            .map_err(|reason| (k, reason))?;
+        for (line, value) in outputs.iter_mut().zip(&found) {
+            if let Some(to) = line.as_mut().get_mut(k) {
+                *to = *value;
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,59 @@
+//! This crate's own source, for crates that are handed on in a folder of their own.
+
+/// Place in the crate's folder and text of every file.
+pub const FILES: [(&str, &str); 11] = [
+    ("Cargo.toml", MANIFEST),
+    ("src/blocks.rs", include_str!("blocks.rs")),
+    ("src/lanes.rs", include_str!("lanes.rs")),
+    ("src/lib.rs", include_str!("lib.rs")),
+    ("src/loops.rs", include_str!("loops.rs")),
+    ("src/numbers.rs", include_str!("numbers.rs")),
+    ("src/parallel.rs", include_str!("parallel.rs")),
+    ("src/real.rs", include_str!("real.rs")),
+    ("src/solve.rs", include_str!("solve.rs")),
+    ("src/source.rs", "//! Stays with the project.\n"),
+    ("src/wide.rs", include_str!("wide.rs")),
+];
+
+/// The manifest outside of the project's workspace.
+const MANIFEST: &str = r#"[package]
+name = "modelmill-runtime"
+description = "What emitted models need at run time"
+version = "0.1.0"
+edition = "2024"
+rust-version = "1.89"
+license = "MIT OR Apache-2.0"
+publish = false
+
+[features]
+std = ["dep:pulp"]
+rayon = ["std", "dep:rayon"]
+source = []
+
+[dependencies]
+libm = "0.2"
+pulp = { version = "0.22", default-features = false, features = ["std", "x86-v3", "x86-v4"], optional = true }
+rayon = { version = "1.12", optional = true }
+"#;
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn no_file_is_missing() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let files = std::fs::read_dir(folder.join("src")).unwrap();
+        let mut names: std::vec::Vec<_> = files
+            .map(|f| std::format!("src/{}", f.unwrap().file_name().to_str().unwrap()))
+            .collect();
+        names.push("Cargo.toml".into());
+        names.sort();
+        let mut listed = FILES.map(|f| f.0).to_vec();
+        listed.sort_unstable();
+        assert_eq!(names, listed);
+    }
+}

@@ -1,0 +1,438 @@
+//! Programs in the widest vectors of the machine, by way of `pulp`, which asks the machine at run time and keeps the
+//! instructions behind a safe face: 512 bits with AVX-512, 256 with AVX2, 128 with NEON, else one number at a time.
+//!
+//! Products are fused with the sums that they go into where the machine has an instruction for that, so that results agree
+//! with those of one state, and between machines, to rounding.
+#![allow(
+    clippy::inline_always,
+    reason = "a function of its own would be compiled for the narrowest vectors"
+)]
+
+use core::cell::Cell;
+use core::ops::{Add, Div, Mul, Neg, Sub};
+use std::sync::OnceLock;
+
+use pulp::{Arch, Simd, WithSimd};
+
+use crate::blocks::{BlockError, Blocks, Job, Line, Line32, Line64, Program, Vectors};
+use crate::lanes::{Angle, LARGEST_ANGLE, reduced_sin_cos};
+use crate::{Numbers, Outputs, PoseError, Real};
+
+/// The widest vectors of the machine, or narrower ones if the environment variable `MODELMILL_VECTORS` asks for `256` bits
+/// or `none`, so that the figures of another machine can be seen on this one.
+fn vectors() -> Arch {
+    static CHOSEN: OnceLock<Arch> = OnceLock::new();
+    *CHOSEN.get_or_init(|| match std::env::var("MODELMILL_VECTORS").as_deref() {
+        Ok("none") => Arch::Scalar,
+        #[cfg(target_arch = "x86_64")]
+        Ok("256") => pulp::x86::V3::try_new().map_or(Arch::Scalar, Arch::V3),
+        _ => Arch::new(),
+    })
+}
+
+/// A job inside the vectors that `pulp` chose.
+struct Chosen<J, T>(J, core::marker::PhantomData<T>);
+
+macro_rules! wide {
+    (
+        $float:ty, $line:ident, $value:ident, $numbers:ident, $put:ident, $vectors:ident,
+        $floats:ident, $mask:ident, $lanes:ident, $splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident,
+        $fused:ident, $fused_less:ident, $sqrt:ident, $abs:ident, $less:ident, $greater:ident, $at_least:ident, $and:ident, $not:ident, $first:ident,
+        $select:ident, $of_slice:ident, $of_slice_mut:ident
+    ) => {
+        /// As many numbers as a vector holds.
+        #[derive(Clone, Copy)]
+        struct $value<S: Simd> {
+            simd: S,
+            v: S::$floats,
+        }
+
+        wide!(operator $value, Add, add, $add);
+        wide!(operator $value, Sub, sub, $sub);
+        wide!(operator $value, Mul, mul, $mul);
+        wide!(operator $value, Div, div, $div);
+
+        impl<S: Simd> Neg for $value<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn neg(self) -> Self {
+                Self {
+                    simd: self.simd,
+                    v: self.simd.$neg(self.v),
+                }
+            }
+        }
+
+        /// Arithmetic of a vector, and which of its lanes are regular.
+        struct $numbers<S: Simd> {
+            simd: S,
+            regular: Cell<S::$mask>,
+        }
+
+        impl<S: Simd> $numbers<S> {
+            #[inline(always)]
+            fn new(simd: S) -> Self {
+                let (zero, one) = (simd.$splat(0.0), simd.$splat(1.0));
+                Self {
+                    simd,
+                    regular: Cell::new(simd.$less(zero, one)),
+                }
+            }
+
+            #[inline(always)]
+            fn value(&self, v: S::$floats) -> $value<S> {
+                $value { simd: self.simd, v }
+            }
+
+            #[inline(always)]
+            fn hold(&self, mask: S::$mask) {
+                self.regular.set(self.simd.$and(self.regular.get(), mask));
+            }
+
+            #[inline(always)]
+            fn all_regular(&self) -> bool {
+                let irregular = self.simd.$not(self.regular.get());
+                self.simd.$first(irregular) >= S::$lanes
+            }
+
+            /// A function that has no vector form, lane by lane.
+            #[inline(always)]
+            fn each(&self, x: $value<S>, f: impl Fn($float) -> $float) -> $value<S> {
+                let mut line = [0.0; $line::LENGTH];
+                if let Some(to) = S::$of_slice_mut(&mut line).0.first_mut() {
+                    *to = x.v;
+                }
+                for x in line.iter_mut().take(S::$lanes) {
+                    *x = f(*x);
+                }
+                let first = S::$of_slice(&line).0.first();
+                first.map_or(x, |v| self.value(*v))
+            }
+        }
+
+        impl<S: Simd> Numbers for $numbers<S> {
+            type Scalar = $float;
+            type Value = $value<S>;
+
+            #[inline(always)]
+            fn of(&self, x: $float) -> $value<S> {
+                self.value(self.simd.$splat(x))
+            }
+            #[inline(always)]
+            fn number(&self, x: f64) -> $value<S> {
+                self.of(<$float as Real>::from_f64(x))
+            }
+            #[inline(always)]
+            fn sin_cos(&self, angle: $value<S>) -> ($value<S>, $value<S>) {
+                let (simd, largest) = (self.simd, <$float as Real>::from_f64(LARGEST_ANGLE));
+                self.hold(simd.$less(simd.$abs(angle.v), simd.$splat(largest)));
+                angle.sin_cos()
+            }
+            #[inline(always)]
+            fn mul_add(&self, a: $value<S>, b: $value<S>, c: $value<S>) -> $value<S> {
+                self.value(self.simd.$fused(a.v, b.v, c.v))
+            }
+            #[inline(always)]
+            fn mul_sub(&self, a: $value<S>, b: $value<S>, c: $value<S>) -> $value<S> {
+                self.value(self.simd.$fused(a.v, b.v, self.simd.$neg(c.v)))
+            }
+            #[inline(always)]
+            fn sub_mul(&self, c: $value<S>, a: $value<S>, b: $value<S>) -> $value<S> {
+                self.value(self.simd.$fused_less(a.v, b.v, c.v))
+            }
+            #[inline(always)]
+            fn sqrt(&self, x: $value<S>) -> $value<S> {
+                self.value(self.simd.$sqrt(x.v))
+            }
+            #[inline(always)]
+            fn abs(&self, x: $value<S>) -> $value<S> {
+                self.value(self.simd.$abs(x.v))
+            }
+            #[inline(always)]
+            fn sign(&self, x: $value<S>) -> $value<S> {
+                let simd = self.simd;
+                let (zero, one) = (simd.$splat(0.0), simd.$splat(1.0));
+                let below = simd.$select(simd.$less(x.v, zero), simd.$splat(-1.0), x.v);
+                self.value(simd.$select(simd.$greater(x.v, zero), one, below))
+            }
+            #[inline(always)]
+            fn tanh(&self, x: $value<S>) -> $value<S> {
+                self.each(x, Real::tanh)
+            }
+            #[inline(always)]
+            fn exp(&self, x: $value<S>) -> $value<S> {
+                self.each(x, Real::exp)
+            }
+            #[inline(always)]
+            fn atan2(&self, y: $value<S>, x: $value<S>) -> $value<S> {
+                let mut line = [0.0; $line::LENGTH];
+                if let Some(to) = S::$of_slice_mut(&mut line).0.first_mut() {
+                    *to = x.v;
+                }
+                let at = Cell::new(0);
+                self.each(y, |y| {
+                    let k = at.replace(at.get() + 1);
+                    Real::atan2(y, line.get(k).copied().unwrap_or_default())
+                })
+            }
+            #[inline(always)]
+            fn reachable(&self, x: $value<S>) -> Result<(), PoseError> {
+                self.hold(self.simd.$at_least(x.v, self.simd.$splat(0.0)));
+                Ok(())
+            }
+            #[inline(always)]
+            fn regular(&self, x: $value<S>, limit: f64) -> Result<(), PoseError> {
+                let limit = self.number(limit);
+                self.hold(self.simd.$greater(self.simd.$abs(x.v), limit.v));
+                Ok(())
+            }
+            #[inline(always)]
+            fn finite(&self, x: $value<S>) -> Result<(), PoseError> {
+                let infinite = self.simd.$splat(<$float>::INFINITY);
+                self.hold(self.simd.$less(self.simd.$abs(x.v), infinite));
+                Ok(())
+            }
+        }
+
+        /// Writes one vector of each line.
+        struct $put<'a, S, const OUTPUTS: usize> {
+            lines: &'a mut [$line; OUTPUTS],
+            part: usize,
+            simd: S,
+        }
+
+        impl<S: Simd, const OUTPUTS: usize> Outputs<$value<S>> for $put<'_, S, OUTPUTS> {
+            #[inline(always)]
+            fn put(&mut self, k: usize, value: $value<S>) {
+                let _ = self.simd;
+                if let Some(to) = S::$of_slice_mut(&mut self.lines[k].0).0.get_mut(self.part) {
+                    *to = value.v;
+                }
+            }
+        }
+
+        #[derive(Clone, Copy)]
+        struct $vectors<S>(S);
+
+        impl<S: Simd> Vectors<$float> for $vectors<S> {
+            #[inline(always)]
+            fn line<P, const INPUTS: usize, const OUTPUTS: usize>(
+                self,
+                program: &P,
+                inputs: &[$line; INPUTS],
+                outputs: &mut [$line; OUTPUTS],
+            ) -> bool
+            where
+                P: Program<$float, INPUTS, OUTPUTS>,
+            {
+                let simd = self.0;
+                let mut regular = true;
+                for part in 0..$line::LENGTH / S::$lanes {
+                    let numbers = $numbers::new(simd);
+                    let zero = simd.$splat(0.0);
+                    let mut values = [numbers.value(zero); INPUTS];
+                    // The sum is finite unless one of them is not, or all are huge.
+                    let mut sum = zero;
+                    for (to, line) in values.iter_mut().zip(inputs) {
+                        if let Some(v) = S::$of_slice(&line.0).0.get(part) {
+                            to.v = *v;
+                            sum = simd.$add(sum, *v);
+                        }
+                    }
+                    regular &= numbers.finite(numbers.value(sum)).is_ok();
+                    let lines = &mut *outputs;
+                    let mut put = $put { lines, part, simd };
+                    regular &= program.run(&numbers, &values, &mut put).is_ok();
+                    regular &= numbers.all_regular();
+                }
+                regular
+            }
+        }
+
+        impl<J: Job<$float>> WithSimd for Chosen<J, $float> {
+            type Output = Result<(), BlockError>;
+            #[inline(always)]
+            fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+                self.0.with($vectors(simd))
+            }
+        }
+
+        impl Blocks for $float {
+            type Line = $line;
+            fn run<J: Job<Self>>(job: J) -> Result<(), BlockError> {
+                vectors().dispatch(Chosen(job, core::marker::PhantomData))
+            }
+        }
+    };
+    (operator $value:ident, $trait:ident, $method:ident, $instruction:ident) => {
+        impl<S: Simd> $trait for $value<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self {
+                    simd: self.simd,
+                    v: self.simd.$instruction(self.v, other.v),
+                }
+            }
+        }
+    };
+}
+
+wide!(
+    f64,
+    Line64,
+    Wide64,
+    Numbers64,
+    Put64,
+    Vectors64,
+    f64s,
+    m64s,
+    F64_LANES,
+    splat_f64s,
+    add_f64s,
+    sub_f64s,
+    mul_f64s,
+    div_f64s,
+    neg_f64s,
+    mul_add_e_f64s,
+    negate_mul_add_e_f64s,
+    sqrt_f64s,
+    abs_f64s,
+    less_than_f64s,
+    greater_than_f64s,
+    greater_than_or_equal_f64s,
+    and_m64s,
+    not_m64s,
+    first_true_m64s,
+    select_f64s,
+    as_simd_f64s,
+    as_mut_simd_f64s
+);
+wide!(
+    f32,
+    Line32,
+    Wide32,
+    Numbers32,
+    Put32,
+    Vectors32,
+    f32s,
+    m32s,
+    F32_LANES,
+    splat_f32s,
+    add_f32s,
+    sub_f32s,
+    mul_f32s,
+    div_f32s,
+    neg_f32s,
+    mul_add_e_f32s,
+    negate_mul_add_e_f32s,
+    sqrt_f32s,
+    abs_f32s,
+    less_than_f32s,
+    greater_than_f32s,
+    greater_than_or_equal_f32s,
+    and_m32s,
+    not_m32s,
+    first_true_m32s,
+    select_f32s,
+    as_simd_f32s,
+    as_mut_simd_f32s
+);
+
+impl<S: Simd> Wide64<S> {
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        reduced_sin_cos(self)
+    }
+
+    /// The other one where the mask is set.
+    #[inline(always)]
+    fn like_or(self, mask: S::m64s, other: Self) -> Self {
+        Self {
+            simd: self.simd,
+            v: self.simd.select_f64s(mask, other.v, self.v),
+        }
+    }
+
+    /// Turned around in the third and fourth quarter.
+    #[inline(always)]
+    fn with_sign(self, quarter: S::u64s) -> Self {
+        let (simd, two) = (self.simd, self.simd.splat_u64s(2));
+        let negative = simd.equal_u64s(simd.and_u64s(quarter, two), two);
+        let sign = simd.select_f64s(negative, simd.splat_f64s(-0.0), simd.splat_f64s(0.0));
+        Self {
+            simd,
+            v: simd.xor_f64s(self.v, sign),
+        }
+    }
+}
+
+impl<S: Simd> Angle for Wide64<S> {
+    #[inline(always)]
+    fn like(self, x: f64) -> Self {
+        Self {
+            simd: self.simd,
+            v: self.simd.splat_f64s(x),
+        }
+    }
+
+    #[inline(always)]
+    fn plus_product(self, a: Self, b: Self) -> Self {
+        Self {
+            simd: self.simd,
+            v: self.simd.mul_add_e_f64s(a.v, b.v, self.v),
+        }
+    }
+
+    #[inline(always)]
+    fn less_product(self, a: Self, b: Self) -> Self {
+        Self {
+            simd: self.simd,
+            v: self.simd.negate_mul_add_e_f64s(a.v, b.v, self.v),
+        }
+    }
+
+    #[inline(always)]
+    fn turned(shifted: Self, sin: Self, cos: Self) -> (Self, Self) {
+        let simd = shifted.simd;
+        let one = simd.splat_u64s(1);
+        let quarter = simd.transmute_u64s_f64s(shifted.v);
+        let odd = simd.equal_u64s(simd.and_u64s(quarter, one), one);
+        let next = simd.add_u64s(quarter, one);
+        (
+            sin.like_or(odd, cos).with_sign(quarter),
+            cos.like_or(odd, sin).with_sign(next),
+        )
+    }
+}
+
+impl<S: Simd> Wide32<S> {
+    /// Through `f64`, as for one number: the compiler makes vectors of these loops.
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        let mut angle = [0.0_f64; Line32::LENGTH];
+        let (mut sin, mut cos) = ([0.0_f64; Line32::LENGTH], [0.0_f64; Line32::LENGTH]);
+        let mut line = [0.0_f32; Line32::LENGTH];
+        let (mut sin32, mut cos32) = (line, line);
+        if let Some(to) = S::as_mut_simd_f32s(&mut line).0.first_mut() {
+            *to = self.v;
+        }
+        for k in 0..S::F32_LANES.min(Line32::LENGTH) {
+            angle[k] = f64::from(line[k]);
+        }
+        for k in 0..S::F32_LANES.min(Line32::LENGTH) {
+            (sin[k], cos[k]) = reduced_sin_cos(angle[k]);
+        }
+        for k in 0..S::F32_LANES.min(Line32::LENGTH) {
+            (sin32[k], cos32[k]) = (Real::from_f64(sin[k]), Real::from_f64(cos[k]));
+        }
+        let read = |line: &[f32; Line32::LENGTH]| {
+            let first = S::as_simd_f32s(line).0.first();
+            first.map_or(self, |v| Self {
+                simd: self.simd,
+                v: *v,
+            })
+        };
+        (read(&sin32), read(&cos32))
+    }
+}
