@@ -288,10 +288,10 @@ where
 ///
 /// # Errors
 /// An array whose length is not `OUTPUTS` times that of the first input.
-pub fn columns_of<'a, T, const OUTPUTS: usize>(
-    array: &'a mut [T],
+pub fn columns_of<T, const OUTPUTS: usize>(
+    array: &mut [T],
     n: usize,
-) -> Result<[&'a mut [T]; OUTPUTS], BlockError> {
+) -> Result<[&mut [T]; OUTPUTS], BlockError> {
     let expected = OUTPUTS * n;
     same_length("output", core::iter::once(array.len()), expected)?;
     let mut rest = array;

@@ -39,6 +39,6 @@ where
             sample: sample + half,
             reason,
         },
-        other => other,
+        other @ BlockError::Length { .. } => other,
     })
 }
