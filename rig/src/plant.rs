@@ -167,9 +167,10 @@ impl<'r> Plant<'r> {
             per_acceleration.set_column(k, &(needed(self, &unit)? - &found));
         }
         let decomposed = per_acceleration.lu();
+        // What may cancel, as where a rig falls freely, says how well zero can be met.
+        let size = given.amax().max(found.amax()).max(f64::MIN_POSITIVE);
         for _ in 0..MOST_STEPS {
             let missing = &given - &found;
-            let size = given.amax().max(found.amax()).max(f64::MIN_POSITIVE);
             if missing.amax() <= TOLERANCE * size {
                 return Ok(qdd.as_slice().to_vec());
             }

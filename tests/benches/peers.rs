@@ -160,7 +160,9 @@ fn peers() -> (Vec<(String, PathBuf)>, Vec<String>) {
         let program = out.join(name.replace(' ', "_"));
         // Pinocchio's templates take minutes: what is newer than its sources is kept.
         let made = |path: &Path| path.metadata().and_then(|m| m.modified()).ok();
-        let sources = arguments.iter().filter(|a| a.ends_with(".cpp"));
+        let sources = arguments
+            .iter()
+            .filter(|a| Path::new(a).extension().is_some_and(|e| e == "cpp"));
         let newest = sources.filter_map(|a| made(Path::new(a))).max();
         if made(&program) > newest {
             found.push((name.to_owned(), program));

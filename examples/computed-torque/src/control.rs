@@ -45,7 +45,10 @@ impl Situation {
 }
 
 /// Forces of the spindles for a situation.
-pub(crate) struct Controller<'a>(Box<dyn Fn(&Situation) -> Result<[f64; 2], PoseError> + 'a>);
+pub(crate) struct Controller<'a>(Box<Law<'a>>);
+
+/// Forces of the spindles, N, in a situation.
+type Law<'a> = dyn Fn(&Situation) -> Result<[f64; 2], PoseError> + 'a;
 
 impl<'a> Controller<'a> {
     /// Knows the mass that each crank feels, and the weight, at the nominal pose only.
