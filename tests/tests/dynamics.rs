@@ -126,7 +126,7 @@ fn check_energy(name: &str, force: f64, duration: f64, steps: u32) {
     let slope = |x: &DVector<f64>| -> DVector<f64> {
         let sample = one(x);
         let forces: Vec<[f64; 1]> = (0..n).map(|d| [force * (1.0 + d as f64)]).collect();
-        let given: Vec<&[f64]> = forces.iter().map(|f| f.as_slice()).collect();
+        let given: Vec<&[f64]> = forces.iter().map(<[f64; 1]>::as_slice).collect();
         let states = sample.states();
         let accelerations = evaluator
             .forward_dynamics(&dynamics, &states, &p_min, &given)
