@@ -18,6 +18,7 @@ use crate::forms::{self, Frames, TotalForm};
 use crate::lower::Program;
 use crate::lower::cost::cost;
 use crate::newton_euler::{self, Body, Element, Style};
+use crate::programs::base_atoms;
 use crate::reduce::closed_form;
 use crate::regressor::Equations;
 
@@ -43,17 +44,7 @@ impl Derivation {
     /// A mechanism with an effect that is not affine in the accelerations.
     pub fn dynamics(&self) -> Result<Dynamics, DeriveError> {
         let mut graph = self.graph.clone();
-        let retained: Vec<&Monomial> = self
-            .reduction
-            .retained
-            .iter()
-            .map(|k| &self.reduction.products[*k])
-            .collect();
-        let base: BTreeMap<Monomial, ExprId> = retained
-            .iter()
-            .enumerate()
-            .map(|(k, m)| ((*m).clone(), graph.atom(Atom::Base(k))))
-            .collect();
+        let base = base_atoms(&mut graph, &self.reduction);
         let value = |m: &Monomial| base.get(m).copied().unwrap_or(Graph::ZERO);
         dynamics(&mut graph, &self.mechanism, &self.equations, &value)
     }

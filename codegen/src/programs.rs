@@ -66,18 +66,11 @@ pub(crate) fn programs(
     let closing = Closing::new(graph, mechanism, equations, plan)?;
     let n_drives = mechanism.drives.len();
 
-    let retained: Vec<&Monomial> = reduction
-        .retained
-        .iter()
-        .map(|k| &reduction.products[*k])
-        .collect();
-    let base: BTreeMap<Monomial, ExprId> = retained
-        .iter()
-        .enumerate()
-        .map(|(k, m)| ((*m).clone(), graph.atom(Atom::Base(k))))
-        .collect();
+    let base = base_atoms(graph, reduction);
     let base_value = |m: &Monomial| base.get(m).copied().unwrap_or(Graph::ZERO);
-    let retained: Vec<Monomial> = retained.into_iter().cloned().collect();
+    let retained: Vec<Monomial> = (reduction.retained.iter())
+        .map(|k| reduction.products[*k].clone())
+        .collect();
     let row_by_row = |columns: &[Vec<ExprId>]| -> Vec<ExprId> {
         (0..n_drives)
             .flat_map(|d| columns.iter().map(move |column| column[d]))
@@ -138,6 +131,17 @@ pub(crate) fn programs(
         base_parameters,
         drives: program(&drives),
     })
+}
+
+/// The base parameters by the products that they stand for; all other products are zero.
+pub(crate) fn base_atoms(graph: &mut Graph, reduction: &Reduction) -> BTreeMap<Monomial, ExprId> {
+    let retained = reduction.retained.iter().enumerate();
+    retained
+        .map(|(k, product)| {
+            let product = reduction.products[*product].clone();
+            (product, graph.atom(Atom::Base(k)))
+        })
+        .collect()
 }
 
 /// A program of expressions as they stand, without guards.

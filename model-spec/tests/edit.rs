@@ -165,6 +165,15 @@ fn a_drive_may_be_coupled_with_two_others() {
     assert!(loaded.warnings.is_empty());
     let says = add(&text, &effect("coupled_drive", &["joint5", "joint4"])).unwrap_err();
     assert!(says.contains("already"), "{says}");
+    // A pair that is written down twice is warned of, whichever comes first.
+    let twice =
+        format!("{text}\n[[effect]]\nkind = \"coupled_drive\"\nat = [\"joint5\", \"joint4\"]\n");
+    let (_, loaded) = add(&twice, &effect("viscous_friction", &["joint1"])).unwrap();
+    let warned = loaded
+        .warnings
+        .iter()
+        .any(|w| format!("{w:?}").contains("acts twice"));
+    assert!(warned);
 }
 
 #[test]

@@ -40,10 +40,8 @@ impl Bench<'_> {
                 let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
                 // What takes nothing off cannot be stood in for.
                 let own = left - squares;
-                let is_something = own > WITHIN * left;
-                let is_near = worse < APART && left - trial.squares > STANDS_IN * own;
-                let is_near = is_something && is_near;
-                (is_near && trial.wrong_sign.is_empty()).then_some(worse)
+                let stands_in = own > WITHIN * left && left - trial.squares > STANDS_IN * own;
+                (worse < APART && stands_in && trial.wrong_sign.is_empty()).then_some(worse)
             };
             let mut found: Vec<Alias> = Vec::new();
             for candidate in self.present.iter().flatten() {

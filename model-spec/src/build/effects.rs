@@ -37,14 +37,14 @@ pub(super) fn effects(
         log,
     );
     // What couples two places may couple each with a third.
-    let couples = |entry: &&EffectEntry| {
+    let couples = |entry: &EffectEntry| {
         let kind = entry
             .kind
             .as_ref()
             .and_then(|kind| kinds.get(kind.text.as_str()));
         kind.is_some_and(|(kind, _)| n_places(kind) == Some(2))
     };
-    warn_of_twins(entries.clone().filter(|entry| !couples(entry)), log);
+    warn_of_twins(entries.clone(), &couples, log);
     check_single(entries.clone(), &kinds, log);
     entries
         .filter_map(|entry| effect(entry, &kinds, symbols, scene, log))
@@ -78,15 +78,28 @@ fn check_single<'a>(
 }
 
 /// Warns of a kind that acts twice at one place with the same constants: the columns are equal, and a variant that means
-/// to override an effect without a name brings this about.
-fn warn_of_twins<'a>(entries: impl Iterator<Item = &'a EffectEntry>, log: &mut Log) {
-    let mut seen: BTreeMap<(&str, &str), (&EffectEntry, &Name)> = BTreeMap::new();
+/// to override an effect without a name brings this about. What couples places is a twin if it couples the same ones.
+fn warn_of_twins<'a>(
+    entries: impl Iterator<Item = &'a EffectEntry>,
+    couples: &dyn Fn(&EffectEntry) -> bool,
+    log: &mut Log,
+) {
+    let mut seen: BTreeMap<(&str, Vec<&str>), (&EffectEntry, &Name)> = BTreeMap::new();
     for entry in entries.filter(|entry| entry.constants.is_none()) {
         let Some(kind) = &entry.kind else { continue };
-        for place in entry.at.iter().flat_map(|at| &at.entries) {
-            let known = *seen
-                .entry((&kind.text, &place.text))
-                .or_insert((entry, place));
+        let mut all: Vec<&str> = (entry.at.iter().flat_map(|at| &at.entries))
+            .map(|place| place.text.as_str())
+            .collect();
+        all.sort_unstable();
+        let together = couples(entry);
+        let n_keys = if together { 1 } else { all.len() };
+        for place in entry.at.iter().flat_map(|at| &at.entries).take(n_keys) {
+            let key = if together {
+                all.clone()
+            } else {
+                vec![place.text.as_str()]
+            };
+            let known = *seen.entry((&kind.text, key)).or_insert((entry, place));
             let (first, first_place) = known;
             if std::ptr::eq(first, entry) {
                 continue;
