@@ -21,19 +21,17 @@ const RESOLUTION: f64 = TAU / 1_048_576.0;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Situation {
     q: [f64; 2],
-    qd: [f64; 2],
     wanted: [[f64; 2]; 3],
+    /// Rate of the error.
+    error_rate: [f64; 2],
 }
 
 impl Situation {
     /// Acceleration that lets the error die out.
     fn correction(&self) -> [f64; 2] {
         std::array::from_fn(|k| {
-            let (e, ed) = (
-                self.wanted[0][k] - self.q[k],
-                self.wanted[1][k] - self.qd[k],
-            );
-            SPEED * SPEED * e + 2.0 * SPEED * ed
+            let error = self.wanted[0][k] - self.q[k];
+            SPEED * SPEED * error + 2.0 * SPEED * self.error_rate[k]
         })
     }
 
@@ -77,7 +75,7 @@ impl<'a> Controller<'a> {
         Ok(Self(Box::new(move |now| {
             let state = spidermill::State {
                 q: now.q,
-                qd: now.qd,
+                qd: [0.0; 2],
                 qdd: [0.0; 2],
             };
             let jacobian = drives.drives(&state)?.jacobian;
@@ -145,24 +143,26 @@ pub(crate) fn run(
     let mut plant = Plant::new(rig, &q, &qd)?;
     let mut recording = Recording::default();
     let read = |q: &[f64]| [0, 1].map(|k| (q[k] / RESOLUTION).round() * RESOLUTION);
-    let mut before = read(&q);
-    let mut rate = qd;
+    let mut before = [0.0; 2];
+    let mut error_rate = [0.0; 2];
     let mut t = 0.0;
     while t < reference.duration {
         let q = read(plant.q());
-        // Differences of readings through a low-pass of 100 Hz.
+        let wanted = reference.at(t);
+        // Differences through a low-pass of 100 Hz: of the error rather than of the reading, whose rate would come late
+        // and be taken for an error.
         let share = 1.0 - f64::exp(-TAU * 100.0 * CYCLE);
         for k in 0..2 {
+            let error = wanted[0][k] - q[k];
             if t > 0.0 {
-                rate[k] += share * ((q[k] - before[k]) / CYCLE - rate[k]);
+                error_rate[k] += share * ((error - before[k]) / CYCLE - error_rate[k]);
             }
+            before[k] = error;
         }
-        before = q;
-        let wanted = reference.at(t);
         let forces = controller.0(&Situation {
             q,
-            qd: rate,
             wanted,
+            error_rate,
         })?;
         recording.t.push(t);
         for k in 0..2 {
