@@ -198,6 +198,16 @@ fn multiple_of(exact: &Exact) -> Option<ParameterIdx> {
 }
 
 impl Model {
+    /// Gravity in the frame of the base with the constants of the file, m/s^2.
+    pub(crate) fn gravity(&self) -> [f64; 3] {
+        let mechanism = &self.derivation.mechanism;
+        let value = |symbol| match symbol {
+            Symbol::Constant(c) => mechanism.constants[c.0].value,
+            _ => 0.0,
+        };
+        mechanism.gravity.each_ref().map(|g| g.evaluate(&value))
+    }
+
     /// Active coordinates with whether they are angles.
     pub(crate) fn motions(&self) -> Vec<(String, bool)> {
         let coordinates = self.derivation.mechanism.coordinates.iter();

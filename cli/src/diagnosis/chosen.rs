@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use modelmill_codegen::Evaluator;
-use modelmill_identify::diagnose::{Candidate, Choice, Column, Effect, Source, Tangent};
+use modelmill_identify::diagnose::{Candidate, Choice, Column, Effect, Source};
 use modelmill_spec::edit::{EditFailure, NewEffect, add_to_model};
 use modelmill_spec::{ActsOn, DriveKind, EffectKind, Loaded, Mechanics, Mechanism, Search};
 
@@ -247,15 +247,18 @@ impl Chosen {
                     .next()
                     .map_or_else(Vec::new, |(_, c)| only(c))
             }
-            Source::Tangent(changes) => {
-                let sum = |changes: &Tangent| {
+            Source::Tilt(tilt) => {
+                let level = vec![0.0; tilt.axes.len()];
+                let sum = |direction: [f64; 3]| {
                     let mut sum = Column(vec![None; model.drives().len()]);
-                    for (nominal, change) in model.nominal.iter().zip(&changes.base) {
-                        sum.add(*nominal, change);
+                    for (share, change) in direction.iter().zip(&tilt.components) {
+                        for (nominal, change) in model.nominal.iter().zip(&change.base) {
+                            sum.add(share * nominal, change);
+                        }
                     }
                     sum
                 };
-                only(changes.iter().map(sum).collect())
+                only(tilt.directions(&level).into_iter().map(sum).collect())
             }
             Source::Delay => Vec::new(),
         };

@@ -1,8 +1,8 @@
 //! Columns of all candidates along the recordings, for every choice of their constants.
 
-use modelmill_codegen::{Derivation, Evaluator};
+use modelmill_codegen::Evaluator;
 use modelmill_identify::diagnose::{
-    Candidate, Choice, Column, Effect, EffectParameter, Sign, Source, Tangent,
+    Candidate, Choice, Column, Effect, EffectParameter, Sign, Source,
 };
 use modelmill_spec::{ActsOn, EffectKind, Mechanics, Search};
 use rayon::prelude::*;
@@ -12,10 +12,8 @@ use crate::failure::Outcome;
 use crate::model::Model;
 
 use super::candidates::{Candidates, Change, Entry, Single, Sort, grid, sign};
-use super::numbers::{Motions, Runs, regressor, regressor_of};
-
-/// Half the step by which a tilt is varied, rad.
-const TILT: f64 = 1e-4;
+use super::numbers::{Motions, Runs, regressor_of};
+use super::tilt::{TILTS, tilt};
 
 /// Candidates with their columns; where each comes from is said in the same order.
 pub(super) fn columns(
@@ -80,14 +78,15 @@ pub(super) fn columns(
         }
     }
     if let Some((change, derivation)) = &candidates.tilt {
-        let (parameters, changes) = tilts(derivation, model, all)?;
-        if !parameters.is_empty() {
-            made.push(changed(
-                candidates,
-                change,
-                parameters,
-                Source::Tangent(changes),
-            ));
+        let tilt = tilt(derivation, model, all)?;
+        if !tilt.axes.is_empty() {
+            let angle = |axis: &usize| EffectParameter {
+                symbol: TILTS[*axis].to_owned(),
+                unit: "rad".to_owned(),
+                sign: Sign::Any,
+            };
+            let parameters = tilt.axes.iter().map(angle).collect();
+            made.push(changed(candidates, change, parameters, Source::Tilt(tilt)));
             origins.push(Origin::Tilt);
         }
     }
@@ -151,67 +150,6 @@ fn changed(
         refines: None,
         source,
     }
-}
-
-/// What each base column changes by with a tilt, those of known parameters included, for every axis about which one is
-/// felt.
-fn tilts(
-    derivation: &Derivation,
-    model: &Model,
-    all: &Runs<'_>,
-) -> Outcome<(Vec<EffectParameter>, Vec<Tangent>)> {
-    let mechanism = &derivation.mechanism;
-    let usual: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
-    let own = &model.derivation.reduction;
-    let (mut parameters, mut changes) = (Vec::new(), Vec::new());
-    for symbol in ["tx", "ty", "tz"] {
-        let name = format!("candidate_{symbol}");
-        let Some(at) = mechanism.constants.iter().position(|c| c.name == name) else {
-            continue;
-        };
-        let tilted = |by: f64| {
-            let mut constants = usual.clone();
-            constants[at] = by;
-            regressor(
-                all,
-                &Evaluator::with_constants(derivation, constants),
-                model,
-            )
-        };
-        let [before, after] = [tilted(-TILT)?, tilted(TILT)?];
-        // The base columns in the order of the model.
-        let mut of_axis = Vec::new();
-        for retained in &own.retained {
-            let product = &own.products[*retained];
-            let reduction = &derivation.reduction;
-            let place = reduction
-                .retained
-                .iter()
-                .position(|p| reduction.products[*p] == *product);
-            let mut change = Column(vec![None; model.drives().len()]);
-            if let Some(place) = place {
-                change.add(0.5 / TILT, &after[place]);
-                change.add(-0.5 / TILT, &before[place]);
-            }
-            of_axis.push(change);
-        }
-        let is_felt = |change: &Column| {
-            let values = change.0.iter().flatten().flatten();
-            values.fold(0.0_f64, |m, x| m.max(x.abs())) > 1e-6
-        };
-        if of_axis.iter().any(is_felt) {
-            parameters.push(EffectParameter {
-                symbol: symbol.to_owned(),
-                unit: "rad".to_owned(),
-                sign: Sign::Any,
-            });
-            changes.push(Tangent {
-                base: of_axis,
-                held: Column(vec![None; model.drives().len()]),
-            });
-        }
-    }
-    Ok((parameters, changes))
 }
 
 /// Columns of some single candidates for given values of their constants.

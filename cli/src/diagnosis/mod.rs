@@ -9,6 +9,7 @@ mod columns;
 mod numbers;
 mod places;
 mod problem;
+mod tilt;
 
 pub(crate) use candidates::sign;
 pub(crate) use chosen::{Chosen, Constants, Named, base, choose};

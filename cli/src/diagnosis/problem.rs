@@ -164,17 +164,17 @@ fn hold(problem: &mut Problem, model: &Model, held: Held) {
         }
     }
     for candidate in &mut problem.candidates {
-        if let Source::Tangent(tangents) = &mut candidate.source {
-            for tangent in tangents {
+        if let Source::Tilt(tilt) = &mut candidate.source {
+            for change in &mut tilt.components {
                 let mut free = Vec::new();
-                for (k, change) in std::mem::take(&mut tangent.base).into_iter().enumerate() {
+                for (k, column) in std::mem::take(&mut change.base).into_iter().enumerate() {
                     if is_held(k) {
-                        tangent.held.add(model.nominal[k], &change);
+                        change.held.add(model.nominal[k], &column);
                     } else {
-                        free.push(change);
+                        free.push(column);
                     }
                 }
-                tangent.base = free;
+                change.base = free;
             }
         }
     }

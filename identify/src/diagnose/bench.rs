@@ -180,7 +180,7 @@ impl<'a> Bench<'a> {
                     };
                     best.map(|best| self.pick(k, best))
                 }
-                Source::Tangent(_) | Source::Delay => Some(self.tangent(k, picks, &factors)),
+                Source::Tilt(_) | Source::Delay => Some(self.changed(k, picks, &factors)),
                 Source::Carried => carried.get(&k).cloned(),
             };
             present.push(pick.and_then(|mut pick| {

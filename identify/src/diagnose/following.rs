@@ -1,4 +1,4 @@
-//! Effects whose columns follow from the fit: small changes of the model, late forces, and what depends on the load.
+//! Effects whose columns follow from the fit: a tilted base, late forces, and what depends on the load.
 
 use std::collections::HashMap;
 
@@ -47,53 +47,55 @@ impl Bench<'_> {
         picks.collect()
     }
 
-    /// Columns of a candidate that is a small change of the model as fitted.
-    pub(crate) fn tangent(
+    /// Columns of a candidate that changes the model as fitted. What it was found to be so far, if it is among the picks,
+    /// says where: the columns times the parameters are the change there.
+    pub(crate) fn changed(
         &mut self,
         candidate: usize,
         picks: &[Pick],
         factors: &DVector<f64>,
     ) -> Pick {
+        let mine = picks.iter().position(|pick| pick.candidate == candidate);
+        let found = mine.map(|i| {
+            let before: usize = picks[..i].iter().map(|p| p.columns.len()).sum();
+            let start = self.base.len() + before;
+            factors.as_slice()[start..start + picks[i].columns.len()].to_vec()
+        });
         let columns: Vec<Column> = match &self.problem.candidates[candidate].source {
-            Source::Tangent(parameters) => parameters
-                .iter()
-                .map(|changes| {
-                    let mut sum = changes.held.clone();
+            Source::Tilt(tilt) => {
+                let angles = found.unwrap_or_else(|| vec![0.0; tilt.axes.len()]);
+                let along = tilt.components.each_ref().map(|component| {
+                    let mut sum = component.held.clone();
                     sum.0.resize(self.weights.len(), None);
                     // Factors of the base come first, then those of effects, which do not tilt.
-                    for (change, factor) in changes.base.iter().zip(factors.iter()) {
+                    for (change, factor) in component.base.iter().zip(factors.iter()) {
                         sum.add(*factor, change);
                     }
                     sum
-                })
-                .collect(),
+                });
+                let directions = tilt.directions(&angles).into_iter();
+                directions
+                    .map(|direction| {
+                        let mut sum = Column(vec![None; self.weights.len()]);
+                        for (share, along) in direction.iter().zip(&along) {
+                            sum.add(*share, along);
+                        }
+                        sum
+                    })
+                    .collect()
+            }
             Source::Delay => {
                 let mut force = self.problem.held.clone().unwrap_or_default();
                 force.0.resize(self.weights.len(), None);
-                let is_delay = |pick: &Pick| {
-                    matches!(
-                        self.problem.candidates[pick.candidate].source,
-                        Source::Delay
-                    )
-                };
-                let delays: Vec<usize> = picks
-                    .iter()
-                    .filter(|pick| is_delay(pick))
-                    .flat_map(|pick| pick.columns.clone())
-                    .collect();
+                let own = mine.map_or(&[][..], |i| &picks[i].columns);
                 for (k, factor) in self.columns(picks).iter().zip(factors.iter()) {
-                    if !delays.contains(k) {
+                    if !own.contains(k) {
                         force.add(*factor, self.pool.column(*k));
                     }
                 }
-                // The delay that was found so far, where it is not new.
-                let found = picks.iter().position(is_delay).map(|i| {
-                    let before: usize = picks[..i].iter().map(|p| p.columns.len()).sum();
-                    factors[self.base.len() + before]
-                });
-                vec![self.late(&force, found.unwrap_or(0.0))]
+                vec![self.late(&force, found.map_or(0.0, |delay| delay[0]))]
             }
-            Source::Columns(_) | Source::Carried => unreachable!("they are no tangents"),
+            Source::Columns(_) | Source::Carried => unreachable!("they change no model"),
         };
         Pick {
             candidate,
@@ -146,7 +148,7 @@ impl Bench<'_> {
                 let rank = picks[i].rank;
                 let anew = match self.problem.candidates[candidate].source {
                     Source::Carried => self.carried(&picks).remove(&candidate),
-                    _ => Some(self.tangent(candidate, &picks.clone(), &factors)),
+                    _ => Some(self.changed(candidate, &picks.clone(), &factors)),
                 };
                 if let Some(anew) = anew {
                     picks[i] = Pick { rank, ..anew };

@@ -3,7 +3,8 @@
 //!
 //! 1. [`Problem`] - measured forces, columns of the model, candidates with the constants that are searched for.
 //! 2. `pool`, `factored`, `bench` - inner products of all columns, so that a set of effects is fitted in microseconds;
-//!    `tuning` finds constants, `following` makes columns that depend on the fit, `delays` those of late forces.
+//!    `tuning` finds constants, `following` makes columns that depend on the fit, `delays` those of late forces, `tilt`
+//!    turns gravity.
 //! 3. `search` - forward over sets, with exchanges; `evidence` decides on time that was not fitted; `settle` makes the last
 //!    set as small and simple as it can be.
 //! 4. `aliases` - what this recording cannot tell apart; `reproducible` - what no candidate explains and no noise is.
@@ -21,6 +22,7 @@ mod problem;
 mod reproducible;
 mod search;
 mod settle;
+mod tilt;
 mod tuning;
 
 use serde::Serialize;
@@ -29,8 +31,9 @@ pub use evidence::Evidence;
 pub use noise::{effective_samples, white_noise};
 pub use problem::{
     Candidate, Choice, Column, Effect, EffectParameter, Layout, NoSupply, Problem, Sign, Source,
-    Stretch, Supply, Tangent,
+    Stretch, Supply,
 };
+pub use tilt::{Sensitivity, Tilt};
 
 use bench::{Bench, Pick};
 use pool::{On, dot};

@@ -1,5 +1,7 @@
 //! What a diagnosis starts from: measured forces, the columns that the model has, and those that effects would add.
 
+use super::tilt::Tilt;
+
 /// Numbers along all recordings, for each channel one for every sample: recordings of the fit first, then those of the
 /// check; `None` for a channel on which the column is zero throughout.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -150,21 +152,12 @@ pub struct Choice {
 pub enum Source {
     /// They are known, for each choice of the constants.
     Columns(Vec<Choice>),
-    /// A small change of a constant of the model, for each parameter.
-    Tangent(Vec<Tangent>),
+    /// The base does not stand level; the parameters are angles, rad.
+    Tilt(Tilt),
     /// All forces come later than the motion; the parameter is the delay, s.
     Delay,
     /// They depend on what the drives carry, which the fit says: see [`Supply::carried`].
     Carried,
-}
-
-/// What the forces change by with a constant of the model.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Tangent {
-    /// What every column of the base changes by, in their order.
-    pub base: Vec<Column>,
-    /// What the forces of held parameters change by.
-    pub held: Column,
 }
 
 /// Columns that are made while the search goes on.

@@ -1,0 +1,100 @@
+//! A base that does not stand level: gravity in its frame is turned, and forces are linear in gravity.
+
+use super::problem::Column;
+
+/// Angles below this are taken for none, rad.
+const STRAIGHT: f64 = 1e-9;
+
+/// A tilt of the base as a candidate; its parameters are angles, rad.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tilt {
+    /// Gravity in the frame of a level base, m/s^2.
+    pub gravity: [f64; 3],
+    /// The axis of each parameter: 0, 1, 2 for x, y, z.
+    pub axes: Vec<usize>,
+    /// What forces change by with gravity along x, y and z, for each m/s^2.
+    pub components: [Sensitivity; 3],
+}
+
+/// What the forces change by with a number of the model.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sensitivity {
+    /// What every column of the base changes by, in their order.
+    pub base: Vec<Column>,
+    /// What the forces of held parameters change by.
+    pub held: Column,
+}
+
+impl Tilt {
+    /// Change of gravity for each radian of each parameter, between a level base and one at these angles: differences that
+    /// add up to the whole change, so that it is exact at the angles, or derivatives where these are zero.
+    #[must_use]
+    pub fn directions(&self, angles: &[f64]) -> Vec<[f64; 3]> {
+        let mut directions = vec![[0.0; 3]; self.axes.len()];
+        let mut now = self.gravity;
+        // Gravity turns back by Rz Ry Rx, first about z.
+        for axis in [2, 1, 0] {
+            let Some(k) = self.axes.iter().position(|a| *a == axis) else {
+                continue;
+            };
+            if angles[k].abs() < STRAIGHT {
+                directions[k] = slope(now, axis);
+            } else {
+                let turned = turned(now, axis, angles[k]);
+                directions[k] = std::array::from_fn(|c| (turned[c] - now[c]) / angles[k]);
+                now = turned;
+            }
+        }
+        directions
+    }
+}
+
+/// A fixed vector seen from a frame that has turned about an axis.
+fn turned(vector: [f64; 3], axis: usize, angle: f64) -> [f64; 3] {
+    let (sin, cos) = angle.sin_cos();
+    let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+    let mut turned = vector;
+    turned[i] = cos * vector[i] + sin * vector[j];
+    turned[j] = cos * vector[j] - sin * vector[i];
+    turned
+}
+
+/// Its derivative where the frame has not turned.
+fn slope(vector: [f64; 3], axis: usize) -> [f64; 3] {
+    let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+    let mut slope = [0.0; 3];
+    slope[i] = vector[j];
+    slope[j] = -vector[i];
+    slope
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Rotation3, Vector3};
+
+    use super::*;
+
+    /// Directions times angles are the whole change, by nalgebra's rotations; small angles agree with none.
+    #[test]
+    fn directions_add_up_to_gravity_that_turned() {
+        let gravity = [1.0, -9.0, 3.0];
+        let tilt = |axes: Vec<usize>| Tilt {
+            gravity,
+            axes,
+            components: std::array::from_fn(|_| Sensitivity::default()),
+        };
+        let [x, y, z] = [0.3, -0.2, 0.7];
+        let base = Rotation3::from_euler_angles(x, y, z);
+        let expected = base.inverse() * Vector3::from(gravity) - Vector3::from(gravity);
+        let directions = tilt(vec![0, 1, 2]).directions(&[x, y, z]);
+        let sum: Vector3<f64> = (directions.iter().zip([x, y, z]))
+            .map(|(d, angle)| angle * Vector3::from(*d))
+            .sum();
+        assert!((sum - expected).norm() < 1e-14, "{sum} {expected}");
+        for axis in 0..3 {
+            let [none, little] = [0.0, 1e-7].map(|a| tilt(vec![axis]).directions(&[a])[0]);
+            let distance = (Vector3::from(none) - Vector3::from(little)).norm();
+            assert!(distance < 1e-6, "{none:?} {little:?}");
+        }
+    }
+}
