@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use modelmill_spec::{
-    Action, Axis, CoordinateIdx, DriveKind, Exact, Inertial, LumpedMass, Mechanism, Part, Step,
-    Symbol,
+    Action, Axis, CoordinateIdx, DriveKind, Exact, FrameIdx, Inertial, LumpedMass, Mechanism, Part,
+    Step, Symbol,
 };
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
@@ -126,10 +126,11 @@ impl Chain {
             return Err("a coordinate moves no joint".to_owned());
         }
         let parts = mechanism.parts.iter().map(|p| (p.frame, part(p, &number)));
-        let masses = mechanism.lumped_masses.iter();
-        let masses = masses.map(|m| Ok((m.frame, lumped_mass(m, &number)?)));
-        for body in parts.map(Ok).chain(masses) {
-            let (frame, body) = body?;
+        let mut bodies: Vec<(FrameIdx, Body)> = parts.collect();
+        for mass in &mechanism.lumped_masses {
+            bodies.push((mass.frame, lumped_mass(mass, &number)?));
+        }
+        for (frame, body) in bodies {
             if let (Some(joint), at) = &frames[frame.0] {
                 joints[*joint].body.add(&body.placed(at));
             }

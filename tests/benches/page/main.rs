@@ -14,6 +14,7 @@ mod chain;
 mod machine;
 mod models;
 mod peers;
+mod picture;
 mod run;
 mod write;
 
@@ -128,9 +129,16 @@ fn compare(names: &[&str]) -> Result<(), String> {
         println!("{page}");
         return Ok(());
     }
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/benchmarks.md");
-    std::fs::write(&file, page).map_err(|error| format!("{}: {error}", file.display()))?;
-    eprintln!("written: docs/benchmarks.md");
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
+    let keep = |name: &str, text: &str| {
+        let file = docs.join(name);
+        std::fs::write(&file, text).map_err(|error| format!("{}: {error}", file.display()))
+    };
+    if let Some(panda) = all.iter().find(|f| f.name == "panda") {
+        keep("pictures/benchmarks.svg", &picture::bars(panda))?;
+    }
+    keep("benchmarks.md", &page)?;
+    eprintln!("written: docs/benchmarks.md and its picture");
     Ok(())
 }
 

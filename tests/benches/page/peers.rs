@@ -198,7 +198,8 @@ impl Peers {
         let before: BTreeMap<&str, Option<Vec<u8>>> =
             GENERATORS.iter().map(|name| (*name, old(name))).collect();
         let script = text(&sources().join("generated.py"));
-        let arguments = [&script, &text(&file), &text(&start)].map(String::as_str);
+        let (from, to) = (text(&file), text(&start));
+        let arguments = [&script[..], &from, &to];
         let lines = output(&self.python, &arguments).unwrap_or_default();
         for line in lines.lines() {
             if let Some((name, took)) = line.split_once('\t')

@@ -94,7 +94,7 @@ fn times(ratio: Option<f64>) -> String {
 }
 
 impl Figures {
-    fn time(&self, who: &str, function: &str) -> Option<f64> {
+    pub(crate) fn time(&self, who: &str, function: &str) -> Option<f64> {
         self.times.get(&format!("{who}: {function}")).copied()
     }
 
@@ -171,7 +171,9 @@ fn headline(page: &mut String, all: &[Figures]) {
         for line in lines {
             _ = writeln!(page, "- {line}");
         }
-        page.push('\n');
+        page.push_str(
+            "\n![Nanoseconds per state of the Panda: modelmill and its peers](pictures/benchmarks.svg)\n\n",
+        );
     }
 }
 
