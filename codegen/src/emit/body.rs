@@ -166,13 +166,24 @@ impl<'a> Body<'a> {
         let mut statements: Vec<TokenStream> = made
             .filter_map(|(i, op)| self.statement(Stage::State, i, op))
             .collect();
-        let (sines, cosines): (Vec<Ident>, Vec<Ident>) =
-            (0..self.first.sines.len()).map(both_of).unzip();
+        let name = |name: Ident| quote! { #name };
+        let (mut sines, mut cosines): (Vec<TokenStream>, Vec<TokenStream>) =
+            (0..self.first.sines.len())
+                .map(both_of)
+                .map(|(s, c)| (name(s), name(c)))
+                .unzip();
         let angles = self.first.sines.iter();
         let angles = angles.filter_map(|i| match &self.program.ops[*i] {
             Op::Sin(angle) => Some(self.operand(Stage::State, *angle)),
             _ => None,
         });
+        let mut angles: Vec<TokenStream> = angles.collect();
+        // The compiler makes pairs only of a number of angles that is even.
+        if angles.len() % 2 == 1 {
+            angles.extend(angles.last().cloned());
+            sines.push(quote!(_));
+            cosines.push(quote!(_));
+        }
         statements.push(quote! {
             let ([#(#sines),*], [#(#cosines),*]) = n.angles([#(#angles),*]);
         });
