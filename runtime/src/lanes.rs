@@ -224,7 +224,7 @@ mod tests {
                 scale * (0.37 + 0.21 * f64::from(u8::try_from(k).unwrap_or(0)))
             });
             let (sin, cos) = Real::sin_cos_all(angles);
-            let single = angles.map(|x| x as f32);
+            let single: [f32; 7] = angles.map(Real::from_f64);
             let (sin32, cos32) = Real::sin_cos_all(single);
             for k in 0..7 {
                 let (s, c) = Real::sin_cos(angles[k]);
