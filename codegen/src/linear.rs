@@ -3,7 +3,7 @@
 //! Blocks that are too large for that are torn apart first.
 //! No pivot is ever divided by except the determinant of a block, so that a regular system has no spurious singularity.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use petgraph::algo::{maximum_matching, tarjan_scc};
 use petgraph::graph::{DiGraph, NodeIndex, UnGraph};
@@ -93,7 +93,7 @@ pub(crate) fn by_cofactors(
     let all = (1u32 << n) - 1;
     let mut minors = Minors {
         matrix: block,
-        known: HashMap::new(),
+        known: FxHashMap::default(),
     };
     let determinant = minors.minor(graph, all, all);
     if determinant == Graph::ZERO {
@@ -131,7 +131,7 @@ pub(crate) fn determinant(graph: &mut Graph, matrix: &[Vec<ExprId>]) -> ExprId {
     let all = (1u32 << matrix.len()) - 1;
     let mut minors = Minors {
         matrix,
-        known: HashMap::new(),
+        known: FxHashMap::default(),
     };
     minors.minor(graph, all, all)
 }
@@ -175,7 +175,7 @@ fn blocks(matrix: &[Vec<ExprId>]) -> Option<Vec<(Vec<usize>, Vec<usize>)>> {
 /// Minors by expansion along their first row, each computed once.
 struct Minors<'a> {
     matrix: &'a [Vec<ExprId>],
-    known: HashMap<(u32, u32), ExprId>,
+    known: FxHashMap<(u32, u32), ExprId>,
 }
 
 impl Minors<'_> {

@@ -35,6 +35,14 @@ pub fn sin_cos_lanes<const N: usize>(angle: &[f64; N], sin: &mut [f64; N], cos: 
     }
 }
 
+/// Sines and cosines of several angles, rad: one branch for all of them, and pairs in the vectors that every machine has.
+#[inline]
+pub(crate) fn sin_cos_each<const N: usize>(angles: [f64; N]) -> ([f64; N], [f64; N]) {
+    let (mut sin, mut cos) = ([0.0; N], [0.0; N]);
+    sin_cos_lanes(&angles, &mut sin, &mut cos);
+    (sin, cos)
+}
+
 /// Sine and cosine of one angle, rad; the same on every machine, and in constant time below [`LARGEST_ANGLE`].
 #[inline]
 pub(crate) fn sin_cos_once(angle: f64) -> (f64, f64) {
@@ -205,6 +213,31 @@ mod tests {
             let angle = f64::from(quarter) * core::f64::consts::FRAC_PI_2;
             let up = |n: u64| f64::from_bits(angle.to_bits() + n);
             check([angle, up(1), up(2), up(3), -angle, -up(1), -up(2), -up(5)]);
+        }
+    }
+
+    /// Several at once are one by one, to the bit, wherever they lie.
+    #[test]
+    fn several_angles_are_one_by_one() {
+        for scale in [1e-3, 3.0, 1e3, 1e5, 1e7] {
+            let angles: [f64; 7] = core::array::from_fn(|k| {
+                scale * (0.37 + 0.21 * f64::from(u8::try_from(k).unwrap_or(0)))
+            });
+            let (sin, cos) = Real::sin_cos_all(angles);
+            let single: [f32; 7] = angles.map(Real::from_f64);
+            let (sin32, cos32) = Real::sin_cos_all(single);
+            for k in 0..7 {
+                let (s, c) = Real::sin_cos(angles[k]);
+                assert_eq!(
+                    (sin[k].to_bits(), cos[k].to_bits()),
+                    (s.to_bits(), c.to_bits())
+                );
+                let (s, c) = Real::sin_cos(single[k]);
+                assert_eq!(
+                    (sin32[k].to_bits(), cos32[k].to_bits()),
+                    (s.to_bits(), c.to_bits())
+                );
+            }
         }
     }
 

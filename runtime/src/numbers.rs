@@ -26,6 +26,22 @@ pub trait Numbers {
     fn number(&self, x: f64) -> Self::Value;
     /// Sine and cosine of an angle in rad.
     fn sin_cos(&self, angle: Self::Value) -> (Self::Value, Self::Value);
+    /// Angles in rad whose sines and cosines [`Self::sin_cos_of`] gives later. One number computes all of them here, which
+    /// takes less time than one by one; vectors wait, since they lack the registers to hold the results.
+    #[allow(clippy::inline_always, reason = "nothing at all")]
+    #[inline(always)]
+    fn angles<const N: usize>(
+        &self,
+        angles: [Self::Value; N],
+    ) -> ([Self::Value; N], [Self::Value; N]) {
+        (angles, angles)
+    }
+    /// Sine and cosine of one of [`Self::angles`], by what stands in both arrays.
+    #[allow(clippy::inline_always, reason = "as for one")]
+    #[inline(always)]
+    fn sin_cos_of(&self, angle: Self::Value, _: Self::Value) -> (Self::Value, Self::Value) {
+        self.sin_cos(angle)
+    }
     /// Square root.
     fn sqrt(&self, x: Self::Value) -> Self::Value;
     /// Absolute value.
@@ -106,6 +122,14 @@ impl<T: Real> Numbers for One<T> {
     #[inline(always)]
     fn sin_cos(&self, angle: T) -> (T, T) {
         angle.sin_cos()
+    }
+    #[inline(always)]
+    fn angles<const N: usize>(&self, angles: [T; N]) -> ([T; N], [T; N]) {
+        T::sin_cos_all(angles)
+    }
+    #[inline(always)]
+    fn sin_cos_of(&self, sin: T, cos: T) -> (T, T) {
+        (sin, cos)
     }
     #[inline(always)]
     fn sqrt(&self, x: T) -> T {

@@ -24,6 +24,13 @@ pub trait Real:
     fn is_finite(self) -> bool;
     /// Sine and cosine of an angle in rad.
     fn sin_cos(self) -> (Self, Self);
+    /// Sines and cosines of several angles in rad: the same values as one by one.
+    #[inline]
+    #[must_use]
+    fn sin_cos_all<const N: usize>(angles: [Self; N]) -> ([Self; N], [Self; N]) {
+        let both = angles.map(Self::sin_cos);
+        (both.map(|(sin, _)| sin), both.map(|(_, cos)| cos))
+    }
     /// Square root.
     #[must_use]
     fn sqrt(self) -> Self;
@@ -80,6 +87,11 @@ macro_rules! real {
                 $sincos(self)
             }
             #[inline]
+            fn sin_cos_all<const N: usize>(angles: [Self; N]) -> ([Self; N], [Self; N]) {
+                let (sin, cos) = crate::lanes::sin_cos_each(angles.map(Self::to_f64));
+                (sin.map(Self::from_f64), cos.map(Self::from_f64))
+            }
+            #[inline]
             fn sqrt(self) -> Self {
                 self.sqrt()
             }
@@ -123,6 +135,11 @@ macro_rules! real {
             #[inline]
             fn sin_cos(self) -> (Self, Self) {
                 $sincos(self)
+            }
+            #[inline]
+            fn sin_cos_all<const N: usize>(angles: [Self; N]) -> ([Self; N], [Self; N]) {
+                let (sin, cos) = crate::lanes::sin_cos_each(angles.map(Self::to_f64));
+                (sin.map(Self::from_f64), cos.map(Self::from_f64))
             }
             #[inline]
             fn sqrt(self) -> Self {

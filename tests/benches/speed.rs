@@ -2,7 +2,7 @@
 //!
 //! `cargo bench -p modelmill-tests`, or `cargo bench -p modelmill-tests -- panda` for one model. Operation counts are
 //! printed first, beside the best known ones. What is compared stands in the same run: the block evaluator beside the
-//! emitted code, in time per sample. `--bench peers` times other programs on the same arm, and blocks of states.
+//! emitted code, in time per sample. `--bench page` times other programs on the same models, and blocks of states.
 
 use std::hint::black_box;
 

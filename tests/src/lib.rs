@@ -5,6 +5,7 @@
 //! as exact linear maps.
 
 pub mod base_parameters;
+pub mod counts;
 pub mod equation_of_motion;
 pub mod fixtures;
 pub mod laws;

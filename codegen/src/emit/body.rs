@@ -16,6 +16,8 @@ pub(super) struct Body<'a> {
     fused: Vec<bool>,
     /// Fixed values that the state stage needs, with their place in the array that hands them over.
     handed: Vec<ValueId>,
+    /// Sines and cosines that may be computed at once, before everything else.
+    first: AnglesFirst,
 }
 
 impl<'a> Body<'a> {
@@ -48,6 +50,7 @@ impl<'a> Body<'a> {
             names,
             fused: fused(program),
             handed,
+            first: AnglesFirst::of(program),
         }
     }
 
@@ -124,8 +127,12 @@ impl<'a> Body<'a> {
                     !ready
                 });
             };
+        if stage == Stage::State {
+            statements.extend(self.angles_first());
+        }
         for (i, op) in self.program.ops.iter().enumerate() {
-            if self.program.stages[i] == stage && !matches!(op, Op::Number(_)) {
+            let written = stage == Stage::State && self.first.done[i];
+            if self.program.stages[i] == stage && !matches!(op, Op::Number(_)) && !written {
                 statements.extend(self.statement(stage, i, op));
             }
             // A cosine is written with the sine after it; what needs it comes then.
@@ -142,6 +149,44 @@ impl<'a> Body<'a> {
                 statements.push(self.put(k, v));
             }
         }
+        statements
+    }
+
+    /// The angles that come first, and what the arithmetic makes of them all at once.
+    fn angles_first(&self) -> Vec<TokenStream> {
+        if self.first.sines.is_empty() {
+            return Vec::new();
+        }
+        let ops = self.program.ops.iter().enumerate();
+        let made = ops.filter(|(i, op)| {
+            self.first.done[*i]
+                && self.program.stages[*i] == Stage::State
+                && !matches!(op, Op::Number(_))
+        });
+        let mut statements: Vec<TokenStream> = made
+            .filter_map(|(i, op)| self.statement(Stage::State, i, op))
+            .collect();
+        let name = |name: Ident| quote! { #name };
+        let (mut sines, mut cosines): (Vec<TokenStream>, Vec<TokenStream>) =
+            (0..self.first.sines.len())
+                .map(both_of)
+                .map(|(s, c)| (name(s), name(c)))
+                .unzip();
+        let angles = self.first.sines.iter();
+        let angles = angles.filter_map(|i| match &self.program.ops[*i] {
+            Op::Sin(angle) => Some(self.operand(Stage::State, *angle)),
+            _ => None,
+        });
+        let mut angles: Vec<TokenStream> = angles.collect();
+        // The compiler makes pairs only of a number of angles that is even.
+        if angles.len() % 2 == 1 {
+            angles.extend(angles.last().cloned());
+            sines.push(quote!(_));
+            cosines.push(quote!(_));
+        }
+        statements.push(quote! {
+            let ([#(#sines),*], [#(#cosines),*]) = n.angles([#(#angles),*]);
+        });
         statements
     }
 
@@ -184,6 +229,10 @@ impl<'a> Body<'a> {
             // The sine is written together with its cosine, which stands right before it if both are needed.
             Op::Sin(a) if i > 0 && self.program.ops[i - 1] == Op::Cos(*a) => {
                 let (a, cosine) = (get(a), &self.names[i - 1]);
+                if let Some(k) = self.first.sines.iter().position(|sine| *sine == i) {
+                    let (s, c) = both_of(k);
+                    return Some(quote! { let (#name, #cosine) = n.sin_cos_of(#s, #c); });
+                }
                 return Some(quote! { let (#name, #cosine) = n.sin_cos(#a); });
             }
             Op::Sin(a) => {
@@ -254,6 +303,61 @@ impl<'a> Body<'a> {
         }
         let name = &self.names[v.index()];
         quote! { #name }
+    }
+}
+
+/// What stands for sine and cosine of angle `k` of those that come first.
+fn both_of(k: usize) -> (Ident, Ident) {
+    (format_ident!("s{}", k), format_ident!("c{}", k))
+}
+
+/// Sines with their cosines whose angles need no other function, if there are several: they take much of the time of one
+/// state, and less if they are computed at once.
+struct AnglesFirst {
+    /// The sines; the cosine of each stands right before it.
+    sines: Vec<usize>,
+    /// Which operations are written before all others: what the angles are made of.
+    done: Vec<bool>,
+}
+
+impl AnglesFirst {
+    fn of(program: &Program) -> Self {
+        let n = program.ops.len();
+        // What needs inputs and arithmetic alone.
+        let mut plain = vec![false; n];
+        let mut done = vec![false; n];
+        let mut sines = Vec::new();
+        for (i, op) in program.ops.iter().enumerate() {
+            let mut of_plain = true;
+            op.for_each_operand(|v| of_plain &= plain[v.index()]);
+            let fixed = program.stages[i] == Stage::Fixed;
+            let simple = matches!(
+                op,
+                Op::Number(_) | Op::Input(_) | Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Neg(_)
+            );
+            plain[i] = fixed || simple && of_plain;
+            if let Op::Sin(a) = op
+                && i > 0
+                && program.ops[i - 1] == Op::Cos(*a)
+                && of_plain
+                && !fixed
+            {
+                sines.push(i);
+                done[a.index()] = true;
+            }
+        }
+        if sines.len() < 2 {
+            return Self {
+                sines: Vec::new(),
+                done: vec![false; n],
+            };
+        }
+        for i in (0..n).rev() {
+            if done[i] {
+                program.ops[i].for_each_operand(|v| done[v.index()] = true);
+            }
+        }
+        Self { sines, done }
     }
 }
 

@@ -15,7 +15,9 @@ mod substitute;
 #[cfg(test)]
 mod tests;
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::BTreeSet;
+
+use rustc_hash::FxHashMap;
 
 pub use angle::AngleSum;
 pub use evaluate::{Domain, F64, FieldPoint, RationalPoint, Tape};
@@ -105,7 +107,7 @@ impl Node {
 #[derive(Clone, Debug)]
 pub struct Graph {
     nodes: Vec<Node>,
-    ids: HashMap<Node, ExprId>,
+    ids: FxHashMap<Node, ExprId>,
 }
 
 impl Default for Graph {
@@ -124,7 +126,7 @@ impl Graph {
     pub fn new() -> Self {
         let mut graph = Self {
             nodes: Vec::new(),
-            ids: HashMap::new(),
+            ids: FxHashMap::default(),
         };
         let zero = graph.intern(Node::Rational(Rational::ZERO));
         let one = graph.intern(Node::Rational(Rational::ONE));

@@ -43,6 +43,13 @@ impl Rational {
     }
 
     fn from_wide(numerator: i128, denominator: i128) -> Self {
+        // Nearly all numbers are words and most are whole, and long division is slow.
+        if let (Ok(n), Ok(d)) = (i64::try_from(numerator), i64::try_from(denominator))
+            && n != i64::MIN
+            && d != i64::MIN
+        {
+            return Self::from_words(n, d);
+        }
         let common = gcd(numerator.unsigned_abs(), denominator.unsigned_abs());
         let divide = |x: i128| {
             let magnitude = x.unsigned_abs() / common;
@@ -58,6 +65,19 @@ impl Rational {
                 BigInt::from(denominator),
             )),
         }
+    }
+
+    /// A fraction of words of which neither is the least one.
+    fn from_words(numerator: i64, denominator: i64) -> Self {
+        if denominator == 1 {
+            return Self(Repr::Small(numerator, 1));
+        }
+        let (mut common, mut rest) = (numerator.abs(), denominator.abs());
+        while rest != 0 {
+            (common, rest) = (rest, common % rest);
+        }
+        let common = if denominator < 0 { -common } else { common };
+        Self(Repr::Small(numerator / common, denominator / common))
     }
 
     /// The same number as a fraction of big integers.
@@ -124,7 +144,7 @@ impl Rational {
     /// Integer power; zero must not be raised to a negative one.
     #[must_use]
     pub fn pow(&self, exponent: i32) -> Self {
-        if self.is_one() {
+        if self.is_one() || exponent == 1 {
             return self.clone();
         }
         let base = if exponent < 0 {
@@ -249,7 +269,13 @@ impl PartialOrd for Rational {
 
 impl Ord for Rational {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.to_big().cmp(&other.to_big())
+        match (&self.0, &other.0) {
+            (Repr::Small(a, b), Repr::Small(c, d)) => {
+                let [a, b, c, d] = [*a, *b, *c, *d].map(i128::from);
+                (a * d).cmp(&(c * b))
+            }
+            _ => self.to_big().cmp(&other.to_big()),
+        }
     }
 }
 

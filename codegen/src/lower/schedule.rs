@@ -1,7 +1,9 @@
 //! The last pass: n-ary sums and products become binary operations, fixed factors and terms are gathered so that they
 //! are computed once, and equal operations are shared.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::BTreeSet;
+
+use rustc_hash::FxHashMap;
 
 use super::program::{Guard, Op, Program, Stage, ValueId};
 use super::{Request, is_fixed};
@@ -34,8 +36,8 @@ pub(crate) fn schedule(graph: &Graph, roots: &[ExprId], request: &Request<'_>) -
         fixed: fixed_nodes(graph, roots),
         uses: inverse_uses(graph, roots),
         program: Program::default(),
-        known: HashMap::new(),
-        values: HashMap::new(),
+        known: FxHashMap::default(),
+        values: FxHashMap::default(),
         defined: request
             .definitions
             .iter()
@@ -86,8 +88,8 @@ pub(crate) fn fixed_nodes(graph: &Graph, roots: &[ExprId]) -> Vec<bool> {
 }
 
 /// How often each node stands in a denominator.
-fn inverse_uses(graph: &Graph, roots: &[ExprId]) -> HashMap<(ExprId, i32), usize> {
-    let mut uses = HashMap::new();
+fn inverse_uses(graph: &Graph, roots: &[ExprId]) -> FxHashMap<(ExprId, i32), usize> {
+    let mut uses = FxHashMap::default();
     for node in graph.nodes_of(roots) {
         if let Node::Product(factors) = node {
             for (base, n) in factors {
@@ -103,12 +105,12 @@ fn inverse_uses(graph: &Graph, roots: &[ExprId]) -> HashMap<(ExprId, i32), usize
 struct Scheduler<'a> {
     graph: &'a Graph,
     fixed: Vec<bool>,
-    uses: HashMap<(ExprId, i32), usize>,
+    uses: FxHashMap<(ExprId, i32), usize>,
     program: Program,
-    known: HashMap<Op, ValueId>,
-    values: HashMap<ExprId, ValueId>,
+    known: FxHashMap<Op, ValueId>,
+    values: FxHashMap<ExprId, ValueId>,
     /// Quarter turns, sine and cosine.
-    defined: HashMap<Atom, (i32, ExprId, ExprId)>,
+    defined: FxHashMap<Atom, (i32, ExprId, ExprId)>,
 }
 
 impl Scheduler<'_> {
