@@ -301,8 +301,9 @@ fn pin(
 pub struct Found {
     /// Largest relative error.
     pub error: f64,
-    /// Components that are told, and that are not.
+    /// Components that are told.
     pub told: usize,
+    /// Components that are not.
     pub left_out: usize,
 }
 

@@ -86,9 +86,9 @@ fn emitted_reactions_of_random_mechanisms_agree_with_the_evaluator() {
     check_reactions!(tree_0, random::tree(0, Matter::Physical), 2.0);
     check_reactions!(tree_1, random::tree(1, Matter::Physical), 2.0);
     check_reactions!(tree_2, random::tree(2, Matter::Physical), 2.0);
-    check_reactions!(planar_loop_0, random::planar_loop(0, Matter::Physical), 0.2);
-    check_reactions!(planar_loop_1, random::planar_loop(1, Matter::Physical), 0.2);
-    check_reactions!(planar_loop_2, random::planar_loop(2, Matter::Physical), 0.2);
+    check_reactions!(loop_0, random::planar_loop(0, Matter::Physical), 0.2);
+    check_reactions!(loop_1, random::planar_loop(1, Matter::Physical), 0.2);
+    check_reactions!(loop_2, random::planar_loop(2, Matter::Physical), 0.2);
 }
 
 #[test]
@@ -122,9 +122,9 @@ fn base_parameters_pass_their_own_tests() {
         ("tree_0", asked_models::tree_0::self_test()),
         ("tree_1", asked_models::tree_1::self_test()),
         ("tree_2", asked_models::tree_2::self_test()),
-        ("planar_loop_0", asked_models::planar_loop_0::self_test()),
-        ("planar_loop_1", asked_models::planar_loop_1::self_test()),
-        ("planar_loop_2", asked_models::planar_loop_2::self_test()),
+        ("loop_0", asked_models::loop_0::self_test()),
+        ("loop_1", asked_models::loop_1::self_test()),
+        ("loop_2", asked_models::loop_2::self_test()),
     ];
     for (name, result) in tests {
         assert_eq!(result, Ok(()), "{name}");

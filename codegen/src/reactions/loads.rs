@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modelmill_spec::{Action, DriveKind, Mechanism, Place, PointIdx};
+use modelmill_spec::{Action, Axis, DriveKind, Mechanism, Place, PointIdx};
 
 use super::through;
 use crate::DeriveError;
@@ -75,6 +75,16 @@ fn turns_along(tree: &Tree, start: &[Turn], links: &[usize]) -> Vec<Turn> {
     turns
 }
 
+/// Whether turns, but for fixed ones at their inner end, are one about z.
+fn turns_about_z(turns: &[Turn]) -> bool {
+    let fixed = turns.iter().rev().take_while(|turn| turn.sum.is_empty());
+    match &turns[..turns.len() - fixed.count()] {
+        [] => true,
+        [turn] => turn.axis == Axis::Z,
+        _ => false,
+    }
+}
+
 /// Unknown number `k` of cut `l`. Base parameters have no part in reactions, so that their atoms are free.
 fn unknown(l: usize, k: usize) -> Atom {
     Atom::Base(5 * l + k)
@@ -121,8 +131,9 @@ pub(super) fn cuts(
             turns: turns_along(tree, &start, &paths.links[k]),
             at: paths.at[k],
         };
-        let closure = equations.projection.closures.get(l);
-        let is_planar = closure.is_some_and(|c| c.chain.is_some());
+        let sides = [side(0), side(1)];
+        // Points stay in one plane, and their frames turn about its normal alone.
+        let is_planar = gap[2] == Graph::ZERO && sides.iter().all(|s| turns_about_z(&s.turns));
         cuts.push(Cut {
             name: closed.name.clone(),
             gap,
@@ -130,7 +141,7 @@ pub(super) fn cuts(
             moment: is_planar.then(|| [3, 4].map(|k| unknown(l, k))),
             shown_in,
             common: paths.common,
-            sides: [side(0), side(1)],
+            sides,
             shown,
         });
     }
