@@ -146,9 +146,9 @@ pub fn self_test<const N_PRODUCTS: usize, const N_BASE: usize>(
                 let (reduced, reduced_size) = sum(h_min, base);
                 let limit = NOTHING * (size + reduced_size);
                 for (of, found) in [("H_min p_min", reduced), ("the inverse dynamics", force)] {
-                    let error = Real::abs(found - expected);
                     // What is no number is wrong too.
-                    if worst.is_none() && !(error <= limit) {
+                    let holds = Real::abs(found - expected) <= limit;
+                    if worst.is_none() && !holds {
                         worst = Some(SelfTestError::Forces {
                             of,
                             expected,
@@ -231,7 +231,9 @@ impl<const N: usize> Triangle<N> {
         for column in &mut columns {
             let length = Real::sqrt(dot(column, column));
             if length > 0.0 {
-                column.iter_mut().for_each(|x| *x /= length);
+                for x in column {
+                    *x /= length;
+                }
             }
         }
         for _ in 0..SWEEPS {
