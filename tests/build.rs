@@ -16,6 +16,7 @@ mod stream;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use modelmill_codegen::{Derivation, Op};
 use modelmill_spec::Mechanism;
 use random::Matter;
 
@@ -46,11 +47,88 @@ fn main() {
     };
     write("random_models.rs", random_models());
     write("fixture_models.rs", fixture_models());
+    write("asked_models.rs", asked_models());
+}
+
+/// Models, fixtures and random mechanisms that are emitted with reactions and self-test.
+const ASKED: [&str; 5] = [
+    "model-spec/models/five_bar.toml",
+    "model-spec/models/panda.toml",
+    "model-spec/models/delta_tied.toml",
+    "tests/fixtures/emitted/spatial_press.toml",
+    "tests/fixtures/emitted/swinging_cylinder.toml",
+];
+
+fn asked_models() -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut modules = String::new();
+    let mut add = |derivation: &Derivation| {
+        let name = &derivation.mechanism.name;
+        let reactions = derivation.reactions();
+        let reactions = reactions.unwrap_or_else(|error| panic!("{name}: {error}"));
+        let emitted = modelmill_codegen::emit(derivation).with_reactions(derivation, &reactions);
+        modules.push_str(&emitted.with_self_test(derivation).module());
+    };
+    for file in ASKED {
+        let file = root.join(file);
+        println!("cargo::rerun-if-changed={}", file.display());
+        let mechanism = match modelmill_spec::load_file(&file) {
+            Ok(loaded) => loaded.mechanism,
+            Err(failure) => panic!("{}", failure.render(false)),
+        };
+        let derivation = derived(&mechanism);
+        add(&derivation);
+        match mechanism.name.as_str() {
+            "five_bar" => {
+                let mut other = derivation;
+                other.mechanism.name = "five_bar_without_a_term".to_owned();
+                without_a_term(&mut other);
+                add(&other);
+            }
+            "panda" => {
+                let mut other = derivation;
+                other.mechanism.name = "panda_with_a_column_twice".to_owned();
+                // The last column is that of the one before it.
+                let outputs = &mut other.programs.regressor.outputs;
+                let n_base = other.reduction.retained.len();
+                for row in outputs.chunks_mut(n_base) {
+                    row[n_base - 1] = row[n_base - 2];
+                }
+                add(&other);
+            }
+            _ => {}
+        }
+    }
+    for seed in 0..3 {
+        add(&derived(&random::tree(seed, Matter::Physical)));
+        add(&derived(&random::planar_loop(seed, Matter::Physical)));
+    }
+    modules
+}
+
+/// Takes the last term off the first base parameter that is a sum.
+fn without_a_term(derivation: &mut Derivation) {
+    let program = &mut derivation.programs.base_parameters;
+    let shorter =
+        program
+            .outputs
+            .iter()
+            .enumerate()
+            .find_map(|(k, v)| match program.ops[v.index()] {
+                Op::Add(rest, _) => Some((k, rest)),
+                _ => None,
+            });
+    let (k, rest) = shorter.expect("a base parameter that is a sum");
+    program.outputs[k] = rest;
+}
+
+fn derived(mechanism: &Mechanism) -> Derivation {
+    modelmill_codegen::derive(mechanism)
+        .unwrap_or_else(|error| panic!("{}: {error}", mechanism.name))
 }
 
 fn module(mechanism: &Mechanism) -> String {
-    let derivation = modelmill_codegen::derive(mechanism)
-        .unwrap_or_else(|error| panic!("{}: {error}", mechanism.name));
+    let derivation = derived(mechanism);
     match derivation.dynamics() {
         Ok(dynamics) => modelmill_codegen::emit_with_dynamics(&derivation, &dynamics).module(),
         Err(error) => panic!("{}: {error}", mechanism.name),

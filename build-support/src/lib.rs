@@ -32,6 +32,10 @@ pub struct Options {
     /// The equation of motion (`Dynamics`): mass matrix, velocity terms, gravity, forward dynamics. It nearly doubles the
     /// code, so that it is made on demand.
     pub dynamics: bool,
+    /// What the joints transmit (`Reactions`): forces and moments in all joints, and the forces that close loops.
+    pub reactions: bool,
+    /// A test of the base parameters (`self_test()`), to be called in a test of the crate.
+    pub self_test: bool,
 }
 
 impl Options {
@@ -39,6 +43,20 @@ impl Options {
     #[must_use]
     pub fn with_dynamics(mut self) -> Self {
         self.dynamics = true;
+        self
+    }
+
+    /// With reactions.
+    #[must_use]
+    pub fn with_reactions(mut self) -> Self {
+        self.reactions = true;
+        self
+    }
+
+    /// With a test of the base parameters.
+    #[must_use]
+    pub fn with_self_test(mut self) -> Self {
+        self.self_test = true;
         self
     }
 }
@@ -146,13 +164,18 @@ fn module(file: &Path, options: Options) -> Result<(String, String), BuildError>
     }
     let derivation = modelmill_codegen::derive(&loaded.mechanism)
         .map_err(|error| BuildError(format!("{}: {error}\n", file.display())))?;
-    let emitted = if options.dynamics {
-        let dynamics = derivation
-            .dynamics()
-            .map_err(|error| BuildError(format!("{}: {error}\n", file.display())))?;
-        modelmill_codegen::emit_with_dynamics(&derivation, &dynamics)
-    } else {
-        modelmill_codegen::emit(&derivation)
-    };
+    let fault = |error| BuildError(format!("{}: {error}\n", file.display()));
+    let mut emitted = modelmill_codegen::emit(&derivation);
+    if options.dynamics {
+        let dynamics = derivation.dynamics().map_err(fault)?;
+        emitted = emitted.with_dynamics(&derivation, &dynamics);
+    }
+    if options.reactions {
+        let reactions = derivation.reactions().map_err(fault)?;
+        emitted = emitted.with_reactions(&derivation, &reactions);
+    }
+    if options.self_test {
+        emitted = emitted.with_self_test(&derivation);
+    }
     Ok((loaded.mechanism.name.clone(), emitted.module()))
 }

@@ -97,11 +97,26 @@ fn an_empty_or_missing_folder_is_said() {
 }
 
 fn with_dynamics(folder: &Path) -> Result<String, String> {
+    with(folder, Options::default().with_dynamics())
+}
+
+fn with(folder: &Path, options: Options) -> Result<String, String> {
     let out = folder.join("models.rs");
     let pattern = format!("{}/*.toml", folder.display());
-    try_generate_with(&pattern, Options::default().with_dynamics(), &out)
-        .map_err(|error| error.to_string())?;
+    try_generate_with(&pattern, options, &out).map_err(|error| error.to_string())?;
     Ok(std::fs::read_to_string(out).unwrap())
+}
+
+#[test]
+fn reactions_and_the_self_test_come_on_demand() {
+    let folder = folder("on_demand", &[("pendulum.toml", PENDULUM)]);
+    let plain = generate(&folder).unwrap();
+    let (transmitted, self_test) = ("pub fn transmitted(", "pub fn self_test(");
+    assert!(!plain.contains(transmitted) && !plain.contains(self_test));
+    let text = with(&folder, Options::default().with_reactions()).unwrap();
+    assert!(text.contains(transmitted) && !text.contains(self_test));
+    let text = with(&folder, Options::default().with_self_test()).unwrap();
+    assert!(!text.contains(transmitted) && text.contains(self_test));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! A model along a recording: its forces, beside the measured ones, and where they differ.
 
-use modelmill_codegen::{Evaluator, States};
+use modelmill_codegen::{Evaluator, Reactions, States};
 use modelmill_identify::decimation::decimate_columns;
 use modelmill_identify::locate::{LocateOptions, TIME, locate};
 use modelmill_identify::{Comparison, Figures, Region};
@@ -17,6 +17,17 @@ pub(crate) fn forces(model: &Model, data: &Data, values: &[f64]) -> Outcome<Vec<
     let columns = columns(model, data, |states| {
         evaluator.inverse_dynamics(states, values)
     })?;
+    decimated(columns, data)
+}
+
+/// Determined components of the reactions along a recording for nominal parameters, `[component][sample]`, decimated.
+pub(crate) fn reactions(
+    model: &Model,
+    data: &Data,
+    reactions: &Reactions,
+) -> Outcome<Vec<Vec<f64>>> {
+    let evaluator = Evaluator::new(&model.derivation);
+    let columns = columns(model, data, |states| evaluator.reactions(reactions, states))?;
     decimated(columns, data)
 }
 

@@ -76,7 +76,9 @@ pub(crate) enum Command {
         modelmill evaluate model-spec/models/spidermill.toml \\\n      \
         --data recordings/spidermill-mbs/plain-check.csv --out forces.csv\n  \
         modelmill evaluate model-spec/models/spidermill.toml \\\n      \
-        --data recordings/spidermill-mbs/plain-check.csv --parameters fit.json --out forces.csv")]
+        --data recordings/spidermill-mbs/plain-check.csv --parameters fit.json --out forces.csv\n  \
+        modelmill evaluate model-spec/models/spidermill.toml --reactions \\\n      \
+        --data recordings/spidermill-mbs/plain-check.csv --out reactions.csv")]
     Evaluate(EvaluateArgs),
     /// Find the base parameters from recordings by least squares
     #[command(after_help = "Examples (from the project's root):\n  \
@@ -246,6 +248,12 @@ pub(crate) struct GenerateArgs {
     /// With the equation of motion: mass matrix, velocity terms, gravity, forward dynamics
     #[arg(long, conflicts_with = "language")]
     pub(crate) dynamics: bool,
+    /// With what the joints transmit: forces and moments in all joints, and the forces that close loops
+    #[arg(long, conflicts_with = "language")]
+    pub(crate) reactions: bool,
+    /// With a function `self_test` that holds base parameters against all parameters, for a test of your own
+    #[arg(long, conflicts_with = "language")]
+    pub(crate) self_test: bool,
     /// What to make: a Rust module, or a crate that builds a C library with its header, or a Python module
     #[arg(long, value_enum, default_value = "rust")]
     pub(crate) language: Language,
@@ -309,6 +317,10 @@ pub(crate) struct EvaluateArgs {
     /// Values of the base parameters: `nominal`, or a file that `identify` wrote
     #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
     pub(crate) parameters: ParameterSource,
+    /// What the joints transmit instead of the drives' forces: forces (N) and moments (N m) in all joints, and the forces
+    /// that close loops; for the nominal values of all parameters, since base parameters do not say
+    #[arg(long)]
+    pub(crate) reactions: bool,
     /// Write the forces to this file instead of standard output
     #[arg(long, value_name = "OUT.csv")]
     pub(crate) out: Option<PathBuf>,

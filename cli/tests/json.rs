@@ -230,6 +230,9 @@ fn generate_prints_rust_and_completions_name_the_commands() {
     assert!(!source.contains("pub fn mass_matrix"), "made on demand");
     let with_dynamics = printed(&["generate", &model("two_link.toml"), "--dynamics"]);
     assert!(with_dynamics.contains("pub fn mass_matrix"));
+    let both = ["--reactions", "--self-test"];
+    let asked = printed(&["generate", &model("two_link.toml"), both[0], both[1]]);
+    assert!(asked.contains("pub fn transmitted") && asked.contains("pub fn self_test"));
     let out = scratch("two_link.rs");
     printed(&["generate", &model("two_link.toml"), "--out", &out]);
     assert_eq!(std::fs::read_to_string(out).expect("the source"), source);

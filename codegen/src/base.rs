@@ -112,18 +112,6 @@ impl Derivation {
 
 /// The base parameters as expressions of the graph: eq. (7) carried out.
 pub(crate) fn expressions(graph: &mut Graph, reduction: &Reduction) -> Vec<ExprId> {
-    let product = |graph: &mut Graph, m: &Monomial| {
-        let factors: Vec<_> =
-            m.0.iter()
-                .map(|(p, n)| {
-                    (
-                        graph.atom(Atom::Parameter(*p)),
-                        i32::try_from(*n).expect("a small power"),
-                    )
-                })
-                .collect();
-        graph.product(&factors)
-    };
     let mut terms: Vec<Vec<ExprId>> = reduction
         .retained
         .iter()
@@ -137,6 +125,19 @@ pub(crate) fn expressions(graph: &mut Graph, reduction: &Reduction) -> Vec<ExprI
         }
     }
     terms.iter().map(|terms| graph.add_all(terms)).collect()
+}
+
+/// A product of parameters as an expression.
+pub(crate) fn product(graph: &mut Graph, product: &Monomial) -> ExprId {
+    let factors: Vec<_> = product
+        .0
+        .iter()
+        .map(|(p, n)| {
+            let power = i32::try_from(*n).expect("a small power");
+            (graph.atom(Atom::Parameter(*p)), power)
+        })
+        .collect();
+    graph.product(&factors)
 }
 
 /// Unit of a product of parameters.

@@ -140,6 +140,16 @@ impl Closing {
         Ok(closing)
     }
 
+    /// Guards further determinants.
+    pub(crate) fn guard(&mut self, graph: &mut Graph, mechanism: &Mechanism, more: &[ExprId]) {
+        for id in more {
+            if self.regular.iter().all(|(known, _)| known != id) {
+                let limit = SINGULAR * magnitude::at_nominal(graph, mechanism, &[*id]);
+                self.regular.push((*id, limit));
+            }
+        }
+    }
+
     /// Uses the first passes of lowering only, to see what the others do.
     pub(crate) fn limit_passes(&mut self, n: usize) {
         self.n_passes = n;

@@ -65,7 +65,7 @@ pub(crate) fn stretches(tree: &Tree, links: &[usize], start: &[Turn], at: &Vecto
 }
 
 /// The fixed rotations from the root of a path to the axis of its first turning joint; `None` if nothing turns.
-fn fixed_turns(tree: &Tree, links: &[usize]) -> Option<Vec<Turn>> {
+pub(crate) fn fixed_turns(tree: &Tree, links: &[usize]) -> Option<Vec<Turn>> {
     let mut turns = Vec::new();
     for &i in links {
         let link = &tree.links[i];
@@ -94,7 +94,7 @@ pub(crate) fn sum_of(graph: &mut Graph, path: &[Stretch]) -> Vector {
     graph.add_vectors(&vectors)
 }
 
-fn point_at(graph: &mut Graph, point: &Point) -> Result<Vector, DeriveError> {
+pub(crate) fn point_at(graph: &mut Graph, point: &Point) -> Result<Vector, DeriveError> {
     Ok([
         exact::expression(graph, &point.at[0])?,
         exact::expression(graph, &point.at[1])?,

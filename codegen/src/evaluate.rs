@@ -12,7 +12,7 @@ use nalgebra::DMatrix;
 use crate::expr::Atom;
 use crate::lower::{Op, Program};
 use crate::programs::{LoopPrograms, PassivePosition};
-use crate::{Derivation, Dynamics, Programs};
+use crate::{Derivation, Dynamics, Programs, Reactions};
 
 use machine::{Block, Machine, Scalar};
 
@@ -219,6 +219,16 @@ impl<'a> Evaluator<'a> {
         base: &[f64],
     ) -> Result<Vec<Vec<f64>>, PoseFault> {
         self.run(&dynamics.effects, states, base)
+    }
+
+    /// All determined components of the reactions for the parameters of the model file, one vector each, in the order in
+    /// which the places of [`Reactions`] count them.
+    pub fn reactions(
+        &self,
+        reactions: &Reactions,
+        states: &States<'_>,
+    ) -> Result<Vec<Vec<f64>>, PoseFault> {
+        self.run(&reactions.program, states, &[])
     }
 
     /// Forward dynamics: accelerations of the independent coordinates, one vector each, under the given forces of the

@@ -11,7 +11,7 @@ use crate::DeriveError;
 use crate::closure::{self, Closure};
 use crate::expr::{Atom, ExprId, Graph, Node, Rational, Unary};
 use crate::field::Stream;
-use crate::linear;
+use crate::linear::{self, Solution};
 use crate::linear_loops;
 use crate::magnitude;
 use crate::numeric_pose::Loops;
@@ -241,6 +241,76 @@ impl Projection {
         Ok(solution.values.into_iter().map(|row| row[0]).collect())
     }
 
+    /// Multipliers of some closing equations, as many as there are passive coordinates: how strongly each pushes, where
+    /// the open tree needs the given generalised forces, drives taken off. They push where their gap grows.
+    pub(crate) fn multipliers(
+        &self,
+        graph: &mut Graph,
+        gaps: &[ExprId],
+        forces: &[ExprId],
+    ) -> Result<Solution, DeriveError> {
+        let n = self.passive.len();
+        let by_passive: Vec<Vec<ExprId>> = self
+            .passive
+            .iter()
+            .map(|p| graph.differentiate(gaps, Atom::Coordinate(*p)))
+            .collect();
+        // Derivatives by the passive y; these move no coordinates but passive ones.
+        let jacobian: Vec<Vec<ExprId>> = (0..gaps.len())
+            .map(|row| {
+                let by = |j: &usize| {
+                    let terms = self.passive.iter().zip(&by_passive);
+                    let terms = terms.filter(|(i, _)| self.rates_of[**i][*j] != 0);
+                    let terms: Vec<_> = terms
+                        .map(|(i, slopes)| (slopes[row], Rational::integer(self.rates_of[*i][*j])))
+                        .collect();
+                    graph.sum(&terms)
+                };
+                self.passive.iter().map(by).collect()
+            })
+            .collect();
+        let in_y: Vec<ExprId> = self
+            .passive
+            .iter()
+            .map(|j| {
+                let terms: Vec<_> = (0..forces.len())
+                    .filter(|i| self.rates_of[*i][*j] != 0)
+                    .map(|i| (forces[i], Rational::integer(self.rates_of[i][*j])))
+                    .collect();
+                graph.sum(&terms)
+            })
+            .collect();
+        let what = "the loops for their forces";
+        let transposed: Vec<Vec<ExprId>> = (0..n)
+            .map(|p| jacobian.iter().map(|row| row[p]).collect())
+            .collect();
+        let rhs: Vec<Vec<ExprId>> = in_y.iter().map(|x| vec![*x]).collect();
+        match linear::solve(graph, &transposed, &rhs, what) {
+            // Systems of legs can be torn apart by columns only: the inverse of the untransposed one serves as well.
+            Err(DeriveError::TooLarge { .. }) => {}
+            found => return found,
+        }
+        let identity: Vec<Vec<ExprId>> = (0..n)
+            .map(|i| {
+                let one = |j| if i == j { Graph::ONE } else { Graph::ZERO };
+                (0..n).map(one).collect()
+            })
+            .collect();
+        let mut solution = linear::solve(graph, &jacobian, &identity, what)?;
+        let inverse = std::mem::take(&mut solution.values);
+        solution.values = (0..n)
+            .map(|r| {
+                let terms: Vec<ExprId> = inverse
+                    .iter()
+                    .zip(&in_y)
+                    .map(|(row, force)| graph.mul(row[r], *force))
+                    .collect();
+                vec![graph.add_all(&terms)]
+            })
+            .collect();
+        Ok(solution)
+    }
+
     fn add_drives(
         &mut self,
         graph: &mut Graph,
@@ -399,7 +469,7 @@ fn sufficient(
 }
 
 /// Rows of a matrix that span its row space well: each time the one of which most is left.
-fn most_different_rows(matrix: &DMatrix<f64>, n: usize) -> Vec<usize> {
+pub(crate) fn most_different_rows(matrix: &DMatrix<f64>, n: usize) -> Vec<usize> {
     let mut rest = matrix.clone();
     let mut chosen = Vec::new();
     for _ in 0..n.min(matrix.nrows()) {

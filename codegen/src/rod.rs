@@ -95,3 +95,40 @@ pub(crate) fn generalised_forces(
     }
     Ok(forces)
 }
+
+/// Forces that a rod needs at its two ends, in the axes of the base, for given moments of second, first and no order.
+///
+/// The rod's own balance of moments about the first point gives the force at the second one, which is square to the
+/// rod since it slides there; the rest of its weight and inertia hangs on the first.
+pub(crate) fn end_forces(
+    graph: &mut Graph,
+    [a, b]: [Vector; 2],
+    length: ExprId,
+    gravity: &Vector,
+    moments: &[ExprId],
+) -> [Vector; 2] {
+    let [second, first, mass] = [0, 1, 2].map(|k| moments.get(k).copied().unwrap_or(Graph::ZERO));
+    let per_length = graph.pow(length, -1);
+    let twice_derived = |graph: &mut Graph, v: &Vector| -> Vector {
+        let once = graph.time_derivative(v);
+        let twice = graph.time_derivative(&once);
+        [twice[0], twice[1], twice[2]]
+    };
+    let d = graph.sub_vectors(&b, &a);
+    let u = graph.scale_vector(per_length, &d);
+    let turning = twice_derived(graph, &u);
+    let pivot = twice_derived(graph, &a);
+    let lifted = graph.sub_vectors(&pivot, gravity);
+    let sum = |graph: &mut Graph, [x, y]: [ExprId; 2]| {
+        let x = graph.scale_vector(x, &turning);
+        let y = graph.scale_vector(y, &lifted);
+        graph.add_vectors(&[x, y])
+    };
+    let swung = sum(graph, [second, first]);
+    let along = graph.dot(&u, &swung);
+    let along = graph.scale_vector(along, &u);
+    let square = graph.sub_vectors(&swung, &along);
+    let at_second = graph.scale_vector(per_length, &square);
+    let total = sum(graph, [first, mass]);
+    [graph.sub_vectors(&total, &at_second), at_second]
+}

@@ -19,6 +19,8 @@ pub(crate) struct Link {
     pub(crate) pre: Vec<Turn>,
     /// The joint's rotation about z, with any fixed offset.
     pub(crate) joint: Turn,
+    /// The axis of the model file about or along which the joint moves; the link's own z lies along it.
+    pub(crate) named: Axis,
     /// Position of the origin in the parent's frame.
     pub(crate) position: Vector,
     /// Coordinates that turn it, with their integer factors.
@@ -37,6 +39,19 @@ pub(crate) struct Link {
 }
 
 impl Link {
+    /// Whether it moves relative to its parent.
+    pub(crate) fn is_moving(&self) -> bool {
+        !self.turns.is_empty() || !self.slides.is_empty()
+    }
+
+    /// Components in the axes that the model file reaches behind the joint, of a vector given in the link's own.
+    pub(crate) fn to_named_axes(&self, graph: &mut Graph, v: &Vector) -> Vector {
+        match to_z(self.named) {
+            Some((axis, pi12)) => graph.turn_out(&fixed_turn(axis, pi12), v),
+            None => *v,
+        }
+    }
+
     /// Finds the axis of the joint in the parent's frame, and splits the position by it.
     fn find_axis(&mut self, graph: &mut Graph) {
         let z = [Graph::ZERO, Graph::ZERO, Graph::ONE];
@@ -142,10 +157,28 @@ impl Tree {
     }
 }
 
+/// The fixed turn, by its axis and twelfths of pi, that takes z to an axis of the model file.
+fn to_z(axis: Axis) -> Option<(Axis, i32)> {
+    match axis {
+        Axis::X => Some((Axis::Y, 6)),
+        Axis::Y => Some((Axis::X, -6)),
+        Axis::Z => None,
+    }
+}
+
+fn fixed_turn(axis: Axis, pi12: i32) -> Turn {
+    Turn {
+        axis,
+        sum: AngleSum::NONE,
+        pi12,
+    }
+}
+
 /// Collects elementary steps into links: a link ends where a step would no longer commute with its joint.
 struct Builder {
     parent: Option<usize>,
     pre: Vec<Turn>,
+    named: Axis,
     position: Vector,
     joint: Turn,
     turns: Vec<(usize, i32)>,
@@ -163,6 +196,7 @@ impl Builder {
         Self {
             parent,
             pre: Vec::new(),
+            named: Axis::Z,
             position: vector::ZERO,
             joint: NO_TURN,
             turns: Vec::new(),
@@ -260,25 +294,16 @@ impl Builder {
         if self.has_joint() && axis != Axis::Z {
             self.close(links);
         }
-        if !moves || axis == Axis::Z {
+        let Some((about, pi12)) = to_z(axis).filter(|_| moves) else {
             apply(self, graph, axis);
             return;
-        }
+        };
         // A = Ry(pi/2) takes z to x, A = Rx(-pi/2) takes z to y; motion about x is A (motion about z) A^-1.
-        let (about, pi12) = if axis == Axis::X {
-            (Axis::Y, 6)
-        } else {
-            (Axis::X, -6)
-        };
-        let turn = |pi12| Turn {
-            axis: about,
-            sum: AngleSum::NONE,
-            pi12,
-        };
-        push_turn(&mut self.pre, &turn(pi12));
+        push_turn(&mut self.pre, &fixed_turn(about, pi12));
+        self.named = axis;
         apply(self, graph, Axis::Z);
         self.close(links);
-        push_turn(&mut self.pre, &turn(-pi12));
+        push_turn(&mut self.pre, &fixed_turn(about, -pi12));
     }
 
     fn close(&mut self, links: &mut Vec<Link>) {
@@ -302,6 +327,7 @@ impl Builder {
         links.push(Link {
             parent: done.parent,
             pre: done.pre,
+            named: done.named,
             joint: done.joint,
             position: done.position,
             turns: done.turns,

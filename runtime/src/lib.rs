@@ -9,7 +9,9 @@ mod loops;
 mod numbers;
 #[cfg(feature = "rayon")]
 mod parallel;
+mod reactions;
 mod real;
+mod self_test;
 mod solve;
 #[cfg(feature = "source")]
 pub mod source;
@@ -21,7 +23,9 @@ use core::fmt;
 pub use lanes::{LARGEST_ANGLE, sin_cos_lanes};
 pub use loops::{Loops, Scales, correct, follow, settle};
 pub use numbers::{Numbers, One, Outputs};
+pub use reactions::{ClosedLoop, Joint, Wrench};
 pub use real::Real;
+pub use self_test::{Random, SelfTestError, ShowRows, self_test};
 pub use solve::solve;
 
 /// A pose for which a model has no answer.

@@ -1,7 +1,7 @@
 //! This crate's own source, for crates that are handed on in a folder of their own.
 
 /// Place in the crate's folder and text of every file.
-pub const FILES: [(&str, &str); 11] = [
+pub const FILES: [(&str, &str); 13] = [
     ("Cargo.toml", MANIFEST),
     ("src/blocks.rs", include_str!("blocks.rs")),
     ("src/lanes.rs", include_str!("lanes.rs")),
@@ -9,7 +9,9 @@ pub const FILES: [(&str, &str); 11] = [
     ("src/loops.rs", include_str!("loops.rs")),
     ("src/numbers.rs", include_str!("numbers.rs")),
     ("src/parallel.rs", include_str!("parallel.rs")),
+    ("src/reactions.rs", include_str!("reactions.rs")),
     ("src/real.rs", include_str!("real.rs")),
+    ("src/self_test.rs", include_str!("self_test.rs")),
     ("src/solve.rs", include_str!("solve.rs")),
     ("src/source.rs", "//! Stays with the project.\n"),
     ("src/wide.rs", include_str!("wide.rs")),

@@ -8,6 +8,7 @@ pub mod base_parameters;
 pub mod counts;
 pub mod equation_of_motion;
 pub mod fixtures;
+pub mod free_bodies;
 pub mod laws;
 pub mod mechanics;
 pub mod published;

@@ -37,12 +37,16 @@ impl Jet {
         self.function(s, c, -s)
     }
 
-    fn recip(self) -> Self {
+    /// 1 by it.
+    #[must_use]
+    pub fn recip(self) -> Self {
         let one = self.0[0].recip();
         self.function(one, -one * one, 2.0 * one * one * one)
     }
 
-    fn sqrt(self) -> Self {
+    /// Square root.
+    #[must_use]
+    pub fn sqrt(self) -> Self {
         let root = self.0[0].sqrt();
         self.function(root, 0.5 / root, -0.25 / (root * self.0[0]))
     }
@@ -253,6 +257,139 @@ impl<'a> Numbers<'a> {
     fn point(&self, poses: &[Pose], point: PointIdx) -> [Jet; 3] {
         let point = &self.mechanism.points[point.0];
         poses[point.frame.0].point(self.vector(&point.at))
+    }
+
+    /// Poses of all frames with their first and second time derivatives.
+    pub fn motions(&self, coordinates: &[Jet]) -> Vec<[Matrix4<f64>; 3]> {
+        let poses = self.poses(coordinates);
+        let orders = |pose: &Pose| [0, 1, 2].map(|order| pose.derivative(order));
+        poses.iter().map(orders).collect()
+    }
+
+    /// Where a point is, with derivatives.
+    pub fn point_motion(&self, coordinates: &[Jet], point: PointIdx) -> [Jet; 3] {
+        self.point(&self.poses(coordinates), point)
+    }
+
+    /// Pose that a frame's steps reach behind the one that a coordinate moves, and behind what follows along or about z.
+    pub fn pose_behind(
+        &self,
+        coordinates: &[Jet],
+        frame: usize,
+        coordinate: usize,
+    ) -> Matrix4<f64> {
+        let moves = |step: &Step| match step {
+            Step::Rotate(_, angle) => angle
+                .terms
+                .iter()
+                .any(|(s, _)| matches!(s, Symbol::Coordinate(c) if c.0 == coordinate)),
+            Step::Translate(_, length) => length.coordinates.iter().any(|(c, _)| c.0 == coordinate),
+        };
+        let axis = |step: &Step| match step {
+            Step::Rotate(axis, _) | Step::Translate(axis, _) => *axis,
+        };
+        let mut behind = self.mechanism.clone();
+        let steps = &mut behind.frames[frame].steps;
+        let joint = steps.iter().rposition(moves).expect("a joint of it");
+        let mut end = joint + 1;
+        if axis(&steps[joint]) == Axis::Z {
+            let more = steps[end..].iter().take_while(|s| axis(s) == Axis::Z);
+            end += more.count();
+        }
+        steps.truncate(end);
+        let numbers = Numbers {
+            mechanism: &behind,
+            constants: self.constants.clone(),
+            parameters: self.parameters.clone(),
+        };
+        numbers.poses(coordinates)[frame].derivative(0)
+    }
+
+    /// Frames and pseudo-inertias of all bodies but lumped masses.
+    pub fn bodies(&self) -> Vec<(usize, Matrix4<f64>)> {
+        let mut parts: Vec<&modelmill_spec::Part> = self.mechanism.parts.iter().collect();
+        let mut points = Vec::new();
+        for effect in &self.mechanism.effects {
+            if let Action::Bodies { parts: more, .. } = &effect.action {
+                parts.extend(more);
+            }
+            for place in &effect.places {
+                let Place::Point(p) = place else { continue };
+                let point = &self.mechanism.points[p.0];
+                for term in &effect.terms {
+                    let mass = self.parameters[term.parameter.0] * self.value(&term.expression);
+                    let at = Vector3::from(self.vector(&point.at));
+                    points.push((point.frame.0, point_mass(mass, at)));
+                }
+            }
+        }
+        let parts = parts
+            .into_iter()
+            .map(|part| (part.frame.0, self.pseudo_inertia(&part.inertial)));
+        parts.chain(points).collect()
+    }
+
+    /// Frames and masses of lumped masses, with where the balances of forces and of moments see them.
+    pub fn lumps(&self) -> Vec<(usize, f64, [f64; 3], [f64; 3])> {
+        let mut lumps: Vec<&LumpedMass> = self.mechanism.lumped_masses.iter().collect();
+        for effect in &self.mechanism.effects {
+            if let Action::Bodies { lumped_masses, .. } = &effect.action {
+                lumps.extend(lumped_masses);
+            }
+        }
+        let one = |lump: &LumpedMass| {
+            let mass = self.value(&lump.mass) * rational(&lump.share);
+            let [force_at, moment_at] = [&lump.force_at, &lump.moment_at].map(|at| self.vector(at));
+            (lump.frame.0, mass, force_at, moment_at)
+        };
+        lumps.into_iter().map(one).collect()
+    }
+
+    /// What effects on joints ask for, one force or torque per coordinate.
+    pub fn effects_on_joints(&self, coordinates: &[Jet]) -> Vec<f64> {
+        let drives = self.drives(coordinates);
+        let mut forces = vec![0.0; coordinates.len()];
+        for effect in &self.mechanism.effects {
+            let motions: Vec<Option<Jet>> = (effect.places.iter())
+                .map(|place| match place {
+                    Place::Drive(d) => Some(drives[d.0]),
+                    Place::Coordinate(i) => Some(coordinates[i.0]),
+                    _ => None,
+                })
+                .collect();
+            for (p, place) in effect.places.iter().enumerate() {
+                let Place::Coordinate(i) = place else {
+                    continue;
+                };
+                let other = motions[(p + 1) % motions.len()];
+                let other = other.unwrap_or(Jet::constant(f64::NAN));
+                for term in &effect.terms {
+                    let quantity = quantity(coordinates[i.0], f64::NAN, other);
+                    let parameter = self.parameters[term.parameter.0];
+                    forces[i.0] += parameter * self.value_at(&term.expression, &quantity);
+                }
+            }
+        }
+        forces
+    }
+
+    /// Rods along drives: the drive, and moments of second, first and no order.
+    pub fn rods(&self) -> Vec<(usize, [f64; 3])> {
+        let mut rods = Vec::new();
+        for effect in &self.mechanism.effects {
+            for place in &effect.places {
+                if let (Action::Rod, Place::Drive(d)) = (&effect.action, place) {
+                    let moments = |k: usize| self.parameters[effect.terms[k].parameter.0];
+                    rods.push((d.0, [0, 1, 2].map(moments)));
+                }
+            }
+        }
+        rods
+    }
+
+    /// Acceleration of free fall.
+    pub fn gravity(&self) -> Vector3<f64> {
+        Vector3::from(self.vector(&self.mechanism.gravity))
     }
 
     /// Distances of the points that loops join, with derivatives: three components per loop.

@@ -170,10 +170,13 @@ agrees! {
     arm_four_bar_agrees_with_the_evaluator: arm_four_bar "arm_four_bar" passive;
     arm_parallelogram_agrees_with_the_evaluator: arm_parallelogram "arm_parallelogram" passive;
     delta_agrees_with_the_evaluator: delta "delta" passive;
+    delta_tied_agrees_with_the_evaluator: delta_tied "delta_tied" passive;
     emps_agrees_with_the_evaluator: emps "emps";
     five_bar_agrees_with_the_evaluator: five_bar "five_bar" passive;
     four_bar_agrees_with_the_evaluator: four_bar "four_bar" passive;
     panda_agrees_with_the_evaluator: panda "panda";
+    gough_stewart_agrees_with_the_evaluator: gough_stewart "gough_stewart" passive;
+    gough_stewart_tied_agrees_with_the_evaluator: gough_stewart_tied "gough_stewart_tied" passive;
     parallelogram_agrees_with_the_evaluator: parallelogram "parallelogram";
     puma560_agrees_with_the_evaluator: puma560 "puma560";
     rx90_agrees_with_the_evaluator: rx90 "rx90";

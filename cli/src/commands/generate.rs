@@ -41,14 +41,20 @@ pub(crate) fn run(args: &GenerateArgs) -> Outcome {
         .map(|path| Target::new(path, model.files.iter().map(PathBuf::as_path)))
         .transpose()?;
     let derivation = &model.derivation;
-    let source = if args.dynamics {
-        let dynamics = derivation
-            .dynamics()
-            .map_err(|error| Failure::Input(format!("{}: {error}", model.path)))?;
-        modelmill_codegen::emit_with_dynamics(derivation, &dynamics).file()
-    } else {
-        emit(derivation).file()
-    };
+    let fault = |error| Failure::Input(format!("{}: {error}", model.path));
+    let mut emitted = emit(derivation);
+    if args.dynamics {
+        let dynamics = derivation.dynamics().map_err(fault)?;
+        emitted = emitted.with_dynamics(derivation, &dynamics);
+    }
+    if args.reactions {
+        let reactions = derivation.reactions().map_err(fault)?;
+        emitted = emitted.with_reactions(derivation, &reactions);
+    }
+    if args.self_test {
+        emitted = emitted.with_self_test(derivation);
+    }
+    let source = emitted.file();
     match target {
         Some(target) => {
             target.write(&source)?;

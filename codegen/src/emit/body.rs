@@ -20,6 +20,27 @@ pub(super) struct Body<'a> {
     first: AnglesFirst,
 }
 
+/// How many statements a function may have before they are put in groups, and how many make a group.
+const LONG: usize = 2000;
+const GROUP: usize = 250;
+
+/// A statement with the values that it names and those that it reads.
+struct Statement {
+    tokens: TokenStream,
+    defines: Vec<usize>,
+    needs: Vec<usize>,
+}
+
+impl Statement {
+    fn using(tokens: TokenStream, needs: Vec<usize>) -> Self {
+        Self {
+            tokens,
+            defines: Vec::new(),
+            needs,
+        }
+    }
+}
+
 impl<'a> Body<'a> {
     pub(super) fn new(program: &'a Program, input: &'a dyn Fn(Atom) -> TokenStream) -> Self {
         let names = (0..program.ops.len())
@@ -61,7 +82,7 @@ impl<'a> Body<'a> {
 
     /// Statements and final expression of the fixed stage: an array.
     pub(super) fn fixed(&self) -> TokenStream {
-        let statements = self.statements(Stage::Fixed, false);
+        let statements = self.statements(Stage::Fixed, false, &self.handed);
         let values = self.handed.iter().map(|v| &self.names[v.index()]);
         quote! { let n = &One::<T>::new(); #(#statements)* [#(#values),*] }
     }
@@ -69,7 +90,7 @@ impl<'a> Body<'a> {
     /// Statements of the state stage, with guards as early returns; `fixed` is the array of [`Self::fixed`], and `n` the
     /// arithmetic.
     pub(super) fn state(&self) -> TokenStream {
-        let statements = self.statements(Stage::State, false);
+        let statements = self.statements(Stage::State, false, &self.program.outputs);
         quote! { #(#statements)* }
     }
 
@@ -82,7 +103,7 @@ impl<'a> Body<'a> {
             self.program.stages[v.index()] == Stage::Fixed && !zero
         });
         let fixed = fixed.map(|(k, v)| self.put(k, *v));
-        let statements = self.statements(Stage::State, true);
+        let statements = self.statements(Stage::State, true, &[]);
         quote! { #(#fixed)* #(#statements)* }
     }
 
@@ -103,11 +124,12 @@ impl<'a> Body<'a> {
 
     /// Statements of the fixed stage alone.
     pub(super) fn fixed_statements(&self) -> TokenStream {
-        let statements = self.statements(Stage::Fixed, false);
+        let statements = self.statements(Stage::Fixed, false, &self.program.outputs);
         quote! { let n = &One::<T>::new(); #(#statements)* }
     }
 
-    fn statements(&self, stage: Stage, put: bool) -> Vec<TokenStream> {
+    /// All statements of a stage, with those values in scope at the end that are kept.
+    fn statements(&self, stage: Stage, put: bool, kept: &[ValueId]) -> Vec<TokenStream> {
         let mut puts: Vec<Vec<usize>> = vec![Vec::new(); self.program.ops.len()];
         for (k, v) in self.program.outputs.iter().enumerate() {
             if put && self.program.stages[v.index()] == stage {
@@ -115,29 +137,43 @@ impl<'a> Body<'a> {
             }
         }
         let mut late = Vec::new();
-        let mut statements = Vec::new();
+        let mut statements: Vec<Statement> = Vec::new();
         let mut guards: Vec<&Guard> = self.program.guards.iter().collect();
         let emit_guards =
-            |upto: usize, statements: &mut Vec<TokenStream>, guards: &mut Vec<&Guard>| {
+            |upto: usize, statements: &mut Vec<Statement>, guards: &mut Vec<&Guard>| {
                 guards.retain(|guard| {
                     let ready = guard.value().index() <= upto;
                     if ready {
-                        statements.push(self.guard(**guard));
+                        let needs = self.needed_names(stage, [guard.value()]);
+                        statements.push(Statement::using(self.guard(**guard), needs));
                     }
                     !ready
                 });
             };
-        if stage == Stage::State {
-            statements.extend(self.angles_first());
-        }
         for (i, op) in self.program.ops.iter().enumerate() {
-            let written = stage == Stage::State && self.first.done[i];
-            if self.program.stages[i] == stage && !matches!(op, Op::Number(_)) && !written {
-                statements.extend(self.statement(stage, i, op));
-            }
             // A cosine is written with the sine after it; what needs it comes then.
-            let paired = matches!((op, self.program.ops.get(i + 1)), (Op::Cos(a), Some(Op::Sin(b))) if a == b);
-            if paired {
+            let pair =
+                |a: &Op, b: Option<&Op>| matches!((a, b), (Op::Cos(a), Some(Op::Sin(b))) if a == b);
+            let ops = &self.program.ops;
+            let written = stage == Stage::State && self.first.done[i];
+            if self.program.stages[i] == stage
+                && !matches!(op, Op::Number(_))
+                && !written
+                && let Some(tokens) = self.statement(stage, i, op)
+            {
+                let mut operands = Vec::new();
+                op.for_each_operand(|v| operands.push(v));
+                let mut defines = vec![i];
+                if i > 0 && pair(&ops[i - 1], Some(op)) {
+                    defines.push(i - 1);
+                }
+                statements.push(Statement {
+                    tokens,
+                    defines,
+                    needs: self.needed_names(stage, operands),
+                });
+            }
+            if pair(op, ops.get(i + 1)) {
                 late.extend(puts[i].iter().map(|k| (*k, i)));
                 continue;
             }
@@ -146,10 +182,64 @@ impl<'a> Body<'a> {
             }
             for (k, i) in late.drain(..).chain(puts[i].iter().map(|k| (*k, i))) {
                 let v = ValueId(u32::try_from(i).expect("program below 4G operations"));
-                statements.push(self.put(k, v));
+                let needs = self.needed_names(stage, [v]);
+                statements.push(Statement::using(self.put(k, v), needs));
             }
         }
-        statements
+        let needed = self.needed_names(stage, kept.iter().copied());
+        let mut all = match stage {
+            Stage::State => self.angles_first(),
+            Stage::Fixed => Vec::new(),
+        };
+        all.extend(self.in_groups(statements, needed));
+        all
+    }
+
+    /// Names that are read where some values are, products that are written inside sums opened.
+    fn needed_names(&self, stage: Stage, values: impl IntoIterator<Item = ValueId>) -> Vec<usize> {
+        let mut open: Vec<ValueId> = values.into_iter().collect();
+        let mut needed = Vec::new();
+        while let Some(v) = open.pop() {
+            let i = v.index();
+            if self.fused[i] {
+                self.program.ops[i].for_each_operand(|v| open.push(v));
+            } else if self.program.stages[i] == stage {
+                needed.push(i);
+            }
+        }
+        needed
+    }
+
+    /// Long programs in groups of statements, each a block that hands on what later ones need: every `let` opens a scope
+    /// inside the one before, and the compiler, which writes debug information scope by scope into each other, runs out of
+    /// stack where there are many thousands.
+    fn in_groups(&self, statements: Vec<Statement>, kept: Vec<usize>) -> Vec<TokenStream> {
+        if statements.len() <= LONG {
+            return statements.into_iter().map(|s| s.tokens).collect();
+        }
+        let mut last_need = vec![0; self.program.ops.len()];
+        for (k, statement) in statements.iter().enumerate() {
+            for v in &statement.needs {
+                last_need[*v] = k / GROUP;
+            }
+        }
+        for v in kept {
+            last_need[v] = usize::MAX;
+        }
+        let groups = statements.chunks(GROUP).enumerate();
+        groups
+            .map(|(g, group)| {
+                let tokens = group.iter().map(|s| &s.tokens);
+                let defined = group.iter().flat_map(|s| &s.defines);
+                let handed = defined.filter(|v| last_need[**v] > g);
+                let handed: Vec<&Ident> = handed.map(|v| &self.names[*v]).collect();
+                if handed.is_empty() {
+                    quote! { { #(#tokens)* } }
+                } else {
+                    quote! { let [#(#handed),*] = { #(#tokens)* [#(#handed),*] }; }
+                }
+            })
+            .collect()
     }
 
     /// The angles that come first, and what the arithmetic makes of them all at once.

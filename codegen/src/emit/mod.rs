@@ -13,6 +13,8 @@ mod identifier;
 mod items;
 mod newton;
 mod python;
+mod reactions;
+mod self_test;
 
 pub use c::emit_c;
 pub use foreign::EmittedFile;
@@ -21,7 +23,7 @@ pub use python::emit_python;
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use crate::{Derivation, Dynamics};
+use crate::{Derivation, Dynamics, Reactions};
 
 /// Rust source of a module.
 #[derive(Clone, Debug)]
@@ -45,14 +47,32 @@ pub fn emit(derivation: &Derivation) -> Emitted {
 /// Writes the module of a derivation with its equation of motion besides: mass matrix, forward dynamics and what belongs
 /// to them.
 pub fn emit_with_dynamics(derivation: &Derivation, dynamics: &Dynamics) -> Emitted {
-    let mut emitted = emit(derivation);
-    emitted
-        .items
-        .extend(dynamics::dynamics(derivation, dynamics));
-    emitted
+    emit(derivation).with_dynamics(derivation, dynamics)
 }
 
 impl Emitted {
+    /// The module with the equation of motion of the same derivation.
+    #[must_use]
+    pub fn with_dynamics(mut self, derivation: &Derivation, dynamics: &Dynamics) -> Self {
+        self.items.extend(dynamics::dynamics(derivation, dynamics));
+        self
+    }
+
+    /// The module with a test of its base parameters.
+    #[must_use]
+    pub fn with_self_test(mut self, derivation: &Derivation) -> Self {
+        self.items.extend(self_test::self_test(derivation));
+        self
+    }
+
+    /// The module with the reactions of the same derivation.
+    #[must_use]
+    pub fn with_reactions(mut self, derivation: &Derivation, reactions: &Reactions) -> Self {
+        self.items
+            .extend(reactions::reactions(derivation, reactions));
+        self
+    }
+
     /// The source as a file of its own, to be declared with `mod`.
     pub fn file(&self) -> String {
         let (doc, items) = (doc_lines(&self.doc, true), &self.items);

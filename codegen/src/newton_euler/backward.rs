@@ -29,7 +29,7 @@ impl Rows {
     }
 }
 
-fn join(graph: &mut Graph, total: &mut Option<Wrench>, wrench: Wrench) {
+pub(super) fn join(graph: &mut Graph, total: &mut Option<Wrench>, wrench: Wrench) {
     *total = Some(match *total {
         None => wrench,
         Some(there) => Wrench {
@@ -56,7 +56,13 @@ pub(super) fn back_along_axis(
 }
 
 /// A wrench on a link, taken to its parent.
-fn to_parent(graph: &mut Graph, style: Style, link: &Link, side: Side, wrench: &Wrench) -> Wrench {
+pub(super) fn to_parent(
+    graph: &mut Graph,
+    style: Style,
+    link: &Link,
+    side: Side,
+    wrench: &Wrench,
+) -> Wrench {
     let mut moment = back_along_axis(graph, style, link, wrench);
     let mut force = wrench.force;
     if side == Side::Moving {

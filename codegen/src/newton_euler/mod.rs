@@ -8,6 +8,7 @@
 mod backward;
 mod body;
 mod composite;
+mod joints;
 mod motion;
 mod project;
 
@@ -18,6 +19,7 @@ use crate::vector::{self, Turn, Vector};
 pub(crate) use backward::{Depths, backward, carry};
 pub(crate) use body::{Body, Spread, flatten_along_axes, wrenches};
 pub(crate) use composite::mass_matrix;
+pub(crate) use joints::{Load, joint_wrenches};
 pub(crate) use motion::{Motion, forward};
 
 /// What a link's inertia is linear in. The first moment stands twice: as the balance of forces sees it and as the
@@ -117,7 +119,7 @@ impl Style {
 }
 
 /// Components behind several turns of a vector given before them.
-fn turn_in_all(graph: &mut Graph, turns: &[Turn], v: &Vector) -> Vector {
+pub(crate) fn turn_in_all(graph: &mut Graph, turns: &[Turn], v: &Vector) -> Vector {
     turns.iter().fold(*v, |v, turn| graph.turn_in(turn, &v))
 }
 

@@ -1,0 +1,114 @@
+//! A test of the base parameters that goes with the module.
+
+use proc_macro2::{Literal, TokenStream};
+use quote::quote;
+
+use super::body::Body;
+use super::functions::{Kind, Method, reads_passive, rows};
+use super::identifier::of_field;
+use super::items::{input, signed, uses_load};
+use crate::Derivation;
+use crate::self_test::reaches;
+
+/// The function `self_test`, and the regressor of all products that it needs.
+pub(super) fn self_test(derivation: &Derivation) -> TokenStream {
+    let mechanism = &derivation.mechanism;
+    let products = &derivation.reduction.products;
+    let n_products = products.len();
+    let program = &derivation.programs.full_regressor;
+    let input = input(derivation);
+    let body = Body::new(program, &input);
+    let (n_fixed, fixed) = (body.n_fixed(), body.fixed());
+    let result = rows(&body, 0, mechanism.drives.len(), n_products);
+    let needs_model = reads_passive(derivation, program);
+    let model_field = needs_model.then(|| quote! { model: Model<T>, });
+    let model_init = needs_model.then(|| quote! { model: Model::new(geometry), });
+    let method = Method {
+        name: "all_columns",
+        doc: "H: one row per drive, one column per product of parameters.",
+        program,
+        body: &body,
+        kind: Kind::Single(result),
+        fixed: quote! { self.fixed },
+        model: quote! { self.model },
+        output: quote! { [[T; N_PRODUCTS]; N_DRIVES] },
+    };
+    let method = method.tokens(derivation);
+    let fields: Vec<_> = mechanism
+        .parameters
+        .iter()
+        .map(|p| of_field(&p.name))
+        .collect();
+    let values = products.iter().map(|product| {
+        let powers = product.0.iter();
+        let factors = powers.flat_map(|(p, n)| {
+            let field = &fields[*p];
+            (0..*n).map(move |_| quote! { * parameters.#field })
+        });
+        quote! { 1.0 #(#factors)* }
+    });
+    let (active, _) = derivation.coordinates();
+    let nominal = active
+        .iter()
+        .map(|i| signed(mechanism.coordinates[*i].nominal));
+    let reach = reaches(derivation).into_iter().map(Literal::f64_unsuffixed);
+    let load = uses_load(derivation)
+        .then(|| quote! { load: ::core::array::from_fn(|_| random.between(-50.0, 50.0)), });
+    quote! {
+        /// Number of products of parameters.
+        pub const N_PRODUCTS: usize = #n_products;
+
+        /// Holds the base parameters against all parameters at random states around the nominal pose, for the model
+        /// file's geometry: H and H_min have rank [`N_BASE`], and `H p = H_min p_min`.
+        ///
+        /// Call it in a test of your own: `arm::self_test()?;`. It needs room on the stack for the square of the number
+        /// of products.
+        ///
+        /// # Errors
+        /// What does not hold, in numbers.
+        pub fn self_test() -> Result<(), ::modelmill_runtime::SelfTestError> {
+            const NOMINAL: [f64; N_ACTIVE] = [#(#nominal),*];
+            const REACH: [f64; N_ACTIVE] = [#(#reach),*];
+            let geometry = Geometry::<f64>::default();
+            let (model, all) = (Model::new(&geometry), AllColumns::new(&geometry));
+            let mut draw = ::modelmill_runtime::Random::new(2);
+            #[allow(unused_mut)]
+            let mut parameters = Parameters::<f64>::default();
+            #(parameters.#fields = draw.near(parameters.#fields);)*
+            let products = [#(#values),*];
+            let base = base_parameters(&geometry, &parameters);
+            let dynamics = InverseDynamics::new(&geometry, &base);
+            ::modelmill_runtime::self_test::<N_PRODUCTS, N_BASE>(&products, &base, |random, reach, show| {
+                let state = State {
+                    q: ::core::array::from_fn(|k| NOMINAL[k] + reach * REACH[k] * random.between(-1.0, 1.0)),
+                    qd: ::core::array::from_fn(|_| random.between(-2.0, 2.0)),
+                    qdd: ::core::array::from_fn(|_| random.between(-8.0, 8.0)),
+                    #load
+                };
+                let (h, h_min, forces) =
+                    (all.all_columns(&state)?, model.regressor(&state)?, dynamics.forces(&state)?);
+                for ((h, h_min), force) in h.iter().zip(&h_min).zip(&forces) {
+                    show(h, h_min, *force);
+                }
+                Ok(())
+            })
+        }
+
+        /// H for all products of parameters, for the self-test.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        struct AllColumns<T> {
+            /// What is wrong with the geometry.
+            input: Result<(), PoseError>,
+            fixed: [T; #n_fixed],
+            #model_field
+        }
+
+        impl<T: Real> AllColumns<T> {
+            fn new(geometry: &Geometry<T>) -> Self {
+                Self { input: geometry.check(), fixed: { #fixed }, #model_init }
+            }
+
+            #method
+        }
+    }
+}

@@ -1,0 +1,277 @@
+//! A test that emitted models bring along: do the base parameters hold all of the parameters, and none too many?
+//!
+//! At random states the rows of H and of H_min go into triangles, whose singular values say the ranks; the forces of all
+//! parameters are held against those of the base parameters. There is no allocation here.
+
+use core::fmt;
+
+use crate::{PoseError, Real};
+
+/// A singular value below this share of the largest counts as zero, columns of length 1; forces differ by rounding if by
+/// less than this share of their terms.
+const NOTHING: f64 = 1e-9;
+
+/// Random numbers that are the same on every machine (`SplitMix64`; Steele, Lea and Flood 2014).
+#[derive(Clone, Copy, Debug)]
+pub struct Random(u64);
+
+impl Random {
+    /// A stream that starts from a seed.
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    /// Uniform between two numbers.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^= z >> 31;
+        let unit = (z >> 11) as f64 / (1_u64 << 53) as f64;
+        low + unit * (high - low)
+    }
+
+    /// A number of the same sign and some other size; any where there was none.
+    pub fn near(&mut self, value: f64) -> f64 {
+        let factor = self.between(0.5, 1.5);
+        if value == 0.0 { factor } else { value * factor }
+    }
+}
+
+/// What is wrong with the base parameters of an emitted model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SelfTestError {
+    /// Too few random states around the nominal pose have an answer.
+    TooFewStates {
+        /// How many have one.
+        found: usize,
+        /// How many were asked for.
+        needed: usize,
+        /// Why the last one had none.
+        last: PoseError,
+    },
+    /// The columns of a regressor are not as independent as they should be.
+    Rank {
+        /// Which one: `H` for all products of parameters, or `H_min`.
+        of: &'static str,
+        /// Rank by singular values.
+        found: usize,
+        /// Number of base parameters.
+        expected: usize,
+    },
+    /// Base parameters do not give the forces of all parameters.
+    Forces {
+        /// Which forces: of `H_min p_min`, or of the inverse dynamics.
+        of: &'static str,
+        /// Force by all products of parameters.
+        expected: f64,
+        /// Force by base parameters.
+        found: f64,
+    },
+}
+
+impl fmt::Display for SelfTestError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooFewStates {
+                found,
+                needed,
+                last,
+            } => write!(
+                f,
+                "only {found} of {needed} random states around the nominal pose have an answer; the last one had none \
+                 because {last}"
+            ),
+            Self::Rank {
+                of,
+                found,
+                expected,
+            } => write!(
+                f,
+                "{of} has rank {found} at random states, but the model has {expected} base parameters"
+            ),
+            Self::Forces {
+                of,
+                expected,
+                found,
+            } => write!(
+                f,
+                "{of} is {found} where all parameters together give {expected}"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for SelfTestError {}
+
+/// Shows the rows of H, of H_min, and the force of the inverse dynamics at one random state.
+pub type ShowRows<'a, const N_PRODUCTS: usize, const N_BASE: usize> =
+    dyn FnMut(&[f64; N_PRODUCTS], &[f64; N_BASE], f64) + 'a;
+
+/// Tests base parameters: ranks of H and H_min, and forces by all parameters, by base parameters and by the inverse
+/// dynamics.
+///
+/// `products` and `base` are values of both for one set of parameters. `rows` draws a state, within the given share of
+/// its reach around the nominal pose, and shows the rows of it.
+///
+/// # Errors
+/// What is wrong.
+pub fn self_test<const N_PRODUCTS: usize, const N_BASE: usize>(
+    products: &[f64; N_PRODUCTS],
+    base: &[f64; N_BASE],
+    mut rows: impl FnMut(
+        &mut Random,
+        f64,
+        &mut ShowRows<'_, N_PRODUCTS, N_BASE>,
+    ) -> Result<(), PoseError>,
+) -> Result<(), SelfTestError> {
+    /// How often the reach is halved before states are given up.
+    const HALVINGS: usize = 4;
+    let needed = 2 * N_PRODUCTS + 20;
+    let mut all = Triangle::<N_PRODUCTS>::new();
+    let mut few = Triangle::<N_BASE>::new();
+    let mut random = Random::new(1);
+    let (mut found, mut reach, mut last) = (0, 1.0, PoseError::OutOfReach);
+    let mut worst: Option<SelfTestError> = None;
+    for _ in 0..=HALVINGS {
+        for _ in 0..needed {
+            if found == needed {
+                break;
+            }
+            let shown = rows(&mut random, reach, &mut |h, h_min, force| {
+                all.add(*h);
+                few.add(*h_min);
+                let (expected, size) = sum(h, products);
+                let (reduced, reduced_size) = sum(h_min, base);
+                let limit = NOTHING * (size + reduced_size);
+                for (of, found) in [("H_min p_min", reduced), ("the inverse dynamics", force)] {
+                    // What is no number is wrong too.
+                    let holds = Real::abs(found - expected) <= limit;
+                    if worst.is_none() && !holds {
+                        worst = Some(SelfTestError::Forces {
+                            of,
+                            expected,
+                            found,
+                        });
+                    }
+                }
+            });
+            match shown {
+                Ok(()) => found += 1,
+                Err(error) => last = error,
+            }
+        }
+        reach *= 0.5;
+    }
+    if found < needed {
+        return Err(SelfTestError::TooFewStates {
+            found,
+            needed,
+            last,
+        });
+    }
+    for (of, found) in [("H_min", few.rank()), ("H", all.rank())] {
+        if found != N_BASE {
+            return Err(SelfTestError::Rank {
+                of,
+                found,
+                expected: N_BASE,
+            });
+        }
+    }
+    worst.map_or(Ok(()), Err)
+}
+
+/// A row times a column, and the sum of the magnitudes of its terms.
+fn sum<const N: usize>(row: &[f64; N], column: &[f64; N]) -> (f64, f64) {
+    let terms = row.iter().zip(column).map(|(a, b)| a * b);
+    terms.fold((0.0, 0.0), |(sum, size), term| {
+        (sum + term, size + Real::abs(term))
+    })
+}
+
+/// The triangle of a QR factorisation that takes row after row by rotations (Givens 1958).
+struct Triangle<const N: usize>([[f64; N]; N]);
+
+impl<const N: usize> Triangle<N> {
+    fn new() -> Self {
+        Self([[0.0; N]; N])
+    }
+
+    fn add(&mut self, mut row: [f64; N]) {
+        for (k, own) in self.0.iter_mut().enumerate() {
+            let (Some(a), Some(b)) = (own.get(k).copied(), row.get(k).copied()) else {
+                return;
+            };
+            if b == 0.0 {
+                continue;
+            }
+            let length = Real::sqrt(a * a + b * b);
+            let (c, s) = (a / length, b / length);
+            for (x, y) in own.iter_mut().zip(&mut row) {
+                (*x, *y) = (c * *x + s * *y, c * *y - s * *x);
+            }
+        }
+    }
+
+    /// How many singular values are not zero, with all columns of length 1 (one-sided rotations; Hestenes 1958).
+    fn rank(mut self) -> usize {
+        const SWEEPS: usize = 30;
+        const ROUNDING: f64 = 1e-15;
+        // Columns as rows, so that two of them can be turned into each other.
+        let mut columns = [[0.0; N]; N];
+        for (i, row) in self.0.iter_mut().enumerate() {
+            for (column, x) in columns.iter_mut().zip(row) {
+                if let Some(slot) = column.get_mut(i) {
+                    *slot = *x;
+                }
+            }
+        }
+        for column in &mut columns {
+            let length = Real::sqrt(dot(column, column));
+            if length > 0.0 {
+                for x in column {
+                    *x /= length;
+                }
+            }
+        }
+        for _ in 0..SWEEPS {
+            let mut turned = false;
+            for q in 1..N {
+                let (before, behind) = columns.split_at_mut(q);
+                let Some(second) = behind.first_mut() else {
+                    continue;
+                };
+                for first in before {
+                    let (a, b, mixed) =
+                        (dot(first, first), dot(second, second), dot(first, second));
+                    if Real::abs(mixed) <= ROUNDING * Real::sqrt(a * b) || a * b == 0.0 {
+                        continue;
+                    }
+                    turned = true;
+                    let zeta = (b - a) / (2.0 * mixed);
+                    let sign = if zeta < 0.0 { -1.0 } else { 1.0 };
+                    let t = sign / (Real::abs(zeta) + Real::sqrt(1.0 + zeta * zeta));
+                    let c = 1.0 / Real::sqrt(1.0 + t * t);
+                    let s = c * t;
+                    for (x, y) in first.iter_mut().zip(second.iter_mut()) {
+                        (*x, *y) = (c * *x - s * *y, s * *x + c * *y);
+                    }
+                }
+            }
+            if !turned {
+                break;
+            }
+        }
+        let sizes = columns.map(|column| Real::sqrt(dot(&column, &column)));
+        let largest = sizes
+            .iter()
+            .fold(0.0, |m: f64, x| if *x > m { *x } else { m });
+        sizes.iter().filter(|x| **x > NOTHING * largest).count()
+    }
+}
+
+fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    a.iter().zip(b).fold(0.0, |sum, (x, y)| sum + x * y)
+}
