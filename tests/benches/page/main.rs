@@ -186,6 +186,7 @@ fn figures(name: &str, peers: &mut Peers) -> Result<Figures, String> {
             ("one", None, "one state: "),
             ("blocks", None, "blocks: "),
             ("blocks", Some("256"), "blocks, 256 bits: "),
+            ("blocks", Some("none"), "scalar: "),
         ] {
             let mut command: Command = run::itself(&["--measure", name, part]);
             command.envs(vectors.map(|v| ("MODELMILL_VECTORS", v)));

@@ -19,6 +19,7 @@ pub(crate) fn bars(panda: &Figures) -> String {
             ("blocks", "modelmill, blocks"),
             ("blocks, 256 bits", "modelmill, 256 bits"),
             ("one state", "modelmill, one state"),
+            ("scalar", "modelmill, scalar"),
         ];
         let peers = GENERATORS.iter().copied().chain(["Pinocchio"]);
         let all = ours.into_iter().chain(peers.map(|p| (p, p)));

@@ -103,9 +103,9 @@ impl Figures {
         ratio(self.time(who, function), self.time("one state", function))
     }
 
-    /// How many times faster than one state at a time.
-    fn faster(&self, who: &str, function: &str) -> Option<f64> {
-        ratio(self.time("one state", function), self.time(who, function))
+    /// How many times faster blocks are than another way of our own.
+    fn faster(&self, who: &str, than: &str, function: &str) -> Option<f64> {
+        ratio(self.time(than, function), self.time(who, function))
     }
 
     /// A peer's cell: a ratio, or why there is none.
@@ -153,13 +153,17 @@ fn headline(page: &mut String, all: &[Figures]) {
             "the fastest generated peer ({name}) takes {r:.2} times as long"
         ));
     }
-    if let (Some(a), Some(b)) = (
-        panda.faster("blocks", f),
-        panda.faster("blocks, 256 bits", f),
-    ) {
-        lines.push(format!(
-            "blocks of states are {a:.1} times faster per state, {b:.1} times in vectors of 256 bits"
-        ));
+    for (function, what) in [(f, "inverse dynamics"), ("regressor", "the regressor")] {
+        if let (Some(a), Some(b), Some(one)) = (
+            panda.faster("blocks", "scalar", function),
+            panda.faster("blocks, 256 bits", "scalar", function),
+            panda.faster("blocks", "one state", function),
+        ) {
+            lines.push(format!(
+                "{what} in blocks takes {a:.1} times less time per state than in scalar instructions, {b:.1} times in \
+                 vectors of 256 bits; {one:.1} times less than one state at a time, whose sines and cosines come in pairs"
+            ));
+        }
     }
     if let Some(ms) = panda.generation.get("all") {
         lines.push(format!(
@@ -298,21 +302,33 @@ fn generation(page: &mut String, all: &[Figures], peers: &Peers) {
 fn run_time(page: &mut String, all: &[Figures], peers: &Peers) {
     page.push_str(
         "## Run time\n\n\
-         Nanoseconds per state, one state at a time; how many times faster blocks are per state, in the widest vectors of this machine and in 256 bits; and how many times longer peers take.\n\n\
+         Nanoseconds per state: one state at a time, whose sines and cosines come in pairs; many states in scalar instructions, one number at a time; in blocks of the widest vectors of this machine and of 256 bits. How many times faster than in scalar instructions blocks are; and how many times longer than one state peers take.\n\n\
          Inverse dynamics:\n\n",
     );
     let rows = |function: &'static str, who: Vec<&'static str>| {
         all.iter().map(move |f| {
-            let ns = f.time("one state", function);
-            let ns = ns.map_or_else(|| "-".to_owned(), |ns| format!("{ns:.1}"));
-            let mut cells = vec![f.name.clone(), ns];
-            cells.push(times(f.faster("blocks", function)));
-            cells.push(times(f.faster("blocks, 256 bits", function)));
+            let mut cells = vec![f.name.clone()];
+            cells.extend(
+                ["one state", "scalar", "blocks", "blocks, 256 bits"].map(|who| {
+                    let ns = f.time(who, function);
+                    ns.map_or_else(|| "-".to_owned(), |ns| format!("{ns:.1}"))
+                }),
+            );
+            cells.push(times(f.faster("blocks", "scalar", function)));
+            cells.push(times(f.faster("blocks, 256 bits", "scalar", function)));
             cells.extend(who.iter().map(|w| f.peer(f.longer(w, function), w, peers)));
             cells
         })
     };
-    let ours = ["model", "ns", "blocks", "blocks, 256 bits"];
+    let ours = [
+        "model",
+        "one state",
+        "scalar",
+        "blocks",
+        "256 bits",
+        "scalar / blocks",
+        "scalar / 256 bits",
+    ];
     let who: Vec<&str> = std::iter::once("Pinocchio").chain(GENERATORS).collect();
     let headings: Vec<&str> = ours.into_iter().chain(who.iter().copied()).collect();
     table(page, &headings, rows("inverse dynamics", who));
