@@ -29,6 +29,7 @@ pub mod review;
 mod rod;
 mod solvable;
 mod spatial;
+mod square;
 mod torn;
 mod tree;
 mod vector;

@@ -21,8 +21,11 @@ use std::collections::BTreeSet;
 use modelmill_spec::Mechanism;
 
 pub(crate) use branches::closed_form;
+pub(crate) use eliminate::null_space;
+pub(crate) use lift::lift;
 pub(crate) use plan::Plan;
 pub use rational_function::{Polynomial, Powers, RationalFunction, Variable};
+pub(crate) use univariate::interpolate;
 
 use crate::DeriveError;
 use crate::exact::Monomial;
