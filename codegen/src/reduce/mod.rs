@@ -14,6 +14,7 @@ mod print;
 mod rational_function;
 mod reconstruct;
 mod sample;
+mod support;
 mod univariate;
 
 use std::collections::BTreeSet;
