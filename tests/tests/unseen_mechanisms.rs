@@ -46,7 +46,8 @@ ranks! {
         "pantograph" => 8, "parallelogram_with_tool" => 6, "double_parallelogram" => 6,
         "palletizer" => 25;
     planar_bodies_wherever_gravity_points:
-        "four_bar_tilted" => 8, "four_bar_in_a_horizontal_plane" => 4, "four_bar_isosceles" => 8;
+        "four_bar_tilted" => 8, "four_bar_in_a_horizontal_plane" => 4, "four_bar_isosceles" => 8,
+        "antiparallelogram" => 8, "deltoid" => 8;
     planar_platforms:
         "three_prr" => 13, "three_prr_tied_by_drives" => 7, "three_rpr_tied" => 9,
         "three_rpr_by_drives" => 19, "three_rrr_by_drives" => 19, "five_bar_prismatic" => 7;
@@ -58,11 +59,14 @@ ranks! {
         "linear_delta" => 28, "linear_delta_tied" => 10, "delta_ia" => 34, "orthoglide" => 27,
         "tripteron" => 16, "tripteron_by_drives" => 16, "delta_wrist" => 37;
     spherical_platforms: "agile_eye" => 31, "agile_eye_by_drives" => 31;
-    platforms_of_six_freedoms: "six_pus" => 64, "ups_by_lengths" => 88, "six_rus_by_drives" => 21;
+    platforms_of_six_freedoms:
+        "six_pus" => 64, "ups_by_lengths" => 88, "six_rus_by_drives" => 21,
+        "stewart_3_3_octahedral" => 82;
     arms_with_drive_inertia_and_gravity_anywhere:
         "ur5_ia" => 40, "ur5_horizontal" => 38, "ur5_tilted" => 38, "gen3" => 43, "iiwa_ia" => 48;
     arms_with_special_angles_and_links_alike:
-        "arm_45" => 22, "arm_30_60" => 15, "arm_decimals" => 22, "arm_tied" => 11, "skew_arm" => 22;
+        "arm_45" => 22, "arm_30_60" => 15, "arm_decimals" => 22, "arm_tied" => 11,
+        "skew_arm" => 22, "skew_arm_6" => 36;
     legs_and_arms_on_bases_that_move:
         "go2_leg" => 18, "floating_leg" => 31, "quadruped" => 94, "mobile_arm" => 21,
         "gantry" => 14;

@@ -70,9 +70,9 @@ fn of(powers: &Powers, variables: &[Occurrence]) -> Powers {
     let is_in = |variable: &Variable| match variable {
         Variable::Constant(i) => variables.contains(&(*i, false)),
         Variable::Cos(i) | Variable::Sin(i) => variables.contains(&(*i, true)),
-        _ => true,
+        Variable::Root(_) => true,
     };
-    powers.iter().filter(|(v, _)| is_in(v)).cloned().collect()
+    powers.iter().filter(|(v, _)| is_in(v)).copied().collect()
 }
 
 /// The origin with some constants drawn anew.
