@@ -8,6 +8,7 @@ use std::collections::BTreeSet;
 use crate::closure::{Closure, Leg, coordinates_of};
 use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational};
 use crate::linear_loops::Relation;
+use crate::square;
 
 /// What a dyad yields.
 #[derive(Clone, Debug)]
@@ -29,6 +30,8 @@ pub(crate) struct Root {
     pub(crate) radicand: ExprId,
     /// An expression of the coordinates that equals the signed root.
     pub(crate) witness: ExprId,
+    /// The function that the root is, if it needs no root sign: the two modes are then two motions, each by itself.
+    pub(crate) whole: Option<ExprId>,
 }
 
 /// The vectors that turn with one set of unknown angles, as one vector in a frame turned by `angle`.
@@ -183,9 +186,12 @@ fn direction(
     [graph.mul(along, inverse), graph.mul(across, inverse)]
 }
 
-fn signed(graph: &mut Graph, radicand: ExprId, positive: bool) -> ExprId {
-    let root = graph.unary(crate::expr::Unary::Sqrt, radicand);
+fn signed(graph: &mut Graph, root: ExprId, positive: bool) -> ExprId {
     if positive { root } else { graph.neg(root) }
+}
+
+fn root_of(graph: &mut Graph, radicand: ExprId) -> ExprId {
+    graph.unary(crate::expr::Unary::Sqrt, radicand)
 }
 
 /// `known + v1 + v2 = 0`, both of known length: `v1 = alpha d + beta d'`, with `d = -known` and `d'` normal to it.
@@ -210,7 +216,17 @@ fn two_circles(
     let alpha = graph.combine([(one_half, Rational::ONE), (ratio, half)]);
     let (square, alpha_square) = (graph.mul(aa, inverse), graph.mul(alpha, alpha));
     let radicand = graph.sub(square, alpha_square);
-    let beta = signed(graph, radicand, positive);
+    // 4 d^4 beta^2 = 4 a^2 d^2 - (d^2 + a^2 - b^2)^2, sixteen times the square of the triangle's area
+    let sum = graph.add(dd, difference);
+    let (four, square_of_sum) = (graph.mul(aa, dd), graph.mul(sum, sum));
+    let four = graph.scale(four, &Rational::integer(4));
+    let area = graph.sub(four, square_of_sum);
+    let whole = square::exact_root(graph, area).map(|root| {
+        let root = graph.mul(root, inverse);
+        graph.scale(root, &Rational::new(1, 2))
+    });
+    let root = whole.unwrap_or_else(|| root_of(graph, radicand));
+    let beta = signed(graph, root, positive);
     let normal = [graph.neg(d[1]), d[0]];
     let v1: [ExprId; 2] = std::array::from_fn(|i| {
         let (x, y) = (graph.mul(alpha, d[i]), graph.mul(beta, normal[i]));
@@ -231,7 +247,11 @@ fn two_circles(
         ],
         relations: Vec::new(),
         lengths: Vec::new(),
-        root: Some(Root { radicand, witness }),
+        root: Some(Root {
+            radicand,
+            witness,
+            whole,
+        }),
     })
 }
 
@@ -273,13 +293,20 @@ fn circle_and_line(
         let (square, product) = (graph.mul(q, q), graph.mul(p, r));
         let difference = graph.sub(square, product);
         let radicand = graph.mul(difference, inverse);
-        let root = signed(graph, radicand, positive);
+        let whole = square::exact_root(graph, difference).map(|root| graph.div(root, one));
+        let root = whole.unwrap_or_else(|| root_of(graph, radicand));
+        let root = signed(graph, root, positive);
         let root_of_length = graph.mul(root, one);
         let numerator = graph.sub(root_of_length, q);
         let linear = graph.mul(p, at);
         let sum = graph.add(linear, q);
         let witness = graph.div(sum, one);
-        (graph.div(numerator, p), Some(Root { radicand, witness }))
+        let root = Root {
+            radicand,
+            witness,
+            whole,
+        };
+        (graph.div(numerator, p), Some(root))
     };
     let put = |graph: &mut Graph, v0: [ExprId; 2], v1: [ExprId; 2]| -> [ExprId; 2] {
         std::array::from_fn(|i| {

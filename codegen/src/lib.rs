@@ -31,6 +31,7 @@ mod rod;
 mod self_test;
 mod solvable;
 mod spatial;
+mod square;
 mod torn;
 mod tree;
 mod vector;

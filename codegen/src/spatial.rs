@@ -15,6 +15,7 @@ use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Node, Rational, Tap
 use crate::field::{Element, Stream};
 use crate::magnitude;
 use crate::programs::nominal_value;
+use crate::square;
 use crate::tree::Tree;
 use crate::vector::{Turn, push_turn};
 
@@ -262,7 +263,13 @@ impl Circular {
         if is_zero(graph, radicand) || !is_regular(graph, mechanism, arm) {
             return None;
         }
-        let root = signed_root(graph, mechanism, radicand, witness)?;
+        let (root, branch) = signed_root(graph, mechanism, radicand, witness)?;
+        if branch.is_none() && rest == Graph::ZERO {
+            // Then the arm is the square of the root.
+            let minus = graph.neg(sine);
+            let angle = [graph.div(minus, root), graph.div(cosine, root)];
+            return Some(of_angle(coordinate, angle));
+        }
         // cos q = -(cosine rest + sine r) / arm, sin q = (cosine r - sine rest) / arm
         let quotient = |graph: &mut Graph, terms: [(ExprId, ExprId, i64); 2]| {
             let terms = terms.map(|(x, y, sign)| (graph.mul(x, y), Rational::integer(sign)));
@@ -274,7 +281,7 @@ impl Circular {
             quotient(graph, [(cosine, root, 1), (sine, rest, -1)]),
         ];
         Some(Solved {
-            root: Some(Root { radicand, witness }),
+            root: branch,
             ..of_angle(coordinate, angle)
         })
     }
@@ -354,27 +361,39 @@ fn slide(
     let at = graph.atom(atom);
     let linear = graph.mul(p, at);
     let witness = graph.add(linear, q);
-    let root = signed_root(graph, mechanism, radicand, witness)?;
+    let (root, branch) = signed_root(graph, mechanism, radicand, witness)?;
     let numerator = graph.sub(root, q);
     Some(Solved {
-        root: Some(Root { radicand, witness }),
+        root: branch,
         ..length(graph.div(numerator, p))
     })
 }
 
 /// The root with the sign of its witness at the nominal pose; `None` if it vanishes there.
+///
+/// Where the radicand is the square of a polynomial, that polynomial is the root and there is no other branch.
 fn signed_root(
     graph: &mut Graph,
     mechanism: &Mechanism,
     radicand: ExprId,
     witness: ExprId,
-) -> Option<ExprId> {
+) -> Option<(ExprId, Option<Root>)> {
     if !is_regular(graph, mechanism, witness) {
         return None;
     }
-    let root = graph.unary(Unary::Sqrt, radicand);
-    let positive = nominal_value(graph, mechanism, witness)? > 0.0;
-    Some(if positive { root } else { graph.neg(root) })
+    let whole = square::exact_root(graph, radicand);
+    let root = whole.unwrap_or_else(|| graph.unary(Unary::Sqrt, radicand));
+    let mut sign = nominal_value(graph, mechanism, witness)?;
+    if let Some(whole) = whole {
+        sign *= nominal_value(graph, mechanism, whole)?;
+    }
+    let signed = if sign > 0.0 { root } else { graph.neg(root) };
+    let branch = Root {
+        radicand,
+        witness,
+        whole,
+    };
+    Some((signed, whole.is_none().then_some(branch)))
 }
 
 /// Whether an expression can be divided by at the nominal pose.

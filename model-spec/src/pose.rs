@@ -139,6 +139,48 @@ fn close_loops(mechanism: &mut Mechanism, places: &Places, log: &mut Log) -> boo
         .iter()
         .map(|&i| mechanism.coordinates[i].nominal)
         .collect();
+    let Closing { gaps: now, size } = move_passive(mechanism, &passive);
+    let mut closes = true;
+    for (i, closed) in mechanism.loops.iter().enumerate() {
+        let gap = norm(&now.values[3 * i..3 * i + 3]);
+        // A gap that is no number is no closed loop either.
+        if gap <= CLOSED * size {
+            continue;
+        }
+        closes = false;
+        let [one, other] = closed
+            .joins
+            .map(|point| mechanism.points[point.0].name.as_str());
+        log.push(
+            Diagnostic::error(
+                places.loops[i],
+                format!("the loop `{}` does not close at the nominal pose", closed.name),
+            )
+            .label(format!("`{one}` and `{other}` stay {gap:.3} m apart"))
+            .help("check the lengths, and the nominal values of the coordinates of both chains")
+            .help("the values of passive coordinates are only a start: they are moved until the loops close, those of active ones stay"),
+        );
+    }
+    closes && check_same_assembly(mechanism, &passive, &given, size, places, log)
+}
+
+/// What is left of the gaps when they are as small as the passive coordinates can make them.
+struct Closing {
+    gaps: Gaps,
+    /// The size of the mechanism where it started.
+    size: f64,
+}
+
+impl Closing {
+    /// Whether all loops close.
+    fn is_closed(&self) -> bool {
+        let mut loops = self.gaps.values.chunks(3);
+        loops.all(|gap| norm(gap) <= CLOSED * self.size)
+    }
+}
+
+/// Moves the passive coordinates until the loops close as well as they can.
+fn move_passive(mechanism: &mut Mechanism, passive: &[usize]) -> Closing {
     let at_start = gaps(mechanism);
     let size = at_start.size.max(1e-6);
     let mut now = at_start;
@@ -173,28 +215,7 @@ fn close_loops(mechanism: &mut Mechanism, places: &Places, log: &mut Log) -> boo
             }
         }
     }
-    let mut closes = true;
-    for (i, closed) in mechanism.loops.iter().enumerate() {
-        let gap = norm(&now.values[3 * i..3 * i + 3]);
-        // A gap that is no number is no closed loop either.
-        if gap <= CLOSED * size {
-            continue;
-        }
-        closes = false;
-        let [one, other] = closed
-            .joins
-            .map(|point| mechanism.points[point.0].name.as_str());
-        log.push(
-            Diagnostic::error(
-                places.loops[i],
-                format!("the loop `{}` does not close at the nominal pose", closed.name),
-            )
-            .label(format!("`{one}` and `{other}` stay {gap:.3} m apart"))
-            .help("check the lengths, and the nominal values of the coordinates of both chains")
-            .help("the values of passive coordinates are only a start: they are moved until the loops close, those of active ones stay"),
-        );
-    }
-    closes && check_same_assembly(mechanism, &passive, &given, size, places, log)
+    Closing { gaps: now, size }
 }
 
 fn check_same_assembly(
@@ -255,12 +276,19 @@ fn tied_rows(mechanism: &Mechanism) -> Rows {
 
 /// The loops must not tie more coordinates than are passive.
 fn check_tied(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
-    let n_passive = mechanism
-        .coordinates
-        .iter()
-        .filter(|coordinate| coordinate.passive)
-        .count();
-    let n_equations = rank(&tied_rows(mechanism), SINGULAR);
+    let passive: Vec<usize> = (0..mechanism.coordinates.len())
+        .filter(|&i| mechanism.coordinates[i].passive)
+        .collect();
+    let n_passive = passive.len();
+    let mut n_equations = rank(&tied_rows(mechanism), SINGULAR);
+    if n_equations > n_passive {
+        // Equations that follow from others, as in linkages that move against the count of their freedoms, do so only
+        // where the loops close, and not where nominal values are rounded.
+        let mut closed = mechanism.clone();
+        if move_passive(&mut closed, &passive).is_closed() {
+            n_equations = rank(&tied_rows(&closed), SINGULAR);
+        }
+    }
     if n_equations <= n_passive {
         return true;
     }

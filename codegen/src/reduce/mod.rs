@@ -14,6 +14,7 @@ mod print;
 mod rational_function;
 mod reconstruct;
 mod sample;
+mod support;
 mod univariate;
 
 use std::collections::BTreeSet;
@@ -21,8 +22,11 @@ use std::collections::BTreeSet;
 use modelmill_spec::Mechanism;
 
 pub(crate) use branches::closed_form;
+pub(crate) use eliminate::null_space;
+pub(crate) use lift::lift;
 pub(crate) use plan::Plan;
 pub use rational_function::{Polynomial, Powers, RationalFunction, Variable};
+pub(crate) use univariate::interpolate;
 
 use crate::DeriveError;
 use crate::exact::Monomial;

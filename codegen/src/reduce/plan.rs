@@ -216,11 +216,17 @@ fn solve(
         return Some(single_steps(steps));
     }
     let mut solved = dyad::solve(graph, closure, &unknown, true)?;
-    if let Some(root) = solved.root
-        && nominal_value(graph, mechanism, root.witness).is_some_and(|x| x < 0.0)
-    {
-        solved = dyad::solve(graph, closure, &unknown, false)?;
+    if let Some(root) = solved.root {
+        let mut sign = nominal_value(graph, mechanism, root.witness).unwrap_or(1.0);
+        if let Some(whole) = root.whole {
+            sign *= nominal_value(graph, mechanism, whole).unwrap_or(1.0);
+        }
+        if sign < 0.0 {
+            solved = dyad::solve(graph, closure, &unknown, false)?;
+        }
     }
+    // A root that is none can neither fail to exist nor choose between what hangs together.
+    solved.root = solved.root.filter(|root| root.whole.is_none());
     Some(vec![PlanStep { unknown, solved }])
 }
 

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use super::eliminate;
 use super::lift::lift;
 use super::rational_function::{Polynomial, Powers, RationalFunction, Variable, monomial_value};
+use super::support::support;
 use super::univariate;
 use crate::DeriveError;
 use crate::expr::{Atom, FieldPoint, Rational};
@@ -59,7 +60,14 @@ pub(crate) fn reconstruct<O: Oracle>(
     let mut fields = Fields::new();
     let mut found = Vec::with_capacity(n);
     for shape in &shape {
-        found.push(shape.fit(&mut fields, oracle, found.len(), roots, stream)?);
+        let function = shape.fit(&mut fields, oracle, &origin, found.len(), roots, stream)?;
+        let resists = function.is_none();
+        found.push(function);
+        if resists {
+            // One that resists is enough: what the others are would not be used.
+            found.resize(n, None);
+            break;
+        }
     }
     Ok(found)
 }
@@ -304,6 +312,7 @@ impl Shape {
         &self,
         fields: &mut Fields<O>,
         oracle: &mut O,
+        origin: &FieldPoint,
         function: usize,
         roots: &[i64],
         stream: &mut Stream,
@@ -344,15 +353,32 @@ impl Shape {
             attempts.extend((0..=angle_degree).map(|d| (d, true)));
         }
         for (angle_in_denominator, roots_in_denominator) in attempts {
-            let numerator = with_roots(self.monomials(true, angle_degree));
+            let mut numerator = with_roots(self.monomials(true, angle_degree));
             let mut denominator = self.monomials(false, angle_in_denominator);
             if roots_in_denominator {
                 denominator = with_roots(denominator);
             }
-            let unknowns = numerator.len() + denominator.len();
-            if unknowns > MOST_UNKNOWNS {
-                continue;
+            if numerator.len() + denominator.len() > MOST_UNKNOWNS {
+                // Most of so many have no coefficient. Roots have a sign of their own at every point, so that no
+                // place stays the same for them.
+                if !roots.is_empty() {
+                    continue;
+                }
+                let variables: Vec<Occurrence> = self.degrees.keys().copied().collect();
+                let all = [numerator.as_slice(), denominator.as_slice()];
+                let found = support(
+                    oracle,
+                    origin,
+                    function,
+                    &variables,
+                    all,
+                    MOST_UNKNOWNS,
+                    stream,
+                )?;
+                let Some(found) = found else { continue };
+                [numerator, denominator] = found;
             }
+            let unknowns = numerator.len() + denominator.len();
             // Roots take either sign by chance; every combination of signs must come up.
             let n_points = unknowns + 4 + 20 * (root_powers.len() - 1);
             let ansatz = Ansatz {

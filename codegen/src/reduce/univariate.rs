@@ -82,8 +82,8 @@ fn divide(a: &[Element], b: &[Element]) -> (Vec<Element>, Vec<Element>) {
     (quotient, rest)
 }
 
-/// Newton's divided differences.
-fn interpolate(x: &[Element], y: &[Element]) -> Vec<Element> {
+/// The polynomial of least degree through some points, lowest power first, by Newton's divided differences.
+pub(crate) fn interpolate(x: &[Element], y: &[Element]) -> Vec<Element> {
     let n = x.len();
     let mut table = y.to_vec();
     for level in 1..n {

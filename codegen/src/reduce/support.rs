@@ -1,0 +1,96 @@
+//! Which monomials a rational function has, where all that its degrees allow are too many for one linear system.
+//!
+//! Variables are let loose one after the other while the rest stay at a point (Zippel 1979, 1990): a monomial can only
+//! have a coefficient if it had one before with its last variable left away.
+
+use std::collections::BTreeSet;
+
+use super::eliminate;
+use super::rational_function::{Powers, Variable, monomial_value};
+use super::reconstruct::{Occurrence, Oracle};
+use crate::DeriveError;
+use crate::expr::{Atom, FieldPoint};
+use crate::field::{Element, Stream};
+
+/// The monomials of numerator and denominator among those given that have a coefficient at a random place; `None` where
+/// a stage has more unknowns than `most`, or more than one solution.
+pub(super) fn support<O: Oracle>(
+    oracle: &mut O,
+    origin: &FieldPoint,
+    function: usize,
+    variables: &[Occurrence],
+    [numerator, denominator]: [&[Powers]; 2],
+    most: usize,
+    stream: &mut Stream,
+) -> Result<Option<[Vec<Powers>; 2]>, DeriveError> {
+    /// Equations beyond the unknowns: they show that the ansatz holds.
+    const MORE: usize = 4;
+    let mut kept: [BTreeSet<Powers>; 2] = [0, 1].map(|_| BTreeSet::from([Powers::new()]));
+    for n in 1..=variables.len() {
+        let loose = &variables[..n];
+        let [top, bottom] = [(numerator, &kept[0]), (denominator, &kept[1])].map(|(all, kept)| {
+            let candidates: BTreeSet<Powers> = all
+                .iter()
+                .filter(|m| kept.contains(&of(m, &variables[..n - 1])))
+                .map(|m| of(m, loose))
+                .collect();
+            candidates.into_iter().collect::<Vec<Powers>>()
+        });
+        let unknowns = top.len() + bottom.len();
+        if unknowns > most {
+            return Ok(None);
+        }
+        let mut rows = Vec::with_capacity(unknowns + MORE);
+        while rows.len() < unknowns + MORE {
+            let point = loosened(oracle, origin, loose, stream)?;
+            let value = oracle.values(&point)?[function];
+            let row: Option<Vec<Element>> = (top.iter().map(|m| monomial_value(m, &point)))
+                .chain((bottom.iter()).map(|m| monomial_value(m, &point).map(|x| -(x * value))))
+                .collect();
+            let Some(row) = row else { return Ok(None) };
+            rows.push(row);
+        }
+        let solutions = eliminate::null_space(rows, unknowns);
+        let [solution] = solutions.as_slice() else {
+            return Ok(None);
+        };
+        let felt = |monomials: &[Powers], factors: &[Element]| -> BTreeSet<Powers> {
+            let pairs = monomials.iter().zip(factors);
+            let felt = pairs.filter(|(_, x)| **x != Element::ZERO);
+            felt.map(|(m, _)| m.clone()).collect()
+        };
+        let (above, below) = solution.split_at(top.len());
+        kept = [felt(&top, above), felt(&bottom, below)];
+    }
+    Ok(Some(kept.map(|set| set.into_iter().collect())))
+}
+
+/// What a monomial is of some variables alone.
+fn of(powers: &Powers, variables: &[Occurrence]) -> Powers {
+    let is_in = |variable: &Variable| match variable {
+        Variable::Constant(i) => variables.contains(&(*i, false)),
+        Variable::Cos(i) | Variable::Sin(i) => variables.contains(&(*i, true)),
+        Variable::Root(_) => true,
+    };
+    powers.iter().filter(|(v, _)| is_in(v)).copied().collect()
+}
+
+/// The origin with some constants drawn anew.
+fn loosened<O: Oracle>(
+    oracle: &O,
+    origin: &FieldPoint,
+    loose: &[Occurrence],
+    stream: &mut Stream,
+) -> Result<FieldPoint, DeriveError> {
+    let fresh: FieldPoint = oracle.constants(stream)?;
+    let mut point = origin.clone();
+    for (index, in_angle) in loose {
+        let atom = Atom::Constant(*index);
+        if *in_angle {
+            point.angles.insert(atom, fresh.angles[&atom]);
+        } else {
+            point.values.insert(atom, fresh.values[&atom]);
+        }
+    }
+    Ok(point)
+}

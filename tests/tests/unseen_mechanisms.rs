@@ -1,0 +1,106 @@
+//! Mechanisms that no bundled model resembles, against the number of base parameters that an independent numeric program
+//! gives: `fixtures/judged/judge.py`, which shares neither files nor code with the mill. It describes each mechanism
+//! once, moves its bodies in floating point, and writes the model file as a user would, from the format's description.
+
+use modelmill_codegen::Method;
+use modelmill_spec::Mechanism;
+use modelmill_tests::fixtures::{derive, fixtures};
+use modelmill_tests::laws::{ACCURACY, Case};
+
+fn judged(name: &str) -> Mechanism {
+    let file = fixtures().join("judged").join(format!("{name}.toml"));
+    match modelmill_spec::load_file(&file) {
+        Ok(loaded) => loaded.mechanism,
+        Err(failure) => panic!("{name}: {}", failure.render(false)),
+    }
+}
+
+/// The reduction has the judge's rank, and its factors come in symbols.
+#[track_caller]
+fn check(name: &str, rank: usize) {
+    let reduction = derive(&judged(name)).reduction;
+    assert_eq!(reduction.retained.len(), rank, "{name}");
+    assert!(
+        matches!(reduction.method, Method::Exact { .. }),
+        "{name}: {:?}",
+        reduction.method
+    );
+}
+
+macro_rules! ranks {
+    ($($test:ident: $($name:literal => $rank:literal),+;)+) => {
+        $(#[test]
+        fn $test() {
+            $(check($name, $rank);)+
+        })+
+    };
+}
+
+ranks! {
+    six_bars_and_legs_of_walkers:
+        "watt" => 13, "stephenson" => 13, "stephenson_cranked_at_the_dyad" => 13, "jansen" => 18,
+        "klann" => 13;
+    slides_and_slotted_levers:
+        "scott_russell" => 5, "whitworth" => 11, "inverted_slider_crank" => 8;
+    parallelograms_that_carry_more:
+        "pantograph" => 8, "parallelogram_with_tool" => 6, "double_parallelogram" => 6,
+        "palletizer" => 25;
+    planar_bodies_wherever_gravity_points:
+        "four_bar_tilted" => 8, "four_bar_in_a_horizontal_plane" => 4, "four_bar_isosceles" => 8,
+        "antiparallelogram" => 8, "deltoid" => 8;
+    planar_platforms:
+        "three_prr" => 13, "three_prr_tied_by_drives" => 7, "three_rpr_tied" => 9,
+        "three_rpr_by_drives" => 19, "three_rrr_by_drives" => 19, "five_bar_prismatic" => 7;
+    spatial_linkages_of_one_freedom: "rssr" => 12, "rscr" => 12, "hooke" => 9;
+    bennetts_linkage_moves_against_the_count_of_its_freedoms: "bennett" => 7;
+    platforms_on_three_legs_in_planes: "three_rrs_tied" => 15, "three_rrs_by_pose" => 25;
+    platforms_on_three_legs_with_universal_joints: "two_rru_rrs" => 25;
+    platforms_that_only_translate:
+        "linear_delta" => 28, "linear_delta_tied" => 10, "delta_ia" => 34, "orthoglide" => 27,
+        "tripteron" => 16, "tripteron_by_drives" => 16, "delta_wrist" => 37;
+    spherical_platforms: "agile_eye" => 31, "agile_eye_by_drives" => 31;
+    platforms_of_six_freedoms:
+        "six_pus" => 64, "ups_by_lengths" => 88, "six_rus_by_drives" => 21,
+        "stewart_3_3_octahedral" => 82;
+    arms_with_drive_inertia_and_gravity_anywhere:
+        "ur5_ia" => 40, "ur5_horizontal" => 38, "ur5_tilted" => 38, "gen3" => 43, "iiwa_ia" => 48;
+    arms_with_special_angles_and_links_alike:
+        "arm_45" => 22, "arm_30_60" => 15, "arm_decimals" => 22, "arm_tied" => 11,
+        "skew_arm" => 22, "skew_arm_6" => 36;
+    legs_and_arms_on_bases_that_move:
+        "go2_leg" => 18, "floating_leg" => 31, "quadruped" => 94, "mobile_arm" => 21,
+        "gantry" => 14;
+}
+
+/// What has no symbolic form yet has the right number all the same, and says that its factors are numbers.
+#[test]
+fn numeric_reductions_have_the_rank_of_the_judge() {
+    for (name, rank) in [("rssp", 4), ("two_prs_psr", 23)] {
+        let reduction = derive(&judged(name)).reduction;
+        assert_eq!(reduction.retained.len(), rank, "{name}");
+        assert!(matches!(reduction.method, Method::Numeric { .. }), "{name}");
+    }
+}
+
+/// Forces with nominal parameters are those of d'Alembert's principle, and loops stay closed, where the root of a loop
+/// needs no root sign and where a loop has equations that follow from others.
+#[test]
+fn forces_are_those_of_the_bodies() {
+    for name in ["scott_russell", "hooke", "three_rrs_by_pose", "rscr"] {
+        let mut mechanism = judged(name);
+        for (i, parameter) in mechanism.parameters.iter_mut().enumerate() {
+            if parameter.nominal == 0.0 {
+                parameter.nominal = 0.3 + 0.07 * i as f64;
+            }
+        }
+        let case = Case::near_nominal(&mechanism, 60, 0.2).unwrap();
+        for error in [
+            case.forces_satisfy_dalembert(10),
+            case.loops_stay_closed(),
+            case.reduction_keeps_the_forces(),
+        ] {
+            let error = error.unwrap();
+            assert!(error < 100.0 * ACCURACY, "{name}: {error:.1e}");
+        }
+    }
+}
