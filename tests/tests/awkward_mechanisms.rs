@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use modelmill_codegen::{Evaluator, Method, PassivePosition, States};
+use modelmill_codegen::{DeriveError, Evaluator, Method, PassivePosition, States};
 use modelmill_spec::{DriveKind, FrameIdx, Mechanism, PointIdx};
 use modelmill_tests::fixtures::{derive, fixtures, model};
 use modelmill_tests::laws::Case;
