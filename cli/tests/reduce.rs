@@ -62,14 +62,22 @@ fn what_a_plan_leaves_out_has_its_price() {
     assert!((1e-3..0.3).contains(&price), "{price}");
 }
 
+/// Cranks side by side close more loops than the robot needs: equations that follow from others are left out, and the
+/// model of all bodies has the rig's forces.
+#[test]
+fn a_rig_with_redundant_loops_needs_no_plan() {
+    let out = scratch("unplanned.toml");
+    let rig = rigs("spidermill-full.toml");
+    let told = json(&["reduce", &rig, "--out", &out, "--json"]);
+    for drive in 0..2 {
+        let price = number(&told, &format!("/forces/{drive}/nrms"));
+        assert!(price < 1e-9, "{price}");
+    }
+}
+
 #[test]
 fn faults_of_a_reduction_are_said() {
     let out = scratch("never-reduced.toml");
-    let says = refused(1, &["reduce", &rigs("spidermill-full.toml"), "--out", &out]);
-    assert!(
-        says.contains("--plan") && says.contains("redundant"),
-        "{says}"
-    );
     let says = refused(1, &["reduce", "no/such.toml", "--out", &out]);
     assert!(says.contains("no/such.toml"), "{says}");
     let plan = rigs("spidermill-plan.toml");
