@@ -81,13 +81,13 @@ fn asked_models() -> String {
         match mechanism.name.as_str() {
             "five_bar" => {
                 let mut other = derivation;
-                other.mechanism.name = "five_bar_without_a_term".to_owned();
+                "five_bar_without_a_term".clone_into(&mut other.mechanism.name);
                 without_a_term(&mut other);
                 add(&other);
             }
             "panda" => {
                 let mut other = derivation;
-                other.mechanism.name = "panda_with_a_column_twice".to_owned();
+                "panda_with_a_column_twice".clone_into(&mut other.mechanism.name);
                 // The last column is that of the one before it.
                 let outputs = &mut other.programs.regressor.outputs;
                 let n_base = other.reduction.retained.len();

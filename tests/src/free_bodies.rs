@@ -113,22 +113,58 @@ fn rods(
     forces
 }
 
+/// Velocity and rate of turn of a frame.
+type Twist = (Vector3<f64>, Vector3<f64>);
+
+/// Twists of all frames for each coordinate by itself.
+fn unit_twists(numbers: &Numbers<'_>, motion: &[Jet]) -> Vec<Vec<Twist>> {
+    let of_one = |i: usize| {
+        let one = motion.iter().enumerate();
+        let one: Vec<Jet> = one
+            .map(|(k, q)| Jet([q.0[0], f64::from(u8::from(k == i)), 0.0]))
+            .collect();
+        let moved = numbers.motions(&one);
+        moved.iter().map(|[x, v, _]| twist(v, x)).collect()
+    };
+    (0..motion.len()).map(of_one).collect()
+}
+
+/// Equations of the joints, below those of the frames: along its own motion a joint supplies what its drive does, less what
+/// effects take.
+fn joints_give_way(
+    mechanism: &Mechanism,
+    twists: &[Vec<Twist>],
+    effects: &[f64],
+    drives: usize,
+    matrix: &mut DMatrix<f64>,
+    needed: &mut DVector<f64>,
+) {
+    let n_frames = mechanism.frames.len();
+    for (i, twists) in twists.iter().enumerate() {
+        let r = 6 * (n_frames - 1) + i;
+        for frame in 1..n_frames {
+            let (v, omega) = twists[frame];
+            let (vp, omega_p) = twists[mechanism.frames[frame].parent.0];
+            for k in 0..3 {
+                matrix[(r, 6 * (frame - 1) + k)] += v[k] - vp[k];
+                matrix[(r, 6 * (frame - 1) + 3 + k)] += omega[k] - omega_p[k];
+            }
+        }
+        needed[r] -= effects[i];
+        for (d, drive) in mechanism.drives.iter().enumerate() {
+            if matches!(drive.kind, DriveKind::Joint(c) if c.0 == i) {
+                matrix[(r, drives + d)] -= 1.0;
+            }
+        }
+    }
+}
+
 impl Balances {
     fn new(mechanism: &Mechanism, numbers: &Numbers<'_>, motion: &[Jet]) -> Self {
         let n = motion.len();
         let n_frames = mechanism.frames.len();
         let poses = numbers.motions(motion);
-        // Twists of all frames for each coordinate by itself.
-        let twists: Vec<Vec<(Vector3<f64>, Vector3<f64>)>> = (0..n)
-            .map(|i| {
-                let one = motion.iter().enumerate();
-                let one: Vec<Jet> = one
-                    .map(|(k, q)| Jet([q.0[0], f64::from(u8::from(k == i)), 0.0]))
-                    .collect();
-                let moved = numbers.motions(&one);
-                moved.iter().map(|[x, v, _]| twist(v, x)).collect()
-            })
-            .collect();
+        let twists = unit_twists(numbers, motion);
         let pins: Vec<Vec<Vector3<f64>>> = mechanism
             .loops
             .iter()
@@ -206,26 +242,15 @@ impl Balances {
                 column += 1;
             }
         }
-        // A joint gives way: along its own motion it supplies what its drive does, less what effects take.
         let effects = numbers.effects_on_joints(motion);
-        for i in 0..n {
-            let r = 6 * (n_frames - 1) + i;
-            for frame in 1..n_frames {
-                let parent = mechanism.frames[frame].parent.0;
-                let (v, omega) = twists[i][frame];
-                let (vp, omega_p) = twists[i][parent];
-                for k in 0..3 {
-                    matrix[(r, 6 * (frame - 1) + k)] += v[k] - vp[k];
-                    matrix[(r, 6 * (frame - 1) + 3 + k)] += omega[k] - omega_p[k];
-                }
-            }
-            needed[r] -= effects[i];
-            for (d, drive) in mechanism.drives.iter().enumerate() {
-                if matches!(drive.kind, DriveKind::Joint(c) if c.0 == i) {
-                    matrix[(r, drives + d)] -= 1.0;
-                }
-            }
-        }
+        joints_give_way(
+            mechanism,
+            &twists,
+            &effects,
+            drives,
+            &mut matrix,
+            &mut needed,
+        );
         Self {
             matrix,
             needed,
