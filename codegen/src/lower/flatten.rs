@@ -1,6 +1,6 @@
 //! Opens nested sums and products that are used only once, so that the passes behind see them whole.
 
-use std::collections::BTreeMap;
+use rustc_hash::FxHashMap;
 
 use super::schedule::fixed_nodes;
 use crate::expr::{ExprId, Graph, Node};
@@ -30,24 +30,34 @@ pub(crate) fn rewrite(
     roots: &[ExprId],
     mut rule: impl FnMut(&mut Graph, ExprId, Node) -> ExprId,
 ) -> Vec<ExprId> {
-    let mut new: BTreeMap<ExprId, ExprId> = BTreeMap::new();
+    let mut new: Vec<Option<ExprId>> = vec![None; graph.len()];
+    let rewritten =
+        |new: &[Option<ExprId>], id: ExprId| new[id.index()].expect("children come first");
     for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
         if !needed {
             continue;
         }
         let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
         let node = match graph.node(id).clone() {
-            Node::Sum(terms) => Node::Sum(terms.into_iter().map(|(c, k)| (new[&c], k)).collect()),
-            Node::Product(factors) => {
-                Node::Product(factors.into_iter().map(|(c, n)| (new[&c], n)).collect())
-            }
-            Node::Unary(f, c) => Node::Unary(f, new[&c]),
+            Node::Sum(terms) => Node::Sum(
+                terms
+                    .into_iter()
+                    .map(|(c, k)| (rewritten(&new, c), k))
+                    .collect(),
+            ),
+            Node::Product(factors) => Node::Product(
+                factors
+                    .into_iter()
+                    .map(|(c, n)| (rewritten(&new, c), n))
+                    .collect(),
+            ),
+            Node::Unary(f, c) => Node::Unary(f, rewritten(&new, c)),
             leaf => leaf,
         };
         let value = rule(graph, id, node);
-        new.insert(id, value);
+        new[i] = Some(value);
     }
-    roots.iter().map(|root| new[root]).collect()
+    roots.iter().map(|root| rewritten(&new, *root)).collect()
 }
 
 /// Builds a node through the smart constructors.
@@ -65,7 +75,7 @@ pub(crate) fn flatten(graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
     let uses = use_counts(graph, roots);
     let fixed = fixed_nodes(graph, roots);
     // The rule sees rewritten operands; how often they were used is known by what they came from.
-    let mut once: BTreeMap<ExprId, bool> = BTreeMap::new();
+    let mut once: FxHashMap<ExprId, bool> = FxHashMap::default();
     rewrite(graph, roots, |graph, id, node| {
         let open = |graph: &Graph, child: ExprId| {
             once.get(&child).copied().unwrap_or(false) && graph.node(child).is_open()

@@ -1,6 +1,8 @@
 //! Shares pairs of terms or factors that several sums or products have in common (Breuer 1969, greedy).
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
+
+use rustc_hash::FxHashMap;
 
 use super::flatten::{rebuild, rewrite};
 use super::schedule::fixed_nodes;
@@ -25,7 +27,7 @@ pub(crate) fn share(graph: &Graph, roots: &[ExprId]) -> (Graph, Vec<ExprId>) {
 }
 
 /// Two operands that stand together: factors, or terms with the ratio of their coefficients.
-#[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 enum Pair {
     Factors(ExprId, ExprId),
     Terms(ExprId, ExprId, Rational),
@@ -83,7 +85,7 @@ fn pairs_of(node: &Node, fixed: &[bool], mut visit: impl FnMut(Pair)) {
 /// Pairs that occur more than once, best first, no operand twice, so that they can be replaced together.
 fn common_pairs(graph: &Graph, roots: &[ExprId]) -> BTreeSet<Pair> {
     let fixed = fixed_nodes(graph, roots);
-    let mut counts: BTreeMap<Pair, usize> = BTreeMap::new();
+    let mut counts: FxHashMap<Pair, usize> = FxHashMap::default();
     for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
         if needed && !fixed[i] {
             let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
@@ -115,34 +117,48 @@ fn common_pairs(graph: &Graph, roots: &[ExprId]) -> BTreeSet<Pair> {
 }
 
 fn replace(graph: &mut Graph, roots: &[ExprId], pairs: &BTreeSet<Pair>) -> Vec<ExprId> {
+    // No operand stands in two pairs of a kind, so that the first one tells which pair it is.
+    let (mut terms_with, mut factors_with) = (FxHashMap::default(), FxHashMap::default());
+    for pair in pairs {
+        match pair {
+            Pair::Terms(a, b, ratio) => _ = terms_with.insert(*a, (*b, ratio)),
+            Pair::Factors(a, b) => _ = factors_with.insert(*a, *b),
+        }
+    }
     rewrite(graph, roots, |graph, id, node| match &node {
         Node::Sum(terms) if terms.len() > 2 => {
+            let mut firsts: Vec<ExprId> = terms.iter().map(|(t, _)| *t).collect();
+            firsts.sort_unstable();
             let mut terms = terms.clone();
-            for pair in pairs {
-                let Pair::Terms(a, b, ratio) = pair else {
+            for a in firsts {
+                let Some((b, ratio)) = terms_with.get(&a) else {
                     continue;
                 };
                 let find = |id: ExprId| terms.iter().position(|(t, _)| *t == id);
-                if let (Some(i), Some(j)) = (find(*a), find(*b))
+                if let (Some(i), Some(j)) = (find(a), find(*b))
                     && terms.len() > 2
-                    && terms[j].1 == &terms[i].1 * ratio
+                    && terms[j].1 == &terms[i].1 * *ratio
                 {
                     let k = terms[i].1.clone();
-                    let joined = graph.sum(&[(*a, Rational::ONE), (*b, ratio.clone())]);
-                    terms.retain(|(t, _)| t != a && t != b);
+                    let joined = graph.sum(&[(a, Rational::ONE), (*b, (*ratio).clone())]);
+                    terms.retain(|(t, _)| *t != a && t != b);
                     terms.push((joined, k));
                 }
             }
             graph.sum(&terms)
         }
         Node::Product(factors) if factors.len() > 2 => {
+            let mut firsts: Vec<ExprId> = factors.iter().map(|(f, _)| *f).collect();
+            firsts.sort_unstable();
             let mut factors = factors.clone();
-            for pair in pairs {
-                let Pair::Factors(a, b) = pair else { continue };
+            for a in firsts {
+                let Some(b) = factors_with.get(&a) else {
+                    continue;
+                };
                 let has = |id: ExprId| factors.contains(&(id, 1));
-                if factors.len() > 2 && has(*a) && has(*b) {
-                    let joined = graph.mul(*a, *b);
-                    factors.retain(|(f, _)| f != a && f != b);
+                if factors.len() > 2 && has(a) && has(*b) {
+                    let joined = graph.mul(a, *b);
+                    factors.retain(|(f, _)| *f != a && f != b);
                     factors.push((joined, 1));
                 }
             }
