@@ -246,13 +246,13 @@ pub(crate) struct GenerateArgs {
     #[arg(long, value_name = "FILE.rs|DIR", required_if_eq_any([("language", "c"), ("language", "python")]))]
     pub(crate) out: Option<PathBuf>,
     /// With the equation of motion: mass matrix, velocity terms, gravity, forward dynamics
-    #[arg(long, conflicts_with = "language")]
+    #[arg(long)]
     pub(crate) dynamics: bool,
     /// With what the joints transmit: forces and moments in all joints, and the forces that close loops
-    #[arg(long, conflicts_with = "language")]
+    #[arg(long)]
     pub(crate) reactions: bool,
     /// With a function `self_test` that holds base parameters against all parameters, for a test of your own
-    #[arg(long, conflicts_with = "language")]
+    #[arg(long)]
     pub(crate) self_test: bool,
     /// What to make: a Rust module, or a crate that builds a C library with its header, or a Python module
     #[arg(long, value_enum, default_value = "rust")]

@@ -36,8 +36,13 @@ fn there(program: &str) -> bool {
 
 /// Writes the crate of a bundled model.
 fn written(model: &str, language: &str) -> PathBuf {
-    let out = folder(&format!("{model}-{language}"));
     let file = project().join(format!("model-spec/models/{model}.toml"));
+    written_of(&file, model, language)
+}
+
+/// Writes the crate of a model file.
+fn written_of(file: &Path, model: &str, language: &str) -> PathBuf {
+    let out = folder(&format!("{model}-{language}"));
     run(Command::new(env!("CARGO_BIN_EXE_modelmill"))
         .arg("generate")
         .arg(file)
@@ -161,6 +166,105 @@ fn the_python_module_gives_the_torques_of_the_table() {
         .arg(tables()));
     println!("{says}");
     assert!(says.starts_with("agrees with the table"), "{says}");
+}
+
+/// A pendulum without constants under a name, as a model file.
+fn pendulum(name: &str) -> PathBuf {
+    let file = folder(&format!("called-{name}.toml"));
+    let text = format!(
+        "schema = 1\nname = \"{name}\"\ngravity = [0, -9.81, 0]\n[parameters]\nm = {{ nominal = 2, unit = \"kg\" }}\n\
+         [coordinates]\nq = {{}}\n[[frame]]\nname = \"arm\"\non = \"base\"\nmodified_dh = {{ theta = \"q\" }}\n\
+         [[lumped_mass]]\nmass = \"m\"\non = \"arm\"\nat = [0.5, 0]\n[[drive]]\nname = \"motor\"\njoint = \"q\"\n"
+    );
+    std::fs::write(&file, text).unwrap();
+    file
+}
+
+#[test]
+fn c_headers_are_c_whatever_the_model_is_called_and_lacks() {
+    if !there("cc") {
+        println!("skipped: there is no C compiler `cc` on this machine");
+        return;
+    }
+    for (name, header) in [
+        ("plain", "plain"),
+        ("stdint", "stdint_model"),
+        ("loop", "loop"),
+    ] {
+        let out = written_of(&pendulum(name), name, "c");
+        let source = folder(&format!("{name}.c"));
+        std::fs::write(&source, format!("#include \"{header}.h\"\n")).unwrap();
+        run(Command::new("cc")
+            .args([
+                "-std=c99",
+                "-pedantic-errors",
+                "-Wall",
+                "-Werror",
+                "-fsyntax-only",
+                "-I",
+            ])
+            .arg(out.join("include"))
+            .arg(&source));
+    }
+}
+
+#[test]
+fn python_modules_build_whatever_the_model_is_called() {
+    for (name, module) in [
+        ("regressor", "regressor"),
+        ("model", "model"),
+        ("loop", "loop"),
+        ("class", "class_model"),
+    ] {
+        let out = written_of(&pendulum(name), name, "python");
+        let fetched = Command::new(env!("CARGO"))
+            .arg("fetch")
+            .current_dir(&out)
+            .output();
+        if !fetched.is_ok_and(|output| output.status.success()) {
+            println!("skipped: the crates pyo3 and numpy cannot be had here");
+            return;
+        }
+        let manifest = std::fs::read_to_string(out.join("pyproject.toml")).unwrap();
+        assert!(
+            manifest.contains(&format!("module-name = \"{module}\"")),
+            "{manifest}"
+        );
+        run(Command::new(env!("CARGO"))
+            .args(["check", "--release", "--quiet", "--target-dir"])
+            .arg(folder("target"))
+            .current_dir(&out));
+    }
+}
+
+#[test]
+fn what_only_rust_has_is_refused_with_a_word() {
+    let two_link = project().join("model-spec/models/two_link.toml");
+    let generate = |more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_modelmill"));
+        command.arg("generate").arg(&two_link).args(more);
+        command.output().unwrap()
+    };
+    let out = folder("never");
+    let output = generate(&[
+        "--dynamics",
+        "--language",
+        "c",
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    assert_eq!(output.status.code(), Some(2));
+    let says = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        says.contains("--dynamics goes with the Rust module only"),
+        "{says}"
+    );
+    assert!(!out.exists());
+    assert!(
+        generate(&["--dynamics", "--language", "rust"])
+            .status
+            .success()
+    );
 }
 
 #[test]

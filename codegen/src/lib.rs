@@ -40,7 +40,7 @@ use modelmill_spec::Mechanism;
 
 pub use base::BaseParameter;
 pub use dynamics::Dynamics;
-pub use emit::{Emitted, EmittedFile, emit, emit_c, emit_python, emit_with_dynamics};
+pub use emit::{Emitted, EmittedFile, emit, emit_c, emit_python, emit_with_dynamics, module_name};
 pub use error::DeriveError;
 pub use evaluate::{Evaluator, PoseFault, PoseReason, States};
 pub use exact::Monomial;

@@ -3,7 +3,7 @@
 //! States go through in lines of one cache line each (8 `f64`, 16 `f32`). With the feature `std` the program runs in the
 //! widest vectors of the machine, which is asked at run time (`wide`); without it, one state at a time. A line in
 //! which anything is out of the ordinary, such as a number that is none, a pose that is out of reach or an angle of more
-//! than a hundred thousand turns, is looked at again one by one: so there is one definition of what is wrong, that of one state.
+//! than 16 000 turns, is looked at again one by one: so there is one definition of what is wrong, that of one state.
 
 use core::fmt;
 

@@ -79,7 +79,7 @@ pub trait Numbers {
     /// # Errors
     /// [`PoseError::OutOfReach`] for one number; a block remembers it and is looked at one by one.
     fn reachable(&self, x: Self::Value) -> Result<(), PoseError>;
-    /// Asks that the magnitude of a value is above a limit.
+    /// Asks that the magnitude of a determinant is above a limit; see [`Real::singular`].
     ///
     /// # Errors
     /// [`PoseError::Singular`] for one number; a block remembers it and is looked at one by one.
@@ -166,7 +166,7 @@ impl<T: Real> Numbers for One<T> {
     }
     #[inline(always)]
     fn regular(&self, x: T, limit: f64) -> Result<(), PoseError> {
-        if x.abs() > T::from_f64(limit) {
+        if x.abs() > T::from_f64(T::singular(limit)) {
             Ok(())
         } else {
             Err(PoseError::Singular)

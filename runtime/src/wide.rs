@@ -182,7 +182,7 @@ macro_rules! wide {
             }
             #[inline(always)]
             fn regular(&self, x: $value<S>, limit: f64) -> Result<(), PoseError> {
-                let limit = self.number(limit);
+                let limit = self.number(<$float as Real>::singular(limit));
                 self.hold(self.simd.$greater(self.simd.$abs(x.v), limit.v));
                 Ok(())
             }

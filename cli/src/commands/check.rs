@@ -1,6 +1,6 @@
 //! `check`: validates a model file and says what is in it.
 
-use modelmill_codegen::Derivation;
+use modelmill_codegen::{Derivation, module_name};
 use modelmill_spec::{Diagnostic, DriveKind, Mechanism, Motion, Severity, Sources};
 use serde_json::{Value, json};
 
@@ -123,7 +123,7 @@ impl Summary {
     fn json(&self, name: &str, derivation: &Derivation, warnings: &[Value]) -> Value {
         json!({
             "model": name,
-            "module": derivation.mechanism.name,
+            "module": module_name(&derivation.mechanism.name),
             "valid": true,
             "title": derivation.mechanism.title,
             "bodies": self.bodies,
@@ -152,7 +152,13 @@ impl Summary {
             [] => String::new(),
             names => format!(": {}", names.join(", ")),
         };
-        line("module", format!("{} (the file's `name`)", m.name));
+        let module = module_name(&m.name);
+        let whose = if module == m.name {
+            "the file's `name`"
+        } else {
+            "for the file's `name`, which is a word of Rust or of emitted code"
+        };
+        line("module", format!("{module} ({whose})"));
         line("bodies", self.bodies.to_string());
         if self.lumped_masses > 0 {
             line("lumped masses", self.lumped_masses.to_string());

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill_codegen::{EmittedFile, emit, emit_c, emit_python};
+use modelmill_codegen::{EmittedFile, emit, emit_c, emit_python, module_name};
 
 use crate::args::{GenerateArgs, Language};
 use crate::failure::{Failure, Outcome};
@@ -13,6 +13,18 @@ use crate::terminal;
 
 /// Writes the source that `cargo build` makes of the model, or the folder of a crate.
 pub(crate) fn run(args: &GenerateArgs) -> Outcome {
+    let more = [
+        ("--dynamics", args.dynamics),
+        ("--reactions", args.reactions),
+        ("--self-test", args.self_test),
+    ];
+    if let Some((flag, _)) = more.iter().find(|(_, asked)| *asked)
+        && args.language != Language::Rust
+    {
+        return Err(Failure::Usage(format!(
+            "{flag} goes with the Rust module only; leave it out, or leave --language out"
+        )));
+    }
     let model = model::derive(&args.model)?;
     let crate_files = match args.language {
         Language::Rust => None,
@@ -62,7 +74,7 @@ pub(crate) fn run(args: &GenerateArgs) -> Outcome {
                 "{}: {}, the module `{}`",
                 target.path().display(),
                 count(source.lines().count(), "line", "lines"),
-                model.derivation.mechanism.name
+                module_name(&model.derivation.mechanism.name)
             ));
             Ok(())
         }

@@ -63,6 +63,7 @@ broken[2, 5] = math.nan
 refused(ValueError, "at sample 5: `q3` is no finite number", lambda: panda.regressor(broken, qd, qdd))
 refused(ValueError, "qd has shape [7, 39]; expected [7, 40]", lambda: panda.regressor(q, qd[:, 1:].copy(), qdd))
 refused(ValueError, "numpy.ascontiguousarray(q)", lambda: panda.regressor(table[:, :7].T, qd, qdd))
+refused(ValueError, "numpy.ascontiguousarray(qd)", lambda: panda.regressor(q, np.asfortranarray(qd), qdd))
 refused(ValueError, "p has 42 numbers", lambda: panda.inverse_dynamics(q, qd, qdd, p[1:]))
 refused(KeyError, "no `m8`", lambda: panda.base_parameters({"m8": 1.0}))
 

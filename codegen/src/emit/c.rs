@@ -26,9 +26,42 @@ const STATUS: [(&str, &str); 8] = [
     ("LENGTH", "arrays of different lengths"),
 ];
 
+/// Names whose headers the C library has itself.
+const RESERVED: &[&str] = &[
+    "assert",
+    "complex",
+    "ctype",
+    "errno",
+    "fenv",
+    "float",
+    "inttypes",
+    "iso646",
+    "limits",
+    "locale",
+    "math",
+    "setjmp",
+    "signal",
+    "stdalign",
+    "stdarg",
+    "stdatomic",
+    "stdbool",
+    "stddef",
+    "stdint",
+    "stdio",
+    "stdlib",
+    "stdnoreturn",
+    "string",
+    "tgmath",
+    "threads",
+    "time",
+    "uchar",
+    "wchar",
+    "wctype",
+];
+
 /// The files of the crate. It needs `modelmill-runtime` in the folder `modelmill-runtime` beside its manifest.
 pub fn emit_c(derivation: &Derivation) -> Vec<EmittedFile> {
-    let face = Face::new(derivation);
+    let face = Face::new(derivation, RESERVED);
     let doc = "The model for C: see the header in `include`. All `unsafe` code is here, and all of it reads and writes what the \
                caller's pointers point to.";
     vec![
@@ -308,11 +341,14 @@ fn items(face: &Face<'_>) -> TokenStream {
         }
 
         unsafe fn array<'a, const N: usize>(from: *const f64) -> Option<&'a [f64; N]> {
-            unsafe { from.cast::<[f64; N]>().as_ref() }
+            // Of nothing nothing is read, whatever the pointer is.
+            let from = if N == 0 { core::ptr::NonNull::<[f64; N]>::dangling().as_ptr().cast_const() } else { from.cast() };
+            unsafe { from.as_ref() }
         }
 
         unsafe fn array_mut<'a, const N: usize>(to: *mut f64) -> Option<&'a mut [f64; N]> {
-            unsafe { to.cast::<[f64; N]>().as_mut() }
+            let to = if N == 0 { core::ptr::NonNull::<[f64; N]>::dangling().as_ptr() } else { to.cast() };
+            unsafe { to.as_mut() }
         }
 
         unsafe fn columns<'a, const N: usize>(from: *const f64, n: usize) -> [&'a [f64]; N] {
@@ -436,8 +472,15 @@ fn header(face: &Face<'_>) -> String {
         " * Prepare once, then call; nothing allocates, locks or throws, and all of it is reentrant:",
     );
     line(" *");
+    let room = |count: &str, n: usize| match n {
+        0 => "1".to_owned(),
+        _ => format!("{upper}_N_{count}"),
+    };
     line(&format!(
-        " *     double geometry[{upper}_N_CONSTANTS], parameters[{upper}_N_PARAMETERS], base[{upper}_N_BASE];"
+        " *     double geometry[{}], parameters[{}], base[{}];",
+        room("CONSTANTS", mechanism.constants.len()),
+        room("PARAMETERS", mechanism.parameters.len()),
+        room("BASE", face.n_base()),
     ));
     line(&format!(" *     {name}_dynamics dynamics;"));
     line(&format!(" *     {name}_default_geometry(geometry);"));
@@ -533,20 +576,37 @@ fn header(face: &Face<'_>) -> String {
         _ = write!(s, "const double *{part}, ");
         s
     });
+    // An array of nothing is no C.
+    let array = |what: &str, count: &str| {
+        let n = match count {
+            "CONSTANTS" => mechanism.constants.len(),
+            "PARAMETERS" => mechanism.parameters.len(),
+            _ => face.n_base(),
+        };
+        if n == 0 {
+            format!("*{what}")
+        } else {
+            format!("{what}[{upper}_N_{count}]")
+        }
+    };
     line("/* The model file's values. */");
     line(&format!(
-        "int32_t {name}_default_geometry(double geometry[{upper}_N_CONSTANTS]);"
+        "int32_t {name}_default_geometry(double {});",
+        array("geometry", "CONSTANTS")
     ));
     line(&format!(
-        "int32_t {name}_nominal_parameters(double parameters[{upper}_N_PARAMETERS]);"
+        "int32_t {name}_nominal_parameters(double {});",
+        array("parameters", "PARAMETERS")
     ));
     line("\n/* Base parameters of physical ones. */");
     line(&format!(
-        "int32_t {name}_base_parameters(const double *geometry, const double *parameters, double base[{upper}_N_BASE]);"
+        "int32_t {name}_base_parameters(const double *geometry, const double *parameters, double {});",
+        array("base", "BASE")
     ));
     line("\n/* Computes what depends on geometry and base parameters alone. */");
     line(&format!(
-        "int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const double base[{upper}_N_BASE]);"
+        "int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const double {});",
+        array("base", "BASE")
     ));
     line("\n/* Forces of the drives, N or N m. */");
     line(&format!(
@@ -554,8 +614,11 @@ fn header(face: &Face<'_>) -> String {
     ));
     line("\n/* H_min row by row: one row per drive, one column per base parameter. */");
     line(&format!(
-        "int32_t {name}_regressor(const {name}_dynamics *dynamics, {state}double regressor[{}]);",
-        face.n_drives() * face.n_base()
+        "int32_t {name}_regressor(const {name}_dynamics *dynamics, {state}double {});",
+        match face.n_drives() * face.n_base() {
+            0 => "*regressor".to_owned(),
+            n => format!("regressor[{n}]"),
+        }
     ));
     if face.newton {
         line("\n/* Passive coordinates of a pose, followed from the nominal pose. */");

@@ -31,11 +31,16 @@ pub(super) struct Face<'a> {
 }
 
 impl<'a> Face<'a> {
-    pub(super) fn new(derivation: &'a Derivation) -> Self {
+    /// Names that are `reserved` in the other language get `_model` behind them.
+    pub(super) fn new(derivation: &'a Derivation, reserved: &[&str]) -> Self {
         let module = of_module(&derivation.mechanism.name).to_string();
+        let mut name = module.trim_start_matches("r#").to_owned();
+        if reserved.contains(&name.as_str()) {
+            name.push_str("_model");
+        }
         Self {
             derivation,
-            name: module.trim_start_matches("r#").to_owned(),
+            name,
             load: uses_load(derivation),
             newton: matches!(
                 derivation.programs.passive_position,

@@ -87,6 +87,11 @@ impl Emitted {
     }
 }
 
+/// The name of the module that is emitted for a model: its own, or one near it where Rust cannot have that.
+pub fn module_name(model: &str) -> String {
+    identifier::of_module(model).to_string()
+}
+
 /// Lints that emitted code does not keep to: names come from the model file, and code is in single assignments.
 struct Lints;
 const LINTS: Lints = Lints;

@@ -1,15 +1,23 @@
 //! A crate that makes a Python module of a model, with PyO3: functions of numpy arrays, one state or many.
 
 use proc_macro2::TokenStream;
-use quote::{format_ident, quote};
+use quote::quote;
 
 use super::foreign::{EmittedFile, Face, source};
 use crate::Derivation;
 
+/// Names that a module of Python cannot have, or must leave to the module whose arrays it takes.
+const RESERVED: &[&str] = &[
+    "False", "None", "True", "and", "as", "assert", "async", "await", "break", "class", "continue",
+    "def", "del", "elif", "else", "except", "finally", "for", "from", "global", "if", "import",
+    "in", "is", "lambda", "nonlocal", "not", "numpy", "or", "pass", "raise", "return", "try",
+    "while", "with", "yield",
+];
+
 /// The files of the crate. It needs `modelmill-runtime` in the folder `modelmill-runtime` beside its manifest.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 pub fn emit_python(derivation: &Derivation) -> Vec<EmittedFile> {
-    let face = Face::new(derivation);
+    let face = Face::new(derivation, RESERVED);
     let name = &face.name;
     let package = name.trim_start_matches('_');
     let cargo = format!(
@@ -62,7 +70,7 @@ module-name = \"{name}\"
 
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 fn items(face: &Face<'_>) -> TokenStream {
-    let module = format_ident!("{}", face.name);
+    let module = &face.name;
     let mechanism = &face.derivation.mechanism;
     let title = format!(
         "{}.\n\nInverse dynamics tau = H_min(q, q', q'') p_min. Arrays of one state have one number per coordinate; arrays \
@@ -173,7 +181,9 @@ fn items(face: &Face<'_>) -> TokenStream {
         }
 
         fn slice<'a>(array: &'a PyReadonlyArrayDyn<'_, f64>, name: &str) -> PyResult<&'a [f64]> {
-            array.as_slice().map_err(|_| {
+            // `as_slice` alone would also take an array that lies column by column, and read it wrongly.
+            let rows = array.is_c_contiguous().then(|| array.as_slice().ok()).flatten();
+            rows.ok_or_else(|| {
                 value_error(format!("{name} does not lie row by row in memory: pass numpy.ascontiguousarray({name})"))
             })
         }
@@ -251,7 +261,8 @@ fn items(face: &Face<'_>) -> TokenStream {
 
         #[doc = #title]
         #[pymodule]
-        fn #module(m: &Bound<'_, PyModule>) -> PyResult<()> {
+        #[pyo3(name = #module)]
+        fn python_module(m: &Bound<'_, PyModule>) -> PyResult<()> {
             m.add_function(wrap_pyfunction!(inverse_dynamics, m)?)?;
             m.add_function(wrap_pyfunction!(regressor, m)?)?;
             m.add_function(wrap_pyfunction!(base_parameters, m)?)?;
