@@ -123,6 +123,19 @@ fn python() -> Option<String> {
     named.or_else(|| there("python3").then(|| "python3".to_owned()))
 }
 
+/// Whether the crates that a Python module needs can be had; says so if not.
+fn has_its_crates(out: &Path) -> bool {
+    let fetched = Command::new(env!("CARGO"))
+        .arg("fetch")
+        .current_dir(out)
+        .output();
+    let has = fetched.is_ok_and(|output| output.status.success());
+    if !has {
+        println!("skipped: the crates pyo3 and numpy cannot be had here");
+    }
+    has
+}
+
 #[test]
 fn the_python_module_gives_the_torques_of_the_table() {
     let Some(python) = python() else {
@@ -144,12 +157,7 @@ fn the_python_module_gives_the_torques_of_the_table() {
         return;
     }
     let out = written("panda", "python");
-    let fetched = Command::new(env!("CARGO"))
-        .arg("fetch")
-        .current_dir(&out)
-        .output();
-    if !fetched.is_ok_and(|output| output.status.success()) {
-        println!("skipped: the crates pyo3 and numpy cannot be had here");
+    if !has_its_crates(&out) {
         return;
     }
     built("panda", "python", &[]);
@@ -217,12 +225,7 @@ fn python_modules_build_whatever_the_model_is_called() {
         ("class", "class_model"),
     ] {
         let out = written_of(&pendulum(name), name, "python");
-        let fetched = Command::new(env!("CARGO"))
-            .arg("fetch")
-            .current_dir(&out)
-            .output();
-        if !fetched.is_ok_and(|output| output.status.success()) {
-            println!("skipped: the crates pyo3 and numpy cannot be had here");
+        if !has_its_crates(&out) {
             return;
         }
         let manifest = std::fs::read_to_string(out.join("pyproject.toml")).unwrap();
