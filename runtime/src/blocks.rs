@@ -105,11 +105,12 @@ pub trait Job<T: Blocks> {
 
 /// Vectors of one width, and the instructions for them.
 pub trait Vectors<T: Blocks>: Copy {
-    /// Runs a program over all of a line; whether every lane was regular.
+    /// Runs a program over the line of states that starts `at` a place of the inputs; whether every lane was regular.
     fn line<P: Program<T, INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
         self,
         program: &P,
-        inputs: &[T::Line; INPUTS],
+        inputs: &[&[T]; INPUTS],
+        at: usize,
         outputs: &mut [T::Line; OUTPUTS],
     ) -> bool;
 }
@@ -123,7 +124,8 @@ impl<T: Blocks> Vectors<T> for Singly {
     fn line<P: Program<T, INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
         self,
         _program: &P,
-        _inputs: &[T::Line; INPUTS],
+        _inputs: &[&[T]; INPUTS],
+        _at: usize,
         _outputs: &mut [T::Line; OUTPUTS],
     ) -> bool {
         // Every line is looked at one by one.
@@ -200,6 +202,47 @@ pub struct Block<'a, L, const OUTPUTS: usize> {
     pub outputs: &'a [L; OUTPUTS],
 }
 
+/// What is done with the results of a line.
+trait Visit<L, const OUTPUTS: usize> {
+    fn visit(&mut self, block: Block<'_, L, OUTPUTS>);
+}
+
+/// A function that looks at them.
+struct Shown<F>(F);
+
+impl<L, F: FnMut(Block<'_, L, OUTPUTS>), const OUTPUTS: usize> Visit<L, OUTPUTS> for Shown<F> {
+    #[inline]
+    fn visit(&mut self, block: Block<'_, L, OUTPUTS>) {
+        (self.0)(block);
+    }
+}
+
+/// Columns that they are written to.
+struct Columns<'a, 'b, T, const OUTPUTS: usize>(&'a mut [&'b mut [T]; OUTPUTS]);
+
+impl<T: Copy, L: Line<T>, const OUTPUTS: usize> Visit<L, OUTPUTS> for Columns<'_, '_, T, OUTPUTS> {
+    #[allow(
+        clippy::inline_always,
+        reason = "a function of its own would copy with the narrowest vectors"
+    )]
+    #[inline(always)]
+    fn visit(&mut self, block: Block<'_, L, OUTPUTS>) {
+        for (column, line) in self.0.iter_mut().zip(block.outputs) {
+            let to = column.get_mut(block.first..block.first + block.len);
+            let (Some(to), line) = (to, line.as_ref()) else {
+                continue;
+            };
+            if to.len() == line.len() {
+                to.copy_from_slice(line);
+            } else {
+                for (to, from) in to.iter_mut().zip(line) {
+                    *to = *from;
+                }
+            }
+        }
+    }
+}
+
 /// Runs a program over states, one slice per input, and shows the outputs line by line.
 ///
 /// # Errors
@@ -214,12 +257,11 @@ where
     P: Program<T, INPUTS, OUTPUTS>,
 {
     let n = length(program, inputs)?;
-    T::run(Lines {
+    T::run(Lines::<T, P, _, INPUTS, OUTPUTS> {
         program,
         inputs,
-        outputs: [T::Line::filled(T::from_f64(0.0)); OUTPUTS],
         n,
-        visit,
+        visit: Shown(visit),
     })
 }
 
@@ -238,26 +280,11 @@ where
 {
     let n = length(program, inputs)?;
     same_length("output", outputs.iter().map(|o| o.len()), n)?;
-    T::run(Lines {
+    T::run(Lines::<T, P, _, INPUTS, OUTPUTS> {
         program,
         inputs,
-        outputs: [T::Line::filled(T::from_f64(0.0)); OUTPUTS],
         n,
-        visit: |block: Block<'_, T::Line, OUTPUTS>| {
-            for (column, line) in outputs.iter_mut().zip(block.outputs) {
-                let to = column.get_mut(block.first..block.first + block.len);
-                let (Some(to), line) = (to, line.as_ref()) else {
-                    continue;
-                };
-                if to.len() == line.len() {
-                    to.copy_from_slice(line);
-                } else {
-                    for (to, from) in to.iter_mut().zip(line) {
-                        *to = *from;
-                    }
-                }
-            }
-        },
+        visit: Columns(outputs),
     })
 }
 
@@ -336,19 +363,18 @@ fn same_length(
 }
 
 /// All states, line by line.
-struct Lines<'a, T: Blocks, P, F, const INPUTS: usize, const OUTPUTS: usize> {
+struct Lines<'a, T, P, F, const INPUTS: usize, const OUTPUTS: usize> {
     program: &'a P,
     inputs: &'a [&'a [T]; INPUTS],
-    outputs: [T::Line; OUTPUTS],
     n: usize,
     visit: F,
 }
 
-impl<T: Blocks, P, F, const INPUTS: usize, const OUTPUTS: usize> Job<T>
-    for Lines<'_, T, P, F, INPUTS, OUTPUTS>
+impl<'a, T: Blocks, P, F, const INPUTS: usize, const OUTPUTS: usize> Job<T>
+    for Lines<'a, T, P, F, INPUTS, OUTPUTS>
 where
     P: Program<T, INPUTS, OUTPUTS>,
-    F: FnMut(Block<'_, T::Line, OUTPUTS>),
+    F: Visit<T::Line, OUTPUTS>,
 {
     #[allow(
         clippy::inline_always,
@@ -356,34 +382,52 @@ where
     )]
     #[inline(always)]
     fn with<V: Vectors<T>>(mut self, vectors: V) -> Result<(), BlockError> {
-        let mut inputs = [T::Line::filled(T::from_f64(0.0)); INPUTS];
+        let zero = T::Line::filled(T::from_f64(0.0));
+        let (mut lines, mut outputs) = ([zero; INPUTS], [zero; OUTPUTS]);
         let mut last = None;
         let mut first = 0;
         while first < self.n {
-            let mut len = T::Line::LENGTH.min(self.n - first);
-            for (line, array) in inputs.iter_mut().zip(self.inputs) {
-                load(line, array, first, len);
-            }
             let mut fault = None;
-            if P::COMPLETED > 0
-                && let Err((k, reason)) = complete(self.program, &mut inputs, len, &mut last)
-            {
-                (len, fault) = (k, Some(reason));
-            }
-            let regular = fault.is_none() && vectors.line(self.program, &inputs, &mut self.outputs);
-            if !regular
-                && let Err((k, reason)) = one_by_one(self.program, &inputs, &mut self.outputs, len)
-            {
-                (len, fault) = (k, Some(reason));
-            }
-            (self.visit)(Block {
-                first,
-                len,
-                outputs: &self.outputs,
-            });
-            if let Some(reason) = fault {
-                let sample = first + len;
-                return Err(BlockError::At { sample, reason });
+            let left = self.n - first;
+            // Whole lines are read where they are; the last one is filled up, and what is completed needs a place.
+            let (inputs, len): ([&[T]; INPUTS], usize) =
+                if P::COMPLETED == 0 && left >= T::Line::LENGTH {
+                    let len = left - left % T::Line::LENGTH;
+                    let part = |array: &'a [T]| array.get(first..first + len).unwrap_or_default();
+                    (self.inputs.map(part), len)
+                } else {
+                    let mut len = T::Line::LENGTH.min(left);
+                    for (line, array) in lines.iter_mut().zip(self.inputs) {
+                        load(line, array, first, len);
+                    }
+                    if P::COMPLETED > 0
+                        && let Err((k, reason)) = complete(self.program, &mut lines, len, &mut last)
+                    {
+                        (len, fault) = (k, Some(reason));
+                    }
+                    (lines.each_ref().map(AsRef::as_ref), len)
+                };
+            let mut at = 0;
+            while at < len || fault.is_some() {
+                let mut done = T::Line::LENGTH.min(len - at);
+                let regular =
+                    fault.is_none() && vectors.line(self.program, &inputs, at, &mut outputs);
+                if !regular
+                    && let Err((k, reason)) =
+                        one_by_one(self.program, &inputs, at, done, &mut outputs)
+                {
+                    (done, fault) = (k, Some(reason));
+                }
+                self.visit.visit(Block {
+                    first: first + at,
+                    len: done,
+                    outputs: &outputs,
+                });
+                if let Some(reason) = fault {
+                    let sample = first + at + done;
+                    return Err(BlockError::At { sample, reason });
+                }
+                at += T::Line::LENGTH;
             }
             first += len;
         }
@@ -408,15 +452,9 @@ fn load<T: Blocks>(line: &mut T::Line, array: &[T], first: usize, len: usize) {
     }
 }
 
-/// State `k` of a line.
-fn column<T: Blocks, const INPUTS: usize>(inputs: &[T::Line; INPUTS], k: usize) -> [T; INPUTS] {
-    core::array::from_fn(|i| {
-        inputs[i]
-            .as_ref()
-            .get(k)
-            .copied()
-            .unwrap_or(T::from_f64(0.0))
-    })
+/// State `k` of some.
+fn state<T: Blocks, const INPUTS: usize>(inputs: &[&[T]; INPUTS], k: usize) -> [T; INPUTS] {
+    inputs.map(|input| input.get(k).copied().unwrap_or(T::from_f64(0.0)))
 }
 
 /// Completes the inputs of a line; which state has none, and why.
@@ -431,7 +469,7 @@ where
     P: Program<T, INPUTS, OUTPUTS>,
 {
     for k in 0..len {
-        let mut state = column::<T, INPUTS>(inputs, k);
+        let mut state = state(&inputs.each_ref().map(AsRef::as_ref), k);
         if let Err(reason) = program.complete(&mut state, last.as_ref()) {
             return Err((k, reason));
         }
@@ -447,21 +485,22 @@ where
     Ok(())
 }
 
-/// The states of a line one after the other: which one has no answer, and why.
+/// `len` states of a line that starts `at` a place, one after the other: which one of them has no answer, and why.
 #[cold]
 #[inline(never)]
 fn one_by_one<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
     program: &P,
-    inputs: &[T::Line; INPUTS],
-    outputs: &mut [T::Line; OUTPUTS],
+    inputs: &[&[T]; INPUTS],
+    at: usize,
     len: usize,
+    outputs: &mut [T::Line; OUTPUTS],
 ) -> Result<(), (usize, PoseError)>
 where
     P: Program<T, INPUTS, OUTPUTS>,
 {
     let names = program.names();
     for k in 0..len {
-        let state = column::<T, INPUTS>(inputs, k);
+        let state = state(inputs, at + k);
         let mut found = [T::from_f64(0.0); OUTPUTS];
         check_finite(&state, &names)
             .and_then(|()| program.run(&One::new(), &state, &mut found))

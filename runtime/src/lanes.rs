@@ -148,20 +148,21 @@ fn kernel<A: Angle>(x: A, tail: A) -> (A, A) {
     let one = x.like(1.0);
     let lead = one - half;
 
-    let s = x.like(S5).plus_product(z, x.like(S6));
-    let s = x.like(S4).plus_product(z, s);
-    let s = x.like(S3).plus_product(z, s);
-    let s = x.like(S2).plus_product(z, s);
-    let s = x.like(S1).plus_product(z, s);
-    let sin = x + (tail * lead).plus_product(z * x, s);
+    // Terms in pairs, as G. Estrin adds them up: half of the operations wait for no other.
+    let (zz, zx) = (z * z, z * x);
+    let zzzz = zz * zz;
+    let s1 = x.like(S1).plus_product(z, x.like(S2));
+    let s3 = x.like(S3).plus_product(z, x.like(S4));
+    let s5 = x.like(S5).plus_product(z, x.like(S6));
+    let s = s1.plus_product(zz, s3).plus_product(zzzz, s5);
+    let sin = x + (tail * lead).plus_product(zx, s);
 
-    let c = x.like(C5).plus_product(z, x.like(C6));
-    let c = x.like(C4).plus_product(z, c);
-    let c = x.like(C3).plus_product(z, c);
-    let c = x.like(C2).plus_product(z, c);
-    let c = x.like(C1).plus_product(z, c);
+    let c1 = x.like(C1).plus_product(z, x.like(C2));
+    let c3 = x.like(C3).plus_product(z, x.like(C4));
+    let c5 = x.like(C5).plus_product(z, x.like(C6));
+    let c = c1.plus_product(zz, c3).plus_product(zzzz, c5);
     let rest = ((one - lead) - half).less_product(x, tail);
-    let cos = lead + rest.plus_product(z * z, c);
+    let cos = lead + rest.plus_product(zz, c);
     (sin, cos)
 }
 

@@ -38,7 +38,7 @@ macro_rules! wide {
         $float:ty, $line:ident, $value:ident, $numbers:ident, $put:ident, $vectors:ident,
         $floats:ident, $mask:ident, $lanes:ident, $splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident,
         $fused:ident, $fused_less:ident, $sqrt:ident, $abs:ident, $less:ident, $greater:ident, $at_least:ident, $and:ident, $not:ident, $first:ident,
-        $select:ident, $of_slice:ident, $of_slice_mut:ident
+        $select:ident, $max:ident, $of_slice:ident, $of_slice_mut:ident
     ) => {
         /// As many numbers as a vector holds.
         #[derive(Clone, Copy)]
@@ -126,6 +126,20 @@ macro_rules! wide {
             fn sin_cos(&self, angle: $value<S>) -> ($value<S>, $value<S>) {
                 let (simd, largest) = (self.simd, <$float as Real>::from_f64(LARGEST_ANGLE));
                 self.hold(simd.$less(simd.$abs(angle.v), simd.$splat(largest)));
+                angle.sin_cos()
+            }
+            #[inline(always)]
+            fn angles<const N: usize>(&self, angles: [$value<S>; N]) -> ([$value<S>; N], [$value<S>; N]) {
+                let (simd, largest) = (self.simd, <$float as Real>::from_f64(LARGEST_ANGLE));
+                let mut size = simd.$splat(0.0);
+                for angle in angles {
+                    size = simd.$max(size, simd.$abs(angle.v));
+                }
+                self.hold(simd.$less(size, simd.$splat(largest)));
+                (angles, angles)
+            }
+            #[inline(always)]
+            fn sin_cos_of(&self, angle: $value<S>, _: $value<S>) -> ($value<S>, $value<S>) {
                 angle.sin_cos()
             }
             #[inline(always)]
@@ -219,7 +233,8 @@ macro_rules! wide {
             fn line<P, const INPUTS: usize, const OUTPUTS: usize>(
                 self,
                 program: &P,
-                inputs: &[$line; INPUTS],
+                inputs: &[&[$float]; INPUTS],
+                at: usize,
                 outputs: &mut [$line; OUTPUTS],
             ) -> bool
             where
@@ -233,8 +248,12 @@ macro_rules! wide {
                     let mut values = [numbers.value(zero); INPUTS];
                     // The sum is finite unless one of them is not, or all are huge.
                     let mut sum = zero;
-                    for (to, line) in values.iter_mut().zip(inputs) {
-                        if let Some(v) = S::$of_slice(&line.0).0.get(part) {
+                    let mut sum = zero;
+                    for (to, input) in values.iter_mut().zip(inputs) {
+                        let Some(line) = input.get(at..at + $line::LENGTH) else {
+                            return false;
+                        };
+                        if let Some(v) = S::$of_slice(line).0.get(part) {
                             to.v = *v;
                             sum = simd.$add(sum, *v);
                         }
@@ -305,6 +324,7 @@ wide!(
     not_m64s,
     first_true_m64s,
     select_f64s,
+    max_f64s,
     as_simd_f64s,
     as_mut_simd_f64s
 );
@@ -335,6 +355,7 @@ wide!(
     not_m32s,
     first_true_m32s,
     select_f32s,
+    max_f32s,
     as_simd_f32s,
     as_mut_simd_f32s
 );

@@ -3,12 +3,14 @@
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
 
+use super::order::order;
 use crate::expr::{Atom, Rational, Unary};
 use crate::lower::{Guard, Op, Program, Stage, ValueId};
 
 /// A program as two functions' bodies: what is fixed, and what is computed at every state.
 pub(super) struct Body<'a> {
-    program: &'a Program,
+    /// In the order in which it is written.
+    program: Program,
     /// How an input is written.
     input: &'a dyn Fn(Atom) -> TokenStream,
     names: Vec<Ident>,
@@ -42,7 +44,12 @@ impl Statement {
 }
 
 impl<'a> Body<'a> {
-    pub(super) fn new(program: &'a Program, input: &'a dyn Fn(Atom) -> TokenStream) -> Self {
+    pub(super) fn new(program: &Program, input: &'a dyn Fn(Atom) -> TokenStream) -> Self {
+        let (inside, first) = (fused(program), AnglesFirst::of(program));
+        let order = order(program, &inside, &first.done);
+        let program = program.in_order(&order);
+        let fused = order.iter().map(|i| inside[*i]).collect();
+        let first = first.in_order(&order);
         let names = (0..program.ops.len())
             .map(|i| format_ident!("v{}", i))
             .collect();
@@ -69,9 +76,9 @@ impl<'a> Body<'a> {
             program,
             input,
             names,
-            fused: fused(program),
+            fused,
             handed,
-            first: AnglesFirst::of(program),
+            first,
         }
     }
 
@@ -448,6 +455,18 @@ impl AnglesFirst {
             }
         }
         Self { sines, done }
+    }
+
+    /// The same where operations stand in another order.
+    fn in_order(self, order: &[usize]) -> Self {
+        let mut place = vec![0; self.done.len()];
+        for (k, i) in order.iter().enumerate() {
+            place[*i] = k;
+        }
+        Self {
+            sines: self.sines.iter().map(|i| place[*i]).collect(),
+            done: order.iter().map(|i| self.done[*i]).collect(),
+        }
     }
 }
 

@@ -12,6 +12,7 @@ mod functions;
 mod identifier;
 mod items;
 mod newton;
+mod order;
 mod python;
 mod reactions;
 mod self_test;

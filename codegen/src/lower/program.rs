@@ -191,19 +191,25 @@ impl Program {
                 self.ops[i].for_each_operand(|operand| needed[operand.index()] = true);
             }
         }
+        let kept: Vec<usize> = (0..self.ops.len()).filter(|i| needed[*i]).collect();
+        self.in_order(&kept)
+    }
+
+    /// The same program with the operations that `order` names, in that order; operands stand before what needs them.
+    pub(crate) fn in_order(&self, order: &[usize]) -> Self {
         let mut new = vec![ValueId(0); self.ops.len()];
-        let mut kept = Self::default();
-        for (i, op) in self.ops.into_iter().enumerate() {
-            if !needed[i] {
-                continue;
-            }
-            new[i] = ValueId(u32::try_from(kept.ops.len()).expect("program below 4G operations"));
-            kept.ops
+        let mut ordered = Self::default();
+        for i in order {
+            let place = ordered.ops.len();
+            new[*i] = ValueId(u32::try_from(place).expect("program below 4G operations"));
+            let op = self.ops[*i].clone();
+            ordered
+                .ops
                 .push(op.map_operands(|operand| new[operand.index()]));
-            kept.stages.push(self.stages[i]);
+            ordered.stages.push(self.stages[*i]);
         }
-        kept.outputs = self.outputs.iter().map(|v| new[v.index()]).collect();
-        kept.guards = self
+        ordered.outputs = self.outputs.iter().map(|v| new[v.index()]).collect();
+        ordered.guards = self
             .guards
             .iter()
             .map(|guard| match guard {
@@ -212,7 +218,7 @@ impl Program {
                 Guard::Finite(v) => Guard::Finite(new[v.index()]),
             })
             .collect();
-        kept
+        ordered
     }
 
     /// Estimated cost per state in additions: multiplications cost the same, the slow operations more.
