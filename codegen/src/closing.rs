@@ -9,9 +9,10 @@ use crate::DeriveError;
 use crate::dyad::turn;
 use crate::expr::{AngleSum, Atom, ExprId, Graph, Node};
 use crate::finite;
+use crate::lower::SINGULAR;
 use crate::lower::cost::cost;
 use crate::lower::{Definition, PASSES, Program, Request, lower_by};
-use crate::magnitude;
+use crate::magnitude::{self, Size};
 use crate::programs::nominal_value;
 use crate::reduce::Plan;
 use crate::regressor::Equations;
@@ -27,8 +28,9 @@ pub(crate) struct Closing {
     /// Sums of angles whose cosine and sine are known, and what every passive angle is made of.
     solved: Vec<[ExprId; 2]>,
     angle_of: BTreeMap<usize, AngleParts>,
-    /// Determinants, with the magnitudes below which they count as zero.
-    regular: Vec<(ExprId, f64)>,
+    /// Determinants, with the magnitudes of their terms.
+    regular: Vec<(ExprId, ExprId)>,
+    size: Size,
     /// Whether effects may have no finite value at some states.
     may_be_undefined: bool,
     /// How many of the passes of lowering are used.
@@ -52,9 +54,6 @@ fn quarter_turns(angle: f64) -> i32 {
     quarters
 }
 
-/// A determinant this much smaller than the sum of the magnitudes of its terms counts as zero.
-const SINGULAR: f64 = 1e-9;
-
 impl Closing {
     pub(crate) fn new(
         graph: &mut Graph,
@@ -70,6 +69,7 @@ impl Closing {
             solved: Vec::new(),
             angle_of: BTreeMap::new(),
             regular: Vec::new(),
+            size: Size::of(graph, mechanism, &equations.projection.residual),
             may_be_undefined: finite::may_be_undefined(mechanism),
             n_passes: PASSES.len(),
         };
@@ -78,7 +78,8 @@ impl Closing {
             if nominal_value(graph, mechanism, *id).is_some_and(|value| value.abs() <= limit) {
                 return Err(DeriveError::SingularNominal);
             }
-            closing.regular.push((*id, limit));
+            let size = closing.size.of_terms(graph, mechanism, *id);
+            closing.regular.push((*id, size));
         }
         let Some(plan) = closing.plan.clone() else {
             return Ok(closing);
@@ -144,8 +145,8 @@ impl Closing {
     pub(crate) fn guard(&mut self, graph: &mut Graph, mechanism: &Mechanism, more: &[ExprId]) {
         for id in more {
             if self.regular.iter().all(|(known, _)| known != id) {
-                let limit = SINGULAR * magnitude::at_nominal(graph, mechanism, &[*id]);
-                self.regular.push((*id, limit));
+                let size = self.size.of_terms(graph, mechanism, *id);
+                self.regular.push((*id, size));
             }
         }
     }
@@ -327,14 +328,14 @@ impl Closing {
             .filter(|d| used.contains(&d.atom))
             .copied()
             .collect();
-        let regular: Vec<(ExprId, f64)> = regular
+        let regular: Vec<(ExprId, ExprId)> = regular
             .iter()
             .copied()
             .zip(&self.regular)
-            .map(|(closed, (_, limit))| {
+            .map(|(closed, (_, size))| {
                 // A rational factor need not be multiplied just to be compared with.
                 let (base, factor) = graph.split_factor(closed);
-                (base, limit / factor.abs().to_f64())
+                (base, graph.scale(*size, &factor.abs().recip()))
             })
             .collect();
         lower_by(

@@ -1,13 +1,16 @@
-//! Magnitudes of loop residuals and coordinates: what Newton's method holds residuals and steps against, so that it does
-//! not depend on the unit of length.
+//! Magnitudes of loop residuals, coordinates and determinants: what Newton's method holds residuals and steps against, and
+//! what singular poses are told by, so that neither depends on the unit of length.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use modelmill_spec::{Mechanism, Motion};
+use num_rational::BigRational;
+use num_traits::One;
 
 use crate::closure::coordinates_of;
-use crate::expr::{Atom, ExprId, Graph, Node, Unary};
-use crate::programs::nominal_value;
+use crate::expr::{Atom, ExprId, F64, Graph, Node, Tape, Unary};
+use crate::lower::is_fixed;
+use crate::programs::{nominal_of, nominal_value};
 use crate::projection::Projection;
 
 /// Scales of the residuals, of the passive coordinates and of the active ones, one after the other.
@@ -54,6 +57,116 @@ pub(crate) fn at_nominal(graph: &mut Graph, mechanism: &Mechanism, roots: &[Expr
     nominal_value(graph, mechanism, total)
         .filter(|size| size.is_normal())
         .unwrap_or(1.0)
+}
+
+/// The size of a mechanism's loops: the magnitudes of all lengths in them, without those that move.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Size {
+    /// A sum of magnitudes of constants, in m; 0 where there is none.
+    pub(crate) total: ExprId,
+    /// Its value for the mechanism's constants.
+    pub(crate) nominal: f64,
+}
+
+impl Size {
+    pub(crate) fn of(graph: &mut Graph, mechanism: &Mechanism, residual: &[ExprId]) -> Self {
+        let mut known = HashMap::new();
+        let terms: Vec<ExprId> = residual
+            .iter()
+            .map(|r| magnitude(graph, mechanism, &mut known, *r))
+            .collect();
+        let total = graph.add_all(&terms);
+        let still = lengths(graph, mechanism, |_, _| Graph::ZERO);
+        let total = graph.substitute(&[total], &still)[0];
+        let nominal = nominal_value(graph, mechanism, total).filter(|size| size.is_normal());
+        match nominal {
+            Some(nominal) if graph.atoms(&[total]).into_iter().all(is_fixed) => {
+                Self { total, nominal }
+            }
+            _ => Self {
+                total: Graph::ZERO,
+                nominal: 0.0,
+            },
+        }
+    }
+
+    /// How large these loops are beside those of the mechanism's constants; 1 for those.
+    pub(crate) fn scale(&self, graph: &mut Graph) -> ExprId {
+        self.scaled(graph, 1.0)
+    }
+
+    /// A length of the mechanism, longer by as much as the loops are larger.
+    fn scaled(&self, graph: &mut Graph, length: f64) -> ExprId {
+        if self.nominal == 0.0 {
+            return number(graph, length);
+        }
+        let share = number(graph, length / self.nominal);
+        graph.mul(share, self.total)
+    }
+
+    /// The sum of the magnitudes of all terms of an expression that depends on the pose: for any lengths, with sines and
+    /// cosines of 1 and slides as far out as at the nominal pose. Fractions have the values of the nominal pose, and grow
+    /// with the loops.
+    pub(crate) fn of_terms(&self, graph: &mut Graph, mechanism: &Mechanism, id: ExprId) -> ExprId {
+        let found = magnitude(graph, mechanism, &mut HashMap::new(), id);
+        let out = lengths(graph, mechanism, |graph, nominal| {
+            self.scaled(graph, nominal)
+        });
+        let at_any_pose = graph.substitute(&[found], &out)[0];
+        if graph.atoms(&[at_any_pose]).into_iter().all(is_fixed) {
+            return at_any_pose;
+        }
+        let nominal = at_nominal(graph, mechanism, &[id]);
+        let (scale, nominal) = (self.scale(graph), number(graph, nominal));
+        match self.degree(graph, mechanism, found) {
+            Some(degree) => {
+                let grown = graph.pow(scale, degree);
+                graph.mul(nominal, grown)
+            }
+            None => nominal,
+        }
+    }
+
+    /// The power of the unit of length with which an expression grows, if it does so with one.
+    fn degree(&self, graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Option<i32> {
+        let of_loops = graph.atoms(&[self.total]);
+        let value = |unit: f64| {
+            let atom = |atom: Atom| {
+                let moves = matches!(atom, Atom::Coordinate(i)
+                    if mechanism.coordinates[i].motion != Motion::Revolute);
+                let length = moves || of_loops.contains(&atom);
+                nominal_of(mechanism, atom) * if length { unit } else { 1.0 }
+            };
+            let values = Tape::new(graph, &[id]).evaluate(&F64(atom))?;
+            Some(values[0].abs().log2()).filter(|size| size.is_finite())
+        };
+        let [one, two, four] = [value(1.0)?, value(2.0)?, value(4.0)?];
+        let degree = (two - one).round();
+        let is_power = [two - one, four - two]
+            .iter()
+            .all(|d| (d - degree).abs() < 1e-6);
+        #[allow(clippy::cast_possible_truncation, reason = "it is small, as just seen")]
+        (is_power && degree.abs() < 100.0).then_some(degree as i32)
+    }
+}
+
+/// What stands for each coordinate that is a length, by its nominal value in m.
+fn lengths(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    of: impl Fn(&mut Graph, f64) -> ExprId,
+) -> BTreeMap<ExprId, ExprId> {
+    let coordinates = mechanism.coordinates.iter().enumerate();
+    let slides = coordinates.filter(|(_, c)| c.motion != Motion::Revolute);
+    slides
+        .map(|(i, c)| (graph.atom(Atom::Coordinate(i)), of(graph, c.nominal)))
+        .collect()
+}
+
+/// A number that is exact to rounding.
+fn number(graph: &mut Graph, value: f64) -> ExprId {
+    let value = BigRational::from_float(value).unwrap_or_else(BigRational::one);
+    graph.rational(value.into())
 }
 
 /// An expression with every term taken by its magnitude.

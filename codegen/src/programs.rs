@@ -5,15 +5,15 @@
 
 use std::collections::BTreeMap;
 
-use modelmill_spec::Mechanism;
+use modelmill_spec::{Mechanism, Motion};
 
 use crate::DeriveError;
 use crate::closing::Closing;
 use crate::exact::Monomial;
-use crate::expr::{Atom, ExprId, Graph};
+use crate::expr::{Atom, ExprId, F64, Graph, Tape};
 use crate::forms;
 use crate::lower::{Program, Request, lower};
-use crate::magnitude;
+use crate::magnitude::{self, Size};
 use crate::reduce::{Reduction, closed_form};
 use crate::regressor::Equations;
 
@@ -54,6 +54,8 @@ pub struct Programs {
     pub base_parameters: Program,
     /// Coordinates and rates of the drives, then their Jacobian by the active coordinates, row by row.
     pub drives: Program,
+    /// How large the loops are beside those of the file's constants, if coordinates in them are lengths; fixed.
+    pub scale: Option<Program>,
 }
 
 pub(crate) fn programs(
@@ -119,6 +121,14 @@ pub(crate) fn programs(
     let regressor = row_by_row(&regressor);
     let inverse_dynamics =
         forms::total(graph, mechanism, equations, &base_value, all_passes, &weigh)?;
+    let slides = mechanism
+        .coordinates
+        .iter()
+        .any(|c| c.motion != Motion::Revolute);
+    let scale = (slides && !projection.residual.is_empty()).then(|| {
+        let scale = Size::of(graph, mechanism, &projection.residual).scale(graph);
+        plain(graph, &[scale])
+    });
     let mut program = |outputs: &[ExprId]| closing.program(graph, equations, outputs);
     let regressor = program(&regressor);
     let inverse_dynamics = program(&inverse_dynamics);
@@ -130,6 +140,7 @@ pub(crate) fn programs(
         inverse_dynamics,
         base_parameters,
         drives: program(&drives),
+        scale,
     })
 }
 
@@ -158,14 +169,18 @@ fn plain(graph: &mut Graph, outputs: &[ExprId]) -> Program {
 
 /// Value of an expression at the nominal pose, with the file's constants; rates are zero.
 pub(crate) fn nominal_value(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Option<f64> {
-    let atom = |atom: Atom| match atom {
+    Tape::new(graph, &[id])
+        .evaluate(&F64(|atom| nominal_of(mechanism, atom)))
+        .map(|v| v[0])
+}
+
+/// Value of an atom at the nominal pose.
+pub(crate) fn nominal_of(mechanism: &Mechanism, atom: Atom) -> f64 {
+    match atom {
         Atom::Constant(i) => mechanism.constants[i].value,
         Atom::Coordinate(i) => mechanism.coordinates[i].nominal,
         Atom::Parameter(i) => mechanism.parameters[i].nominal,
         Atom::Pi => std::f64::consts::PI,
         _ => 0.0,
-    };
-    crate::expr::Tape::new(graph, &[id])
-        .evaluate(&crate::expr::F64(atom))
-        .map(|v| v[0])
+    }
 }

@@ -79,11 +79,11 @@ pub trait Numbers {
     /// # Errors
     /// [`PoseError::OutOfReach`] for one number; a block remembers it and is looked at one by one.
     fn reachable(&self, x: Self::Value) -> Result<(), PoseError>;
-    /// Asks that the magnitude of a determinant is above a limit; see [`Real::singular`].
+    /// Asks that a determinant does not vanish beside the magnitude of its terms; see [`Real::singular`].
     ///
     /// # Errors
     /// [`PoseError::Singular`] for one number; a block remembers it and is looked at one by one.
-    fn regular(&self, x: Self::Value, limit: f64) -> Result<(), PoseError>;
+    fn regular(&self, x: Self::Value, size: Self::Scalar) -> Result<(), PoseError>;
     /// Asks that a value is a finite number.
     ///
     /// # Errors
@@ -165,8 +165,8 @@ impl<T: Real> Numbers for One<T> {
         }
     }
     #[inline(always)]
-    fn regular(&self, x: T, limit: f64) -> Result<(), PoseError> {
-        if x.abs() > T::from_f64(T::singular(limit)) {
+    fn regular(&self, x: T, size: T) -> Result<(), PoseError> {
+        if x.abs() > T::singular() * size {
             Ok(())
         } else {
             Err(PoseError::Singular)
@@ -202,5 +202,23 @@ impl<V, const ROWS: usize, const COLUMNS: usize> Outputs<V> for [[V; COLUMNS]; R
     #[inline(always)]
     fn put(&mut self, k: usize, value: V) {
         self[k / COLUMNS][k % COLUMNS] = value;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A determinant of terms of size 100 counts as zero below 1e-7 where numbers have 16 digits, and where they have 7,
+    /// below ten times what rounding leaves.
+    #[test]
+    fn singular_poses_are_told_by_the_digits_that_there_are() {
+        let double = |x| One::<f64>::new().regular(x, 100.0);
+        assert_eq!(double(0.9e-7), Err(PoseError::Singular));
+        assert_eq!(double(-1.1e-7), Ok(()));
+        let single = |x| One::<f32>::new().regular(x, 100.0);
+        assert_eq!(single(1e-4), Err(PoseError::Singular));
+        assert_eq!(single(-1.3e-4), Ok(()));
+        assert_eq!(single(f32::NAN), Err(PoseError::Singular));
     }
 }

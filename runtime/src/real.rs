@@ -20,12 +20,12 @@ pub trait Real:
     fn to_f64(self) -> f64;
     /// Distance from 1 to the next larger number.
     fn epsilon() -> Self;
-    /// What a determinant must exceed, where `limit` is 1e-9 of the magnitudes of its terms: not less than ten times what
+    /// What a determinant must exceed, as a share of the magnitude of its terms: 1e-9, but not less than ten times what
     /// rounding leaves of them in this type.
     #[inline]
     #[must_use]
-    fn singular(limit: f64) -> f64 {
-        limit * (1e10 * Self::epsilon().to_f64()).max(1.0)
+    fn singular() -> Self {
+        Self::from_f64((10.0 * Self::epsilon().to_f64()).max(1e-9))
     }
     /// Whether it is a number and finite.
     fn is_finite(self) -> bool;

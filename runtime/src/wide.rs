@@ -195,8 +195,8 @@ macro_rules! wide {
                 Ok(())
             }
             #[inline(always)]
-            fn regular(&self, x: $value<S>, limit: f64) -> Result<(), PoseError> {
-                let limit = self.number(<$float as Real>::singular(limit));
+            fn regular(&self, x: $value<S>, size: $float) -> Result<(), PoseError> {
+                let limit = self.of(<$float as Real>::singular() * size);
                 self.hold(self.simd.$greater(self.simd.$abs(x.v), limit.v));
                 Ok(())
             }
@@ -247,7 +247,6 @@ macro_rules! wide {
                     let zero = simd.$splat(0.0);
                     let mut values = [numbers.value(zero); INPUTS];
                     // The sum is finite unless one of them is not, or all are huge.
-                    let mut sum = zero;
                     let mut sum = zero;
                     for (to, input) in values.iter_mut().zip(inputs) {
                         let Some(line) = input.get(at..at + $line::LENGTH) else {

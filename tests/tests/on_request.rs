@@ -111,29 +111,88 @@ fn parameters_that_are_no_numbers_are_named() {
 #[test]
 fn base_parameters_pass_their_own_tests() {
     let tests = [
-        ("five_bar", asked_models::five_bar::self_test()),
-        ("panda", asked_models::panda::self_test()),
-        ("delta_tied", asked_models::delta_tied::self_test()),
-        ("spatial_press", asked_models::spatial_press::self_test()),
+        (
+            "five_bar",
+            asked_models::five_bar::self_test(&Default::default()),
+        ),
+        ("panda", asked_models::panda::self_test(&Default::default())),
+        (
+            "delta_tied",
+            asked_models::delta_tied::self_test(&Default::default()),
+        ),
+        (
+            "spatial_press",
+            asked_models::spatial_press::self_test(&Default::default()),
+        ),
         (
             "swinging_cylinder",
-            asked_models::swinging_cylinder::self_test(),
+            asked_models::swinging_cylinder::self_test(&Default::default()),
         ),
-        ("tree_0", asked_models::tree_0::self_test()),
-        ("tree_1", asked_models::tree_1::self_test()),
-        ("tree_2", asked_models::tree_2::self_test()),
-        ("loop_0", asked_models::loop_0::self_test()),
-        ("loop_1", asked_models::loop_1::self_test()),
-        ("loop_2", asked_models::loop_2::self_test()),
+        (
+            "tree_0",
+            asked_models::tree_0::self_test(&Default::default()),
+        ),
+        (
+            "tree_1",
+            asked_models::tree_1::self_test(&Default::default()),
+        ),
+        (
+            "tree_2",
+            asked_models::tree_2::self_test(&Default::default()),
+        ),
+        (
+            "loop_0",
+            asked_models::loop_0::self_test(&Default::default()),
+        ),
+        (
+            "loop_1",
+            asked_models::loop_1::self_test(&Default::default()),
+        ),
+        (
+            "loop_2",
+            asked_models::loop_2::self_test(&Default::default()),
+        ),
     ];
     for (name, result) in tests {
         assert_eq!(result, Ok(()), "{name}");
     }
 }
 
+/// A machine that is built a hundred times smaller, with the code of the large one.
+#[test]
+fn base_parameters_pass_their_own_tests_for_other_geometry() {
+    use asked_models::{delta_tied, five_bar};
+    let large = delta_tied::Geometry::<f64>::default();
+    let small = delta_tied::Geometry {
+        R: 0.01 * large.R,
+        r: 0.01 * large.r,
+        L1: 0.01 * large.L1,
+        L2: 0.01 * large.L2,
+        g: large.g,
+    };
+    assert_eq!(delta_tied::self_test(&small), Ok(()));
+    let large = five_bar::Geometry::<f64>::default();
+    let uneven = five_bar::Geometry {
+        L1: 1.03 * large.L1,
+        ..large
+    };
+    assert_eq!(five_bar::self_test(&uneven), Ok(()));
+    let unreachable = five_bar::Geometry {
+        L1: 100.0 * large.L1,
+        ..large
+    };
+    let error = five_bar::self_test(&unreachable).expect_err("no loop closes");
+    println!("{error}");
+    assert!(
+        matches!(error, SelfTestError::TooFewStates { .. }),
+        "{error}"
+    );
+}
+
 #[test]
 fn a_term_that_is_missing_is_seen() {
-    let error = asked_models::five_bar_without_a_term::self_test().expect_err("a term is missing");
+    let error = asked_models::five_bar_without_a_term::self_test(&Default::default())
+        .expect_err("a term is missing");
     println!("{error}");
     assert!(matches!(error, SelfTestError::Forces { .. }), "{error}");
 }
@@ -141,7 +200,7 @@ fn a_term_that_is_missing_is_seen() {
 #[test]
 fn a_column_that_stands_twice_is_seen() {
     use asked_models::panda_with_a_column_twice as module;
-    let error = module::self_test().expect_err("a column is missing");
+    let error = module::self_test(&Default::default()).expect_err("a column is missing");
     println!("{error}");
     let expected = SelfTestError::Rank {
         of: "H_min",

@@ -1,9 +1,12 @@
 //! Poses: passive coordinates by Newton's method in emitted code and in the evaluator, and what either says where there
 //! is no answer.
 
+use std::f64::consts::FRAC_PI_2;
+
 use modelmill_codegen::{Derivation, Evaluator, PoseFault, PoseReason, States};
 use modelmill_generated::{spidermill, three_rrr};
 use modelmill_runtime::{Loops, PoseError};
+use modelmill_spec::Motion;
 use modelmill_tests::base_parameters;
 use modelmill_tests::fixtures::{derive, derived, model};
 use modelmill_tests::sample::Sample;
@@ -420,5 +423,98 @@ fn terms_without_a_finite_value_are_errors() {
             expected.map(PoseReason::from),
             "{q:?}"
         );
+    }
+}
+
+/// Holds the regressor of a mechanism that is made larger or smaller at run time against that of the file: every entry
+/// grows with a power of the length, at the same poses.
+macro_rules! any_size {
+    ($model:ident, $reach:expr, [$($length:ident),*]) => {{
+        use modelmill_generated::$model as module;
+        let name = stringify!($model).replace("spidermill_paper", "spidermill-paper");
+        let derivation = derived(&name);
+        let active = derivation.mechanism.coordinates.iter().filter(|c| !c.passive);
+        let slides: Vec<bool> = active.map(|c| c.motion == Motion::Prismatic).collect();
+        let drawn = Sample::random(&derivation.mechanism, 40, $reach, &mut Stream::new(4));
+        let regressors = |unit: f64| -> Vec<Vec<f64>> {
+            let default = module::Geometry::<f64>::default();
+            let model = module::Model::new(&module::Geometry { $($length: unit * default.$length),* });
+            let of = |columns: &[Vec<f64>], i: usize| {
+                std::array::from_fn(|k| columns[k][i] * if slides[k] { unit } else { 1.0 })
+            };
+            let states = (0..drawn.len()).map(|i| module::State {
+                q: of(&drawn.q, i),
+                qd: of(&drawn.qd, i),
+                qdd: of(&drawn.qdd, i),
+            });
+            states
+                .map(|state| match model.regressor(&state) {
+                    Ok(h) => h.as_flattened().to_vec(),
+                    Err(error) => panic!("{name}, {unit} times as large: {error} at {:?}", state.q),
+                })
+                .collect()
+        };
+        let one = regressors(1.0);
+        for unit in [1e-3, 0.04, 25.0, 1e3] {
+            let other = regressors(unit);
+            for k in 0..one[0].len() {
+                let largest = (0..one.len()).max_by(|a, b| one[*a][k].abs().total_cmp(&one[*b][k].abs()));
+                let at = largest.expect("states");
+                let size = one[at][k].abs();
+                if size == 0.0 {
+                    continue;
+                }
+                let power = ((other[at][k] / one[at][k]).ln() / unit.ln()).round();
+                for (a, b) in one.iter().zip(&other) {
+                    let b = b[k] / unit.powf(power);
+                    assert!((a[k] - b).abs() < 1e-9 * size, "{name}, {unit}, entry {k}: {} {b}", a[k]);
+                }
+            }
+        }
+    }};
+}
+
+#[test]
+fn geometry_at_run_time_may_be_of_any_size() {
+    any_size!(spidermill, 0.3, [d1, d3, b, dA, Bx, By, g]);
+    any_size!(five_bar, 0.3, [L0, L1, L2, L3, L4, g]);
+    any_size!(arm_four_bar, 0.2, [d2, d3, d4, r4, d8, b, c, g]);
+    any_size!(slider_crank, 1.0, [L1, L2, e, g]);
+    any_size!(three_rrr, 0.02, [l1, l2, c2x, c3x, c3y, b2x, b3x, b3y, g]);
+    any_size!(three_rpr, 0.02, [c2x, c3x, c3y, b1x, b1y, b2x, b2y, b3y, g]);
+    any_size!(delta_tied, 0.2, [R, r, L1, L2, g]);
+    any_size!(
+        gough_stewart_tied,
+        0.02,
+        [
+            bx1, by1, bx2, by2, bx3, by3, bx4, by4, bx5, by5, bx6, by6, ax1, ay1, ax2, ay2, ax3,
+            ay3, ax4, ay4, ax5, ay5, ax6, ay6, g
+        ]
+    );
+}
+
+/// A rod across its slide is as singular in a small machine as in a large one, and a millionth of a radian from there it
+/// is not.
+#[test]
+fn singular_poses_are_singular_at_any_size() {
+    use modelmill_generated::slider_crank::{Geometry, Model, State};
+    let default = Geometry::<f64>::default();
+    for unit in [1e-4, 1.0, 1e4] {
+        let geometry = Geometry {
+            L1: unit,
+            L2: unit,
+            e: 0.0,
+            g: default.g,
+        };
+        let model = Model::new(&geometry);
+        let of = |q: f64| {
+            model.regressor(&State {
+                q: [q],
+                qd: [0.0],
+                qdd: [0.0],
+            })
+        };
+        assert_eq!(of(FRAC_PI_2), Err(PoseError::Singular), "{unit}");
+        assert!(of(FRAC_PI_2 - 1e-6).is_ok(), "{unit}");
     }
 }

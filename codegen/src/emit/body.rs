@@ -63,7 +63,7 @@ impl<'a> Body<'a> {
             .outputs
             .iter()
             .copied()
-            .chain(program.guards.iter().map(|g| g.value()))
+            .chain(program.guards.iter().flat_map(|g| g.values()))
         {
             needed[v.index()] = true;
         }
@@ -378,12 +378,25 @@ impl<'a> Body<'a> {
         let value = self.operand(Stage::State, guard.value());
         match guard {
             Guard::Reachable(_) => quote! { n.reachable(#value)?; },
-            Guard::Regular(_, limit) => {
-                let limit = Literal::f64_unsuffixed(limit);
-                quote! { n.regular(#value, #limit)?; }
+            Guard::Regular(_, size) => {
+                let size = match &self.program.ops[size.index()] {
+                    Op::Number(size) => {
+                        let size = Literal::f64_unsuffixed(size.to_f64());
+                        quote! { T::from_f64(#size) }
+                    }
+                    _ => self.handed_over(size),
+                };
+                quote! { n.regular(#value, #size)?; }
             }
             Guard::Finite(_) => quote! { n.finite(#value)?; },
         }
+    }
+
+    /// A value of the fixed stage where the state stage needs it.
+    fn handed_over(&self, v: ValueId) -> TokenStream {
+        let place = self.handed.iter().position(|h| *h == v);
+        let place = place.expect("a fixed value that is used is handed over");
+        quote! { fixed[#place] }
     }
 
     fn operand(&self, stage: Stage, v: ValueId) -> TokenStream {
@@ -391,12 +404,8 @@ impl<'a> Body<'a> {
             return number(value);
         }
         if stage == Stage::State && self.program.stages[v.index()] == Stage::Fixed {
-            let place = self
-                .handed
-                .iter()
-                .position(|h| *h == v)
-                .expect("a fixed value that is used is handed over");
-            return quote! { n.of(fixed[#place]) };
+            let value = self.handed_over(v);
+            return quote! { n.of(#value) };
         }
         let name = &self.names[v.index()];
         quote! { #name }
@@ -477,7 +486,7 @@ fn fused(program: &Program) -> Vec<bool> {
         op.for_each_operand(|v| uses[v.index()] += 1);
     }
     let kept = program.outputs.iter().copied();
-    for v in kept.chain(program.guards.iter().map(|g| g.value())) {
+    for v in kept.chain(program.guards.iter().flat_map(|g| g.values())) {
         uses[v.index()] += 2;
     }
     let mut fused = vec![false; program.ops.len()];

@@ -1,5 +1,6 @@
 //! The items of an emitted module: names and units, geometry, parameters, state, and the functions of the model.
 
+use modelmill_spec::Motion;
 use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};
 
@@ -336,6 +337,31 @@ pub(super) fn input(derivation: &Derivation) -> impl Fn(Atom) -> TokenStream {
             Atom::Pi => quote! { T::from_f64(::core::f64::consts::PI) },
         }
     }
+}
+
+/// How large the loops of a `geometry` in scope are beside those of the file, for numbers `T`; nothing where no coordinate
+/// in them is a length.
+pub(super) fn scale(derivation: &Derivation) -> Option<TokenStream> {
+    let program = derivation.programs.scale.as_ref()?;
+    let input = input(derivation);
+    let body = Body::new(program, &input);
+    let (statements, scale) = (body.fixed_statements(), body.fixed_output(0));
+    Some(quote! { { #statements #scale } })
+}
+
+/// Nominal values of coordinates, lengths as many times longer as `scale` says.
+pub(super) fn nominal<'a>(
+    derivation: &'a Derivation,
+    coordinates: &'a [usize],
+    scale: Option<&'a TokenStream>,
+) -> impl Iterator<Item = TokenStream> + use<'a> {
+    coordinates.iter().map(move |i| {
+        let coordinate = &derivation.mechanism.coordinates[*i];
+        let value = signed(coordinate.nominal);
+        let scale = scale.filter(|_| coordinate.motion != Motion::Revolute);
+        let scaled = scale.map(|scale| quote! { #scale * });
+        quote! { #scaled T::from_f64(#value) }
+    })
 }
 
 fn base_parameters(derivation: &Derivation) -> TokenStream {

@@ -5,7 +5,7 @@ use quote::quote;
 
 use super::body::Body;
 use super::functions::{Function, list, rows};
-use super::items::{count, input, signed};
+use super::items::{count, input, nominal, scale};
 use crate::Derivation;
 use crate::expr::Atom;
 use crate::programs::PassivePosition;
@@ -28,13 +28,18 @@ pub(super) fn newton(derivation: &Derivation) -> Option<Function> {
     let of_active = list(&scales, 2 * n, n_active);
     let (n_fixed, fixed) = (body.n_fixed(), body.fixed());
     let (n_scales, fixed_scales) = (scales.n_fixed(), scales.fixed());
-    let nominal = |indices: &[usize]| {
-        let values = indices
-            .iter()
-            .map(|i| signed(derivation.mechanism.coordinates[*i].nominal));
-        quote! { [#(T::from_f64(#values)),*] }
-    };
-    let (nominal_active, nominal_passive) = (nominal(&active), nominal(&passive));
+    let scale = scale(derivation);
+    let of_self = scale.as_ref().map(|_| quote! { self.scale });
+    let nominal_active = nominal(derivation, &active, of_self.as_ref());
+    let of_model = scale.as_ref().map(|_| quote! { model.scale });
+    let nominal_passive = nominal(derivation, &passive, of_model.as_ref());
+    let scale_field = scale.as_ref().map(|_| {
+        quote! {
+            /// How large the loops are beside those of the file, for lengths at the nominal pose.
+            scale: T,
+        }
+    });
+    let scale_init = scale.map(|scale| quote! { scale: #scale, });
     let cost = format!(
         " Cost: one evaluation of the loops ({}) with a linear system of {n} unknowns per Newton step,",
         count(&loops.residual)
@@ -75,7 +80,7 @@ pub(super) fn newton(derivation: &Derivation) -> Option<Function> {
         pub fn passive_position(&self, q: &[T; N_ACTIVE]) -> Result<[T; N_PASSIVE], PoseError> {
             self.input?;
             check_finite(q, &ACTIVE)?;
-            follow(self, &Self::nominal_active(), &self.nominal?, q)
+            follow(self, &self.nominal_active(), &self.nominal?, q)
         }
 
         /// Passive coordinates of a pose, from those of a pose near by: for control, of the last cycle.
@@ -97,8 +102,8 @@ pub(super) fn newton(derivation: &Derivation) -> Option<Function> {
         }
 
         /// Independent coordinates of the nominal pose.
-        fn nominal_active() -> [T; N_ACTIVE] {
-            #nominal_active
+        fn nominal_active(&self) -> [T; N_ACTIVE] {
+            [#(#nominal_active),*]
         }
     };
     Some(Function {
@@ -108,13 +113,15 @@ pub(super) fn newton(derivation: &Derivation) -> Option<Function> {
             scales: [T; #n_scales],
             /// Passive coordinates of the nominal pose.
             nominal: Result<[T; N_PASSIVE], PoseError>,
+            #scale_field
         },
         init: quote! {
             residual: { #fixed },
             scales: { #fixed_scales },
             nominal: Err(PoseError::OutOfReach),
+            #scale_init
         },
-        finish: quote! { model.nominal = settle(&model, &Self::nominal_active(), &#nominal_passive); },
+        finish: quote! { model.nominal = settle(&model, &model.nominal_active(), &[#(#nominal_passive),*]); },
         method,
     })
 }

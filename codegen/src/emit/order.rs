@@ -23,6 +23,9 @@ struct Statement {
     needs: Vec<usize>,
     /// Statements that need its values.
     users: Vec<usize>,
+    /// If a value of it is guarded, the statement with the next guarded one: of several faults of a pose the same
+    /// one is told first, in whatever order the rest is written.
+    next_guarded: Option<usize>,
     /// How many values wait after it; inputs wait where they are.
     values: usize,
     /// Time from its start to the end of the program if nothing ever waits for a register, in cycles or thereabouts.
@@ -85,6 +88,15 @@ fn statements(program: &Program, fused: &[bool], wanted: &dyn Fn(usize) -> bool)
         }
         statements.push(statement);
     }
+    let mut guarded: Vec<usize> = (program.guards.iter())
+        .map(|guard| owner[guard.value().index()])
+        .filter(|owner| *owner != usize::MAX)
+        .collect();
+    guarded.sort_unstable();
+    guarded.dedup();
+    for pair in guarded.windows(2) {
+        statements[pair[0]].next_guarded = Some(pair[1]);
+    }
     for k in (0..statements.len()).rev() {
         let longest = |users: &[usize]| users.iter().map(|u| statements[*u].height).max();
         let after = longest(&statements[k].users).unwrap_or(0);
@@ -110,6 +122,9 @@ fn scheduled(statements: &[Statement]) -> Vec<usize> {
     let mut order = Vec::with_capacity(n);
     // How many statements each still waits for, and how many still wait for it.
     let mut missing: Vec<usize> = statements.iter().map(|s| s.needs.len()).collect();
+    for next in statements.iter().filter_map(|s| s.next_guarded) {
+        missing[next] += 1;
+    }
     let mut waiting: Vec<usize> = statements.iter().map(|s| s.users.len()).collect();
     let mut ready: Vec<usize> = (0..n).filter(|k| missing[*k] == 0).collect();
     let mut live = 0;
@@ -142,7 +157,8 @@ fn scheduled(statements: &[Statement]) -> Vec<usize> {
         if statements[k].users.is_empty() {
             live -= statements[k].values;
         }
-        for user in &statements[k].users {
+        let next = statements[k].next_guarded;
+        for user in statements[k].users.iter().chain(&next) {
             missing[*user] -= 1;
             if missing[*user] == 0 {
                 ready.push(*user);

@@ -1,12 +1,13 @@
 //! A test of the base parameters that goes with the module.
 
+use modelmill_spec::Motion;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
 use super::body::Body;
 use super::functions::{Kind, Method, reads_passive, rows};
 use super::identifier::of_field;
-use super::items::{input, signed, uses_load};
+use super::items::{input, nominal, scale, uses_load};
 use crate::Derivation;
 use crate::self_test::reaches;
 
@@ -48,39 +49,51 @@ pub(super) fn self_test(derivation: &Derivation) -> TokenStream {
         quote! { 1.0 #(#factors)* }
     });
     let (active, _) = derivation.coordinates();
-    let nominal = active
-        .iter()
-        .map(|i| signed(mechanism.coordinates[*i].nominal));
-    let reach = reaches(derivation).into_iter().map(Literal::f64_unsuffixed);
+    let scale = scale(derivation);
+    let scaled = scale.as_ref().map(|_| quote! { scale });
+    let nominal = nominal(derivation, &active, scaled.as_ref());
+    let reach = active.iter().zip(reaches(derivation)).map(|(i, reach)| {
+        let scale = scaled
+            .as_ref()
+            .filter(|_| mechanism.coordinates[*i].motion != Motion::Revolute);
+        let (scaled, reach) = (
+            scale.map(|s| quote! { #s * }),
+            Literal::f64_unsuffixed(reach),
+        );
+        quote! { #scaled #reach }
+    });
+    let scale = scale.map(|scale| quote! { let scale = #scale; });
     let load = uses_load(derivation)
         .then(|| quote! { load: ::core::array::from_fn(|_| random.between(-50.0, 50.0)), });
     quote! {
         /// Number of products of parameters.
         pub const N_PRODUCTS: usize = #n_products;
 
-        /// Holds the base parameters against all parameters at random states around the nominal pose, for the model
-        /// file's geometry: H and H_min have rank [`N_BASE`], and `H p = H_min p_min`.
+        /// Holds the base parameters against all parameters at random states around the nominal pose: H and H_min have
+        /// rank [`N_BASE`], and `H p = H_min p_min`.
         ///
-        /// Call it in a test of your own: `arm::self_test()?;`. It needs room on the stack for the square of the number
-        /// of products.
+        /// Call it in a test of your own: `arm::self_test(&arm::Geometry::default())?;`, and for every other geometry that
+        /// you use. It needs room on the stack for the square of the number of products.
         ///
         /// # Errors
-        /// What does not hold, in numbers.
-        pub fn self_test() -> Result<(), ::modelmill_runtime::SelfTestError> {
-            const NOMINAL: [f64; N_ACTIVE] = [#(#nominal),*];
-            const REACH: [f64; N_ACTIVE] = [#(#reach),*];
-            let geometry = Geometry::<f64>::default();
-            let (model, all) = (Model::new(&geometry), AllColumns::new(&geometry));
+        /// What does not hold, in numbers. The rank is smaller at geometries that are special, as with a length of zero
+        /// that is none in the model file.
+        pub fn self_test(geometry: &Geometry<f64>) -> Result<(), ::modelmill_runtime::SelfTestError> {
+            type T = f64;
+            #scale
+            let nominal: [f64; N_ACTIVE] = [#(#nominal),*];
+            let reaches: [f64; N_ACTIVE] = [#(#reach),*];
+            let (model, all) = (Model::new(geometry), AllColumns::new(geometry));
             let mut draw = ::modelmill_runtime::Random::new(2);
             #[allow(unused_mut)]
             let mut parameters = Parameters::<f64>::default();
             #(parameters.#fields = draw.near(parameters.#fields);)*
             let products = [#(#values),*];
-            let base = base_parameters(&geometry, &parameters);
-            let dynamics = InverseDynamics::new(&geometry, &base);
+            let base = base_parameters(geometry, &parameters);
+            let dynamics = InverseDynamics::new(geometry, &base);
             ::modelmill_runtime::self_test::<N_PRODUCTS, N_BASE>(&products, &base, |random, reach, show| {
                 let state = State {
-                    q: ::core::array::from_fn(|k| NOMINAL[k] + reach * REACH[k] * random.between(-1.0, 1.0)),
+                    q: ::core::array::from_fn(|k| nominal[k] + reach * reaches[k] * random.between(-1.0, 1.0)),
                     qd: ::core::array::from_fn(|_| random.between(-2.0, 2.0)),
                     qdd: ::core::array::from_fn(|_| random.between(-8.0, 8.0)),
                     #load

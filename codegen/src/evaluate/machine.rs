@@ -110,7 +110,7 @@ impl<'a> Machine<'a> {
             .outputs
             .iter()
             .copied()
-            .chain(program.guards.iter().map(|g| g.value()))
+            .chain(program.guards.iter().flat_map(|g| g.values()))
         {
             last_use[value.index()] = program.ops.len();
             needed[value.index()] = true;
@@ -205,7 +205,10 @@ impl<'a> Machine<'a> {
     fn first_fault(&self, len: usize, memory: &[[f64; BLOCK]]) -> Option<(usize, Guard)> {
         let failing = self.program.guards.iter().filter_map(|guard| {
             let values = self.values(guard.value(), memory);
-            let k = values[..len].iter().position(|v| !guard.passes(*v))?;
+            let size = guard
+                .size()
+                .map_or(1.0, |size| self.values(size, memory)[0]);
+            let k = values[..len].iter().position(|v| !guard.passes(*v, size))?;
             Some((k, *guard))
         });
         failing.min_by_key(|(k, guard)| (*k, guard.value()))

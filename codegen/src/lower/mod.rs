@@ -11,6 +11,7 @@ mod share;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use program::SINGULAR;
 pub use program::{Guard, Op, OperationCount, Program, Stage, ValueId};
 pub(crate) use schedule::Definition;
 
@@ -30,8 +31,8 @@ pub(crate) struct Request<'a> {
     pub(crate) outputs: &'a [ExprId],
     /// What must not be negative.
     pub(crate) reachable: &'a [ExprId],
-    /// What must not vanish, with the magnitude below which it counts as zero.
-    pub(crate) regular: &'a [(ExprId, f64)],
+    /// What must not vanish, with the magnitude of its terms, which is fixed.
+    pub(crate) regular: &'a [(ExprId, ExprId)],
     /// Whether outputs may have no finite value at states where everything else is regular.
     pub(crate) may_be_undefined: bool,
     /// Atoms that are computed rather than read.
@@ -54,7 +55,7 @@ pub(crate) fn lower(graph: &Graph, request: &Request<'_>) -> Program {
 pub(crate) fn lower_by(graph: &Graph, n_passes: usize, request: &Request<'_>) -> Program {
     let mut roots: Vec<ExprId> = request.outputs.to_vec();
     roots.extend(request.reachable);
-    roots.extend(request.regular.iter().map(|(id, _)| *id));
+    roots.extend(request.regular.iter().flat_map(|(id, size)| [*id, *size]));
     for definition in request.definitions {
         roots.extend(definition.operands());
     }

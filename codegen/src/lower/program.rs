@@ -87,13 +87,16 @@ pub enum Stage {
     State,
 }
 
+/// A determinant this much smaller than the magnitude of its terms counts as zero.
+pub(crate) const SINGULAR: f64 = 1e-9;
+
 /// What must hold at a pose for the model to have an answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Guard {
     /// The value must not be negative: otherwise the loops cannot close.
     Reachable(ValueId),
-    /// The magnitude of the value must stay above the limit: otherwise the pose is singular.
-    Regular(ValueId, f64),
+    /// The magnitude of the value must stay above 1e-9 of the second one, the magnitude of its terms, which is fixed: otherwise the pose is singular.
+    Regular(ValueId, ValueId),
     /// The value must be a finite number: a term of the model may have none.
     Finite(ValueId),
 }
@@ -106,11 +109,24 @@ impl Guard {
         }
     }
 
-    /// Whether a value passes; what is not a number never does.
-    pub fn passes(self, value: f64) -> bool {
+    /// What it is held against, if that is a value of the program.
+    pub fn size(self) -> Option<ValueId> {
+        match self {
+            Self::Regular(_, size) => Some(size),
+            Self::Reachable(_) | Self::Finite(_) => None,
+        }
+    }
+
+    /// Both, for each that there is.
+    pub fn values(self) -> impl Iterator<Item = ValueId> {
+        std::iter::once(self.value()).chain(self.size())
+    }
+
+    /// Whether a value passes beside its size; what is not a number never does.
+    pub fn passes(self, value: f64, size: f64) -> bool {
         match self {
             Self::Reachable(_) => value >= 0.0,
-            Self::Regular(_, limit) => value.abs() > limit,
+            Self::Regular(..) => value.abs() > SINGULAR * size,
             Self::Finite(_) => value.is_finite(),
         }
     }
@@ -182,7 +198,7 @@ impl Program {
             .outputs
             .iter()
             .copied()
-            .chain(self.guards.iter().map(|g| g.value()))
+            .chain(self.guards.iter().flat_map(|g| g.values()))
         {
             needed[value.index()] = true;
         }
@@ -214,7 +230,7 @@ impl Program {
             .iter()
             .map(|guard| match guard {
                 Guard::Reachable(v) => Guard::Reachable(new[v.index()]),
-                Guard::Regular(v, limit) => Guard::Regular(new[v.index()], *limit),
+                Guard::Regular(v, size) => Guard::Regular(new[v.index()], new[size.index()]),
                 Guard::Finite(v) => Guard::Finite(new[v.index()]),
             })
             .collect();

@@ -26,11 +26,12 @@ impl Definition {
     }
 }
 
-/// Writes the program for `roots`: outputs, then what must be reachable, regular, and defined, as in `request`.
+/// Writes the program for `roots`: outputs, then what must be reachable, regular (each with its size), and defined, as in
+/// `request`.
 pub(crate) fn schedule(graph: &Graph, roots: &[ExprId], request: &Request<'_>) -> Program {
     let (outputs, rest) = roots.split_at(request.outputs.len());
     let (reachable, rest) = rest.split_at(request.reachable.len());
-    let (regular, defined) = rest.split_at(request.regular.len());
+    let (regular, defined) = rest.split_at(2 * request.regular.len());
     let mut scheduler = Scheduler {
         graph,
         fixed: fixed_nodes(graph, roots),
@@ -49,9 +50,9 @@ pub(crate) fn schedule(graph: &Graph, roots: &[ExprId], request: &Request<'_>) -
         let value = scheduler.value(*id);
         scheduler.program.guards.push(Guard::Reachable(value));
     }
-    for (id, (_, limit)) in regular.iter().zip(request.regular) {
-        let value = scheduler.value(*id);
-        scheduler.program.guards.push(Guard::Regular(value, *limit));
+    for pair in regular.chunks(2) {
+        let [value, size] = [pair[0], pair[1]].map(|id| scheduler.value(id));
+        scheduler.program.guards.push(Guard::Regular(value, size));
     }
     let outputs: Vec<ValueId> = outputs.iter().map(|id| scheduler.value(*id)).collect();
     if request.may_be_undefined {
