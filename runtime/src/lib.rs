@@ -18,6 +18,7 @@ pub mod source;
 #[cfg(feature = "std")]
 mod wide;
 
+use core::cmp::Ordering;
 use core::fmt;
 
 pub use lanes::{LARGEST_ANGLE, sin_cos_lanes};
@@ -37,7 +38,8 @@ pub enum PoseError {
     Singular,
     /// A term of the model, such as an effect of its own, has no finite value there.
     Undefined,
-    /// An input is no finite number; its name in the model file, with `_d` and `_dd` for rates and accelerations.
+    /// An input is no number, or larger than [`Real::largest`]; its name in the model file, with `_d` and `_dd` for rates
+    /// and accelerations.
     NotFinite(&'static str),
 }
 
@@ -47,31 +49,32 @@ impl fmt::Display for PoseError {
             Self::OutOfReach => f.write_str("the loops cannot close: the pose is out of reach"),
             Self::Singular => f.write_str("the pose is singular"),
             Self::Undefined => f.write_str("a term of the model has no finite value there"),
-            Self::NotFinite(input) => write!(f, "`{input}` is no finite number"),
+            Self::NotFinite(input) => {
+                write!(f, "`{input}` is no number, or too large to compute with")
+            }
         }
     }
 }
 
 impl core::error::Error for PoseError {}
 
-/// Names the first of some inputs that is no finite number.
+/// Names the first of some inputs that is no number, or larger than [`Real::largest`].
 ///
 /// # Errors
 /// [`PoseError::NotFinite`] with its name.
 #[inline]
 pub fn check_finite<T: Real>(values: &[T], names: &[&'static str]) -> Result<(), PoseError> {
-    // The sum is finite unless one of them is not, or all are huge: a branch in place of many.
-    let mut sum = T::from_f64(0.0);
+    // One branch for all of them.
+    let mut fine = true;
     for value in values {
-        sum = sum + *value;
+        fine &= value.abs() < T::largest();
     }
-    if sum.is_finite() {
+    if fine {
         return Ok(());
     }
-    let found = values
-        .iter()
-        .zip(names)
-        .find(|(value, _)| !value.is_finite());
+    let mut named = values.iter().zip(names);
+    let found =
+        named.find(|(value, _)| value.abs().partial_cmp(&T::largest()) != Some(Ordering::Less));
     found.map_or(Ok(()), |(_, name)| Err(PoseError::NotFinite(name)))
 }
 

@@ -20,6 +20,14 @@ pub trait Real:
     fn to_f64(self) -> f64;
     /// Distance from 1 to the next larger number.
     fn epsilon() -> Self;
+    /// What inputs must stay below, whatever their unit: then their powers are finite up to the fifth, or for `f32` up to
+    /// the third.
+    #[inline]
+    #[must_use]
+    fn largest() -> Self {
+        let single = Self::epsilon().to_f64() > 1e-12;
+        Self::from_f64(if single { 1e12 } else { 1e60 })
+    }
     /// What a determinant must exceed, as a share of the magnitude of its terms: 1e-9, but not less than ten times what
     /// rounding leaves of them in this type.
     #[inline]

@@ -17,7 +17,10 @@ const STATUS: [(&str, &str); 8] = [
     ),
     ("SINGULAR", "the pose is singular"),
     ("UNDEFINED", "a term of the model has no finite value there"),
-    ("NOT_FINITE", "an input is no finite number"),
+    (
+        "NOT_FINITE",
+        "an input is no number, or too large to compute with",
+    ),
     (
         "NOT_PREPARED",
         "the structure was not filled by the function that prepares it",

@@ -149,7 +149,7 @@ fn forward(
         /// Accelerations of the state are not read. Cost: [`Self::mass_matrix`], [`Self::bias`], and a linear system.
         ///
         /// # Errors
-        /// A pose out of reach or singular, a mass matrix that is singular, or an input that is no finite number.
+        /// A pose out of reach or singular, a mass matrix that is singular, or an input that is no number or too large.
     };
     if !reads_passive(derivation, &dynamics.mass_matrix)
         && !reads_passive(derivation, &dynamics.bias)

@@ -153,7 +153,7 @@ impl Method<'_> {
                 #[doc = #doc]
                 ///
                 /// # Errors
-                /// A pose out of reach or singular, or an input that is no finite number.
+                /// A pose out of reach or singular, or an input that is no number or too large.
                 pub fn #method(&self, state: &State<T>) -> Result<#output, PoseError> {
                     self.input?;
                     state.check()?;
@@ -183,7 +183,7 @@ impl Method<'_> {
             #[doc = #cost]
             ///
             /// # Errors
-            /// A pose out of reach or singular, or an input that is no finite number.
+            /// A pose out of reach or singular, or an input that is no number or too large.
             pub fn #method(&self, state: &State<T>) -> Result<#output, PoseError> {
                 self.input?;
                 state.check()?;
@@ -195,7 +195,7 @@ impl Method<'_> {
             #[doc = #cost_near]
             ///
             /// # Errors
-            /// A pose out of reach or singular, or an input that is no finite number.
+            /// A pose out of reach or singular, or an input that is no number or too large.
             pub fn #near(&self, state: &State<T>, passive: &mut [T; N_PASSIVE]) -> Result<#output, PoseError> {
                 self.input?;
                 state.check()?;

@@ -276,7 +276,7 @@ fn state(derivation: &Derivation) -> TokenStream {
         #states
 
         impl<T: Real> State<T> {
-            /// Names the first entry that is no finite number.
+            /// Names the first entry that is no number, or too large to compute with.
             fn check(&self) -> Result<(), PoseError> {
                 check_finite(&self.q, &ACTIVE)?;
                 check_finite(&self.qd, #rates)?;
