@@ -46,7 +46,7 @@ impl Run {
         }
         vec![Note::warning(format!(
             "The measured force of {} in {} is 0 throughout: nothing was measured, or the column is another one (--map); \
-             parameters found from it are 0 as well, with deviations of 0.",
+             errors relative to it have no value, and it pulls parameters to 0.",
             list(&idle),
             self.file
         ))]

@@ -83,7 +83,8 @@ impl Recording {
         let low = force.iter().copied().fold(f64::INFINITY, f64::min);
         let high = force.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if low >= high {
-            return (force.len() > 1).then(|| {
+            // Forces of 0 are said beside the drives' other ones, by `suspicious_forces`.
+            return (force.len() > 1 && low != 0.0).then(|| {
                 Note::warning(format!(
                     "The force of `{name}` in {} is {low} throughout: it is no measurement of a drive that works.",
                     self.file()
