@@ -1,7 +1,7 @@
 //! A model as excitation sees it: regressor, and limits beyond those of the active coordinates.
 
 use modelmill_codegen::{Evaluator, States};
-use modelmill_identify::excite::{Motion, Plant, least_singular_value};
+use modelmill_identify::excite::{Margin, Motion, Plant, least_singular_value};
 use modelmill_spec::{Kinematics, Limits, PointIdx};
 use nalgebra::DMatrix;
 
@@ -9,6 +9,19 @@ use crate::model::Model;
 
 /// Names of the axes of the base frame.
 pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Limits of least singular values, which are to stay above a share of those at the nominal pose.
+const SINGULARITIES: [&str; 2] = ["singularity of the loops", "singularity of the drives"];
+
+/// The part of a limit that a trajectory uses, 1 at the limit. Most excesses count from the middle of a range; those of
+/// least singular values from their limit, which is the part of the least value along the trajectory.
+pub(crate) fn used(margin: &Margin) -> f64 {
+    if SINGULARITIES.contains(&margin.name.as_str()) {
+        1.0 / (1.0 - margin.excess).max(0.0)
+    } else {
+        (1.0 + margin.excess).max(0.0)
+    }
+}
 
 /// A model with limits.
 pub(crate) struct ModelPlant<'a> {
@@ -176,9 +189,7 @@ impl Plant for ModelPlant<'_> {
             .map(|(point, axis, _)| format!("{}.{}", mechanism.points[point.0].name, AXES[*axis]));
         let mut names: Vec<String> = passive.chain(forces).chain(points).collect();
         if self.singularity.is_some() {
-            names.extend(
-                ["singularity of the loops", "singularity of the drives"].map(str::to_owned),
-            );
+            names.extend(SINGULARITIES.map(str::to_owned));
         }
         names
     }

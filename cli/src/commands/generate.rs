@@ -7,7 +7,7 @@ use modelmill_codegen::{EmittedFile, emit, emit_c, emit_python, module_name};
 use crate::args::{GenerateArgs, Language};
 use crate::failure::{Failure, Outcome};
 use crate::model;
-use crate::output::{Target, write};
+use crate::output::{Target, refuse_dash, write};
 use crate::progress::watched;
 use crate::table::count;
 use crate::terminal;
@@ -91,6 +91,7 @@ const OURS: &str = "# Written by modelmill.";
 
 /// Writes a crate with a copy of the runtime, so that the folder can go anywhere; only over a crate of the same kind.
 fn write_crate(folder: &Path, files: &[EmittedFile]) -> Outcome {
+    refuse_dash(folder)?;
     let manifest = folder.join("Cargo.toml");
     let ours = std::fs::read_to_string(&manifest).is_ok_and(|text| text.starts_with(OURS));
     let occupied = folder.is_file()
