@@ -255,3 +255,32 @@ fn states<'m>(motion: &'m Motion, load: &'m [Vec<f64>]) -> States<'m> {
         load: slices(load),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A pose far from singular ones uses little of its limit, not less than nothing.
+    #[test]
+    fn what_is_used_of_a_limit_is_never_negative() {
+        let used = |name: &str, excess: f64| {
+            let name = name.to_owned();
+            used(&Margin {
+                name,
+                excess,
+                proven: false,
+            })
+        };
+        // Ranges: the middle, the edge, beyond; sampling may put the middle a little below.
+        assert_eq!(
+            [-1.0, -0.25, 0.0, 0.5].map(|x| used("theta1", x)),
+            [0.0, 0.75, 1.0, 1.5]
+        );
+        assert_eq!(used("theta1", -1.01).to_bits(), 0.0_f64.to_bits());
+        // Least values of four times the limit, of the limit, and of half of it: excess is one less their ratio.
+        for name in SINGULARITIES {
+            assert_eq!([-3.0, 0.0, 0.5].map(|x| used(name, x)), [0.25, 1.0, 2.0]);
+            assert!(used(name, -1e9) >= 0.0);
+        }
+    }
+}

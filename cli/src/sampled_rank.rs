@@ -67,7 +67,7 @@ impl SampledRank {
 
     fn gap_text(&self) -> String {
         format!(
-            "gap {} to the next singular value",
+            "gap of {} to the next singular value",
             significant(self.gap, 2)
         )
     }
@@ -119,9 +119,8 @@ pub(crate) fn judged_rank(model: &Model) -> Judged {
     }
     if found.gap < SMALL_GAP {
         warnings.push(format!(
-            "the numeric rank {rank} stands on a small {}: the file's values nearly tie columns, other states could give \
-             another rank, and identification will find directions that are hardly determined; where units or lengths differ \
-             by many orders of magnitude, check them",
+            "the numeric rank {rank} stands on a small {}; the file's values nearly tie columns, other states could give \
+             another rank, and identification will find directions that are hardly determined",
             found.gap_text()
         ));
     }

@@ -201,7 +201,10 @@ fn check_number(
             "no drive is left for this coordinate"
         })
         .help("each coordinate that is not `passive` is a degree of freedom and needs one drive")
-        .help(if drives.len() > n_active {
+        .help(if n_active == 0 {
+            "every coordinate is `passive`, so that nothing is driven: take `passive = true` off the one that the drive moves; if \
+             the loops tie too many coordinates then, a joint is missing or a loop is too many"
+        } else if drives.len() > n_active {
             "delete a drive, or make another coordinate active"
         } else {
             "add a `[[drive]]`; if the loops settle this coordinate, mark it `passive = true`"
