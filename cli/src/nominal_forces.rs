@@ -67,9 +67,9 @@ pub(crate) fn oddities(
 
 fn says(mechanism: &Mechanism, drives: &[&Drive], which: Oddity, file: &str) -> String {
     let names: Vec<String> = drives.iter().map(|d| format!("`{}`", d.name)).collect();
-    let (forces, are, their) = match drives {
-        [_] => ("force", "is", "its"),
-        _ => ("forces", "are", "their"),
+    let (forces, are, they_are) = match drives {
+        [_] => ("force", "is", "it is"),
+        _ => ("forces", "are", "they are"),
     };
     let maps: Vec<String> = drives
         .iter()
@@ -85,28 +85,12 @@ fn says(mechanism: &Mechanism, drives: &[&Drive], which: Oddity, file: &str) -> 
         })
         .collect();
     let what = match which {
-        Oddity::Turned => {
-            format!("{are} of the opposite sign; if {their} positive direction is another one")
-        }
-        Oddity::TooSmall => format!(
-            "{are} about 1000 times as small; if {are_in} in thousands",
-            are_in = if drives.len() == 1 {
-                "it is"
-            } else {
-                "they are"
-            }
-        ),
-        Oddity::TooLarge => format!(
-            "{are} about 1000 times as large; if {are_in} in thousandths",
-            are_in = if drives.len() == 1 {
-                "it is"
-            } else {
-                "they are"
-            }
-        ),
+        Oddity::Turned => format!("of the opposite sign; if {they_are} counted the other way"),
+        Oddity::TooSmall => format!("about 1000 times as small; if {they_are} in kN or kN m"),
+        Oddity::TooLarge => format!("about 1000 times as large; if {they_are} in mN or mN m"),
     };
     format!(
-        "Beside what the nominal values give, the {forces} of {} in {file} {what}, say `{}`.",
+        "Beside what the nominal values give, the {forces} of {} in {file} {are} {what}, say `{}`.",
         names.join(", "),
         maps.join(" ")
     )

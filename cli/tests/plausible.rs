@@ -528,13 +528,6 @@ name = "sarrus"
 gravity = [0, 0, "-g"]
 constants = { L = { value = 0.4, unit = "m" }, a = { value = 0.2, unit = "m" }, g = { value = 9.81, unit = "m/s^2" } }
 
-[coordinates]
-z = { nominal = 0.451714, passive = true }
-q0 = { nominal = -0.6 }
-e0 = { nominal = -1.941593, passive = true }
-q1 = { nominal = -0.6, passive = true }
-e1 = { nominal = -1.941593, passive = true }
-
 frame = [
     { name = "plat", on = "base", joint = { prismatic = "z", axis = "z" } },
     { name = "p0", on = "base", transform = { xyz = ["a", 0, 0] }, joint = { revolute = "q0", axis = "y" } },
@@ -559,6 +552,13 @@ part = [
 parameters = { M_plat = { unit = "kg" } }
 loop = [{ joins = ["P1", "P2"] }, { joins = ["P3", "P4"] }]
 drive = [{ name = "motor", joint = "q0" }]
+
+[coordinates]
+z = { nominal = 0.451714, passive = true }
+q0 = { nominal = -0.6 }
+e0 = { nominal = -1.941593, passive = true }
+q1 = { nominal = -0.6, passive = true }
+e1 = { nominal = -1.941593, passive = true }
 "#;
 
 /// Random states are no neighbours: followed from one to the next, Newton's method ends at singular poses, although each
