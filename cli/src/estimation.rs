@@ -153,17 +153,7 @@ pub(crate) fn text(model: &Model, found: &Identified, infos: &[ParameterInfo]) -
     let name = |i: usize| infos[found.unknown[i]].name.clone();
     match &found.more {
         More::Nothing => {}
-        More::Prior(beliefs) => lines.push(format!(
-            "{} of nominal values count as measurements{}",
-            count(*beliefs, "soft constraint", "soft constraints"),
-            match found.unknown.len() - beliefs {
-                0 => String::new(),
-                n => format!(
-                    "; {} without one, since their nominal values are 0 or not given",
-                    count(n, "base parameter goes", "base parameters go")
-                ),
-            }
-        )),
+        More::Prior(beliefs) => lines.push(prior_text(*beliefs, found.unknown.len())),
         More::Essential(dropped, rise) => {
             let names: Vec<String> = dropped.iter().map(|one| name(one.parameter)).collect();
             lines.push(if names.is_empty() {
@@ -212,6 +202,19 @@ pub(crate) fn text(model: &Model, found: &Identified, infos: &[ParameterInfo]) -
         }
     }
     lines
+}
+
+/// How many base parameters have a nominal value that counts.
+fn prior_text(beliefs: usize, unknown: usize) -> String {
+    let constraints = count(beliefs, "soft constraint", "soft constraints");
+    let without = match unknown - beliefs {
+        0 => String::new(),
+        n => format!(
+            "; {} without one, since their nominal values are 0 or not given",
+            count(n, "base parameter goes", "base parameters go")
+        ),
+    };
+    format!("{constraints} of nominal values count as measurements{without}")
 }
 
 /// What stands for a share where the recordings say something of a parameter, but not its value.
