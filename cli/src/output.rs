@@ -47,8 +47,9 @@ impl Target {
 pub(crate) fn make_folder(folder: &Path) -> Outcome {
     refuse_dash(folder)?;
     if folder.exists() && !folder.is_dir() {
-        return Err(Failure::Usage(format!(
-            "--out {}: this is a file; give the name of a folder, which is made if it is not there",
+        return Err(Failure::Input(format!(
+            "--out {}: the folder cannot be made, since this is a file; give the name of a folder, which is made if it is not \
+             there",
             folder.display()
         )));
     }

@@ -272,7 +272,7 @@ fn what_stands_in_the_wrong_place_is_named() {
     }
     let data = run("plain-fit.csv");
     let spidermill = model("spidermill.toml");
-    let says = refused(2, &["report", &spidermill, "--data", &data, "--out", &data]);
+    let says = refused(1, &["report", &spidermill, "--data", &data, "--out", &data]);
     assert!(
         says.contains("this is a file") && says.contains("name of a folder"),
         "{says}"
