@@ -584,7 +584,6 @@ fn a_numeric_rank_survives_states_that_have_no_answer() {
     let equations = json(&["equations", &file, "--json"]);
     assert_eq!(equations["rank"]["exact"], 5);
     assert_eq!(equations["rank"]["numeric"], 5);
-    assert!(number(&equations, "/rank/gap") > 1e6);
     // Where a term has no value at some rates, those states are left out, counted, and said.
     let slip = of_joint1("c*sqrt(1 + rate/v)", &["c"]);
     let text = std::fs::read_to_string(model("two_link.toml")).expect("a model");

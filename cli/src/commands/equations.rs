@@ -1,10 +1,9 @@
 //! `equations`: the reduced model for people and programs.
 
 use modelmill_codegen::review::{Equations, Format, page};
-use serde_json::Value;
 
 use crate::args::{EquationsArgs, EquationsFormat};
-use crate::failure::{Failure, Outcome};
+use crate::failure::Outcome;
 use crate::model::{self, Model};
 use crate::output::Target;
 use crate::progress::watched;
@@ -30,7 +29,7 @@ pub(crate) fn run(args: &EquationsArgs) -> Outcome {
         EquationsFormat::Markdown => written(&model, Format::Markdown, rank.as_ref()),
         EquationsFormat::Latex => written(&model, Format::Latex, rank.as_ref()),
         EquationsFormat::Html => written(&model, Format::Html, rank.as_ref()),
-        EquationsFormat::Json => json(&model, rank.as_ref())?,
+        EquationsFormat::Json => json(&model, rank.as_ref()),
     };
     match target {
         Some(target) => target.write(&text),
@@ -38,19 +37,11 @@ pub(crate) fn run(args: &EquationsArgs) -> Outcome {
     }
 }
 
-/// The equations as the contract of the program's JSON has them; beside the ranks stands what they rest on.
-fn json(model: &Model, rank: Option<&SampledRank>) -> Outcome<String> {
+/// The equations as the contract of the program's JSON has them; `check --json` says what the numeric rank rests on.
+fn json(model: &Model, rank: Option<&SampledRank>) -> String {
     let mut equations = Equations::new(&model.derivation, rank.map(|rank| &rank.shown));
     equations.model.clone_from(&model.name);
-    let Some(rank) = rank else {
-        return Ok(equations.json());
-    };
-    let mut value: Value = serde_json::from_str(&equations.json()).map_err(Failure::input)?;
-    let more = rank.json();
-    for key in ["condition_number", "gap", "left_out"] {
-        value["rank"][key] = more[key].clone();
-    }
-    Ok(format!("{value:#}\n"))
+    equations.json()
 }
 
 /// The equations of a model as one self-contained page.
