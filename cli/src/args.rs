@@ -36,7 +36,10 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Validate a model file and print a summary
     #[command(
-        after_help = "Examples (from the project's root):\n  modelmill check model-spec/models/spidermill.toml\n  \
+        after_help = "The numeric rank, eq. (9), is that of the regressor at random states with the file's values. Its gap is the \
+        ratio of the last singular value that counts to the next, or to the level of rounding; below 1000 the rank is a matter \
+        of opinion, and a warning says so.\n\n\
+        Examples (from the project's root):\n  modelmill check model-spec/models/spidermill.toml\n  \
         modelmill check model-spec/models/spidermill.toml --json"
     )]
     Check(CheckArgs),

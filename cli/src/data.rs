@@ -31,6 +31,8 @@ pub(crate) struct Data {
     pub(crate) weights: Option<Vec<f64>>,
     /// What the drives carry, `[drive][sample]`, for effects that depend on it; the measured forces if there are none.
     pub(crate) load: Option<Vec<Vec<f64>>>,
+    /// The options that would read all angles in degrees; empty where no file stands behind.
+    pub(crate) maps_from_degrees: String,
 }
 
 /// Reads and prepares recordings; their warnings go to standard error.
@@ -142,6 +144,12 @@ fn prepare(
         let oddities = recording.oddities(&model.motions(), &model.drives());
         first.notes.splice(0..0, oddities);
     }
+    let motions = model.motions();
+    let angles = motions.iter().filter(|(_, is_angle)| *is_angle);
+    let maps: Vec<String> = angles
+        .map(|(name, _)| recording.maps_from_degrees(name))
+        .collect();
+    let maps_from_degrees = maps.join(" ");
     for run in &mut runs {
         let idle = run.suspicious_forces(&model.drives());
         run.notes.extend(idle);
@@ -154,6 +162,7 @@ fn prepare(
             variance,
             weights: None,
             load: None,
+            maps_from_degrees: maps_from_degrees.clone(),
         })
     });
     with_variance.collect()
@@ -214,6 +223,7 @@ impl From<Run> for Data {
             variance: None,
             weights: None,
             load: None,
+            maps_from_degrees: String::new(),
         }
     }
 }

@@ -2,6 +2,7 @@
 //! people.
 
 use modelmill_identify::ParameterInfo;
+use modelmill_identify::physical::Physical;
 use serde_json::{Value, json};
 
 use crate::estimators::EstimatorArgs;
@@ -81,7 +82,7 @@ pub(crate) fn json(model: &Model, found: &Identified, args: &EstimatorArgs) -> V
                 .map(|(i, p)| {
                     json!({
                         "name": p.name, "value": physical.parameters[i], "std": physical.std[i], "unit": p.unit,
-                        "nominal": p.nominal, "from_recording": physical.from_recording[i],
+                        "nominal": p.nominal, "from_recording": physical.from_recording[i], "alone": physical.alone[i],
                     })
                 })
                 .collect();
@@ -152,10 +153,7 @@ pub(crate) fn text(model: &Model, found: &Identified, infos: &[ParameterInfo]) -
     let name = |i: usize| infos[found.unknown[i]].name.clone();
     match &found.more {
         More::Nothing => {}
-        More::Prior(beliefs) => lines.push(format!(
-            "{} of nominal values count as measurements",
-            count(*beliefs, "soft constraint", "soft constraints")
-        )),
+        More::Prior(beliefs) => lines.push(prior_text(*beliefs, found.unknown.len())),
         More::Essential(dropped, rise) => {
             let names: Vec<String> = dropped.iter().map(|one| name(one.parameter)).collect();
             lines.push(if names.is_empty() {
@@ -206,9 +204,37 @@ pub(crate) fn text(model: &Model, found: &Identified, infos: &[ParameterInfo]) -
     lines
 }
 
+/// How many base parameters have a nominal value that counts.
+fn prior_text(beliefs: usize, unknown: usize) -> String {
+    let constraints = count(beliefs, "soft constraint", "soft constraints");
+    let without = match unknown - beliefs {
+        0 => String::new(),
+        n => format!(
+            "; {} without one, since their nominal values are 0 or not given",
+            count(n, "base parameter goes", "base parameters go")
+        ),
+    };
+    format!("{constraints} of nominal values count as measurements{without}")
+}
+
+/// What stands for a share where the recordings say something of a parameter, but not its value.
+const NOT_ALONE: &str = "not alone";
+/// Shares below this one say plainly enough that it is the nominal value that one sees.
+const NEXT_TO_NOTHING: f64 = 0.01;
+
+/// How much of a physical parameter the recordings say by themselves.
+fn from_recording(physical: &Physical, i: usize) -> String {
+    let share = physical.from_recording[i];
+    if physical.alone[i] || share < NEXT_TO_NOTHING {
+        percent(Some(share))
+    } else {
+        NOT_ALONE.to_owned()
+    }
+}
+
 fn physical_text(
     model: &Model,
-    physical: &modelmill_identify::physical::Physical,
+    physical: &Physical,
     bodies: &[String],
     before: f64,
 ) -> Vec<String> {
@@ -222,7 +248,7 @@ fn physical_text(
                 number(p.nominal),
                 number(physical.parameters[i]),
                 significant(physical.std[i], 2),
-                percent(Some(physical.from_recording[i])),
+                from_recording(physical, i),
                 p.unit.clone(),
             ]
         })
@@ -247,6 +273,12 @@ fn physical_text(
         ],
         &rows,
     ));
+    if (0..rows.len()).any(|i| from_recording(physical, i) == NOT_ALONE) {
+        lines.push(format!(
+            "{NOT_ALONE}: the recordings tell combinations of this parameter with others, not it by itself; nominal values and \
+             what a body can be do the rest, also in `std`"
+        ));
+    }
     let tight = bodies
         .iter()
         .zip(&physical.margins)

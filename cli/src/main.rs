@@ -17,6 +17,7 @@ mod failure;
 mod instruments;
 mod limits;
 mod model;
+mod nominal_forces;
 mod output;
 mod piped;
 mod plant;

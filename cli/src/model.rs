@@ -73,8 +73,10 @@ pub(crate) fn load_quietly(path: &Path) -> Outcome<Loaded> {
             nearby(path)
         )));
     }
-    modelmill_spec::load_file_with(path, libraries())
-        .map_err(|failure| Failure::Rendered(failure.render(terminal::errors_in_colour())))
+    watched(&format!("reading {}", path.display()), 0, |_| {
+        modelmill_spec::load_file_with(path, libraries())
+    })
+    .map_err(|failure| Failure::Rendered(failure.render(terminal::errors_in_colour())))
 }
 
 /// Reads and derives a model file.

@@ -14,6 +14,7 @@ impl Target {
         path: &Path,
         inputs: impl IntoIterator<Item = &'a Path>,
     ) -> Outcome<Self> {
+        refuse_dash(path)?;
         if path.is_dir() {
             return Err(Failure::Usage(format!(
                 "--out {}: this is a folder; give the name of a file in it",
@@ -40,6 +41,36 @@ impl Target {
     pub(crate) fn path(&self) -> &Path {
         &self.0
     }
+}
+
+/// Makes the folder that a command writes into.
+pub(crate) fn make_folder(folder: &Path) -> Outcome {
+    refuse_dash(folder)?;
+    if folder.exists() && !folder.is_dir() {
+        return Err(Failure::Input(format!(
+            "--out {}: the folder cannot be made, since this is a file; give the name of a folder, which is made if it is not \
+             there",
+            folder.display()
+        )));
+    }
+    std::fs::create_dir_all(folder).map_err(|error| {
+        Failure::Input(format!(
+            "the folder {} cannot be made: {error}; give another one with --out",
+            folder.display()
+        ))
+    })
+}
+
+/// Many programs take `-` for standard output; here a file of that name would surprise who asks for it.
+pub(crate) fn refuse_dash(path: &Path) -> Outcome {
+    if path.as_os_str() != "-" {
+        return Ok(());
+    }
+    Err(Failure::Usage(
+        "--out -: the name of a file is expected; what can go to standard output does so without --out (a file of this \
+         very name is `./-`)"
+            .to_owned(),
+    ))
 }
 
 /// Writes a file; the reason and what to do if it cannot be.

@@ -1,7 +1,7 @@
 //! A model as excitation sees it: regressor, and limits beyond those of the active coordinates.
 
 use modelmill_codegen::{Evaluator, States};
-use modelmill_identify::excite::{Motion, Plant, least_singular_value};
+use modelmill_identify::excite::{Margin, Motion, Plant, least_singular_value};
 use modelmill_spec::{Kinematics, Limits, PointIdx};
 use nalgebra::DMatrix;
 
@@ -9,6 +9,19 @@ use crate::model::Model;
 
 /// Names of the axes of the base frame.
 pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Limits of least singular values, which are to stay above a share of those at the nominal pose.
+const SINGULARITIES: [&str; 2] = ["singularity of the loops", "singularity of the drives"];
+
+/// The part of a limit that a trajectory uses, 1 at the limit. Most excesses count from the middle of a range; those of
+/// least singular values from their limit, which is the part of the least value along the trajectory.
+pub(crate) fn used(margin: &Margin) -> f64 {
+    if SINGULARITIES.contains(&margin.name.as_str()) {
+        1.0 / (1.0 - margin.excess).max(0.0)
+    } else {
+        (1.0 + margin.excess).max(0.0)
+    }
+}
 
 /// A model with limits.
 pub(crate) struct ModelPlant<'a> {
@@ -176,9 +189,7 @@ impl Plant for ModelPlant<'_> {
             .map(|(point, axis, _)| format!("{}.{}", mechanism.points[point.0].name, AXES[*axis]));
         let mut names: Vec<String> = passive.chain(forces).chain(points).collect();
         if self.singularity.is_some() {
-            names.extend(
-                ["singularity of the loops", "singularity of the drives"].map(str::to_owned),
-            );
+            names.extend(SINGULARITIES.map(str::to_owned));
         }
         names
     }
@@ -242,5 +253,42 @@ fn states<'m>(motion: &'m Motion, load: &'m [Vec<f64>]) -> States<'m> {
         qd: slices(&motion.qd),
         qdd: slices(&motion.qdd),
         load: slices(load),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A pose far from singular ones uses little of its limit, not less than nothing.
+    #[test]
+    fn what_is_used_of_a_limit_is_never_negative() {
+        let used = |name: &str, excess: f64| {
+            let name = name.to_owned();
+            used(&Margin {
+                name,
+                excess,
+                proven: false,
+            })
+        };
+        let close =
+            |found: f64, expected: f64| assert!((found - expected).abs() < 1e-12, "{found}");
+        // Ranges: the middle, the edge, beyond; sampling may put the middle a little below.
+        for (excess, expected) in [
+            (-1.01, 0.0),
+            (-1.0, 0.0),
+            (-0.25, 0.75),
+            (0.0, 1.0),
+            (0.5, 1.5),
+        ] {
+            close(used("theta1", excess), expected);
+        }
+        // Least values of four times the limit, of the limit, and of half of it: excess is one less their ratio.
+        for name in SINGULARITIES {
+            for (excess, expected) in [(-3.0, 0.25), (0.0, 1.0), (0.5, 2.0)] {
+                close(used(name, excess), expected);
+            }
+            assert!(used(name, -1e9) >= 0.0);
+        }
     }
 }

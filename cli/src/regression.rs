@@ -18,7 +18,7 @@ use crate::estimators::{EstimatorArgs, Weights};
 use crate::failure::{Failure, Outcome};
 use crate::model::Model;
 use crate::progress::{Done, watched};
-use crate::table::count;
+use crate::table::{count, percent};
 use crate::variances;
 
 /// Numbers of the regressor that are kept between passes: 32 MB; beyond, making them again costs less than memory.
@@ -93,6 +93,7 @@ pub(crate) fn identify(
         })
         .collect::<Outcome<Vec<Rows<'_>>>>()?;
     enough(data, &runs, unknown.len(), model)?;
+    not_idle(data, &runs)?;
     // Plain least squares: one pass for the solution, two for the deviations. How often rows are reweighted nobody knows.
     let reweighted = args.weights == Weights::Channels || args.robust.is_some();
     let passes = if reweighted { 0 } else { 3 };
@@ -153,10 +154,16 @@ fn refine(
     if let Some(sigma) = args.prior {
         let beliefs = model.beliefs(unknown, sigma);
         if beliefs.is_empty() {
+            let parameters = &model.derivation.mechanism.parameters;
             return Err(Failure::Input(format!(
-                "{}: --prior needs nominal values, but the file gives none for anything unknown; write `nominal = ...` in \
-                 [parameters]",
-                model.path
+                "{}: --prior takes {} of each nominal value for its uncertainty, but the nominal values of {} are 0 or not \
+                 given, which says nothing of their size; write others in [parameters] (`nominal = ...`), or leave --prior out",
+                model.path,
+                percent(Some(sigma)),
+                match parameters.as_slice() {
+                    [one] => format!("the only parameter `{}`", one.name),
+                    all => format!("all {} parameters", all.len()),
+                }
             )));
         }
         (solution, deviations) = with_prior(&triangle, &solution, &deviations, nominal, &beliefs)?;
@@ -222,6 +229,24 @@ fn enough(data: &[Data], runs: &[Rows<'_>], unknown: usize, model: &Model) -> Ou
             ""
         }
     )))
+}
+
+/// Fails when all measured forces are zero: everything would fit them with zeros, without any doubt.
+fn not_idle(data: &[Data], runs: &[Rows<'_>]) -> Outcome {
+    let is_idle = |run: &Rows<'_>| run.measured.iter().all(|force| *force == 0.0);
+    if !runs.iter().all(is_idle) {
+        return Ok(());
+    }
+    let files: Vec<&str> = data.iter().map(|one| one.run.file.as_str()).collect();
+    Err(Failure::Input(nothing_measured(&files.join(", "))))
+}
+
+/// What is wrong with recordings whose forces are zero throughout.
+pub(crate) fn nothing_measured(files: &str) -> String {
+    format!(
+        "{files}: the measured forces are zero throughout, so that there is nothing to explain; record the forces of the \
+         drives, or name their columns with --map"
+    )
 }
 
 /// The rows of one recording: regressors of the instruments, if there are any, and of the recording itself.

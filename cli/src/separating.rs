@@ -453,6 +453,7 @@ fn recording(plant: &ModelPlant<'_>, motion: &Motion) -> Option<Data> {
         },
         variance: None,
         weights: None,
+        maps_from_degrees: String::new(),
         load: None,
     })
 }

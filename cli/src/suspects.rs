@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::data::Data;
 use crate::model::Model;
+use crate::nominal_forces;
 use crate::standstill::drive_rates;
 use crate::table::percent;
 
@@ -54,11 +55,14 @@ fn findings(model: &Model, data: &Data) -> Vec<Note> {
     let Some(error) = as_it_is.error(&measured) else {
         return Vec::new();
     };
+    let beside = beside_nominal(model, data, &samples);
     let mut notes = Vec::new();
     if error > BEARABLE {
         let drives = model.drives();
         if let Some((suspect, [before, after])) = as_it_is.suspect(&measured)
             && after < BETTER * before
+            // Nominal values know which drive it is.
+            && (beside.is_empty() || !matches!(suspect, Suspect::Turned(_)))
         {
             let what = match suspect {
                 Suspect::Swapped(a, b) => {
@@ -86,6 +90,9 @@ fn findings(model: &Model, data: &Data) -> Vec<Note> {
         if notes.is_empty() {
             notes = suspects_of_motion(model, data, &samples, Some((error, &measured)), &explained);
         }
+    }
+    if notes.is_empty() {
+        notes = beside;
     }
     if notes.is_empty()
         && let Some(with_friction) = with_friction(model, data, &samples)
@@ -118,6 +125,28 @@ fn findings(model: &Model, data: &Data) -> Vec<Note> {
         }
     }
     notes
+}
+
+/// Signs and units of the forces, held against those that the nominal values give.
+fn beside_nominal(model: &Model, data: &Data, samples: &[usize]) -> Vec<Note> {
+    let Some(regressor) = regressor(model, data, samples, &|_| {}) else {
+        return Vec::new();
+    };
+    let forces = data.run.force.as_deref().unwrap_or(&[]);
+    let expected = regressor * DVector::from_column_slice(&model.nominal);
+    let n = forces.len();
+    let expected: Vec<Vec<f64>> = (0..n)
+        .map(|d| expected.iter().skip(d).step_by(n).copied().collect())
+        .collect();
+    let measured: Vec<Vec<f64>> = forces
+        .iter()
+        .map(|force| samples.iter().map(|k| force[*k]).collect())
+        .collect();
+    let mechanism = &model.derivation.mechanism;
+    nominal_forces::oddities(mechanism, &measured, &expected, &data.run.file)
+        .into_iter()
+        .map(Note::warning)
+        .collect()
 }
 
 /// The regressor with friction, inertia and an offset at every drive besides: where a model lacks these, their force
@@ -173,10 +202,10 @@ fn suspects_of_motion(
     let angles: Vec<usize> = (0..motions.len()).filter(|i| motions[*i].1).collect();
     if !angles.is_empty() {
         let angles = angles.clone();
-        let example = &motions[angles[0]].0;
         hypotheses.push((
             format!(
-                "The angles in {file} seem to be in degrees; they must be in rad: say `--map \"{example}={example} [deg]\"`"
+                "The angles in {file} seem to be in degrees; they must be in rad: say `{}`",
+                data.maps_from_degrees
             ),
             Box::new(move |states| {
                 for order in states.iter_mut() {

@@ -208,6 +208,33 @@ fn nominal_values_and_bodies_that_can_be_help_where_the_recording_is_poor() {
             "link {k}: {m}, {minor2}, {minor3}"
         );
     }
+    // What the recording tells by itself are base parameters of one term; all others it tells in sums.
+    let equations = json(&["equations", &model("panda.toml"), "--json"]);
+    let base: Vec<&str> = equations["base"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| p["expression"].as_str().unwrap())
+        .collect();
+    let list = physical["estimator"]["physical"]["parameters"]
+        .as_array()
+        .unwrap();
+    let mut combined = 0;
+    for one in list {
+        let name = one["name"].as_str().unwrap();
+        assert_eq!(one["alone"], base.contains(&name), "{name}");
+        combined += usize::from(one["alone"] == false && number(one, "/from_recording") > 0.01);
+    }
+    let text = printed(&[
+        "identify",
+        &model("panda.toml"),
+        "--data",
+        &path,
+        "--physical",
+    ]);
+    assert!(combined > 10 && text.contains("not alone: the recordings tell combinations"));
+    // One in every row, one in the sentence below.
+    assert_eq!(text.matches("not alone").count(), combined + 1);
     let essential = identified(&path, &["--essential"]);
     let dropped = essential["estimator"]["essential"]["dropped"]
         .as_array()

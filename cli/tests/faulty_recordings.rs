@@ -204,6 +204,85 @@ fn degrees_are_named_and_read_once_they_are_said() {
     assert!(number(&fit, "/fit/nrms") < 2e-3);
 }
 
+/// With the angles go their rates, where these are recorded.
+#[test]
+fn rates_in_degrees_are_named_with_their_angles() {
+    let names = [
+        "t",
+        "theta1",
+        "theta2",
+        "theta1_d",
+        "theta2_d",
+        "theta1_dd",
+        "theta2_dd",
+        "spindle_left",
+        "spindle_right",
+    ];
+    let path = sound(&names).spoilt("degrees-all.csv", |t| {
+        for row in &mut t.rows {
+            for value in &mut row[1..7] {
+                *value = value.to_degrees();
+            }
+        }
+    });
+    let says = refused(1, &["identify", &spidermill(), "--data", &path]);
+    let seem = says
+        .split("seem to be in degrees")
+        .nth(1)
+        .expect("the suspicion");
+    let told: Vec<&str> = seem
+        .split('`')
+        .nth(1)
+        .expect("options")
+        .split('"')
+        .skip(1)
+        .step_by(2)
+        .collect();
+    assert_eq!(told.len(), 6, "{told:?}");
+    let maps: Vec<&str> = told.iter().flat_map(|map| ["--map", *map]).collect();
+    let (fit, _) = notes(&path, &maps);
+    assert!(number(&fit, "/fit/nrms") < 2e-3);
+}
+
+/// Parameters of any sign and size fit forces of any sign and size, so that only nominal values tell.
+#[test]
+fn forces_of_another_sign_or_unit_are_named() {
+    let table = positions();
+    for (name, factor, expected) in [
+        (
+            "turned.csv",
+            -1.0,
+            "--map \"spindle_left=-spindle_left\" --map \"spindle_right=-spindle_right\"",
+        ),
+        (
+            "kilo.csv",
+            1e-3,
+            "--map \"spindle_left=spindle_left [kN]\" --map \"spindle_right=spindle_right [kN]\"",
+        ),
+    ] {
+        let path = table.spoilt(name, |t| {
+            for row in &mut t.rows {
+                row[3] *= factor;
+                row[4] *= factor;
+            }
+        });
+        let (fit, says) = notes(&path, &[]);
+        assert!(number(&fit, "/fit/nrms") < 2e-3);
+        assert!(says.contains(expected), "{says}");
+        // As advised, it is the sound recording again.
+        let maps: Vec<&str> = expected
+            .split('"')
+            .skip(1)
+            .step_by(2)
+            .flat_map(|map| ["--map", map])
+            .collect();
+        let (mended, says) = notes(&path, &maps);
+        assert!(!says.contains("nominal values give"), "{says}");
+        let nominal = number(&mended, "/parameters/0/nominal");
+        assert!((number(&mended, "/parameters/0/value") / nominal - 1.0).abs() < 0.5);
+    }
+}
+
 #[test]
 fn a_late_force_is_measured_in_samples_and_milliseconds() {
     let path = positions().spoilt("late.csv", |t| {

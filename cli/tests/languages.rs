@@ -68,8 +68,14 @@ fn tables() -> PathBuf {
     project().join("tests/fixtures/reference")
 }
 
+/// What a program links beside the static library.
+const LIBRARIES: [&str; 3] = ["-lm", "-lpthread", "-ldl"];
+
 #[test]
 fn the_c_library_gives_the_torques_of_the_table() {
+    let readme = std::fs::read_to_string(project().join("README.md")).unwrap();
+    let line = format!("release/libarm.a {}", LIBRARIES.join(" "));
+    assert!(readme.contains(&line), "the README links otherwise");
     if !there("cc") {
         println!("skipped: there is no C compiler `cc` on this machine");
         return;
@@ -82,7 +88,8 @@ fn the_c_library_gives_the_torques_of_the_table() {
             .arg(out.join("include"))
             .arg(project().join("cli/tests/languages/panda.c"))
             .arg(folder("target").join("release/libpanda.a"))
-            .args(["-lm", "-lpthread", "-ldl", "-o"])
+            .args(LIBRARIES)
+            .arg("-o")
             .arg(&program));
         assert_eq!(run(Command::new(program).arg(tables())), "agrees\n");
     }

@@ -520,3 +520,138 @@ fn special_values_are_told_by_the_numeric_rank() {
         ran.err
     );
 }
+
+/// Two folding legs in planes at right angles hold a platform so that it only rises: Sarrus's linkage.
+const SARRUS: &str = r#"
+schema = 1
+name = "sarrus"
+gravity = [0, 0, "-g"]
+constants = { L = { value = 0.4, unit = "m" }, a = { value = 0.2, unit = "m" }, g = { value = 9.81, unit = "m/s^2" } }
+
+frame = [
+    { name = "plat", on = "base", joint = { prismatic = "z", axis = "z" } },
+    { name = "p0", on = "base", transform = { xyz = ["a", 0, 0] }, joint = { revolute = "q0", axis = "y" } },
+    { name = "d0", on = "p0", transform = { xyz = ["L", 0, 0] }, joint = { revolute = "e0", axis = "y" } },
+    { name = "s1", on = "base", transform = { rpy = [0, 0, "pi/2"] } },
+    { name = "p1", on = "s1", transform = { xyz = ["a", 0, 0] }, joint = { revolute = "q1", axis = "y" } },
+    { name = "d1", on = "p1", transform = { xyz = ["L", 0, 0] }, joint = { revolute = "e1", axis = "y" } },
+]
+point = [
+    { name = "P1", on = "d0", at = ["L", 0, 0] },
+    { name = "P2", on = "plat", at = ["a", 0, 0] },
+    { name = "P3", on = "d1", at = ["L", 0, 0] },
+    { name = "P4", on = "plat", at = [0, "a", 0] },
+]
+part = [
+    { on = "plat", linear = { M = "M_plat" } },
+    { on = "p0", linear = { all = "_p0" } },
+    { on = "d0", linear = { all = "_d0" } },
+    { on = "p1", linear = { all = "_p1" } },
+    { on = "d1", linear = { all = "_d1" } },
+]
+parameters = { M_plat = { unit = "kg" } }
+loop = [{ joins = ["P1", "P2"] }, { joins = ["P3", "P4"] }]
+drive = [{ name = "motor", joint = "q0" }]
+
+[coordinates]
+z = { nominal = 0.451714, passive = true }
+q0 = { nominal = -0.6 }
+e0 = { nominal = -1.941593, passive = true }
+q1 = { nominal = -0.6, passive = true }
+e1 = { nominal = -1.941593, passive = true }
+"#;
+
+/// Random states are no neighbours: followed from one to the next, Newton's method ends at singular poses, although each
+/// state has its answer. That took the whole rank away.
+#[test]
+fn a_numeric_rank_survives_states_that_have_no_answer() {
+    let file = scratch("sarrus.toml");
+    std::fs::write(&file, SARRUS).expect("written");
+    let checked = ran(&["check", &file]);
+    assert!(
+        checked.status == 0 && checked.err.is_empty(),
+        "{}",
+        checked.err
+    );
+    assert!(
+        checked.out.contains("numeric rank        5 over"),
+        "{}",
+        checked.out
+    );
+    let object = json(&["check", &file, "--json"]);
+    assert_eq!(object["numeric_rank"]["rank"], 5);
+    assert!(number(&object, "/numeric_rank/gap") > 1e6, "{object:#}");
+    let equations = json(&["equations", &file, "--json"]);
+    assert_eq!(equations["rank"]["exact"], 5);
+    assert_eq!(equations["rank"]["numeric"], 5);
+    // Where a term has no value at some rates, those states are left out, counted, and said.
+    let slip = of_joint1("c*sqrt(1 + rate/v)", &["c"]);
+    let text = std::fs::read_to_string(model("two_link.toml")).expect("a model");
+    std::fs::write(&file, text + &slip).expect("written");
+    let object = json(&["check", &file, "--json"]);
+    assert_eq!(object["numeric_rank"]["samples"], 40);
+    assert!(
+        number(&object, "/numeric_rank/left_out") > 0.0,
+        "{object:#}"
+    );
+    let checked = printed(&["check", &file]);
+    assert!(
+        checked.contains("more left out, where the model is singular or undefined"),
+        "{checked}"
+    );
+    let said = ran(&["equations", &file]).err;
+    assert!(
+        said.contains("note: ") && said.contains("more left out"),
+        "{said}"
+    );
+}
+
+/// A kind of effect of its own at the first joint of the two-link arm.
+fn of_joint1(expression: &str, parameters: &[&str]) -> String {
+    let unit = "{ unit = { force = \"N\", torque = \"N m\" } }";
+    let parameters: Vec<String> = parameters.iter().map(|p| format!("{p} = {unit}")).collect();
+    format!(
+        r#"
+[[effect]]
+kind = "slip"
+at = ["joint1"]
+
+[[effect_kind]]
+name = "slip"
+on = "drive"
+expression = "{expression}"
+parameters = {{ {} }}
+constants = {{ v = {{ unit = {{ force = "m/s", torque = "rad/s" }}, value = 1.2 }} }}
+says = "A term of a test."
+"#,
+        parameters.join(", ")
+    )
+}
+
+/// Terms that hardly differ spread the singular values so evenly that none of their gaps stands out.
+#[test]
+fn a_rank_without_a_clear_gap_is_said_to_be_none() {
+    let names = ["c0", "c1", "c2", "c3", "c4", "c5", "c6"];
+    let terms: Vec<String> = names
+        .iter()
+        .enumerate()
+        .map(|(k, c)| format!("{c}*tanh({}*rate/v)", 1.0 + 0.01 * k as f64))
+        .collect();
+    let text = std::fs::read_to_string(model("two_link.toml")).expect("a model");
+    let file = scratch("near.toml");
+    std::fs::write(&file, text + &of_joint1(&terms.join(" + "), &names)).expect("written");
+    let gap = number(&json(&["check", &file, "--json"]), "/numeric_rank/gap");
+    assert!(gap > 1.0 && gap < 1e3, "{gap}");
+    for command in ["check", "equations"] {
+        let said = ran(&[command, &file]).err;
+        assert!(said.contains("stands on a small gap of"), "{said}");
+    }
+    // The condition of the columns that are retained is poor, and the note beside the page says what the rank is worth.
+    let said = ran(&["equations", &file]).err;
+    assert!(
+        said.contains("note: ") && said.contains("condition number"),
+        "{said}"
+    );
+    let sound = ran(&["equations", &model("two_link.toml")]);
+    assert_eq!(sound.err, "");
+}

@@ -166,7 +166,7 @@ fn what_cannot_be_done_names_the_option() {
 }
 
 #[test]
-fn a_force_that_is_zero_throughout_is_a_warning() {
+fn forces_that_are_zero_throughout_are_refused() {
     let model = model("zero.toml");
     let mut text = HEAD.to_owned();
     for line in swing(400, |_| 0.0).lines().skip(1) {
@@ -174,9 +174,42 @@ fn a_force_that_is_zero_throughout_is_a_warning() {
         writeln!(text, "{states},0").expect("a text grows");
     }
     let data = written("zero.csv", &text);
-    let says = ran(&["identify", &model, "--data", &data]).err;
+    let says = refused(1, &["identify", &model, "--data", &data]);
     assert!(
-        says.contains("measured force of `motor`") && says.contains("is 0 throughout"),
+        says.contains("measured force of `motor`")
+            && says.contains("error: ")
+            && says.contains("the measured forces are zero throughout"),
         "{says}"
+    );
+    assert_eq!(says.matches("throughout").count(), 2, "{says}");
+}
+
+/// A share of a nominal value is its uncertainty; where all are 0 there is none, although the file gives them.
+#[test]
+fn nominal_values_of_zero_are_no_prior() {
+    let given = PENDULUM.replace(
+        "planar = \"1\" }",
+        "planar = \"1\", nominal = { ZZ = 0, MX = 0, MY = 0 } }",
+    );
+    assert_ne!(given, PENDULUM);
+    let model = written("zero-nominal.toml", &given);
+    let data = written("zero-nominal.csv", &swing(400, |t| 0.1 * (40.0 * t).sin()));
+    let says = refused(1, &["identify", &model, "--data", &data, "--prior", "0.2"]);
+    assert!(
+        says.contains("are 0 or not given") && !says.contains("gives none"),
+        "{says}"
+    );
+    // Where some have one, the others are counted.
+    let some = written("some-nominal.toml", &given.replace("MX = 0,", "MX = 2.5,"));
+    let ran = ran(&["identify", &some, "--data", &data, "--prior", "0.2"]);
+    assert!(
+        ran.out
+            .contains("1 soft constraint of nominal values count")
+            && ran
+                .out
+                .contains("go without one, since their nominal values are 0 or not given"),
+        "{}{}",
+        ran.out,
+        ran.err
     );
 }

@@ -257,6 +257,54 @@ fn an_input_is_never_overwritten() {
     assert!(says.contains("cannot be written"), "{says}");
 }
 
+/// Slips of the hand get an answer that says what to give instead.
+#[test]
+fn what_stands_in_the_wrong_place_is_named() {
+    let arm = model("two_link.toml");
+    for command in [
+        &["equations", &arm][..],
+        &["generate", &arm],
+        &["generate", &arm, "--language", "c"],
+        &["report", &arm, "--data", "none.csv"],
+    ] {
+        let says = refused(2, &[command, &["--out", "-"]].concat());
+        assert!(says.contains("--out -: the name of a file"), "{says}");
+    }
+    let data = run("plain-fit.csv");
+    let spidermill = model("spidermill.toml");
+    let says = refused(1, &["report", &spidermill, "--data", &data, "--out", &data]);
+    assert!(
+        says.contains("this is a file") && says.contains("name of a folder"),
+        "{says}"
+    );
+    let compare = [
+        "compare",
+        &spidermill,
+        "--data",
+        &data,
+        "--parameters",
+        &data,
+    ];
+    let says = refused(1, &compare);
+    assert!(
+        says.contains("is no fit") && says.contains("recordings go to --data"),
+        "{says}"
+    );
+    let out = scratch("no-rig.csv");
+    let says = refused(1, &["simulate", &arm, "--trajectory", &data, "--out", &out]);
+    assert!(
+        says.contains("is a model file; a rig file is expected") && says.contains("evaluate"),
+        "{says}"
+    );
+    let file = scratch("folder.toml");
+    std::fs::write(&file, "schema = 1\nname = \"x\"\nextends = \".\"\n").expect("written");
+    let says = refused(1, &["check", &file]);
+    assert!(
+        says.contains("`.` is a folder") && says.contains("name the file in it"),
+        "{says}"
+    );
+}
+
 #[test]
 fn a_reader_that_goes_away_is_no_error() {
     let mut child = modelmill(&[

@@ -139,6 +139,8 @@ pub enum FitFault {
         /// What is wrong there.
         reason: String,
     },
+    /// The text does not begin as JSON does: a recording or a model file, perhaps.
+    NoJson,
     /// A parameter of the model is not in the file.
     MissingParameter {
         /// The parameter.
@@ -196,6 +198,11 @@ impl fmt::Display for FitFileError {
                 f,
                 "{file}, line {line}, column {column}: this is not the JSON that `modelmill identify --json` prints: \
                  {reason}"
+            ),
+            FitFault::NoJson => write!(
+                f,
+                "{file} is no fit: the JSON that `modelmill identify ... --out FIT.json` writes is expected; recordings go \
+                 to --data, the model file comes first"
             ),
             FitFault::MissingParameter {
                 name,
@@ -329,6 +336,12 @@ impl FitFile {
 
     /// Reads a fit from its text; `file` is what messages call it.
     pub fn parse(text: &str, file: &str) -> Result<Self, FitFileError> {
+        if !text.trim_start().starts_with('{') {
+            return Err(FitFileError {
+                file: file.to_owned(),
+                fault: FitFault::NoJson,
+            });
+        }
         serde_json::from_str(text).map_err(|error| {
             let full = error.to_string();
             let reason = full.split(" at line ").next().unwrap_or(&full).to_owned();

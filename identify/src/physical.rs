@@ -80,6 +80,9 @@ impl fmt::Display for PhysicalError {
 
 impl std::error::Error for PhysicalError {}
 
+/// Directions below this share of the largest singular value are told by rounding only.
+const WITHIN_SPAN: f64 = 1e-10;
+
 /// Physical parameters that are possible.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Physical {
@@ -88,8 +91,11 @@ pub struct Physical {
     /// Their standard deviations if nominal values may be off by their own size (`g = 1`).
     pub std: Vec<f64>,
     /// By how much the recording lowers the variance that the nominal values alone leave, 0 to 1; near 0 it is the nominal
-    /// value that one sees.
+    /// value that one sees. What is not [`alone`](Self::alone) owes some of it to nominal values of others.
     pub from_recording: Vec<f64>,
+    /// Whether the recording tells a parameter by itself. If not, it tells combinations of it with others only, and what
+    /// bodies can be and nominal values of the others share them out.
+    pub alone: Vec<bool>,
     /// The base parameters that follow.
     pub base: Vec<f64>,
     /// Their standard deviations.
@@ -201,6 +207,7 @@ pub fn physical(
                 }
             })
             .collect(),
+        alone: told_alone(&(&problem.r * &slopes)),
         residual_norm: misfit.norm().hypot(triangle.corner()),
         base: p.iter().copied().collect(),
         base_std: spread
@@ -217,6 +224,31 @@ pub fn physical(
         parameters: x.iter().copied().collect(),
         iterations,
     })
+}
+
+/// Which unknowns of linear equations have a value of their own: those whose unit vector lies in the span of the rows.
+fn told_alone(rows: &DMatrix<f64>) -> Vec<bool> {
+    let mut scaled = rows.clone();
+    for mut column in scaled.column_iter_mut() {
+        let norm = column.norm();
+        if norm > 0.0 {
+            column.unscale_mut(norm);
+        }
+    }
+    let svd = scaled.svd(false, true);
+    let largest = svd.singular_values.iter().copied().fold(0.0, f64::max);
+    let Some(span) = svd.v_t.filter(|_| largest > 0.0) else {
+        return vec![false; rows.ncols()];
+    };
+    let mut within = vec![0.0; rows.ncols()];
+    for (direction, value) in span.row_iter().zip(svd.singular_values.iter()) {
+        if *value > WITHIN_SPAN * largest {
+            for (sum, component) in within.iter_mut().zip(direction.iter()) {
+                *sum += component * component;
+            }
+        }
+    }
+    within.iter().map(|share| *share > 1.0 - 1e-6).collect()
 }
 
 /// The nominal matrix of a body, by its inverse root.
@@ -660,6 +692,22 @@ mod tests {
             assert!(found.from_recording[j] < 1e-9);
         }
         assert!(found.from_recording[..10].iter().all(|share| *share > 0.5));
+        // Fourteen combinations of ten numbers tell each of them.
+        assert_eq!(found.alone, [[true; 10], [false; 10]].concat());
+    }
+
+    /// Of `x + y` and `z` only the last has a value of its own, whatever nominal values say beside.
+    #[test]
+    fn what_is_told_in_sums_only_is_not_told_alone() {
+        let rows = DMatrix::from_row_slice(
+            3,
+            4,
+            &[1e3, 1e3, 0.0, 0.0, 2e3, 2e3, 1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0],
+        );
+        assert_eq!(told_alone(&rows), [false, false, true, false]);
+        assert_eq!(told_alone(&DMatrix::zeros(2, 2)), [false, false]);
+        // Fourteen combinations of twenty numbers tell none of them.
+        assert_eq!(find(&case(3, 0.05)).alone, [false; 20]);
     }
 
     #[test]

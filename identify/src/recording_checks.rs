@@ -46,7 +46,7 @@ impl Run {
         }
         vec![Note::warning(format!(
             "The measured force of {} in {} is 0 throughout: nothing was measured, or the column is another one (--map); \
-             parameters found from it are 0 as well, with deviations of 0.",
+             errors relative to it have no value, and it pulls parameters to 0.",
             list(&idle),
             self.file
         ))]
@@ -87,6 +87,29 @@ impl Recording {
         }
         notes.extend(rates);
         notes
+    }
+
+    /// The options that read an angle recorded in degrees, and with it those of its recorded derivatives that are in
+    /// degrees too: all but those that are the derivatives in rad of what stands beside them.
+    pub fn maps_from_degrees(&self, name: &str) -> String {
+        let map = |column: &str, unit: &str| format!("--map \"{column}={column} [{unit}]\"");
+        let mut maps = vec![map(name, "deg")];
+        for (of, order, unit) in [("", "_d", "deg/s"), ("_d", "_dd", "deg/s^2")] {
+            let [of, rate] = [of, order].map(|suffix| format!("{name}{suffix}"));
+            let Ok(values) = self.column(&rate) else {
+                continue;
+            };
+            let beside = self.column("t").ok().zip(self.column(&of).ok());
+            let compared = beside.and_then(|(time, of)| compare(time, of, values));
+            let is_rad = compared.is_some_and(|(ratio, misfit)| {
+                misfit < MISFIT && (ratio * 180.0 / PI - 1.0).abs() < RATIO_TOLERANCE
+            });
+            if is_rad {
+                break;
+            }
+            maps.push(map(&rate, unit));
+        }
+        maps.join(" ")
     }
 
     /// Jumps by a whole turn between neighbouring samples.

@@ -70,10 +70,11 @@ impl Recording {
         (largest > LARGE_ANGLE).then(|| {
             Note::warning(format!(
                 "`{name}` in {} reaches {}, which is {} turns if it is in rad, as it must be; if it is in \
-                 degrees, say so: `--map \"{name}={name} [deg]\"`.",
+                 degrees, say so: `{}`.",
                 self.file(),
                 rounded(largest),
-                rounded(largest / (2.0 * PI))
+                rounded(largest / (2.0 * PI)),
+                self.maps_from_degrees(name)
             ))
         })
     }
@@ -83,7 +84,8 @@ impl Recording {
         let low = force.iter().copied().fold(f64::INFINITY, f64::min);
         let high = force.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if low >= high {
-            return (force.len() > 1).then(|| {
+            // Forces of 0 are said beside the drives' other ones, by `suspicious_forces`.
+            return (force.len() > 1 && low != 0.0).then(|| {
                 Note::warning(format!(
                     "The force of `{name}` in {} is {low} throughout: it is no measurement of a drive that works.",
                     self.file()
@@ -196,6 +198,28 @@ mod tests {
         assert!(found[0].contains("first in line 63"), "{found:?}");
     }
 
+    /// Recorded rates go along, unless they are in rad already.
+    #[test]
+    fn rates_in_degrees_are_named_with_their_angles() {
+        let of = |scale: f64| {
+            let mut text = "t,q,q_d,q_dd\n".to_owned();
+            for k in 0..400 {
+                let t = 0.01 * f64::from(k);
+                let (sin, cos) = (3.0 * t).sin_cos();
+                let (q, rate, acceleration) = (900.0 * sin, 2700.0 * cos, -8100.0 * sin);
+                writeln!(text, "{t},{q},{},{}", scale * rate, scale * acceleration).unwrap();
+            }
+            let recording =
+                Recording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default());
+            recording.unwrap().maps_from_degrees("q")
+        };
+        assert_eq!(
+            of(1.0),
+            "--map \"q=q [deg]\" --map \"q_d=q_d [deg/s]\" --map \"q_dd=q_dd [deg/s^2]\""
+        );
+        assert_eq!(of(PI / 180.0), "--map \"q=q [deg]\"");
+    }
+
     #[test]
     fn held_values_degrees_and_dead_forces_are_named() {
         let held = says(
@@ -208,7 +232,7 @@ mod tests {
         );
         let degrees = says(|t| 90.0 * (3.0 * t).sin(), |t| (5.0 * t).sin());
         assert!(
-            degrees.len() == 1 && degrees[0].contains("[deg]"),
+            degrees.len() == 1 && degrees[0].ends_with("say so: `--map \"q=q [deg]\"`."),
             "{degrees:?}"
         );
         let dead = says(|t| (3.0 * t).sin(), |_| 4.0);

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use crate::diagnostic::Log;
+use crate::diagnostic::{Log, SourceFile, Span};
 use crate::document::{self, Node, Value, get, quote};
 use crate::exact::Exact;
 use crate::kinds::EffectKind;
@@ -89,13 +89,65 @@ pub fn add_to_model(
     let kind = kind_of(effect, &before.kinds)?;
     refuse_twin(effect, kind, &before.mechanism)?;
     let effect = with_free_names(effect, kind, &before.mechanism);
-    let text = add_effect(text, &effect)?;
-    let loaded = load_with(path_name, &text, libraries, read).map_err(model)?;
+    let edited = add_effect(text, &effect)?;
+    let loaded = load_with(path_name, &edited, libraries, read)
+        .map_err(|failure| model(apart(failure, text, &edited, &effect)))?;
     Ok(Edited {
-        text,
+        text: edited,
         loaded,
         effect,
     })
+}
+
+/// What messages call the text of an effect that is not in any file yet.
+const NEW_EFFECT: &str = "the effect to be added";
+
+/// A failure of the edited text with its places in what the user knows: the file as it is, and the effect as a text of
+/// its own. Lines of the edited text are those of no file.
+fn apart(mut failure: Failure, old: &str, new: &str, effect: &NewEffect) -> Failure {
+    let line_end = if old.contains("\r\n") { "\r\n" } else { "\n" };
+    let same = old
+        .bytes()
+        .zip(new.bytes())
+        .take_while(|(a, b)| a == b)
+        .count();
+    // The same text before the place of the edit is another effect's.
+    let found = [block(effect, line_end), inline(effect)]
+        .into_iter()
+        .find_map(|entry| {
+            let mut places = new.match_indices(&entry);
+            let place = places.find(|(at, _)| at + entry.len() > same)?.0;
+            Some((place, entry))
+        });
+    let (Some((start, entry)), Some(file)) = (found, failure.sources.files.first_mut()) else {
+        return failure;
+    };
+    old.clone_into(&mut file.text);
+    let end = start + entry.len();
+    let added = failure.sources.files.len();
+    failure.sources.files.push(SourceFile {
+        path: PathBuf::from(NEW_EFFECT),
+        text: entry,
+    });
+    let longer = new.len().saturating_sub(old.len());
+    let moved = |span: &mut Span| {
+        if span.file != 0 {
+            return;
+        }
+        if span.start >= start && span.end <= end {
+            span.file = added;
+            span.start -= start;
+            span.end -= start;
+        } else if span.start >= end {
+            span.start = span.start.saturating_sub(longer);
+            span.end = span.end.saturating_sub(longer);
+        }
+    };
+    for found in &mut failure.diagnostics {
+        found.span.iter_mut().for_each(moved);
+        found.related.iter_mut().for_each(|(span, _)| moved(span));
+    }
+    failure
 }
 
 /// Adds an effect to the text of a model file; whether it means anything there is not looked at.

@@ -396,6 +396,17 @@ fn extended(
     }
     match read(&next) {
         Ok(text) => Some((next, text)),
+        // `.` beside a file without a folder in its path leaves no name at all.
+        Err(error)
+            if error.kind() == std::io::ErrorKind::IsADirectory || next.as_os_str().is_empty() =>
+        {
+            fault(
+                format!("`{}` is a folder", quote(target)),
+                "expected the path of a model file, relative to this one",
+                "name the file in it, such as `extends = \"arm.toml\"`",
+            );
+            None
+        }
         Err(error) => {
             fault(
                 format!("cannot read `{}`: {error}", quote(&next.to_string_lossy())),

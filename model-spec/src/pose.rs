@@ -292,6 +292,32 @@ fn check_tied(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
     if n_equations <= n_passive {
         return true;
     }
+    let n_coordinates = mechanism.coordinates.len();
+    if n_equations >= n_coordinates {
+        log.push(
+            Diagnostic::error(
+                places.loops[0],
+                format!(
+                    "this mechanism cannot move: its loops tie {} {}",
+                    if n_coordinates == 1 { "its" } else { "all" },
+                    plural(n_coordinates, "coordinate")
+                ),
+            )
+            .label(format!(
+                "{} at the nominal pose, and no coordinate is left",
+                plural(n_equations, "independent loop equation")
+            ))
+            .help(
+                "a loop in a plane ties 2 coordinates, one in space 3: look for a loop or a link too many, or for a joint that \
+                 is missing (a `[[frame]]` with a coordinate of its own)",
+            )
+            .help(
+                "a linkage that moves against this count, as a parallelogram with a third bar does, moves for exact lengths \
+                 only: check the constants",
+            ),
+        );
+        return false;
+    }
     log.push(
         Diagnostic::error(
             places.loops[0],

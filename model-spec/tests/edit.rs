@@ -248,6 +248,44 @@ fn what_cannot_be_is_said() {
     assert!(add_effect("a = [", &effect("spring", &["q"])).is_err());
 }
 
+/// A fault of an effect that is in no file yet has no line there: it is shown in the effect's own text, and what the file
+/// holds stays in its lines.
+#[test]
+fn faults_of_a_new_effect_are_shown_in_its_own_text() {
+    let inline = ARM.replace(
+        "name = \"arm\"\n",
+        "name = \"arm\"\neffect = [{ kind = \"viscous_friction\", at = [\"motor\"] }]\n",
+    );
+    let inline = format!("{inline}{REST}");
+    let table = format!(
+        "{ARM}{REST}\n[[effect]]\nkind = \"viscous_friction\"\nat = [\"motor\"]\n\n# the end\n"
+    );
+    for text in [format!("{ARM}{REST}"), inline, table] {
+        let lines = text.lines().count();
+        let says = add(&text, &effect("spring", &["nowhere"])).unwrap_err();
+        assert!(
+            says.contains("--> the effect to be added:") && !says.contains("here.toml:"),
+            "{says}"
+        );
+        let mut shared = effect("coulomb_friction", &["motor"]);
+        shared.parameters.push(NewParameter {
+            symbol: "Fc".to_owned(),
+            name: Some("g".to_owned()),
+            nominal: None,
+        });
+        let says = add(&text, &shared).unwrap_err();
+        assert!(says.contains("--> the effect to be added:"), "{says}");
+        // Where `g` is defined is a line of the file, and holds it.
+        let place = says.split("here.toml:").nth(1).expect("the other place");
+        let line: usize = place.split(':').next().unwrap().parse().unwrap();
+        assert!(line <= lines, "{says}");
+        assert!(
+            text.lines().nth(line - 1).unwrap().starts_with("g = "),
+            "{says}"
+        );
+    }
+}
+
 /// Every kind of the library can be written into a model where there is a place for it.
 #[test]
 fn every_kind_can_be_added() {

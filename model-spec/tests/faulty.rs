@@ -74,6 +74,58 @@ fn a_file_that_is_no_text_in_utf_8() {
     );
 }
 
+/// A drive of an unknown joint drives nothing, so that another one on the first coordinate is no second one.
+#[test]
+fn one_fault_of_a_drive_makes_no_second_one() {
+    let text = r#"
+schema = 1
+name = "arm"
+coordinates = { q1 = {}, q2 = {} }
+frame = [
+    { name = "upper", on = "base", modified_dh = { theta = "q1" } },
+    { name = "lower", on = "upper", modified_dh = { a = 0.5, theta = "q2" } },
+]
+part = [{ on = "upper", linear = { planar = 1 } }, { on = "lower", linear = { planar = 2 } }]
+drive = [{ name = "shoulder", joint = "shoulder_joint" }, { name = "elbow", joint = "q1" }]
+"#;
+    let found = failure(text).diagnostics;
+    let says: Vec<&str> = found.iter().map(|one| one.message.as_str()).collect();
+    assert_eq!(says, ["unknown name `shoulder_joint`"]);
+    let twice = text.replace("shoulder_joint", "q1");
+    let says = failure(&twice).render(false);
+    assert!(says.contains("two drives act on `q1`"), "{says}");
+}
+
+/// Loops that tie every coordinate leave no motion, which one more passive coordinate would not bring about.
+#[test]
+fn what_cannot_move_is_told_where_to_look() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/four_bar.toml");
+    let text = std::fs::read_to_string(path).unwrap();
+    let braced = format!(
+        "{}\n[[point]]\nname = \"a\"\non = \"body1\"\nat = [0.2, 0.13]\n[[point]]\nname = \"b\"\non = \"body3\"\nat = [0.23, 0.05]\n\
+         [[frame]]\nname = \"brace\"\non = \"body1\"\ntransform = {{ xyz = [0.2, 0.13, 0] }}\n\
+         joint = {{ revolute = \"extra\", axis = \"z\" }}\n[[point]]\nname = \"c\"\non = \"brace\"\nat = [0.83, 0]\n\
+         [[loop]]\njoins = [\"c\", \"b\"]\n",
+        text.replace(
+            "[coordinates]",
+            "[coordinates]\nextra = { nominal = 0.1, passive = true }"
+        )
+    );
+    let says = failure(&braced).render(false);
+    assert!(
+        says.contains("this mechanism cannot move: its loops tie all 4 coordinates")
+            && says.contains("a joint that is missing")
+            && !says.contains("mark 1 coordinate more"),
+        "{says}"
+    );
+    let idle = failure(&text.replace(
+        "crank = { nominal = 1.1 }",
+        "crank = { nominal = 1.1, passive = true }",
+    ));
+    let says = idle.render(false);
+    assert!(says.contains("every coordinate is `passive`"), "{says}");
+}
+
 #[test]
 fn color_marks_the_same_text() {
     let failure = failure("schema = 2");

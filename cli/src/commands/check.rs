@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::args::CheckArgs;
 use crate::failure::{Failure, Outcome};
 use crate::model;
-use crate::sampled_rank::judged_rank;
+use crate::sampled_rank::{Judged, SampledRank, judged_rank};
 use crate::table::count;
 use crate::terminal;
 
@@ -29,14 +29,18 @@ pub(crate) fn run(args: &CheckArgs) -> Outcome {
     let model = model::derive_loaded(&args.model.display().to_string(), &loaded)?;
     let summary = Summary::new(&model.derivation);
     // Without any product there is nothing whose rank could be looked at.
-    let rank = if model.derivation.reduction.products.is_empty() {
-        None
+    let judged = if model.derivation.reduction.products.is_empty() {
+        Judged {
+            found: None,
+            warnings: Vec::new(),
+        }
     } else {
-        judged_rank(&model).1
+        judged_rank(&model)
     };
-    if let Some(says) = &rank {
+    for says in &judged.warnings {
         terminal::warn(&format!("{}: {says}", model.path));
     }
+    let rank = judged.found.as_ref();
     if args.json {
         let mut warnings = diagnostics(&loaded.warnings, &loaded.sources);
         warnings.extend(
@@ -57,11 +61,16 @@ pub(crate) fn run(args: &CheckArgs) -> Outcome {
                 }),
         );
         warnings.extend(
-            rank.map(|says| json!({ "severity": "warning", "says": says, "file": model.path })),
+            judged
+                .warnings
+                .iter()
+                .map(|says| json!({ "severity": "warning", "says": says, "file": model.path })),
         );
-        return terminal::print_json(&summary.json(&model.name, &model.derivation, &warnings));
+        let mut object = summary.json(&model.name, &model.derivation, &warnings);
+        object["numeric_rank"] = rank.map_or(Value::Null, SampledRank::json);
+        return terminal::print_json(&object);
     }
-    terminal::print(&summary.text(&model.name, &model.derivation))
+    terminal::print(&summary.text(&model.name, &model.derivation, rank))
 }
 
 fn diagnostics(found: &[Diagnostic], sources: &Sources) -> Vec<Value> {
@@ -140,7 +149,7 @@ impl Summary {
         })
     }
 
-    fn text(&self, name: &str, derivation: &Derivation) -> String {
+    fn text(&self, name: &str, derivation: &Derivation, rank: Option<&SampledRank>) -> String {
         let style = terminal::style();
         let m = &derivation.mechanism;
         let mut lines = vec![style.bold(&format!("{name}: sound"))];
@@ -201,6 +210,9 @@ impl Summary {
                 ),
             ),
         );
+        if let Some(rank) = rank {
+            line("numeric rank", rank.text());
+        }
         lines.join("\n")
     }
 }

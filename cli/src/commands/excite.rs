@@ -16,7 +16,7 @@ use crate::failure::{Failure, Outcome};
 use crate::limits;
 use crate::model::{self, Model};
 use crate::output::Target;
-use crate::plant::ModelPlant;
+use crate::plant::{ModelPlant, used};
 use crate::progress::watched;
 use crate::svg::Figure;
 use crate::table::{Align, count, number, significant, table};
@@ -269,6 +269,7 @@ impl Answer<'_> {
             json!({
                 "name": margin.name,
                 "excess": margin.excess,
+                "used": Some(used(margin)).filter(|used| used.is_finite()),
                 "proven": margin.proven,
             })
         });
@@ -354,7 +355,7 @@ impl Answer<'_> {
             .map(|margin| {
                 vec![
                     margin.name.clone(),
-                    format!("{} %", significant(100.0 * (1.0 + margin.excess), 4)),
+                    format!("{} %", significant(100.0 * used(margin), 4)),
                     if margin.excess > 0.0 {
                         "exceeded".to_owned()
                     } else {

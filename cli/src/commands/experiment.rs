@@ -16,7 +16,7 @@ use serde_json::json;
 
 use crate::args::ExperimentArgs;
 use crate::bundled;
-use crate::failure::{Failure, Outcome};
+use crate::failure::Outcome;
 use crate::model::{self, Model};
 use crate::output;
 use crate::table::{Align, number, percent, table};
@@ -44,12 +44,7 @@ struct Experiment {
 
 /// Runs the experiment and writes the page.
 pub(crate) fn run(args: &ExperimentArgs) -> Outcome {
-    std::fs::create_dir_all(&args.out).map_err(|error| {
-        Failure::Input(format!(
-            "the folder {} cannot be made: {error}; give another one with --out",
-            args.out.display()
-        ))
-    })?;
+    output::make_folder(&args.out)?;
     let experiment = Experiment::new(args)?;
     let path = args.out.join(PAGE);
     output::write(&path, &page::render(&experiment))?;

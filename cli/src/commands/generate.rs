@@ -7,7 +7,8 @@ use modelmill_codegen::{EmittedFile, emit, emit_c, emit_python, module_name};
 use crate::args::{GenerateArgs, Language};
 use crate::failure::{Failure, Outcome};
 use crate::model;
-use crate::output::{Target, write};
+use crate::output::{Target, refuse_dash, write};
+use crate::progress::watched;
 use crate::table::count;
 use crate::terminal;
 
@@ -26,10 +27,11 @@ pub(crate) fn run(args: &GenerateArgs) -> Outcome {
         )));
     }
     let model = model::derive(&args.model)?;
+    let writing = format!("writing the code of {}", model.name);
     let crate_files = match args.language {
         Language::Rust => None,
-        Language::C => Some(emit_c(&model.derivation)),
-        Language::Python => Some(emit_python(&model.derivation)),
+        Language::C => Some(watched(&writing, 0, |_| emit_c(&model.derivation))),
+        Language::Python => Some(watched(&writing, 0, |_| emit_python(&model.derivation))),
     };
     if let Some(files) = crate_files {
         let Some(folder) = &args.out else {
@@ -54,19 +56,21 @@ pub(crate) fn run(args: &GenerateArgs) -> Outcome {
         .transpose()?;
     let derivation = &model.derivation;
     let fault = |error| Failure::Input(format!("{}: {error}", model.path));
-    let mut emitted = emit(derivation);
-    if args.dynamics {
-        let dynamics = derivation.dynamics().map_err(fault)?;
-        emitted = emitted.with_dynamics(derivation, &dynamics);
-    }
-    if args.reactions {
-        let reactions = derivation.reactions().map_err(fault)?;
-        emitted = emitted.with_reactions(derivation, &reactions);
-    }
-    if args.self_test {
-        emitted = emitted.with_self_test(derivation);
-    }
-    let source = emitted.file();
+    let source = watched(&writing, 0, |_| -> Outcome<String> {
+        let mut emitted = emit(derivation);
+        if args.dynamics {
+            let dynamics = derivation.dynamics().map_err(fault)?;
+            emitted = emitted.with_dynamics(derivation, &dynamics);
+        }
+        if args.reactions {
+            let reactions = derivation.reactions().map_err(fault)?;
+            emitted = emitted.with_reactions(derivation, &reactions);
+        }
+        if args.self_test {
+            emitted = emitted.with_self_test(derivation);
+        }
+        Ok(emitted.file())
+    })?;
     match target {
         Some(target) => {
             target.write(&source)?;
@@ -87,6 +91,7 @@ const OURS: &str = "# Written by modelmill.";
 
 /// Writes a crate with a copy of the runtime, so that the folder can go anywhere; only over a crate of the same kind.
 fn write_crate(folder: &Path, files: &[EmittedFile]) -> Outcome {
+    refuse_dash(folder)?;
     let manifest = folder.join("Cargo.toml");
     let ours = std::fs::read_to_string(&manifest).is_ok_and(|text| text.starts_with(OURS));
     let occupied = folder.is_file()

@@ -9,6 +9,7 @@ use serde_json::json;
 
 use crate::args::SimulateArgs;
 use crate::failure::{Failure, Outcome};
+use crate::model;
 use crate::output::Target;
 use crate::progress::watched;
 use crate::table::count;
@@ -71,8 +72,17 @@ pub(crate) fn load(path: &Path) -> Outcome<modelmill_rig::Loaded> {
             path.display()
         )));
     }
-    modelmill_rig::load_file(path)
-        .map_err(|failure| Failure::Rendered(failure.render(terminal::errors_in_colour())))
+    modelmill_rig::load_file(path).map_err(|failure| {
+        if modelmill_spec::load_file_with(path, model::libraries()).is_ok() {
+            return Failure::Input(format!(
+                "{} is a model file; a rig file is expected, which describes the whole machine (rig/README.md; \
+                 model-spec/rigs holds some). Forces of a model along a motion come from `modelmill evaluate MODEL --data \
+                 RUN --out FORCES.csv`",
+                path.display()
+            ));
+        }
+        Failure::Rendered(failure.render(terminal::errors_in_colour()))
+    })
 }
 
 /// The columns `t` and, per coordinate, its values and what there is of its derivatives.

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use crate::along;
 use crate::args::TourArgs;
 use crate::bundled::{self, PLAIN, Runs, WITH_RODS};
-use crate::commands::{add, report};
+use crate::commands::add;
 use crate::data::{self, Data};
 use crate::diagnosis::Held;
 use crate::failure::{Failure, Outcome};
@@ -33,7 +33,7 @@ pub(crate) fn run(args: &TourArgs) -> Outcome {
         .out
         .clone()
         .unwrap_or_else(|| std::env::temp_dir().join("modelmill-tour"));
-    report::make_folder(&folder)?;
+    output::make_folder(&folder)?;
     let place = Place::unpack(&folder)?;
     let mut story = Story::new(terminal::style());
 

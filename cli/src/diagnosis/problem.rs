@@ -12,6 +12,7 @@ use crate::data::Data;
 use crate::failure::{Failure, Outcome};
 use crate::model::Model;
 use crate::progress::watched;
+use crate::regression::nothing_measured;
 use crate::standstill::drive_rates;
 use crate::table::count;
 
@@ -117,11 +118,9 @@ fn problem(
 ) -> Outcome<(Problem, Vec<Origin>)> {
     let measured = stack(all, |one| Ok(one.run.measured()?.to_vec()))?;
     if measured.iter().flatten().all(|force| *force == 0.0) {
-        return Err(Failure::Input(format!(
-            "{}: the measured forces are zero throughout, so that there is nothing to explain; record the forces of the \
-             drives, or name their columns with --map",
-            all.first()
-                .map_or("the recording", |(one, _)| one.run.file.as_str())
+        let file = all.first().map(|(one, _)| one.run.file.as_str());
+        return Err(Failure::Input(nothing_measured(
+            file.unwrap_or("the recording"),
         )));
     }
     for (one, _) in all {

@@ -90,6 +90,8 @@ pub(super) fn drives(
         .map_or(&[][..], |list| list.entries.as_slice());
     let before = log.n_errors();
     let mut drives: Vec<Drive> = Vec::new();
+    // Which drives act where their entry says; the others only stand in the list.
+    let mut known = Vec::new();
     for entry in entries {
         let kind = match (&entry.joint, &entry.linear) {
             (Some(joint), None) => coordinate(joint, symbols, log).map(DriveKind::Joint),
@@ -125,7 +127,8 @@ pub(super) fn drives(
         if let Some(DriveKind::Joint(joint)) = kind
             && let Some(first) = drives
                 .iter()
-                .position(|drive| drive.kind == DriveKind::Joint(joint))
+                .zip(&known)
+                .position(|(drive, known)| *known && drive.kind == DriveKind::Joint(joint))
         {
             log.push(
                 Diagnostic::error(
@@ -137,6 +140,7 @@ pub(super) fn drives(
             );
         }
         places.drives.push(name.span);
+        known.push(kind.is_some());
         drives.push(Drive {
             name: name.text.clone(),
             kind: kind.unwrap_or(DriveKind::Joint(CoordinateIdx(0))),
@@ -197,7 +201,10 @@ fn check_number(
             "no drive is left for this coordinate"
         })
         .help("each coordinate that is not `passive` is a degree of freedom and needs one drive")
-        .help(if drives.len() > n_active {
+        .help(if n_active == 0 {
+            "every coordinate is `passive`, so that nothing is driven: take `passive = true` off the one that the drive moves; if \
+             the loops tie too many coordinates then, a joint is missing or a loop is too many"
+        } else if drives.len() > n_active {
             "delete a drive, or make another coordinate active"
         } else {
             "add a `[[drive]]`; if the loops settle this coordinate, mark it `passive = true`"
