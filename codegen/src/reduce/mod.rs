@@ -13,6 +13,7 @@ mod poses;
 mod print;
 mod rational_function;
 mod reconstruct;
+mod relations;
 mod sample;
 mod support;
 mod univariate;
@@ -34,6 +35,7 @@ use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Tape, Unary};
 use crate::field::{Element, MODULUS, PRIMES, Stream};
 use crate::projection::Projection;
 use eliminate::Echelon;
+use relations::{FromRelations, Related, Relation};
 use sample::Sampler;
 
 /// Seed of the draws: the same model gives the same text on any machine.
@@ -321,6 +323,8 @@ struct Pattern {
     dependent: Vec<usize>,
     /// Pairs of a dependent and a retained column with a factor that does not vanish.
     wanted: Vec<(usize, usize)>,
+    /// The same dependences between columns that are closer together.
+    relations: Vec<Relation>,
 }
 
 impl Pattern {
@@ -345,11 +349,16 @@ impl Pattern {
             .flat_map(|j| pivots.iter().map(move |p| (*j, *p)))
             .filter(|(j, p)| echelon.entry(*p, *j).is_some_and(|x| x != Element::ZERO))
             .collect();
+        let order: Vec<usize> = (order.iter().copied())
+            .filter(|k| shown.contains(k))
+            .collect();
+        let relations = relations::find(&echelon, &order, &dependent);
         Ok(Self {
             shown,
             pivots,
             dependent,
             wanted,
+            relations,
         })
     }
 
@@ -364,12 +373,54 @@ impl Pattern {
         if self.wanted.is_empty() {
             return Ok(Vec::new());
         }
-        let mut factors = Factors {
-            regressor,
-            pattern: self,
-            sampling: stream.clone(),
+        let found = |relations: &[Relation], stream: &mut Stream| {
+            let mut oracle = NearFactors {
+                regressor,
+                pivots: &self.pivots,
+                relations,
+                sampling: stream.clone(),
+            };
+            reconstruct::reconstruct(&mut oracle, variables, roots, stream)
         };
-        reconstruct::reconstruct(&mut factors, variables, roots, stream)
+        let factors = found(&self.relations, stream)?;
+        let mut related = Related::new(&self.relations, factors);
+        // What is near need not be simple: where the first joints of an arm cannot feel a link, relations between links
+        // divide by sines of twists, and those to retained columns do not.
+        let direct = self.direct(&related.unwieldy());
+        if !direct.is_empty() {
+            let factors = found(&direct, stream)?;
+            related.replace(Related::new(&direct, factors));
+        }
+        let mut written = related.written_out(&self.wanted, roots);
+        let missing: Vec<usize> = (0..written.len())
+            .filter(|k| written[*k].is_none())
+            .collect();
+        if !missing.is_empty() && related.is_complete() {
+            let mut rest = FromRelations {
+                related: &related,
+                regressor,
+                wanted: missing.iter().map(|k| self.wanted[*k]).collect(),
+            };
+            let found = reconstruct::reconstruct(&mut rest, variables, roots, stream)?;
+            for (k, function) in missing.into_iter().zip(found) {
+                written[k] = function;
+            }
+        }
+        Ok(written)
+    }
+
+    /// Dependent columns in terms of retained ones.
+    fn direct(&self, columns: &[usize]) -> Vec<Relation> {
+        let retained = |j: usize| {
+            let own = self.wanted.iter().filter(|(column, _)| *column == j);
+            own.map(|(_, p)| *p).collect()
+        };
+        let line = |j: &usize| Relation {
+            column: *j,
+            retained: retained(*j),
+            dependent: Vec::new(),
+        };
+        columns.iter().map(line).collect()
     }
 
     fn reduction(
@@ -427,14 +478,15 @@ impl Pattern {
     }
 }
 
-/// The wanted factors of a pattern as functions of the constants.
-struct Factors<'a> {
+/// The factors of relations as functions of the constants, from points of motion.
+struct NearFactors<'a> {
     regressor: &'a SampledRegressor,
-    pattern: &'a Pattern,
+    pivots: &'a [usize],
+    relations: &'a [Relation],
     sampling: Stream,
 }
 
-impl reconstruct::Oracle for Factors<'_> {
+impl reconstruct::Oracle for NearFactors<'_> {
     fn constants<const P: u64>(
         &self,
         stream: &mut Stream,
@@ -446,15 +498,11 @@ impl reconstruct::Oracle for Factors<'_> {
         &mut self,
         constants: &FieldPoint<Element<P>>,
     ) -> Result<Vec<Element<P>>, DeriveError> {
-        let Pattern { pivots, wanted, .. } = self.pattern;
-        let rank = Some(pivots.len());
+        let rank = Some(self.pivots.len());
         let echelon = self
             .regressor
-            .echelon(constants, pivots, rank, &mut self.sampling)?;
-        wanted
-            .iter()
-            .map(|(j, p)| echelon.entry(*p, *j).ok_or(DeriveError::RankChanged))
-            .collect()
+            .echelon(constants, self.pivots, rank, &mut self.sampling)?;
+        relations::values(self.relations, &echelon)
     }
 }
 

@@ -50,10 +50,11 @@ pub(crate) fn reconstruct<O: Oracle>(
     let mut shape: Vec<Shape> = vec![Shape::default(); n];
     let varying: Vec<usize> = (0..n).filter(|k| at_origin[*k] != elsewhere[*k]).collect();
     if !varying.is_empty() {
-        for &constant in constants {
-            probe(
-                oracle, &origin, &at_origin, constant, &varying, &mut shape, stream,
-            )?;
+        let moved = moved(
+            oracle, &origin, &at_origin, constants, &varying, &mut shape, stream,
+        )?;
+        for group in apart(&moved, &shape) {
+            probe(oracle, &origin, &at_origin, &group, &mut shape, stream)?;
         }
         total_degrees(oracle, &origin, constants, &varying, &mut shape, stream)?;
     }
@@ -83,44 +84,115 @@ struct Shape {
     lost: bool,
 }
 
-/// Degrees in one constant, with all others at the origin.
+/// One constant moved away from the origin.
+struct Moved {
+    constant: Occurrence,
+    /// Where it stands then, and the values of all functions.
+    at: Element,
+    values: Vec<Element>,
+}
+
+/// Moves one constant after the other; every function gets the constants on which it depends, of degrees not yet known.
+fn moved<O: Oracle>(
+    oracle: &mut O,
+    origin: &FieldPoint,
+    at_origin: &[Element],
+    constants: &[Occurrence],
+    varying: &[usize],
+    shape: &mut [Shape],
+    stream: &mut Stream,
+) -> Result<Vec<Moved>, DeriveError> {
+    let mut all = Vec::with_capacity(constants.len());
+    for &constant in constants {
+        let mut point = origin.clone();
+        let at = stream.element();
+        set(&mut point, constant, at);
+        let values = oracle.values(&point)?;
+        let mut is_felt = false;
+        for &k in varying {
+            if values[k] != at_origin[k] {
+                shape[k].degrees.insert(constant, (0, 0));
+                is_felt = true;
+            }
+        }
+        if is_felt {
+            all.push(Moved {
+                constant,
+                at,
+                values,
+            });
+        }
+    }
+    Ok(all)
+}
+
+/// Constants in groups such that no function depends on two of one group: they may be varied at once. Those of different
+/// joints of an arm mostly are such.
+fn apart<'a>(moved: &'a [Moved], shape: &[Shape]) -> Vec<Vec<&'a Moved>> {
+    let mut groups: Vec<Vec<&Moved>> = Vec::new();
+    for one in moved {
+        let meet = |other: &Moved| {
+            let both = [one.constant, other.constant];
+            shape
+                .iter()
+                .any(|s| both.iter().all(|c| s.degrees.contains_key(c)))
+        };
+        let group = groups.iter_mut().find(|g| !g.iter().any(|m| meet(m)));
+        match group {
+            Some(group) => group.push(one),
+            None => groups.push(vec![one]),
+        }
+    }
+    groups
+}
+
+/// Degrees in each constant of a group, with all others at the origin.
 fn probe<O: Oracle>(
     oracle: &mut O,
     origin: &FieldPoint,
     at_origin: &[Element],
-    constant: Occurrence,
-    varying: &[usize],
+    group: &[&Moved],
     shape: &mut [Shape],
     stream: &mut Stream,
 ) -> Result<(), DeriveError> {
-    let mut x = Vec::new();
+    // Every function with the one constant of the group on which it depends, and what is known along it.
+    let mut open: Vec<(usize, &Moved)> = Vec::new();
+    for one in group {
+        let felt = (0..shape.len()).filter(|k| shape[*k].degrees.contains_key(&one.constant));
+        open.extend(felt.map(|k| (k, *one)));
+    }
+    let mut x: Vec<Element> = Vec::new();
     let mut y: Vec<Vec<Element>> = Vec::new();
-    let mut open: Vec<usize> = varying.to_vec();
-    while !open.is_empty() && x.len() < MOST_POINTS {
+    while !open.is_empty() && x.len() + 2 < MOST_POINTS {
         let mut point = origin.clone();
         let t = stream.element();
-        set(&mut point, constant, t);
+        for one in group {
+            set(&mut point, one.constant, t);
+        }
         x.push(t);
         y.push(oracle.values(&point)?);
-        if x.len() == 1 {
-            open.retain(|k| y[0][*k] != at_origin[*k]);
+        if x.len() < 2 || x.len() % 2 == 1 {
             continue;
         }
-        if x.len() < 4 || x.len() % 2 == 1 {
-            continue;
-        }
-        open.retain(|k| {
-            let values: Vec<Element> = y.iter().map(|row| row[*k]).collect();
-            match univariate::degrees(&x, &values) {
+        open.retain(|(k, one)| {
+            let mut places = vec![one.at];
+            let mut values = vec![one.values[*k]];
+            if let Some(start) = place(origin, one.constant) {
+                places.push(start);
+                values.push(at_origin[*k]);
+            }
+            places.extend(&x);
+            values.extend(y.iter().map(|row| row[*k]));
+            match univariate::degrees(&places, &values) {
                 Some(degrees) => {
-                    shape[*k].degrees.insert(constant, degrees);
+                    shape[*k].degrees.insert(one.constant, degrees);
                     false
                 }
                 None => true,
             }
         });
     }
-    for k in open {
+    for (k, _) in open {
         shape[k].lost = true;
     }
     Ok(())
@@ -186,6 +258,16 @@ fn set(point: &mut FieldPoint, (index, in_angle): Occurrence, t: Element) {
             .angles
             .insert(atom, ((Element::ONE - t * t) * scale, (t + t) * scale));
     }
+}
+
+/// Where a constant stands; half the tangent if inside sines and cosines.
+fn place(point: &FieldPoint, (index, in_angle): Occurrence) -> Option<Element> {
+    let atom = Atom::Constant(index);
+    if !in_angle {
+        return point.values.get(&atom).copied();
+    }
+    let (cosine, sine) = point.angles.get(&atom)?;
+    Some(*sine * (Element::ONE + *cosine).inverse()?)
 }
 
 /// Random points of one field with the values of all functions, shared between the fits.
