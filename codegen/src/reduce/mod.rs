@@ -6,6 +6,7 @@
 
 mod branches;
 mod eliminate;
+mod factors;
 mod lift;
 mod numeric;
 mod plan;
@@ -35,7 +36,7 @@ use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Tape, Unary};
 use crate::field::{Element, MODULUS, PRIMES, Stream};
 use crate::projection::Projection;
 use eliminate::Echelon;
-use relations::{FromRelations, Related, Relation};
+use relations::Relation;
 use sample::Sampler;
 
 /// Seed of the draws: the same model gives the same text on any machine.
@@ -238,7 +239,7 @@ fn reduce_exactly(
     let pattern = Pattern::find(&regressor, order, &mut stream)?;
     let roots = root_radicands(graph, outputs, projection);
     let variables = occurrences(graph, outputs, projection);
-    let factors = pattern.factors(&regressor, &variables, &roots, &mut stream)?;
+    let factors = factors::of(&pattern, &regressor, &variables, &roots, &mut stream)?;
     let names = |k: usize| candidates[effective[k]].clone();
     let reduction = pattern.reduction(mechanism, candidates, &names, factors)?;
     reduction.confirm(&regressor, &pattern.shown, &mut stream)?;
@@ -323,7 +324,7 @@ struct Pattern {
     dependent: Vec<usize>,
     /// Pairs of a dependent and a retained column with a factor that does not vanish.
     wanted: Vec<(usize, usize)>,
-    /// The same dependences between columns that are closer together.
+    /// The same dependences, also between columns that are closer together.
     relations: Vec<Relation>,
 }
 
@@ -360,67 +361,6 @@ impl Pattern {
             wanted,
             relations,
         })
-    }
-
-    /// The wanted factors as rational functions of the constants, found again at any other constants.
-    fn factors(
-        &self,
-        regressor: &SampledRegressor,
-        variables: &[reconstruct::Occurrence],
-        roots: &[i64],
-        stream: &mut Stream,
-    ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
-        if self.wanted.is_empty() {
-            return Ok(Vec::new());
-        }
-        let found = |relations: &[Relation], stream: &mut Stream| {
-            let mut oracle = NearFactors {
-                regressor,
-                pivots: &self.pivots,
-                relations,
-                sampling: stream.clone(),
-            };
-            reconstruct::reconstruct(&mut oracle, variables, roots, stream)
-        };
-        let factors = found(&self.relations, stream)?;
-        let mut related = Related::new(&self.relations, factors);
-        // What is near need not be simple: where the first joints of an arm cannot feel a link, relations between links
-        // divide by sines of twists, and those to retained columns do not.
-        let direct = self.direct(&related.unwieldy());
-        if !direct.is_empty() {
-            let factors = found(&direct, stream)?;
-            related.replace(Related::new(&direct, factors));
-        }
-        let mut written = related.written_out(&self.wanted, roots);
-        let missing: Vec<usize> = (0..written.len())
-            .filter(|k| written[*k].is_none())
-            .collect();
-        if !missing.is_empty() && related.is_complete() {
-            let mut rest = FromRelations {
-                related: &related,
-                regressor,
-                wanted: missing.iter().map(|k| self.wanted[*k]).collect(),
-            };
-            let found = reconstruct::reconstruct(&mut rest, variables, roots, stream)?;
-            for (k, function) in missing.into_iter().zip(found) {
-                written[k] = function;
-            }
-        }
-        Ok(written)
-    }
-
-    /// Dependent columns in terms of retained ones.
-    fn direct(&self, columns: &[usize]) -> Vec<Relation> {
-        let retained = |j: usize| {
-            let own = self.wanted.iter().filter(|(column, _)| *column == j);
-            own.map(|(_, p)| *p).collect()
-        };
-        let line = |j: &usize| Relation {
-            column: *j,
-            retained: retained(*j),
-            dependent: Vec::new(),
-        };
-        columns.iter().map(line).collect()
     }
 
     fn reduction(
@@ -475,34 +415,6 @@ impl Pattern {
                 confirmed_at: CONFIRMED_WITH * CONFIRMED_AT,
             },
         })
-    }
-}
-
-/// The factors of relations as functions of the constants, from points of motion.
-struct NearFactors<'a> {
-    regressor: &'a SampledRegressor,
-    pivots: &'a [usize],
-    relations: &'a [Relation],
-    sampling: Stream,
-}
-
-impl reconstruct::Oracle for NearFactors<'_> {
-    fn constants<const P: u64>(
-        &self,
-        stream: &mut Stream,
-    ) -> Result<FieldPoint<Element<P>>, DeriveError> {
-        self.regressor.sampler.constants(stream)
-    }
-
-    fn values<const P: u64>(
-        &mut self,
-        constants: &FieldPoint<Element<P>>,
-    ) -> Result<Vec<Element<P>>, DeriveError> {
-        let rank = Some(self.pivots.len());
-        let echelon = self
-            .regressor
-            .echelon(constants, self.pivots, rank, &mut self.sampling)?;
-        relations::values(self.relations, &echelon)
     }
 }
 

@@ -35,42 +35,101 @@ pub(crate) type Occurrence = (usize, bool);
 
 /// Reconstructs every function that `oracle` evaluates.
 ///
-/// A function that resists (of a degree beyond all reason, or not rational) comes back as `None`.
+/// A function that resists (of a degree beyond all reason, or not rational) comes back as `None`, and with it all others:
+/// what they are would not be used.
 pub(crate) fn reconstruct<O: Oracle>(
     oracle: &mut O,
     constants: &[Occurrence],
     roots: &[i64],
     stream: &mut Stream,
 ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
-    let origin = oracle.constants(stream)?;
-    let at_origin = oracle.values(&origin)?;
-    let elsewhere = oracle.constants(stream)?;
-    let elsewhere = oracle.values(&elsewhere)?;
-    let n = at_origin.len();
-    let mut shape: Vec<Shape> = vec![Shape::default(); n];
-    let varying: Vec<usize> = (0..n).filter(|k| at_origin[*k] != elsewhere[*k]).collect();
-    if !varying.is_empty() {
-        let moved = moved(
-            oracle, &origin, &at_origin, constants, &varying, &mut shape, stream,
-        )?;
-        for group in apart(&moved, &shape) {
-            probe(oracle, &origin, &at_origin, &group, &mut shape, stream)?;
-        }
-        total_degrees(oracle, &origin, constants, &varying, &mut shape, stream)?;
+    let mut survey = Survey::new(oracle, constants, roots, stream)?;
+    let all: Vec<(usize, bool)> = (0..survey.shapes.len()).map(|k| (k, true)).collect();
+    survey.functions(oracle, &all, stream)
+}
+
+/// Which functions depend on which constants, and what was sampled for that.
+pub(super) struct Survey<O> {
+    roots: Vec<i64>,
+    constants: Vec<Occurrence>,
+    origin: FieldPoint,
+    at_origin: Vec<Element>,
+    moved: Vec<Moved>,
+    shapes: Vec<Shape>,
+    fields: Fields<O>,
+}
+
+impl<O: Oracle> Survey<O> {
+    /// Moves one constant after the other.
+    pub(super) fn new(
+        oracle: &mut O,
+        constants: &[Occurrence],
+        roots: &[i64],
+        stream: &mut Stream,
+    ) -> Result<Self, DeriveError> {
+        let origin = oracle.constants(stream)?;
+        let at_origin = oracle.values(&origin)?;
+        let elsewhere = oracle.constants(stream)?;
+        let elsewhere = oracle.values(&elsewhere)?;
+        let n = at_origin.len();
+        let mut shapes: Vec<Shape> = vec![Shape::default(); n];
+        let varying: Vec<usize> = (0..n).filter(|k| at_origin[*k] != elsewhere[*k]).collect();
+        let moved = if varying.is_empty() {
+            Vec::new()
+        } else {
+            moved(oracle, &origin, &at_origin, constants, &mut shapes, stream)?
+        };
+        Ok(Self {
+            roots: roots.to_vec(),
+            constants: constants.to_vec(),
+            origin,
+            at_origin,
+            moved,
+            shapes,
+            fields: Fields::new(),
+        })
     }
-    let mut fields = Fields::new();
-    let mut found = Vec::with_capacity(n);
-    for shape in &shape {
-        let function = shape.fit(&mut fields, oracle, &origin, found.len(), roots, stream)?;
-        let resists = function.is_none();
-        found.push(function);
-        if resists {
-            // One that resists is enough: what the others are would not be used.
-            found.resize(n, None);
-            break;
-        }
+
+    /// On how many constants a function depends.
+    pub(super) fn n_constants(&self, function: usize) -> usize {
+        self.shapes[function].degrees.len()
     }
-    Ok(found)
+
+    /// Some of the functions, each with whether the others are useless without it: where such a one resists, all that come
+    /// after it are `None` too.
+    pub(super) fn functions(
+        &mut self,
+        oracle: &mut O,
+        wanted: &[(usize, bool)],
+        stream: &mut Stream,
+    ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
+        let (origin, shapes) = (&self.origin, &mut self.shapes);
+        let indices: Vec<usize> = wanted.iter().map(|(k, _)| *k).collect();
+        for group in apart(&self.moved, &indices, shapes) {
+            probe(
+                oracle,
+                origin,
+                &self.at_origin,
+                &group,
+                &indices,
+                shapes,
+                stream,
+            )?;
+        }
+        total_degrees(oracle, origin, &self.constants, &indices, shapes, stream)?;
+        let mut found = Vec::with_capacity(wanted.len());
+        for (k, is_needed) in wanted {
+            let function =
+                shapes[*k].fit(&mut self.fields, oracle, origin, *k, &self.roots, stream)?;
+            let resists = function.is_none();
+            found.push(function);
+            if resists && *is_needed {
+                found.resize(wanted.len(), None);
+                break;
+            }
+        }
+        Ok(found)
+    }
 }
 
 /// What is known about one function before its coefficients are.
@@ -98,8 +157,7 @@ fn moved<O: Oracle>(
     origin: &FieldPoint,
     at_origin: &[Element],
     constants: &[Occurrence],
-    varying: &[usize],
-    shape: &mut [Shape],
+    shapes: &mut [Shape],
     stream: &mut Stream,
 ) -> Result<Vec<Moved>, DeriveError> {
     let mut all = Vec::with_capacity(constants.len());
@@ -109,9 +167,9 @@ fn moved<O: Oracle>(
         set(&mut point, constant, at);
         let values = oracle.values(&point)?;
         let mut is_felt = false;
-        for &k in varying {
+        for (k, shape) in shapes.iter_mut().enumerate() {
             if values[k] != at_origin[k] {
-                shape[k].degrees.insert(constant, (0, 0));
+                shape.degrees.insert(constant, (0, 0));
                 is_felt = true;
             }
         }
@@ -126,16 +184,19 @@ fn moved<O: Oracle>(
     Ok(all)
 }
 
-/// Constants in groups such that no function depends on two of one group: they may be varied at once. Those of different
-/// joints of an arm mostly are such.
-fn apart<'a>(moved: &'a [Moved], shape: &[Shape]) -> Vec<Vec<&'a Moved>> {
+/// Constants in groups such that none of some functions depends on two of one group: they may be varied at once. Those of
+/// different joints of an arm mostly are such.
+fn apart<'a>(moved: &'a [Moved], functions: &[usize], shapes: &[Shape]) -> Vec<Vec<&'a Moved>> {
     let mut groups: Vec<Vec<&Moved>> = Vec::new();
     for one in moved {
+        let felt = |k: &usize| shapes[*k].degrees.contains_key(&one.constant);
+        let own: Vec<usize> = functions.iter().copied().filter(felt).collect();
+        if own.is_empty() {
+            continue;
+        }
         let meet = |other: &Moved| {
-            let both = [one.constant, other.constant];
-            shape
-                .iter()
-                .any(|s| both.iter().all(|c| s.degrees.contains_key(c)))
+            let felt = |k: &usize| shapes[*k].degrees.contains_key(&other.constant);
+            own.iter().any(felt)
         };
         let group = groups.iter_mut().find(|g| !g.iter().any(|m| meet(m)));
         match group {
@@ -152,40 +213,43 @@ fn probe<O: Oracle>(
     origin: &FieldPoint,
     at_origin: &[Element],
     group: &[&Moved],
-    shape: &mut [Shape],
+    functions: &[usize],
+    shapes: &mut [Shape],
     stream: &mut Stream,
 ) -> Result<(), DeriveError> {
-    // Every function with the one constant of the group on which it depends, and what is known along it.
-    let mut open: Vec<(usize, &Moved)> = Vec::new();
-    for one in group {
-        let felt = (0..shape.len()).filter(|k| shape[*k].degrees.contains_key(&one.constant));
-        open.extend(felt.map(|k| (k, *one)));
+    // Every function with the position in the group of the one constant on which it depends.
+    let mut open: Vec<(usize, usize)> = Vec::new();
+    for (i, one) in group.iter().enumerate() {
+        let felt = functions.iter().copied();
+        let felt = felt.filter(|k| shapes[*k].degrees.contains_key(&one.constant));
+        open.extend(felt.map(|k| (k, i)));
     }
-    let mut x: Vec<Element> = Vec::new();
-    let mut y: Vec<Vec<Element>> = Vec::new();
-    while !open.is_empty() && x.len() + 2 < MOST_POINTS {
+    // Places of each constant: different ones, since lengths that are equal may be special.
+    let mut places: Vec<Vec<Element>> = group.iter().map(|one| vec![one.at]).collect();
+    let mut sampled: Vec<Vec<Element>> = Vec::new();
+    while !open.is_empty() && sampled.len() + 2 < MOST_POINTS {
         let mut point = origin.clone();
-        let t = stream.element();
-        for one in group {
+        for (one, places) in group.iter().zip(&mut places) {
+            let t = stream.element();
             set(&mut point, one.constant, t);
+            places.push(t);
         }
-        x.push(t);
-        y.push(oracle.values(&point)?);
-        if x.len() < 2 || x.len() % 2 == 1 {
+        sampled.push(oracle.values(&point)?);
+        if sampled.len() < 2 || sampled.len() % 2 == 1 {
             continue;
         }
-        open.retain(|(k, one)| {
-            let mut places = vec![one.at];
-            let mut values = vec![one.values[*k]];
+        open.retain(|(k, i)| {
+            let one = group[*i];
+            let mut x = places[*i].clone();
+            let mut y = vec![one.values[*k]];
+            y.extend(sampled.iter().map(|row| row[*k]));
             if let Some(start) = place(origin, one.constant) {
-                places.push(start);
-                values.push(at_origin[*k]);
+                x.push(start);
+                y.push(at_origin[*k]);
             }
-            places.extend(&x);
-            values.extend(y.iter().map(|row| row[*k]));
-            match univariate::degrees(&places, &values) {
+            match univariate::degrees(&x, &y) {
                 Some(degrees) => {
-                    shape[*k].degrees.insert(one.constant, degrees);
+                    shapes[*k].degrees.insert(one.constant, degrees);
                     false
                 }
                 None => true,
@@ -193,7 +257,7 @@ fn probe<O: Oracle>(
         });
     }
     for (k, _) in open {
-        shape[k].lost = true;
+        shapes[k].lost = true;
     }
     Ok(())
 }
@@ -203,8 +267,8 @@ fn total_degrees<O: Oracle>(
     oracle: &mut O,
     origin: &FieldPoint,
     constants: &[Occurrence],
-    varying: &[usize],
-    shape: &mut [Shape],
+    functions: &[usize],
+    shapes: &mut [Shape],
     stream: &mut Stream,
 ) -> Result<(), DeriveError> {
     let lengths: Vec<usize> = constants
@@ -215,11 +279,11 @@ fn total_degrees<O: Oracle>(
     let direction: Vec<Element> = lengths.iter().map(|_| stream.element()).collect();
     let mut x = Vec::new();
     let mut y: Vec<Vec<Element>> = Vec::new();
-    let mut open: Vec<usize> = varying
+    let mut open: Vec<usize> = functions
         .iter()
         .copied()
         .filter(|k| {
-            shape[*k]
+            shapes[*k]
                 .degrees
                 .keys()
                 .filter(|(_, in_angle)| !in_angle)
@@ -241,8 +305,8 @@ fn total_degrees<O: Oracle>(
         }
         open.retain(|k| {
             let values: Vec<Element> = y.iter().map(|row| row[*k]).collect();
-            shape[*k].total = univariate::degrees(&x, &values);
-            shape[*k].total.is_none()
+            shapes[*k].total = univariate::degrees(&x, &values);
+            shapes[*k].total.is_none()
         });
     }
     Ok(())

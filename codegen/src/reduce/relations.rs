@@ -7,13 +7,11 @@
 
 use std::collections::BTreeMap;
 
-use super::SampledRegressor;
 use super::eliminate::{self, Echelon};
 use super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
-use super::reconstruct::Oracle;
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
-use crate::field::{Element, Stream};
+use crate::field::Element;
 
 /// One column in terms of others, all by position among the effective ones.
 #[derive(Clone, Debug)]
@@ -21,15 +19,20 @@ pub(super) struct Relation {
     /// The column.
     pub(super) column: usize,
     /// Retained columns that it needs.
-    pub(super) retained: Vec<usize>,
+    retained: Vec<usize>,
     /// Columns that it needs and that have relations of their own, before this one.
     pub(super) dependent: Vec<usize>,
 }
 
 impl Relation {
     /// How many factors it has.
-    fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.retained.len() + self.dependent.len()
+    }
+
+    /// Whether it needs retained columns alone.
+    pub(super) fn is_direct(&self) -> bool {
+        self.dependent.is_empty()
     }
 
     /// Columns with a factor, in the order of [`Self::values`].
@@ -78,35 +81,39 @@ impl Relation {
     }
 }
 
-/// A relation for every dependent column of a pattern, in an order in which each needs earlier ones only.
+/// Relations for every dependent column of a pattern, in an order in which each needs earlier columns only: to retained
+/// columns, then, if they are fewer, to the columns before it that come last.
 ///
-/// `order` is that in which columns are retained. Of the columns before the dependent one those that come last are taken
-/// as long as they are independent; where all retained ones make a shorter relation, that is taken.
+/// `order` is that in which columns are retained.
 pub(super) fn find<const P: u64>(
     echelon: &Echelon<P>,
     order: &[usize],
     dependent: &[usize],
 ) -> Vec<Relation> {
-    let mut relations = Vec::with_capacity(dependent.len());
+    let mut found = Vec::new();
     for (at, column) in order.iter().enumerate() {
         if !dependent.contains(column) {
             continue;
         }
-        let direct: Vec<usize> = (echelon.pivots.iter().copied())
+        let mut direct: Vec<usize> = (echelon.pivots.iter().copied())
             .filter(|p| echelon.entry(*p, *column) != Some(Element::ZERO))
             .collect();
+        direct.sort_unstable();
         let near = near(echelon, &order[..at], *column);
-        let is_direct = near.len() >= direct.len();
-        let mut all = if is_direct { direct } else { near };
-        all.sort_unstable();
-        let (dependent, retained) = all.into_iter().partition(|k| dependent.contains(k));
-        relations.push(Relation {
-            column: *column,
-            retained,
-            dependent,
-        });
+        let is_shorter = near.len() < direct.len();
+        for columns in [Some(direct), is_shorter.then_some(near)]
+            .into_iter()
+            .flatten()
+        {
+            let (dependent, retained) = columns.into_iter().partition(|k| dependent.contains(k));
+            found.push(Relation {
+                column: *column,
+                retained,
+                dependent,
+            });
+        }
     }
-    relations
+    found
 }
 
 /// The columns among those before `column` that it needs if the last ones are preferred.
@@ -181,23 +188,22 @@ type Factors = Vec<Option<RationalFunction>>;
 
 impl Related {
     /// Takes the factors as [`values`] orders them.
-    pub(super) fn new(relations: &[Relation], factors: Factors) -> Self {
+    pub(super) fn new<'a>(relations: impl Iterator<Item = &'a Relation>, factors: Factors) -> Self {
         let mut rest = factors.into_iter();
         let own = |relation: &Relation| {
             let factors = relation.columns().map(|_| rest.next().flatten());
             (relation.clone(), factors.collect())
         };
-        Self(relations.iter().map(own).collect())
+        Self(relations.map(own).collect())
     }
 
     /// Dependent columns whose relations to others that depend are not known, or hold quotients other than by lengths.
     pub(super) fn unwieldy(&self) -> Vec<usize> {
         let is_simple = |f: &Option<RationalFunction>| f.as_ref().and_then(Quotient::of).is_some();
         let lines = self.0.iter();
-        lines
-            .filter(|(r, factors)| !r.dependent.is_empty() && !factors.iter().all(is_simple))
-            .map(|(relation, _)| relation.column)
-            .collect()
+        let unwieldy =
+            lines.filter(|(r, factors)| !r.is_direct() && !factors.iter().all(is_simple));
+        unwieldy.map(|(relation, _)| relation.column).collect()
     }
 
     /// Puts others in the place of relations of the same columns, if they are known.
@@ -219,7 +225,7 @@ impl Related {
     ) -> Vec<Option<RationalFunction>> {
         let mut expanded: BTreeMap<usize, Line> = BTreeMap::new();
         for (relation, factors) in &self.0 {
-            let line = if relation.dependent.is_empty() {
+            let line = if relation.is_direct() {
                 Line::of(relation, factors)
             } else if are_independent(roots) {
                 Line::sum(relation, factors, &expanded)
@@ -239,7 +245,7 @@ impl Related {
     }
 
     /// Values of some wanted factors; `None` where a denominator vanishes.
-    fn values<const P: u64>(
+    pub(super) fn values<const P: u64>(
         &self,
         wanted: &[(usize, usize)],
         constants: &FieldPoint<Element<P>>,
@@ -314,31 +320,6 @@ impl Line {
             functions: line.iter().map(|(p, q)| (*p, q.function())).collect(),
             quotients: Some(line),
         }
-    }
-}
-
-/// Wanted factors from relations, all of which must be known: much cheaper than from points of motion.
-pub(super) struct FromRelations<'a> {
-    pub(super) related: &'a Related,
-    pub(super) regressor: &'a SampledRegressor,
-    /// Which ones.
-    pub(super) wanted: Vec<(usize, usize)>,
-}
-
-impl Oracle for FromRelations<'_> {
-    fn constants<const P: u64>(
-        &self,
-        stream: &mut Stream,
-    ) -> Result<FieldPoint<Element<P>>, DeriveError> {
-        self.regressor.sampler.constants(stream)
-    }
-
-    fn values<const P: u64>(
-        &mut self,
-        constants: &FieldPoint<Element<P>>,
-    ) -> Result<Vec<Element<P>>, DeriveError> {
-        let values = self.related.values(&self.wanted, constants);
-        values.ok_or(DeriveError::RankChanged)
     }
 }
 
