@@ -182,6 +182,7 @@ pub(crate) fn reduce(
             because @ (DeriveError::LoopsNotSampled { .. }
             | DeriveError::BranchesNotSeparated { .. }
             | DeriveError::FactorNotRecovered { .. }
+            | DeriveError::FactorsTooLong { .. }
             | DeriveError::NoPointFound { .. }
             | DeriveError::NotConfirmed
             | DeriveError::RankChanged),
@@ -226,24 +227,42 @@ fn reduce_exactly(
     order: &[usize],
     outputs: &[ExprId],
 ) -> Result<Reduction, DeriveError> {
-    let regressor = SampledRegressor {
+    let regressor = sampled(graph, mechanism, projection, outputs, effective.len())?;
+    let mut stream = Stream::new(SEED);
+    let pattern = Pattern::find(&regressor, order, &mut stream)?;
+    let roots = root_radicands(graph, outputs, projection);
+    let variables = occurrences(graph, outputs, projection);
+    let factors = factors::of(
+        &pattern,
+        &regressor,
+        &variables,
+        &roots,
+        factors::MOST_OPERATIONS,
+        &mut stream,
+    )?;
+    let names = |k: usize| candidates[effective[k]].clone();
+    let reduction = pattern.reduction(mechanism, candidates, &names, factors)?;
+    reduction.confirm(&regressor, &pattern.shown, &mut stream)?;
+    Ok(reduction)
+}
+
+/// Prepares the evaluation of so many columns, drive by drive.
+fn sampled(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    projection: &Projection,
+    outputs: &[ExprId],
+    n_columns: usize,
+) -> Result<SampledRegressor, DeriveError> {
+    Ok(SampledRegressor {
         sampler: Sampler::new(graph, mechanism, projection, outputs)?,
-        n_columns: effective.len(),
+        n_columns,
         idle: if has_sign(graph, outputs) {
             IDLE_WITH_SIGNS
         } else {
             IDLE
         },
-    };
-    let mut stream = Stream::new(SEED);
-    let pattern = Pattern::find(&regressor, order, &mut stream)?;
-    let roots = root_radicands(graph, outputs, projection);
-    let variables = occurrences(graph, outputs, projection);
-    let factors = factors::of(&pattern, &regressor, &variables, &roots, &mut stream)?;
-    let names = |k: usize| candidates[effective[k]].clone();
-    let reduction = pattern.reduction(mechanism, candidates, &names, factors)?;
-    reduction.confirm(&regressor, &pattern.shown, &mut stream)?;
-    Ok(reduction)
+    })
 }
 
 /// In which ways the constants occur in the columns and in the loops.

@@ -27,6 +27,33 @@ pub(crate) trait Oracle {
         &mut self,
         constants: &FieldPoint<Element<P>>,
     ) -> Result<Vec<Element<P>>, DeriveError>;
+    /// Says that so many operations will be done beside evaluation; an error where they are too many.
+    fn spend(&mut self, operations: usize) -> Result<(), DeriveError>;
+}
+
+/// How many operations of the field may still be done. Time would differ from machine to machine, and with it the result.
+#[derive(Clone, Debug)]
+pub(super) struct Budget {
+    all: u64,
+    left: u64,
+}
+
+impl Budget {
+    pub(super) fn new(operations: u64) -> Self {
+        Self {
+            all: operations,
+            left: operations,
+        }
+    }
+
+    pub(super) fn spend(&mut self, operations: usize) -> Result<(), DeriveError> {
+        let operations = u64::try_from(operations).unwrap_or(u64::MAX);
+        let left = self.left.checked_sub(operations);
+        self.left = left.ok_or(DeriveError::FactorsTooLong {
+            operations: self.all,
+        })?;
+        Ok(())
+    }
 }
 
 /// A way in which a constant occurs, by index and whether inside sines and cosines. A constant that occurs in both ways
@@ -389,7 +416,9 @@ impl<O: Oracle, const P: u64> Solve<O> for Samples<P> {
             })
             .collect();
         let Some(rows) = rows else { return Ok(None) };
-        let solutions = eliminate::null_space(rows, n_top + ansatz.denominator.len());
+        let n_unknowns = n_top + ansatz.denominator.len();
+        oracle.spend(rows.len() * n_unknowns * n_unknowns)?;
+        let solutions = eliminate::null_space(rows, n_unknowns);
         Ok(Some(
             solutions
                 .into_iter()

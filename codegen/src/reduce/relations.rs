@@ -127,7 +127,7 @@ fn near<const P: u64>(echelon: &Echelon<P>, before: &[usize], column: usize) -> 
     let mut known: Vec<Made<P>> = Vec::new();
     let vector_of = |k: usize| -> Vec<Element<P>> {
         let entries = echelon.pivots.iter().map(|p| echelon.entry(*p, k));
-        entries.map(|x| x.unwrap_or_default()).collect()
+        entries.map(Option::unwrap_or_default).collect()
     };
     let reduced = |known: &[Made<P>], target: &mut Vec<Element<P>>, of: &mut BTreeMap<_, _>| {
         for one in known {
