@@ -182,6 +182,7 @@ impl Oracle for FromRelations<'_> {
         &mut self,
         constants: &FieldPoint<Element<P>>,
     ) -> Result<Vec<Element<P>>, DeriveError> {
+        self.spend(1000 * self.wanted.len())?;
         let values = self.related.values(&self.wanted, constants);
         values.ok_or(DeriveError::RankChanged)
     }
