@@ -208,7 +208,7 @@ mod tests {
             "schema = 1\nname = \"twisted\"\ngravity = [0, 0, \"-9.81\"]\n[constants]\n",
         );
         for i in 1..n {
-            writeln!(text, "a{i} = {{ value = 0.1 }}\nb{i} = {{ value = 0.{i}, unit = \"rad\" }}\nd{i} = {{ value = 0.2 }}").unwrap();
+            writeln!(text, "a{i} = {{ value = 0.1, unit = \"m\" }}\nb{i} = {{ value = 0.{i}, unit = \"rad\" }}\nd{i} = {{ value = 0.2, unit = \"m\" }}").unwrap();
         }
         text.push_str("[coordinates]\n");
         for i in 0..n {
