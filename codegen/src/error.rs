@@ -79,6 +79,11 @@ pub enum DeriveError {
         /// The retained product.
         retained: String,
     },
+    /// The factors of eq. (6) would take too long to find in symbols.
+    FactorsTooLong {
+        /// How many operations of the prime field were spent.
+        operations: u64,
+    },
     /// An effect asks for a force that is not affine in the accelerations.
     NotAffine {
         /// Its name in the model file.
@@ -152,6 +157,11 @@ impl fmt::Display for DeriveError {
             Self::FactorNotRecovered { product, retained } => write!(
                 f,
                 "the factor between the columns of {product} and {retained} is no rational function of the constants of reasonable size"
+            ),
+            Self::FactorsTooLong { operations } => write!(
+                f,
+                "the factors between dependent columns were not found in symbols within {:.0e} operations; fewer symbolic constants (write numbers for some) take fewer",
+                *operations as f64
             ),
             Self::NotAffine { effect } => write!(
                 f,

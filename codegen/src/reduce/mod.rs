@@ -6,6 +6,7 @@
 
 mod branches;
 mod eliminate;
+mod factors;
 mod lift;
 mod numeric;
 mod plan;
@@ -13,6 +14,7 @@ mod poses;
 mod print;
 mod rational_function;
 mod reconstruct;
+mod relations;
 mod sample;
 mod support;
 mod univariate;
@@ -34,6 +36,7 @@ use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Tape, Unary};
 use crate::field::{Element, MODULUS, PRIMES, Stream};
 use crate::projection::Projection;
 use eliminate::Echelon;
+use relations::Relation;
 use sample::Sampler;
 
 /// Seed of the draws: the same model gives the same text on any machine.
@@ -179,6 +182,7 @@ pub(crate) fn reduce(
             because @ (DeriveError::LoopsNotSampled { .. }
             | DeriveError::BranchesNotSeparated { .. }
             | DeriveError::FactorNotRecovered { .. }
+            | DeriveError::FactorsTooLong { .. }
             | DeriveError::NoPointFound { .. }
             | DeriveError::NotConfirmed
             | DeriveError::RankChanged),
@@ -223,24 +227,42 @@ fn reduce_exactly(
     order: &[usize],
     outputs: &[ExprId],
 ) -> Result<Reduction, DeriveError> {
-    let regressor = SampledRegressor {
+    let regressor = sampled(graph, mechanism, projection, outputs, effective.len())?;
+    let mut stream = Stream::new(SEED);
+    let pattern = Pattern::find(&regressor, order, &mut stream)?;
+    let roots = root_radicands(graph, outputs, projection);
+    let variables = occurrences(graph, outputs, projection);
+    let factors = factors::of(
+        &pattern,
+        &regressor,
+        &variables,
+        &roots,
+        factors::MOST_OPERATIONS,
+        &mut stream,
+    )?;
+    let names = |k: usize| candidates[effective[k]].clone();
+    let reduction = pattern.reduction(mechanism, candidates, &names, factors)?;
+    reduction.confirm(&regressor, &pattern.shown, &mut stream)?;
+    Ok(reduction)
+}
+
+/// Prepares the evaluation of so many columns, drive by drive.
+fn sampled(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    projection: &Projection,
+    outputs: &[ExprId],
+    n_columns: usize,
+) -> Result<SampledRegressor, DeriveError> {
+    Ok(SampledRegressor {
         sampler: Sampler::new(graph, mechanism, projection, outputs)?,
-        n_columns: effective.len(),
+        n_columns,
         idle: if has_sign(graph, outputs) {
             IDLE_WITH_SIGNS
         } else {
             IDLE
         },
-    };
-    let mut stream = Stream::new(SEED);
-    let pattern = Pattern::find(&regressor, order, &mut stream)?;
-    let roots = root_radicands(graph, outputs, projection);
-    let variables = occurrences(graph, outputs, projection);
-    let factors = pattern.factors(&regressor, &variables, &roots, &mut stream)?;
-    let names = |k: usize| candidates[effective[k]].clone();
-    let reduction = pattern.reduction(mechanism, candidates, &names, factors)?;
-    reduction.confirm(&regressor, &pattern.shown, &mut stream)?;
-    Ok(reduction)
+    })
 }
 
 /// In which ways the constants occur in the columns and in the loops.
@@ -321,6 +343,8 @@ struct Pattern {
     dependent: Vec<usize>,
     /// Pairs of a dependent and a retained column with a factor that does not vanish.
     wanted: Vec<(usize, usize)>,
+    /// The same dependences, also between columns that are closer together.
+    relations: Vec<Relation>,
 }
 
 impl Pattern {
@@ -345,31 +369,17 @@ impl Pattern {
             .flat_map(|j| pivots.iter().map(move |p| (*j, *p)))
             .filter(|(j, p)| echelon.entry(*p, *j).is_some_and(|x| x != Element::ZERO))
             .collect();
+        let order: Vec<usize> = (order.iter().copied())
+            .filter(|k| shown.contains(k))
+            .collect();
+        let relations = relations::find(&echelon, &order, &dependent);
         Ok(Self {
             shown,
             pivots,
             dependent,
             wanted,
+            relations,
         })
-    }
-
-    /// The wanted factors as rational functions of the constants, found again at any other constants.
-    fn factors(
-        &self,
-        regressor: &SampledRegressor,
-        variables: &[reconstruct::Occurrence],
-        roots: &[i64],
-        stream: &mut Stream,
-    ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
-        if self.wanted.is_empty() {
-            return Ok(Vec::new());
-        }
-        let mut factors = Factors {
-            regressor,
-            pattern: self,
-            sampling: stream.clone(),
-        };
-        reconstruct::reconstruct(&mut factors, variables, roots, stream)
     }
 
     fn reduction(
@@ -424,37 +434,6 @@ impl Pattern {
                 confirmed_at: CONFIRMED_WITH * CONFIRMED_AT,
             },
         })
-    }
-}
-
-/// The wanted factors of a pattern as functions of the constants.
-struct Factors<'a> {
-    regressor: &'a SampledRegressor,
-    pattern: &'a Pattern,
-    sampling: Stream,
-}
-
-impl reconstruct::Oracle for Factors<'_> {
-    fn constants<const P: u64>(
-        &self,
-        stream: &mut Stream,
-    ) -> Result<FieldPoint<Element<P>>, DeriveError> {
-        self.regressor.sampler.constants(stream)
-    }
-
-    fn values<const P: u64>(
-        &mut self,
-        constants: &FieldPoint<Element<P>>,
-    ) -> Result<Vec<Element<P>>, DeriveError> {
-        let Pattern { pivots, wanted, .. } = self.pattern;
-        let rank = Some(pivots.len());
-        let echelon = self
-            .regressor
-            .echelon(constants, pivots, rank, &mut self.sampling)?;
-        wanted
-            .iter()
-            .map(|(j, p)| echelon.entry(*p, *j).ok_or(DeriveError::RankChanged))
-            .collect()
     }
 }
 

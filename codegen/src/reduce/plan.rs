@@ -67,7 +67,7 @@ pub(crate) fn plan(
                     }),
                 })
                 .collect();
-            choices(closure, &free, projection, unknowns)
+            choices(graph, mechanism, closure, &free, projection, unknowns)
                 .into_iter()
                 .find_map(|unknown| solve(graph, mechanism, closure, unknown))
                 .map(|found| (position, found))
@@ -93,8 +93,13 @@ pub(crate) fn plan(
     Some(Plan { steps })
 }
 
-/// Sets of coordinates for which a loop may be solved; passive ones first.
+/// Of more sets than this of a loop's coordinates not all are tried: each attempt derives expressions.
+const MOST_SETS: usize = 1000;
+
+/// Sets of coordinates for which a loop may be solved; passive ones first. Of very many only those that look solvable.
 fn choices(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
     closure: &Closure,
     free: &[usize],
     projection: &Projection,
@@ -119,6 +124,16 @@ fn choices(
         } else {
             Vec::new()
         };
+    }
+    if closure.chain.is_none() && n_subsets(free.len(), size) > MOST_SETS {
+        return solvable::promising(
+            graph,
+            mechanism,
+            &closure.equations,
+            &closure.residual,
+            free,
+            size,
+        );
     }
     let mut sets = subsets(free, size);
     sets.sort_by_key(|set| {
@@ -182,6 +197,13 @@ fn single_steps(steps: Vec<(usize, Solved)>) -> Vec<PlanStep> {
         solved,
     };
     steps.into_iter().map(step).collect()
+}
+
+/// How many subsets of some size there are, or a number beyond all use.
+fn n_subsets(of: usize, size: usize) -> usize {
+    (0..size).fold(1_usize, |n, i| {
+        n.saturating_mul(of.saturating_sub(i)) / (i + 1)
+    })
 }
 
 /// All subsets of some size, in order.

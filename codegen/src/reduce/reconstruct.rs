@@ -27,6 +27,33 @@ pub(crate) trait Oracle {
         &mut self,
         constants: &FieldPoint<Element<P>>,
     ) -> Result<Vec<Element<P>>, DeriveError>;
+    /// Says that so many operations will be done beside evaluation; an error where they are too many.
+    fn spend(&mut self, operations: usize) -> Result<(), DeriveError>;
+}
+
+/// How many operations of the field may still be done. Time would differ from machine to machine, and with it the result.
+#[derive(Clone, Debug)]
+pub(super) struct Budget {
+    all: u64,
+    left: u64,
+}
+
+impl Budget {
+    pub(super) fn new(operations: u64) -> Self {
+        Self {
+            all: operations,
+            left: operations,
+        }
+    }
+
+    pub(super) fn spend(&mut self, operations: usize) -> Result<(), DeriveError> {
+        let operations = u64::try_from(operations).unwrap_or(u64::MAX);
+        let left = self.left.checked_sub(operations);
+        self.left = left.ok_or(DeriveError::FactorsTooLong {
+            operations: self.all,
+        })?;
+        Ok(())
+    }
 }
 
 /// A way in which a constant occurs, by index and whether inside sines and cosines. A constant that occurs in both ways
@@ -35,41 +62,101 @@ pub(crate) type Occurrence = (usize, bool);
 
 /// Reconstructs every function that `oracle` evaluates.
 ///
-/// A function that resists (of a degree beyond all reason, or not rational) comes back as `None`.
+/// A function that resists (of a degree beyond all reason, or not rational) comes back as `None`, and with it all others:
+/// what they are would not be used.
 pub(crate) fn reconstruct<O: Oracle>(
     oracle: &mut O,
     constants: &[Occurrence],
     roots: &[i64],
     stream: &mut Stream,
 ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
-    let origin = oracle.constants(stream)?;
-    let at_origin = oracle.values(&origin)?;
-    let elsewhere = oracle.constants(stream)?;
-    let elsewhere = oracle.values(&elsewhere)?;
-    let n = at_origin.len();
-    let mut shape: Vec<Shape> = vec![Shape::default(); n];
-    let varying: Vec<usize> = (0..n).filter(|k| at_origin[*k] != elsewhere[*k]).collect();
-    if !varying.is_empty() {
-        for &constant in constants {
+    let mut survey = Survey::new(oracle, constants, roots, stream)?;
+    let all: Vec<(usize, bool)> = (0..survey.shapes.len()).map(|k| (k, true)).collect();
+    survey.functions(oracle, &all, stream)
+}
+
+/// Which functions depend on which constants, and what was sampled for that.
+pub(super) struct Survey<O> {
+    roots: Vec<i64>,
+    constants: Vec<Occurrence>,
+    origin: FieldPoint,
+    at_origin: Vec<Element>,
+    moved: Vec<Moved>,
+    shapes: Vec<Shape>,
+    fields: Fields<O>,
+}
+
+impl<O: Oracle> Survey<O> {
+    /// Moves one constant after the other.
+    pub(super) fn new(
+        oracle: &mut O,
+        constants: &[Occurrence],
+        roots: &[i64],
+        stream: &mut Stream,
+    ) -> Result<Self, DeriveError> {
+        let origin = oracle.constants(stream)?;
+        let at_origin = oracle.values(&origin)?;
+        let elsewhere = oracle.constants(stream)?;
+        let elsewhere = oracle.values(&elsewhere)?;
+        let n = at_origin.len();
+        let mut shapes: Vec<Shape> = vec![Shape::default(); n];
+        let varying: Vec<usize> = (0..n).filter(|k| at_origin[*k] != elsewhere[*k]).collect();
+        let moved = if varying.is_empty() {
+            Vec::new()
+        } else {
+            moved(oracle, &origin, &at_origin, constants, &mut shapes, stream)?
+        };
+        Ok(Self {
+            roots: roots.to_vec(),
+            constants: constants.to_vec(),
+            origin,
+            at_origin,
+            moved,
+            shapes,
+            fields: Fields::new(),
+        })
+    }
+
+    /// On how many constants a function depends.
+    pub(super) fn n_constants(&self, function: usize) -> usize {
+        self.shapes[function].degrees.len()
+    }
+
+    /// Some of the functions, each with whether the others are useless without it: where such a one resists, all that come
+    /// after it are `None` too.
+    pub(super) fn functions(
+        &mut self,
+        oracle: &mut O,
+        wanted: &[(usize, bool)],
+        stream: &mut Stream,
+    ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
+        let (origin, shapes) = (&self.origin, &mut self.shapes);
+        let indices: Vec<usize> = wanted.iter().map(|(k, _)| *k).collect();
+        for group in apart(&self.moved, &indices, shapes) {
             probe(
-                oracle, &origin, &at_origin, constant, &varying, &mut shape, stream,
+                oracle,
+                origin,
+                &self.at_origin,
+                &group,
+                &indices,
+                shapes,
+                stream,
             )?;
         }
-        total_degrees(oracle, &origin, constants, &varying, &mut shape, stream)?;
-    }
-    let mut fields = Fields::new();
-    let mut found = Vec::with_capacity(n);
-    for shape in &shape {
-        let function = shape.fit(&mut fields, oracle, &origin, found.len(), roots, stream)?;
-        let resists = function.is_none();
-        found.push(function);
-        if resists {
-            // One that resists is enough: what the others are would not be used.
-            found.resize(n, None);
-            break;
+        total_degrees(oracle, origin, &self.constants, &indices, shapes, stream)?;
+        let mut found = Vec::with_capacity(wanted.len());
+        for (k, is_needed) in wanted {
+            let function =
+                shapes[*k].fit(&mut self.fields, oracle, origin, *k, &self.roots, stream)?;
+            let resists = function.is_none();
+            found.push(function);
+            if resists && *is_needed {
+                found.resize(wanted.len(), None);
+                break;
+            }
         }
+        Ok(found)
     }
-    Ok(found)
 }
 
 /// What is known about one function before its coefficients are.
@@ -83,45 +170,121 @@ struct Shape {
     lost: bool,
 }
 
-/// Degrees in one constant, with all others at the origin.
+/// One constant moved away from the origin.
+struct Moved {
+    constant: Occurrence,
+    /// Where it stands then, and the values of all functions.
+    at: Element,
+    values: Vec<Element>,
+}
+
+/// Moves one constant after the other; every function gets the constants on which it depends, of degrees not yet known.
+fn moved<O: Oracle>(
+    oracle: &mut O,
+    origin: &FieldPoint,
+    at_origin: &[Element],
+    constants: &[Occurrence],
+    shapes: &mut [Shape],
+    stream: &mut Stream,
+) -> Result<Vec<Moved>, DeriveError> {
+    let mut all = Vec::with_capacity(constants.len());
+    for &constant in constants {
+        let mut point = origin.clone();
+        let at = stream.element();
+        set(&mut point, constant, at);
+        let values = oracle.values(&point)?;
+        let mut is_felt = false;
+        for (k, shape) in shapes.iter_mut().enumerate() {
+            if values[k] != at_origin[k] {
+                shape.degrees.insert(constant, (0, 0));
+                is_felt = true;
+            }
+        }
+        if is_felt {
+            all.push(Moved {
+                constant,
+                at,
+                values,
+            });
+        }
+    }
+    Ok(all)
+}
+
+/// Constants in groups such that none of some functions depends on two of one group: they may be varied at once. Those of
+/// different joints of an arm mostly are such.
+fn apart<'a>(moved: &'a [Moved], functions: &[usize], shapes: &[Shape]) -> Vec<Vec<&'a Moved>> {
+    let mut groups: Vec<Vec<&Moved>> = Vec::new();
+    for one in moved {
+        let felt = |k: &usize| shapes[*k].degrees.contains_key(&one.constant);
+        let own: Vec<usize> = functions.iter().copied().filter(felt).collect();
+        if own.is_empty() {
+            continue;
+        }
+        let meet = |other: &Moved| {
+            let felt = |k: &usize| shapes[*k].degrees.contains_key(&other.constant);
+            own.iter().any(felt)
+        };
+        let group = groups.iter_mut().find(|g| !g.iter().any(|m| meet(m)));
+        match group {
+            Some(group) => group.push(one),
+            None => groups.push(vec![one]),
+        }
+    }
+    groups
+}
+
+/// Degrees in each constant of a group, with all others at the origin.
 fn probe<O: Oracle>(
     oracle: &mut O,
     origin: &FieldPoint,
     at_origin: &[Element],
-    constant: Occurrence,
-    varying: &[usize],
-    shape: &mut [Shape],
+    group: &[&Moved],
+    functions: &[usize],
+    shapes: &mut [Shape],
     stream: &mut Stream,
 ) -> Result<(), DeriveError> {
-    let mut x = Vec::new();
-    let mut y: Vec<Vec<Element>> = Vec::new();
-    let mut open: Vec<usize> = varying.to_vec();
-    while !open.is_empty() && x.len() < MOST_POINTS {
+    // Every function with the position in the group of the one constant on which it depends.
+    let mut open: Vec<(usize, usize)> = Vec::new();
+    for (i, one) in group.iter().enumerate() {
+        let felt = functions.iter().copied();
+        let felt = felt.filter(|k| shapes[*k].degrees.contains_key(&one.constant));
+        open.extend(felt.map(|k| (k, i)));
+    }
+    // Places of each constant: different ones, since lengths that are equal may be special.
+    let mut places: Vec<Vec<Element>> = group.iter().map(|one| vec![one.at]).collect();
+    let mut sampled: Vec<Vec<Element>> = Vec::new();
+    while !open.is_empty() && sampled.len() + 2 < MOST_POINTS {
         let mut point = origin.clone();
-        let t = stream.element();
-        set(&mut point, constant, t);
-        x.push(t);
-        y.push(oracle.values(&point)?);
-        if x.len() == 1 {
-            open.retain(|k| y[0][*k] != at_origin[*k]);
+        for (one, places) in group.iter().zip(&mut places) {
+            let t = stream.element();
+            set(&mut point, one.constant, t);
+            places.push(t);
+        }
+        sampled.push(oracle.values(&point)?);
+        if sampled.len() < 2 || sampled.len() % 2 == 1 {
             continue;
         }
-        if x.len() < 4 || x.len() % 2 == 1 {
-            continue;
-        }
-        open.retain(|k| {
-            let values: Vec<Element> = y.iter().map(|row| row[*k]).collect();
-            match univariate::degrees(&x, &values) {
+        open.retain(|(k, i)| {
+            let one = group[*i];
+            let mut x = places[*i].clone();
+            let mut y = vec![one.values[*k]];
+            y.extend(sampled.iter().map(|row| row[*k]));
+            if let Some(start) = place(origin, one.constant) {
+                x.push(start);
+                y.push(at_origin[*k]);
+            }
+            match univariate::degrees(&x, &y) {
                 Some(degrees) => {
-                    shape[*k].degrees.insert(constant, degrees);
+                    shapes[*k].degrees.insert(one.constant, degrees);
                     false
                 }
                 None => true,
             }
         });
     }
-    for k in open {
-        shape[k].lost = true;
+    for (k, _) in open {
+        shapes[k].lost = true;
     }
     Ok(())
 }
@@ -131,8 +294,8 @@ fn total_degrees<O: Oracle>(
     oracle: &mut O,
     origin: &FieldPoint,
     constants: &[Occurrence],
-    varying: &[usize],
-    shape: &mut [Shape],
+    functions: &[usize],
+    shapes: &mut [Shape],
     stream: &mut Stream,
 ) -> Result<(), DeriveError> {
     let lengths: Vec<usize> = constants
@@ -143,11 +306,11 @@ fn total_degrees<O: Oracle>(
     let direction: Vec<Element> = lengths.iter().map(|_| stream.element()).collect();
     let mut x = Vec::new();
     let mut y: Vec<Vec<Element>> = Vec::new();
-    let mut open: Vec<usize> = varying
+    let mut open: Vec<usize> = functions
         .iter()
         .copied()
         .filter(|k| {
-            shape[*k]
+            shapes[*k]
                 .degrees
                 .keys()
                 .filter(|(_, in_angle)| !in_angle)
@@ -169,8 +332,8 @@ fn total_degrees<O: Oracle>(
         }
         open.retain(|k| {
             let values: Vec<Element> = y.iter().map(|row| row[*k]).collect();
-            shape[*k].total = univariate::degrees(&x, &values);
-            shape[*k].total.is_none()
+            shapes[*k].total = univariate::degrees(&x, &values);
+            shapes[*k].total.is_none()
         });
     }
     Ok(())
@@ -186,6 +349,16 @@ fn set(point: &mut FieldPoint, (index, in_angle): Occurrence, t: Element) {
             .angles
             .insert(atom, ((Element::ONE - t * t) * scale, (t + t) * scale));
     }
+}
+
+/// Where a constant stands; half the tangent if inside sines and cosines.
+fn place(point: &FieldPoint, (index, in_angle): Occurrence) -> Option<Element> {
+    let atom = Atom::Constant(index);
+    if !in_angle {
+        return point.values.get(&atom).copied();
+    }
+    let (cosine, sine) = point.angles.get(&atom)?;
+    Some(*sine * (Element::ONE + *cosine).inverse()?)
 }
 
 /// Random points of one field with the values of all functions, shared between the fits.
@@ -243,7 +416,9 @@ impl<O: Oracle, const P: u64> Solve<O> for Samples<P> {
             })
             .collect();
         let Some(rows) = rows else { return Ok(None) };
-        let solutions = eliminate::null_space(rows, n_top + ansatz.denominator.len());
+        let n_unknowns = n_top + ansatz.denominator.len();
+        oracle.spend(rows.len() * n_unknowns * n_unknowns)?;
+        let solutions = eliminate::null_space(rows, n_unknowns);
         Ok(Some(
             solutions
                 .into_iter()

@@ -28,6 +28,7 @@ pub(super) fn support<O: Oracle>(
     let mut kept: [BTreeSet<Powers>; 2] = [0, 1].map(|_| BTreeSet::from([Powers::new()]));
     for n in 1..=variables.len() {
         let loose = &variables[..n];
+        oracle.spend((numerator.len() + denominator.len()) * 100)?;
         let [top, bottom] = [(numerator, &kept[0]), (denominator, &kept[1])].map(|(all, kept)| {
             let candidates: BTreeSet<Powers> = all
                 .iter()
@@ -50,6 +51,7 @@ pub(super) fn support<O: Oracle>(
             let Some(row) = row else { return Ok(None) };
             rows.push(row);
         }
+        oracle.spend(rows.len() * unknowns * unknowns)?;
         let solutions = eliminate::null_space(rows, unknowns);
         let [solution] = solutions.as_slice() else {
             return Ok(None);
