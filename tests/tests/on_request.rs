@@ -108,52 +108,28 @@ fn parameters_that_are_no_numbers_are_named() {
     assert_eq!(error, modelmill_runtime::PoseError::NotFinite("ma"));
 }
 
+/// What modules say of their base parameters, for the geometry of their files.
+macro_rules! self_tests {
+    ($($model:ident),+) => {
+        [$((stringify!($model), asked_models::$model::self_test(&asked_models::$model::Geometry::default()))),+]
+    };
+}
+
 #[test]
 fn base_parameters_pass_their_own_tests() {
-    let tests = [
-        (
-            "five_bar",
-            asked_models::five_bar::self_test(&Default::default()),
-        ),
-        ("panda", asked_models::panda::self_test(&Default::default())),
-        (
-            "delta_tied",
-            asked_models::delta_tied::self_test(&Default::default()),
-        ),
-        (
-            "spatial_press",
-            asked_models::spatial_press::self_test(&Default::default()),
-        ),
-        (
-            "swinging_cylinder",
-            asked_models::swinging_cylinder::self_test(&Default::default()),
-        ),
-        (
-            "tree_0",
-            asked_models::tree_0::self_test(&Default::default()),
-        ),
-        (
-            "tree_1",
-            asked_models::tree_1::self_test(&Default::default()),
-        ),
-        (
-            "tree_2",
-            asked_models::tree_2::self_test(&Default::default()),
-        ),
-        (
-            "loop_0",
-            asked_models::loop_0::self_test(&Default::default()),
-        ),
-        (
-            "loop_1",
-            asked_models::loop_1::self_test(&Default::default()),
-        ),
-        (
-            "loop_2",
-            asked_models::loop_2::self_test(&Default::default()),
-        ),
-    ];
-    for (name, result) in tests {
+    for (name, result) in self_tests!(
+        five_bar,
+        panda,
+        delta_tied,
+        spatial_press,
+        swinging_cylinder,
+        tree_0,
+        tree_1,
+        tree_2,
+        loop_0,
+        loop_1,
+        loop_2
+    ) {
         assert_eq!(result, Ok(()), "{name}");
     }
 }
@@ -191,7 +167,8 @@ fn base_parameters_pass_their_own_tests_for_other_geometry() {
 
 #[test]
 fn a_term_that_is_missing_is_seen() {
-    let error = asked_models::five_bar_without_a_term::self_test(&Default::default())
+    let error = self_tests!(five_bar_without_a_term)[0]
+        .1
         .expect_err("a term is missing");
     println!("{error}");
     assert!(matches!(error, SelfTestError::Forces { .. }), "{error}");
@@ -200,7 +177,7 @@ fn a_term_that_is_missing_is_seen() {
 #[test]
 fn a_column_that_stands_twice_is_seen() {
     use asked_models::panda_with_a_column_twice as module;
-    let error = module::self_test(&Default::default()).expect_err("a column is missing");
+    let error = module::self_test(&module::Geometry::default()).expect_err("a column is missing");
     println!("{error}");
     let expected = SelfTestError::Rank {
         of: "H_min",
