@@ -3,6 +3,7 @@
 //! The module depends on `modelmill-runtime` alone. It is `no_std`, allocates nothing, contains no unsafe code, and works
 //! for `f32` and `f64`.
 
+mod angles;
 mod blocks;
 mod body;
 mod c;

@@ -7,6 +7,7 @@
 mod branches;
 mod eliminate;
 mod factors;
+mod fit;
 mod lift;
 mod numeric;
 mod plan;
