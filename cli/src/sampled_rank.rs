@@ -197,6 +197,7 @@ fn one_by_one(
                 sampling.leave_out(full.len());
                 sampling.draw(evaluator, wanted)?;
             }
+            Err(fault) if !is_of_the_pose(&fault) => return Err(fault.to_string()),
             Err(_) => {
                 return Err(format!(
                     "the model is singular or undefined at {} of {} random states around the nominal pose",

@@ -332,10 +332,11 @@ impl Closing {
             .iter()
             .copied()
             .zip(&self.regular)
-            .map(|(closed, (_, size))| {
-                // A rational factor need not be multiplied just to be compared with.
+            .filter_map(|(closed, (_, size))| {
+                // A number that is not zero never is, and a rational factor need not be multiplied just to be compared.
                 let (base, factor) = graph.split_factor(closed);
-                (base, graph.scale(*size, &factor.abs().recip()))
+                let varies = base != Graph::ONE || factor.is_zero();
+                varies.then(|| (base, graph.scale(*size, &factor.abs().recip())))
             })
             .collect();
         lower_by(

@@ -113,7 +113,9 @@ impl Size {
             self.scaled(graph, nominal)
         });
         let at_any_pose = graph.substitute(&[found], &out)[0];
-        if graph.atoms(&[at_any_pose]).into_iter().all(is_fixed) {
+        let is_known = graph.atoms(&[at_any_pose]).into_iter().all(is_fixed);
+        let is_there = nominal_value(graph, mechanism, at_any_pose).is_some_and(f64::is_normal);
+        if is_known && is_there {
             return at_any_pose;
         }
         let nominal = at_nominal(graph, mechanism, &[id]);
@@ -134,7 +136,9 @@ impl Size {
             let atom = |atom: Atom| {
                 let moves = matches!(atom, Atom::Coordinate(i)
                     if mechanism.coordinates[i].motion != Motion::Revolute);
-                let length = moves || of_loops.contains(&atom);
+                let is_metre =
+                    matches!(atom, Atom::Constant(i) if mechanism.constants[i].unit == "m");
+                let length = moves || is_metre && of_loops.contains(&atom);
                 nominal_of(mechanism, atom) * if length { unit } else { 1.0 }
             };
             let values = Tape::new(graph, &[id]).evaluate(&F64(atom))?;

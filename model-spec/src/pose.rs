@@ -289,10 +289,10 @@ fn check_tied(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
             n_equations = rank(&tied_rows(&closed), SINGULAR);
         }
     }
-    if n_equations <= n_passive {
+    let n_coordinates = mechanism.coordinates.len();
+    if n_equations <= n_passive && n_passive < n_coordinates {
         return true;
     }
-    let n_coordinates = mechanism.coordinates.len();
     if n_equations >= n_coordinates {
         log.push(
             Diagnostic::error(
@@ -308,7 +308,7 @@ fn check_tied(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
                 plural(n_equations, "independent loop equation")
             ))
             .help(
-                "a loop in a plane ties 2 coordinates, one in space 3: look for a loop or a link too many, or for a joint that \
+                "each `[[loop]]` joins two points, which ties up to 2 coordinates in a plane and 3 in space: look for a loop or a link too many, or for a joint that \
                  is missing (a `[[frame]]` with a coordinate of its own)",
             )
             .help(

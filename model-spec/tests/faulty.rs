@@ -126,6 +126,55 @@ fn what_cannot_move_is_told_where_to_look() {
     assert!(says.contains("every coordinate is `passive`"), "{says}");
 }
 
+/// A triangle of links, neither of which is driven.
+#[test]
+fn what_cannot_move_is_no_model_without_drives_either() {
+    let says = failure(TRIANGLE).render(false);
+    assert!(
+        says.contains("this mechanism cannot move: its loops tie all 2 coordinates"),
+        "{says}"
+    );
+}
+
+const TRIANGLE: &str = r#"
+schema = 1
+name = "zero_mob"
+[constants]
+a = { value = 1.0, unit = "m" }
+b = { value = 0.8, unit = "m" }
+c = { value = 0.7, unit = "m" }
+[coordinates]
+q1 = { nominal = 0.7, passive = true }
+q2 = { nominal = -1.4, passive = true }
+[[frame]]
+name = "f1"
+on = "base"
+modified_dh = { theta = "q1" }
+[[frame]]
+name = "f2"
+on = "f1"
+modified_dh = { a = "b", theta = "q2" }
+[[point]]
+name = "tip"
+on = "f2"
+at = ["c", 0]
+[[point]]
+name = "pin"
+on = "base"
+at = ["a", 0]
+[[part]]
+name = "p1"
+on = "f1"
+linear = { planar = 1 }
+[[part]]
+name = "p2"
+on = "f2"
+linear = { planar = 2 }
+[[loop]]
+name = "l"
+joins = ["tip", "pin"]
+"#;
+
 #[test]
 fn color_marks_the_same_text() {
     let failure = failure("schema = 2");

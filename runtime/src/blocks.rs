@@ -256,7 +256,7 @@ pub fn visit_blocks<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
 where
     P: Program<T, INPUTS, OUTPUTS>,
 {
-    let n = length(program, inputs)?;
+    let n = n_states(program, inputs)?;
     T::run(Lines::<T, P, _, INPUTS, OUTPUTS> {
         program,
         inputs,
@@ -278,7 +278,7 @@ pub fn fill_columns<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
 where
     P: Program<T, INPUTS, OUTPUTS>,
 {
-    let n = length(program, inputs)?;
+    let n = n_states(program, inputs)?;
     same_length("output", outputs.iter().map(|o| o.len()), n)?;
     T::run(Lines::<T, P, _, INPUTS, OUTPUTS> {
         program,
@@ -303,7 +303,7 @@ where
 {
     #[cfg(feature = "rayon")]
     {
-        let n = length(program, inputs)?;
+        let n = n_states(program, inputs)?;
         same_length("output", outputs.iter().map(|o| o.len()), n)?;
         crate::parallel::fill(program, inputs, outputs, n)
     }
@@ -331,8 +331,11 @@ pub fn columns_of<T, const OUTPUTS: usize>(
     }))
 }
 
-/// The common length of all inputs.
-fn length<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
+/// The common length of all inputs: how many states there are.
+///
+/// # Errors
+/// Slices of different lengths: the first that is shorter than another.
+pub fn n_states<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
     program: &P,
     inputs: &[&[T]; INPUTS],
 ) -> Result<usize, BlockError>

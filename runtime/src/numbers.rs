@@ -27,7 +27,8 @@ pub trait Numbers {
     /// Sine and cosine of an angle in rad.
     fn sin_cos(&self, angle: Self::Value) -> (Self::Value, Self::Value);
     /// Angles in rad whose sines and cosines [`Self::sin_cos_of`] gives later. One number computes all of them here, which
-    /// takes less time than one by one; vectors wait, since they lack the registers to hold the results.
+    /// takes less time than one by one; vectors wait, since they lack the registers to hold the results, and look only
+    /// whether one is too large.
     #[allow(clippy::inline_always, reason = "nothing at all")]
     #[inline(always)]
     fn angles<const N: usize>(

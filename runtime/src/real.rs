@@ -21,7 +21,7 @@ pub trait Real:
     /// Distance from 1 to the next larger number.
     fn epsilon() -> Self;
     /// What inputs must stay below, whatever their unit: then their powers are finite up to the fifth, or for `f32` up to
-    /// the third.
+    /// the third. Products of more of them may still overflow.
     #[inline]
     #[must_use]
     fn largest() -> Self {

@@ -131,6 +131,7 @@ macro_rules! wide {
             #[inline(always)]
             fn angles<const N: usize>(&self, angles: [$value<S>; N]) -> ([$value<S>; N], [$value<S>; N]) {
                 let (simd, largest) = (self.simd, <$float as Real>::from_f64(LARGEST_ANGLE));
+                // What is no number may be lost in the larger of two; inputs are looked at before.
                 let mut size = simd.$splat(0.0);
                 for angle in angles {
                     size = simd.$max(size, simd.$abs(angle.v));

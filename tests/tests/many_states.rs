@@ -209,3 +209,27 @@ fn narrower_vectors_agree_too() {
         );
     }
 }
+
+#[test]
+fn the_array_that_is_too_short_is_named() {
+    let model = panda::Model::<f64>::default();
+    let (long, short) = ([0.1; 9], [0.1; 8]);
+    for odd in 0..3 {
+        let mut states = panda::States {
+            q: [&long[..]; 7],
+            qd: [&long[..]; 7],
+            qdd: [&long[..]; 7],
+        };
+        states.q[odd] = &short;
+        let mut columns = vec![0.0; 9 * 7 * panda::N_BASE];
+        let expected = BlockError::Length {
+            array: ["q1", "q2", "q3"][odd],
+            found: 8,
+            expected: 9,
+        };
+        assert_eq!(
+            model.regressor_of_many(&states, &mut columns),
+            Err(expected)
+        );
+    }
+}

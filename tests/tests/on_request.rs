@@ -137,7 +137,7 @@ fn base_parameters_pass_their_own_tests() {
 /// A machine that is built a hundred times smaller, with the code of the large one.
 #[test]
 fn base_parameters_pass_their_own_tests_for_other_geometry() {
-    use asked_models::{delta_tied, five_bar};
+    use asked_models::{delta_tied, five_bar, swinging_cylinder};
     let large = delta_tied::Geometry::<f64>::default();
     let small = delta_tied::Geometry {
         R: 0.01 * large.R,
@@ -147,6 +147,20 @@ fn base_parameters_pass_their_own_tests_for_other_geometry() {
         g: large.g,
     };
     assert_eq!(delta_tied::self_test(&small), Ok(()));
+    // One whose coordinate is a length.
+    let large = swinging_cylinder::Geometry::<f64>::default();
+    for unit in [1e-9, 1e9] {
+        let other = swinging_cylinder::Geometry {
+            h: unit * large.h,
+            ax: unit * large.ax,
+            az: unit * large.az,
+            bx: unit * large.bx,
+            by: unit * large.by,
+            g: unit * large.g,
+            ..large
+        };
+        assert_eq!(swinging_cylinder::self_test(&other), Ok(()), "{unit}");
+    }
     let large = five_bar::Geometry::<f64>::default();
     let uneven = five_bar::Geometry {
         L1: 1.03 * large.L1,

@@ -67,7 +67,7 @@ pub(super) fn items(function: &Function<'_>) -> TokenStream {
         (
             " One column of all states after the other: first those of the first drive, one per base parameter.",
             quote! { outputs: &mut [T] },
-            quote! { &mut columns_of(outputs, states.q.first().map_or(0, |q| q.len()))? },
+            quote! { &mut columns_of(outputs, n_states(&#adapter(self), &#inputs)?)? },
         )
     } else {
         (

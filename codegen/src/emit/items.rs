@@ -8,6 +8,7 @@ use super::body::Body;
 use super::functions::{inverse_dynamics, model};
 use super::identifier::of_field;
 use crate::Derivation;
+use crate::closure::coordinates_of;
 use crate::expr::Atom;
 use crate::lower::{Op, OperationCount, Program, Stage};
 use crate::programs::PassivePosition;
@@ -99,7 +100,7 @@ pub(super) fn items(derivation: &Derivation) -> TokenStream {
     .then(|| quote! { use ::modelmill_runtime::{Scales, correct, follow, settle}; });
     quote! {
         use ::modelmill_runtime::blocks::{
-            Block, BlockError, Blocks, Program, columns_of, fill_columns, fill_columns_in_parallel, visit_blocks,
+            Block, BlockError, Blocks, Program, columns_of, fill_columns, fill_columns_in_parallel, n_states, visit_blocks,
         };
         use ::modelmill_runtime::{
             BaseParameter, Numbers, One, Outputs, PoseError, Quantity, Real, check_finite,
@@ -349,16 +350,19 @@ pub(super) fn scale(derivation: &Derivation) -> Option<TokenStream> {
     Some(quote! { { #statements #scale } })
 }
 
-/// Nominal values of coordinates, lengths as many times longer as `scale` says.
+/// Nominal values of coordinates, lengths in loops as many times longer as `scale` says.
 pub(super) fn nominal<'a>(
     derivation: &'a Derivation,
     coordinates: &'a [usize],
     scale: Option<&'a TokenStream>,
 ) -> impl Iterator<Item = TokenStream> + use<'a> {
+    let residual = &derivation.equations.projection.residual;
+    let in_loops = coordinates_of(&derivation.graph, residual);
     coordinates.iter().map(move |i| {
         let coordinate = &derivation.mechanism.coordinates[*i];
         let value = signed(coordinate.nominal);
-        let scale = scale.filter(|_| coordinate.motion != Motion::Revolute);
+        let is_length = coordinate.motion != Motion::Revolute && in_loops.contains(i);
+        let scale = scale.filter(|_| is_length);
         let scaled = scale.map(|scale| quote! { #scale * });
         quote! { #scaled T::from_f64(#value) }
     })

@@ -12,6 +12,7 @@ use crate::Derivation;
 use crate::self_test::reaches;
 
 /// The function `self_test`, and the regressor of all products that it needs.
+#[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 pub(super) fn self_test(derivation: &Derivation) -> TokenStream {
     let mechanism = &derivation.mechanism;
     let products = &derivation.reduction.products;
@@ -62,6 +63,13 @@ pub(super) fn self_test(derivation: &Derivation) -> TokenStream {
         );
         quote! { #scaled #reach }
     });
+    // Slides of a small machine are slow, so that no column is lost beside others.
+    let units = active.iter().map(|i| {
+        let scale = scaled
+            .as_ref()
+            .filter(|_| mechanism.coordinates[*i].motion != Motion::Revolute);
+        scale.cloned().unwrap_or_else(|| quote! { 1.0 })
+    });
     let scale = scale.map(|scale| quote! { let scale = #scale; });
     let load = uses_load(derivation)
         .then(|| quote! { load: ::core::array::from_fn(|_| random.between(-50.0, 50.0)), });
@@ -83,6 +91,7 @@ pub(super) fn self_test(derivation: &Derivation) -> TokenStream {
             #scale
             let nominal: [f64; N_ACTIVE] = [#(#nominal),*];
             let reaches: [f64; N_ACTIVE] = [#(#reach),*];
+            let units: [f64; N_ACTIVE] = [#(#units),*];
             let (model, all) = (Model::new(geometry), AllColumns::new(geometry));
             let mut draw = ::modelmill_runtime::Random::new(2);
             #[allow(unused_mut)]
@@ -94,8 +103,8 @@ pub(super) fn self_test(derivation: &Derivation) -> TokenStream {
             ::modelmill_runtime::self_test::<N_PRODUCTS, N_BASE>(&products, &base, |random, reach, show| {
                 let state = State {
                     q: ::core::array::from_fn(|k| nominal[k] + reach * reaches[k] * random.between(-1.0, 1.0)),
-                    qd: ::core::array::from_fn(|_| random.between(-2.0, 2.0)),
-                    qdd: ::core::array::from_fn(|_| random.between(-8.0, 8.0)),
+                    qd: ::core::array::from_fn(|k| units[k] * random.between(-2.0, 2.0)),
+                    qdd: ::core::array::from_fn(|k| units[k] * random.between(-8.0, 8.0)),
                     #load
                 };
                 let (h, h_min, forces) =

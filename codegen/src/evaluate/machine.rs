@@ -211,7 +211,9 @@ impl<'a> Machine<'a> {
             let k = values[..len].iter().position(|v| !guard.passes(*v, size))?;
             Some((k, *guard))
         });
-        failing.min_by_key(|(k, guard)| (*k, guard.value()))
+        // Fixed values come before those of a state there.
+        let stage = |guard: &Guard| self.program.stages[guard.value().index()];
+        failing.min_by_key(|(k, guard)| (*k, stage(guard), guard.value()))
     }
 
     fn values<'m>(&self, value: ValueId, memory: &'m [[f64; BLOCK]]) -> &'m [f64; BLOCK] {

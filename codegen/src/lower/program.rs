@@ -213,25 +213,30 @@ impl Program {
 
     /// The same program with the operations that `order` names, in that order; operands stand before what needs them.
     pub(crate) fn in_order(&self, order: &[usize]) -> Self {
-        let mut new = vec![ValueId(0); self.ops.len()];
+        let mut places: Vec<Option<ValueId>> = vec![None; self.ops.len()];
         let mut ordered = Self::default();
         for i in order {
+            let op = self.ops[*i].clone().map_operands(|operand| {
+                places[operand.index()].expect("operands stand before what needs them")
+            });
             let place = ordered.ops.len();
-            new[*i] = ValueId(u32::try_from(place).expect("program below 4G operations"));
-            let op = self.ops[*i].clone();
-            ordered
-                .ops
-                .push(op.map_operands(|operand| new[operand.index()]));
+            places[*i] = Some(ValueId(
+                u32::try_from(place).expect("program below 4G operations"),
+            ));
+            ordered.ops.push(op);
             ordered.stages.push(self.stages[*i]);
         }
-        ordered.outputs = self.outputs.iter().map(|v| new[v.index()]).collect();
+        let new = |value: &ValueId| {
+            places[value.index()].expect("outputs and guarded values are in the order")
+        };
+        ordered.outputs = self.outputs.iter().map(new).collect();
         ordered.guards = self
             .guards
             .iter()
             .map(|guard| match guard {
-                Guard::Reachable(v) => Guard::Reachable(new[v.index()]),
-                Guard::Regular(v, size) => Guard::Regular(new[v.index()], new[size.index()]),
-                Guard::Finite(v) => Guard::Finite(new[v.index()]),
+                Guard::Reachable(v) => Guard::Reachable(new(v)),
+                Guard::Regular(v, size) => Guard::Regular(new(v), new(size)),
+                Guard::Finite(v) => Guard::Finite(new(v)),
             })
             .collect();
         ordered

@@ -31,9 +31,16 @@ pub(super) fn of(
         .filter(|relation| relation.is_direct())
         .cloned()
         .collect();
+    let mut budget = Budget::new(operations);
     let mut by = |relations: &[Relation]| {
         by_relations(
-            relations, pattern, regressor, variables, roots, operations, stream,
+            relations,
+            pattern,
+            regressor,
+            variables,
+            roots,
+            &mut budget,
+            stream,
         )
     };
     match by(&pattern.relations) {
@@ -50,7 +57,7 @@ fn by_relations(
     regressor: &SampledRegressor,
     variables: &[Occurrence],
     roots: &[i64],
-    operations: u64,
+    budget: &mut Budget,
     stream: &mut Stream,
 ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
     let mut oracle = FromMotion {
@@ -58,7 +65,7 @@ fn by_relations(
         pivots: &pattern.pivots,
         relations: all,
         sampling: stream.clone(),
-        budget: Budget::new(operations),
+        budget,
     };
     let mut survey = Survey::new(&mut oracle, variables, roots, stream)?;
     let starts: Vec<usize> = (all.iter())
@@ -104,7 +111,7 @@ fn by_relations(
     let direct: Vec<usize> = (0..all.len())
         .filter(|i| all[*i].is_direct() && unwieldy.contains(&all[*i].column))
         .collect();
-    if !direct.is_empty() {
+    if !direct.is_empty() && !related.is_lost() {
         related.replace(found(&direct, stream)?);
     }
     let mut written = related.written_out(&pattern.wanted, roots);
@@ -116,7 +123,7 @@ fn by_relations(
             related: &related,
             regressor,
             wanted: missing.iter().map(|k| pattern.wanted[*k]).collect(),
-            budget: oracle.budget.clone(),
+            budget: &mut *oracle.budget,
         };
         let found = reconstruct::reconstruct(&mut rest, variables, roots, stream)?;
         for (k, function) in missing.into_iter().zip(found) {
@@ -132,7 +139,7 @@ struct FromMotion<'a> {
     pivots: &'a [usize],
     relations: &'a [Relation],
     sampling: Stream,
-    budget: Budget,
+    budget: &'a mut Budget,
 }
 
 impl Oracle for FromMotion<'_> {
@@ -167,7 +174,7 @@ struct FromRelations<'a> {
     regressor: &'a SampledRegressor,
     /// Which ones.
     wanted: Vec<(usize, usize)>,
-    budget: Budget,
+    budget: &'a mut Budget,
 }
 
 impl Oracle for FromRelations<'_> {

@@ -96,7 +96,8 @@ pub(crate) fn plan(
 /// Of more sets than this of a loop's coordinates not all are tried: each attempt derives expressions.
 const MOST_SETS: usize = 1000;
 
-/// Sets of coordinates for which a loop may be solved; passive ones first. Of very many only those that look solvable.
+/// Sets of coordinates for which a loop may be solved; passive ones first. Of very many only those that look solvable, in
+/// their own order.
 fn choices(
     graph: &mut Graph,
     mechanism: &Mechanism,

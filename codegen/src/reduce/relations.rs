@@ -206,6 +206,12 @@ impl Related {
         unwieldy.map(|(relation, _)| relation.column).collect()
     }
 
+    /// Whether a factor on retained columns resists, so that no others need be looked for.
+    pub(super) fn is_lost(&self) -> bool {
+        let mut direct = self.0.iter().filter(|(relation, _)| relation.is_direct());
+        direct.any(|(_, factors)| factors.iter().any(Option::is_none))
+    }
+
     /// Puts others in the place of relations of the same columns, if they are known.
     pub(super) fn replace(&mut self, others: Self) {
         let known = |(_, factors): &(Relation, Factors)| factors.iter().all(Option::is_some);
@@ -271,7 +277,7 @@ impl Related {
     }
 }
 
-/// Whether no product of some different ones is a square: those that occur are small.
+/// Whether all are prime, so that no product of different ones is a square: those that occur are small.
 fn are_independent(roots: &[i64]) -> bool {
     let is_prime = |n: i64| n > 1 && (2..n).take_while(|d| d * d <= n).all(|d| n % d != 0);
     roots.iter().all(|n| is_prime(*n))
