@@ -119,9 +119,17 @@ impl Size {
             return at_any_pose;
         }
         let nominal = at_nominal(graph, mechanism, &[id]);
-        let (scale, nominal) = (self.scale(graph), number(graph, nominal));
-        match self.degree(graph, mechanism, found) {
+        let nominal = number(graph, nominal);
+        // Its own lengths say how large it is: drives between points have some without a loop.
+        let lengths: Vec<Atom> = graph.atoms(&[found]).into_iter().collect();
+        let is_metre =
+            |atom: &Atom| matches!(atom, Atom::Constant(i) if mechanism.constants[*i].unit == "m");
+        let lengths: Vec<Atom> = lengths.into_iter().filter(is_metre).collect();
+        let degree = degree(graph, mechanism, found, &lengths);
+        let own = Self::sum(graph, mechanism, &lengths).unwrap_or(*self);
+        match degree {
             Some(degree) => {
+                let scale = own.scale(graph);
                 let grown = graph.pow(scale, degree);
                 graph.mul(nominal, grown)
             }
@@ -129,29 +137,41 @@ impl Size {
         }
     }
 
-    /// The power of the unit of length with which an expression grows, if it does so with one.
-    fn degree(&self, graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Option<i32> {
-        let of_loops = graph.atoms(&[self.total]);
-        let value = |unit: f64| {
-            let atom = |atom: Atom| {
-                let moves = matches!(atom, Atom::Coordinate(i)
-                    if mechanism.coordinates[i].motion != Motion::Revolute);
-                let is_metre =
-                    matches!(atom, Atom::Constant(i) if mechanism.constants[i].unit == "m");
-                let length = moves || is_metre && of_loops.contains(&atom);
-                nominal_of(mechanism, atom) * if length { unit } else { 1.0 }
-            };
-            let values = Tape::new(graph, &[id]).evaluate(&F64(atom))?;
-            Some(values[0].abs().log2()).filter(|size| size.is_finite())
-        };
-        let [one, two, four] = [value(1.0)?, value(2.0)?, value(4.0)?];
-        let degree = (two - one).round();
-        let is_power = [two - one, four - two]
+    /// The size that some constants make up, if they do.
+    fn sum(graph: &mut Graph, mechanism: &Mechanism, constants: &[Atom]) -> Option<Self> {
+        let terms: Vec<ExprId> = constants
             .iter()
-            .all(|d| (d - degree).abs() < 1e-6);
-        #[allow(clippy::cast_possible_truncation, reason = "it is small, as just seen")]
-        (is_power && degree.abs() < 100.0).then_some(degree as i32)
+            .map(|constant| {
+                let constant = graph.atom(*constant);
+                graph.unary(Unary::Abs, constant)
+            })
+            .collect();
+        let total = graph.add_all(&terms);
+        let nominal = nominal_value(graph, mechanism, total).filter(|size| size.is_normal())?;
+        Some(Self { total, nominal })
     }
+}
+
+/// The power of the unit of length with which an expression grows, if it does so with one: `lengths` are those of its
+/// constants that are in it, besides the coordinates that slide.
+fn degree(graph: &Graph, mechanism: &Mechanism, id: ExprId, lengths: &[Atom]) -> Option<i32> {
+    let value = |unit: f64| {
+        let atom = |atom: Atom| {
+            let moves = matches!(atom, Atom::Coordinate(i)
+                if mechanism.coordinates[i].motion != Motion::Revolute);
+            let is_length = moves || lengths.contains(&atom);
+            nominal_of(mechanism, atom) * if is_length { unit } else { 1.0 }
+        };
+        let values = Tape::new(graph, &[id]).evaluate(&F64(atom))?;
+        Some(values[0].abs().log2()).filter(|size| size.is_finite())
+    };
+    let [one, two, four] = [value(1.0)?, value(2.0)?, value(4.0)?];
+    let degree = (two - one).round();
+    let is_power = [two - one, four - two]
+        .iter()
+        .all(|d| (d - degree).abs() < 1e-6);
+    #[allow(clippy::cast_possible_truncation, reason = "it is small, as just seen")]
+    (is_power && degree.abs() < 100.0).then_some(degree as i32)
 }
 
 /// What stands for each coordinate that is a length, by its nominal value in m.
