@@ -1,0 +1,380 @@
+//! Files on a disk, and what else a path may lead to.
+//!
+//! - An ordinary file is read up to the cap.
+//! - Standard input and pipes that were handed over by a shell (`/dev/stdin`, `<(zcat run.csv.gz)`) are read up to the
+//!   cap; whoever writes is waited for, since the shell started it together with us.
+//! - A named pipe is waited for as long as [`Disk::patience`] says, at its opening and between its bytes: there may be
+//!   nobody at its other end.
+//! - Devices and sockets are refused, unless one is standard input.
+
+use std::fs::{File, Metadata};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use super::{FileError, FileFault, Files, Kind, Opened, write};
+
+/// The files of this machine.
+#[derive(Debug)]
+pub struct Disk {
+    /// How long a named pipe is waited for.
+    pub patience: Duration,
+    /// What was read, so that it is never overwritten.
+    read: Mutex<Vec<Identity>>,
+}
+
+/// What makes two paths one file, be it through links.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Identity {
+    /// Device and number on it: a hard link is the same file under a path of its own.
+    #[cfg(unix)]
+    Number(u64, u64),
+    /// The path without links.
+    #[cfg(not(unix))]
+    Path(PathBuf),
+}
+
+impl Default for Disk {
+    fn default() -> Self {
+        Self {
+            patience: Duration::from_secs(10),
+            read: Mutex::default(),
+        }
+    }
+}
+
+impl Disk {
+    /// Whether a path leads to a file that was read here, however both are reached.
+    pub fn was_read(&self, path: &Path) -> bool {
+        identity(path).is_some_and(|found| self.known().contains(&found))
+    }
+
+    /// Writes a file as a whole (see [`write()`]); fails when it is one that was read here.
+    pub fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+        if self.was_read(path) {
+            return Err(FileError::new(path, FileFault::Input));
+        }
+        write(path, bytes)
+    }
+
+    /// Writes a file as a whole over one that was read, as an edit in place does.
+    pub fn replace(&self, path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+        let old = identity(path);
+        write(path, bytes)?;
+        // The old file is no more; its number may be given to another one.
+        let mut known = self.known();
+        known.retain(|one| Some(one) != old.as_ref());
+        known.extend(identity(path));
+        Ok(())
+    }
+
+    fn known(&self) -> std::sync::MutexGuard<'_, Vec<Identity>> {
+        self.read.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn remember(&self, path: &Path) {
+        if let Some(found) = identity(path) {
+            let mut known = self.known();
+            if !known.contains(&found) {
+                known.push(found);
+            }
+        }
+    }
+}
+
+impl Files for Disk {
+    fn read(&self, path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
+        match self.open(path, most)? {
+            Opened::File(file) => capped(file, path, most),
+            Opened::Memory(bytes) => Ok(bytes.to_vec()),
+        }
+    }
+
+    fn kind(&self, path: &Path) -> Kind {
+        match path.metadata() {
+            Ok(found) => kind_of(&found, path),
+            Err(_) => Kind::Missing,
+        }
+    }
+
+    fn list(&self, folder: &Path) -> Result<Vec<PathBuf>, FileError> {
+        let fail = |error: io::Error| FileError::system(folder, &error);
+        let entries = std::fs::read_dir(folder).map_err(fail)?;
+        let mut found = entries
+            .map(|entry| entry.map(|entry| entry.path()))
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(fail)?;
+        found.sort();
+        Ok(found)
+    }
+
+    fn open(&self, path: &Path, most: u64) -> Result<Opened, FileError> {
+        let fail = |error: io::Error| FileError::system(path, &error);
+        let found = path.metadata().map_err(fail)?;
+        let opened = match kind_of(&found, path) {
+            Kind::File => Opened::File(File::open(path).map_err(fail)?),
+            Kind::Stream if is_standard_input(path) => {
+                Opened::Memory(capped(io::stdin().lock(), path, most)?.into())
+            }
+            Kind::Stream if is_handed_over(path) => {
+                let file = File::open(path).map_err(fail)?;
+                Opened::Memory(capped(file, path, most)?.into())
+            }
+            Kind::Stream => Opened::Memory(patiently(path, most, self.patience)?.into()),
+            Kind::Folder => return Err(FileError::new(path, FileFault::Folder)),
+            Kind::Device | Kind::Missing => return Err(FileError::new(path, FileFault::Device)),
+        };
+        self.remember(path);
+        Ok(opened)
+    }
+}
+
+/// What a path leads to that is there.
+fn kind_of(found: &Metadata, path: &Path) -> Kind {
+    if found.is_file() {
+        return Kind::File;
+    }
+    if found.is_dir() {
+        return Kind::Folder;
+    }
+    #[cfg(unix)]
+    if std::os::unix::fs::FileTypeExt::is_fifo(&found.file_type()) {
+        return Kind::Stream;
+    }
+    if is_handed_over(path) {
+        Kind::Stream
+    } else {
+        Kind::Device
+    }
+}
+
+/// Whether a path names standard input.
+fn is_standard_input(path: &Path) -> bool {
+    ["/dev/stdin", "/dev/fd/0", "/proc/self/fd/0"]
+        .iter()
+        .any(|name| path == Path::new(name))
+}
+
+/// Whether a path names what a shell has opened for us.
+fn is_handed_over(path: &Path) -> bool {
+    path == Path::new("/dev/stdin")
+        || path.starts_with("/dev/fd")
+        || path.starts_with("/proc/self/fd")
+}
+
+/// All bytes of a stream, unless there are more than `most`.
+fn capped(stream: impl Read, path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
+    let mut bytes = Vec::new();
+    stream
+        .take(most.saturating_add(1))
+        .read_to_end(&mut bytes)
+        .map_err(|error| FileError::system(path, &error))?;
+    if bytes.len() as u64 > most {
+        return Err(FileError::new(path, FileFault::TooLarge { most }));
+    }
+    Ok(bytes)
+}
+
+/// All bytes of a named pipe. A thread waits for them; if none come, it is left waiting.
+fn patiently(path: &Path, most: u64, patience: Duration) -> Result<Vec<u8>, FileError> {
+    let (sender, receiver) = sync_channel(4);
+    let pipe = path.to_owned();
+    std::thread::Builder::new()
+        .name("reads a named pipe".to_owned())
+        .spawn(move || hand_on(&pipe, &sender))
+        .map_err(|error| FileError::system(path, &error))?;
+    let mut bytes = Vec::new();
+    loop {
+        match receiver.recv_timeout(patience) {
+            Ok(Ok(more)) => bytes.extend_from_slice(&more),
+            Ok(Err(error)) => return Err(FileError::system(path, &error)),
+            Err(RecvTimeoutError::Disconnected) => return Ok(bytes),
+            Err(RecvTimeoutError::Timeout) => {
+                let seconds = patience.as_secs();
+                return Err(FileError::new(path, FileFault::Silent { seconds }));
+            }
+        }
+        if bytes.len() as u64 > most {
+            return Err(FileError::new(path, FileFault::TooLarge { most }));
+        }
+    }
+}
+
+/// Sends what comes through a pipe until it ends or nobody takes it any more.
+fn hand_on(pipe: &Path, to: &SyncSender<io::Result<Vec<u8>>>) {
+    let mut stream = match File::open(pipe) {
+        Ok(stream) => stream,
+        Err(error) => return drop(to.send(Err(error))),
+    };
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        let sent = match stream.read(&mut buffer) {
+            Ok(0) => return,
+            Ok(n) => to.send(Ok(buffer[..n].to_vec())),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => Ok(()),
+            Err(error) => return drop(to.send(Err(error))),
+        };
+        if sent.is_err() {
+            return;
+        }
+    }
+}
+
+#[cfg(unix)]
+fn identity(path: &Path) -> Option<Identity> {
+    use std::os::unix::fs::MetadataExt;
+    let found = path.metadata().ok()?;
+    // Terminals and the like may be read and written at once.
+    found
+        .is_file()
+        .then(|| Identity::Number(found.dev(), found.ino()))
+}
+
+#[cfg(not(unix))]
+fn identity(path: &Path) -> Option<Identity> {
+    path.canonicalize().ok().map(Identity::Path)
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::process::Command;
+
+    use super::*;
+
+    /// A folder of its own for a test, gone with it.
+    struct Folder(PathBuf);
+
+    impl Folder {
+        fn new(name: &str) -> Self {
+            let own = format!("modelmill-disk-{name}-{}", std::process::id());
+            let path = std::env::temp_dir().join(own);
+            std::fs::create_dir_all(&path).unwrap();
+            Self(path)
+        }
+
+        fn pipe(&self) -> PathBuf {
+            let path = self.0.join("pipe");
+            assert!(
+                Command::new("mkfifo")
+                    .arg(&path)
+                    .status()
+                    .unwrap()
+                    .success()
+            );
+            path
+        }
+
+        fn names(&self) -> Vec<String> {
+            let listed = Disk::default().list(&self.0).unwrap();
+            let name = |path: &PathBuf| path.file_name().unwrap().to_string_lossy().into_owned();
+            listed.iter().map(name).collect()
+        }
+    }
+
+    impl Drop for Folder {
+        fn drop(&mut self) {
+            let _ = std::fs::remove_dir_all(&self.0);
+        }
+    }
+
+    fn hasty() -> Disk {
+        Disk {
+            patience: Duration::from_millis(200),
+            ..Disk::default()
+        }
+    }
+
+    #[test]
+    fn what_never_ends_is_refused_or_capped() {
+        let folder = Folder::new("endless");
+        let fault = |path: &Path| hasty().read(path, 100).unwrap_err().fault;
+        assert_eq!(fault(Path::new("/dev/zero")), FileFault::Device);
+        assert_eq!(fault(&folder.0), FileFault::Folder);
+        assert_eq!(fault(&folder.0.join("none")), FileFault::Missing);
+        let pipe = folder.pipe();
+        assert_eq!(fault(&pipe), FileFault::Silent { seconds: 0 });
+        let mut endless = Command::new("sh")
+            .args(["-c", "exec cat /dev/zero > \"$0\""])
+            .arg(&pipe)
+            .spawn()
+            .unwrap();
+        let disk = Disk::default();
+        let found = disk.read(&pipe, 100_000).unwrap_err().fault;
+        let _ = endless.kill();
+        let _ = endless.wait();
+        assert_eq!(found, FileFault::TooLarge { most: 100_000 });
+    }
+
+    #[test]
+    fn a_named_pipe_that_ends_is_a_file() {
+        let folder = Folder::new("pipe");
+        let pipe = folder.pipe();
+        let mut writer = Command::new("sh")
+            .args(["-c", "sleep 0.1; head -c 200000 /dev/zero > \"$0\""])
+            .arg(&pipe)
+            .spawn()
+            .unwrap();
+        let bytes = Disk::default().read(&pipe, 1 << 20).unwrap();
+        writer.wait().unwrap();
+        assert_eq!(bytes.len(), 200_000);
+    }
+
+    #[test]
+    fn what_was_read_is_not_overwritten_under_any_name() {
+        let folder = Folder::new("inputs");
+        let at = |name: &str| folder.0.join(name);
+        std::fs::write(at("model"), "old").unwrap();
+        std::os::unix::fs::symlink("model", at("soft")).unwrap();
+        std::fs::hard_link(at("model"), at("hard")).unwrap();
+        let disk = Disk::default();
+        assert_eq!(disk.read(&at("model"), 100).unwrap(), b"old");
+        for name in ["model", "soft", "hard", "../x/model"] {
+            let name = name.replace('x', &folder.0.file_name().unwrap().to_string_lossy());
+            let found = disk.write(&at(&name), b"new").unwrap_err();
+            assert_eq!(found.fault, FileFault::Input, "{name}");
+        }
+        disk.write(&at("other"), b"new").unwrap();
+        disk.replace(&at("soft"), b"edited").unwrap();
+        assert_eq!(std::fs::read(at("model")).unwrap(), b"edited");
+        assert!(at("soft").is_symlink());
+        assert!(disk.was_read(&at("model")));
+        assert_eq!(folder.names(), ["hard", "model", "other", "soft"]);
+    }
+
+    #[test]
+    fn a_file_keeps_its_permissions_and_one_that_is_locked_its_bytes() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = Folder::new("permissions");
+        let path = folder.0.join("model");
+        std::fs::write(&path, "old").unwrap();
+        let set = |mode| {
+            std::fs::set_permissions(&path, std::fs::Permissions::from_mode(mode)).unwrap();
+        };
+        set(0o640);
+        write(&path, b"new").unwrap();
+        assert_eq!(path.metadata().unwrap().permissions().mode() & 0o777, 0o640);
+        assert_eq!(std::fs::read(&path).unwrap(), b"new");
+        // A superuser may write to anything, so the rest shows nothing there.
+        set(0o440);
+        if OpenOptions::new().write(true).open(&path).is_err() {
+            assert!(write(&path, b"newer").is_err());
+            assert_eq!(std::fs::read(&path).unwrap(), b"new");
+        }
+        assert_eq!(folder.names(), ["model"]);
+    }
+
+    #[test]
+    fn devices_are_written_to_as_they_are() {
+        write(Path::new("/dev/null"), b"gone").unwrap();
+        assert_eq!(Disk::default().kind(Path::new("/dev/null")), Kind::Device);
+        #[cfg(target_os = "linux")]
+        {
+            let full = write(Path::new("/dev/full"), b"none").unwrap_err();
+            assert_eq!(full.fault.remedy(), "make room, or choose another place");
+        }
+    }
+
+    use std::fs::OpenOptions;
+}

@@ -1,0 +1,104 @@
+//! Files in memory, as a browser or a test has them.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::{FileError, FileFault, Files, Kind, Opened, tidy};
+
+/// Files in memory by their paths; folders are there as far as files are in them.
+///
+/// ```
+/// use modelmill_boundary::files::{Files, Memory};
+/// let files = Memory::default().with("models/arm.toml", "schema = 1");
+/// assert_eq!(files.read_text("models/./arm.toml".as_ref(), 100)?, "schema = 1");
+/// assert!(files.read("models/leg.toml".as_ref(), 100).is_err());
+/// # Ok::<(), modelmill_boundary::files::FileError>(())
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct Memory {
+    files: BTreeMap<PathBuf, Arc<[u8]>>,
+}
+
+impl Memory {
+    /// These files and one more, which takes the place of one of its path.
+    #[must_use]
+    pub fn with(mut self, path: impl AsRef<Path>, bytes: impl Into<Vec<u8>>) -> Self {
+        self.insert(path, bytes);
+        self
+    }
+
+    /// Adds a file, which takes the place of one of its path.
+    pub fn insert(&mut self, path: impl AsRef<Path>, bytes: impl Into<Vec<u8>>) {
+        self.files.insert(tidy(path.as_ref()), bytes.into().into());
+    }
+
+    fn find(&self, path: &Path, most: u64) -> Result<&Arc<[u8]>, FileError> {
+        let fail = |fault| Err(FileError::new(path, fault));
+        match self.files.get(&tidy(path)) {
+            Some(bytes) if bytes.len() as u64 > most => fail(FileFault::TooLarge { most }),
+            Some(bytes) => Ok(bytes),
+            None if self.kind(path) == Kind::Folder => fail(FileFault::Folder),
+            None => fail(FileFault::Missing),
+        }
+    }
+}
+
+impl Files for Memory {
+    fn read(&self, path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
+        self.find(path, most).map(|bytes| bytes.to_vec())
+    }
+
+    fn kind(&self, path: &Path) -> Kind {
+        let path = tidy(path);
+        if self.files.contains_key(&path) {
+            Kind::File
+        } else if self.files.keys().any(|other| other.starts_with(&path)) {
+            Kind::Folder
+        } else {
+            Kind::Missing
+        }
+    }
+
+    fn list(&self, folder: &Path) -> Result<Vec<PathBuf>, FileError> {
+        let folder = tidy(folder);
+        let mut found: Vec<PathBuf> = self
+            .files
+            .keys()
+            .filter_map(|path| path.strip_prefix(&folder).ok()?.components().next())
+            .map(|first| folder.join(first))
+            .collect();
+        // The keys are sorted, so what is in one subfolder stands together.
+        found.dedup();
+        if found.is_empty() {
+            return Err(FileError::new(&folder, FileFault::Missing));
+        }
+        Ok(found)
+    }
+
+    fn open(&self, path: &Path, _: u64) -> Result<Opened, FileError> {
+        // What is in memory already needs no cap.
+        self.find(path, u64::MAX).cloned().map(Opened::Memory)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_and_folders_are_found_by_any_of_their_names() {
+        let files = Memory::default()
+            .with("a/one.toml", "1")
+            .with("a/b/two.toml", "22");
+        assert_eq!(files.read(Path::new("a/b/../one.toml"), 1).unwrap(), b"1");
+        assert_eq!(files.kind(Path::new("./a")), Kind::Folder);
+        assert_eq!(files.kind(Path::new("b")), Kind::Missing);
+        let listed = files.list(Path::new("a")).unwrap();
+        assert_eq!(listed, [PathBuf::from("a/b"), PathBuf::from("a/one.toml")]);
+        let fault = |path: &str| files.read(Path::new(path), 1).unwrap_err().fault;
+        assert_eq!(fault("a"), FileFault::Folder);
+        assert_eq!(fault("a/b/two.toml"), FileFault::TooLarge { most: 1 });
+        assert_eq!(fault("c"), FileFault::Missing);
+    }
+}
