@@ -20,63 +20,36 @@
 //! [`excite`]: the motion that tells base parameters apart best, within limits;
 //! and [`numeric_rank`]: eq. (9) on given values, and the numeric fallback reduction.
 
-pub mod base_fit;
-mod csv_text;
-pub mod cutoff;
-pub mod decimation;
-mod delay;
-pub mod derivatives;
-pub mod deviations;
+mod audit;
 pub mod diagnose;
-pub mod essential;
 pub mod estimate;
 pub mod excite;
 pub mod figures;
-pub mod filters;
-pub mod instruments;
-mod intake;
 pub mod interpret;
-pub mod least_squares;
-pub mod local_polynomials;
-pub mod locate;
-mod magnitudes;
-mod mat_file;
-mod notes;
-pub mod numeric_rank;
-mod parquet_file;
-pub mod periods;
-pub mod physical;
-mod preparing;
-pub mod prior;
+mod motion;
 mod recording;
-mod recording_checks;
-mod recording_error;
-mod reflections;
-mod run;
-mod run_checks;
-pub mod series;
-mod signal_checks;
-mod smoothing;
-mod solution;
-mod spectrum;
-pub mod suspects;
 #[cfg(test)]
 mod test_noise;
-mod triangle;
-mod undetermined;
 
-pub use base_fit::{FitFile, FitFileError, FitParameter, ParameterInfo, Status};
-pub use derivatives::{Preparation, Smoothing};
-pub use deviations::Deviations;
-pub use figures::{ChannelFigures, Comparison, Figures, FiguresError};
-pub use filters::FilterError;
-pub use least_squares::{LeastSquares, LeastSquaresError};
-pub use locate::{LocateOptions, Region};
-pub use notes::{Note, Severity};
-pub use periods::Repeats;
+pub use audit::suspects;
+pub use estimate::deviations::Deviations;
+pub use estimate::least_squares::{LeastSquares, LeastSquaresError};
+pub use estimate::solution::{RANK_TOLERANCE, Solution};
+pub use estimate::triangle::Triangle;
+pub use estimate::undetermined::Direction;
+pub use estimate::{
+    deviations, essential, instruments, least_squares, numeric_rank, physical, prior,
+};
+pub use figures::fit_file::{
+    FitFile, FitFileError, FitParameter, ParameterInfo, Status, fit_parameters,
+};
+pub use figures::locate::{LocateOptions, Region};
+pub use figures::{ChannelFigures, Comparison, Figures, FiguresError, locate};
+pub use motion::derivatives::{Preparation, Smoothing};
+pub use motion::filters::FilterError;
+pub use motion::periods::Repeats;
+pub use motion::run::{PreparedAs, Run};
+pub use motion::{cutoff, decimation, derivatives, filters, local_polynomials, periods, series};
+pub use recording::error::{Fault, RecordingError, name_of_bytes, place_word};
+pub use recording::notes::{Note, Severity};
 pub use recording::{Computed, NotFinite, ReadOptions, Recording};
-pub use recording_error::{Fault, RecordingError, name_of_bytes, place_word};
-pub use run::{PreparedAs, Run};
-pub use solution::{RANK_TOLERANCE, Solution};
-pub use triangle::Triangle;
-pub use undetermined::Direction;

@@ -7,8 +7,8 @@
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-use modelmill_identify::base_fit::fit_parameters;
 use modelmill_identify::deviations::autocorrelated;
+use modelmill_identify::fit_parameters;
 use modelmill_identify::{
     Comparison, FitFile, LeastSquares, LeastSquaresError, ParameterInfo, Preparation, ReadOptions,
     Recording, Run,

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill_identify::base_fit::fit_parameters;
 use modelmill_identify::deviations::FEWEST_ROWS;
+use modelmill_identify::fit_parameters;
 use modelmill_identify::{
     Figures, FitFile, FitParameter, Note, ParameterInfo, Repeats, Severity, Status,
 };

@@ -18,7 +18,7 @@ use nalgebra::{DMatrix, DVector};
 use num_rational::BigRational;
 use num_traits::Zero;
 
-use crate::undetermined::{Direction, null_directions};
+use crate::estimate::undetermined::{Direction, null_directions};
 
 pub use polynomial::{Polynomial, exact};
 

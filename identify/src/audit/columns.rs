@@ -1,0 +1,468 @@
+//! What looks wrong with a recording although every number can be read: a recording goes in, warnings come out.
+//!
+//! Angles that are wrapped, rates that are not the derivatives of their positions (with the slip of units that
+//! explains it), and times that can hardly be in seconds.
+
+use std::f64::consts::PI;
+
+use crate::motion::derivatives::Source;
+use crate::motion::run::Run;
+use crate::recording::Recording;
+use crate::recording::error::list;
+use crate::recording::notes::Note;
+
+/// Steps of time above this many times the usual one are gaps, across which nothing is filtered.
+pub(crate) const GAP: f64 = 5.0;
+/// Ratios of a rate to the derivative of its position that pass as 1; drift and coarse sampling make a few per cent.
+const RATIO_TOLERANCE: f64 = 0.1;
+/// Part of a rate's integral that the position may leave unexplained.
+const MISFIT: f64 = 0.3;
+/// No drive is sampled as slowly as this, s.
+const SLOWEST: f64 = 0.5;
+/// Nobody samples forces of a machine in shorter steps, s.
+const FASTEST: f64 = 2e-6;
+
+/// Middle of some numbers; zero for none.
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+impl Run {
+    /// Warnings about measured forces of the given drives that are 0 throughout, which fit parameters of 0 exactly.
+    pub fn suspicious_forces(&self, drives: &[String]) -> Vec<Note> {
+        let forces = self.force.iter().flatten();
+        let idle: Vec<String> = drives
+            .iter()
+            .zip(forces)
+            .filter(|(_, force)| force.iter().all(|f| *f == 0.0))
+            .map(|(name, _)| name.clone())
+            .collect();
+        if idle.is_empty() {
+            return Vec::new();
+        }
+        vec![Note::warning(format!(
+            "The measured force of {} in {} is 0 throughout: nothing was measured, or the column is another one (--map); \
+             errors relative to it have no value, and it pulls parameters to 0.",
+            list(&idle),
+            self.file
+        ))]
+    }
+}
+
+impl Recording {
+    /// Warnings about columns that can be read but hardly are what they should be. `coordinates` are
+    /// `(name, whether it is an angle)`; columns that cannot be used are passed over.
+    pub fn suspicions(&self, coordinates: &[(String, bool)], source: Source) -> Vec<Note> {
+        let Ok(time) = self.column("t") else {
+            return Vec::new();
+        };
+        let mut notes: Vec<Note> = coordinates
+            .iter()
+            .filter(|(_, is_angle)| *is_angle)
+            .filter_map(|(name, _)| self.wrapped(name, time))
+            .collect();
+        let (rates, settled) = if source == Source::Positions {
+            (Vec::new(), false)
+        } else {
+            self.rates(coordinates, time)
+        };
+        let step = median(time.windows(2).map(|w| w[1] - w[0]).collect());
+        if step <= FASTEST {
+            notes.push(Note::warning(format!(
+                "The steps of `t` in {} are {} s, which is fast for a recording of forces; time must be in s.",
+                self.file(),
+                short(step)
+            )));
+        }
+        if step >= SLOWEST && rates.is_empty() && !settled {
+            notes.push(Note::warning(format!(
+                "The steps of `t` in {} are {} s, which is slow for a recording of forces; time must be in s: is it in ms?",
+                self.file(),
+                short(step)
+            )));
+        }
+        notes.extend(rates);
+        notes
+    }
+
+    /// The options that read an angle recorded in degrees, and with it those of its recorded derivatives that are in
+    /// degrees too: all but those that are the derivatives in rad of what stands beside them.
+    pub fn maps_from_degrees(&self, name: &str) -> String {
+        let map = |column: &str, unit: &str| format!("--map \"{column}={column} [{unit}]\"");
+        let mut maps = vec![map(name, "deg")];
+        for (of, order, unit) in [("", "_d", "deg/s"), ("_d", "_dd", "deg/s^2")] {
+            let [of, rate] = [of, order].map(|suffix| format!("{name}{suffix}"));
+            let Ok(values) = self.column(&rate) else {
+                continue;
+            };
+            let beside = self.column("t").ok().zip(self.column(&of).ok());
+            let compared = beside.and_then(|(time, of)| compare(time, of, values));
+            let is_rad = compared.is_some_and(|(ratio, misfit)| {
+                misfit < MISFIT && (ratio * 180.0 / PI - 1.0).abs() < RATIO_TOLERANCE
+            });
+            if is_rad {
+                break;
+            }
+            maps.push(map(&rate, unit));
+        }
+        maps.join(" ")
+    }
+
+    /// Jumps by a whole turn between neighbouring samples.
+    fn wrapped(&self, name: &str, time: &[f64]) -> Option<Note> {
+        let q = self.column(name).ok()?;
+        let steps: Vec<f64> = q.windows(2).map(|w| w[1] - w[0]).collect();
+        let usual = median(steps.iter().map(|step| step.abs()).collect());
+        for (turn, slack, name_of_turn, besides) in [
+            (2.0 * PI, 0.5, "2 pi", ""),
+            (360.0, 20.0, "360", " and in degrees"),
+        ] {
+            let jumps = |step: &f64| (step.abs() - turn).abs() < slack && step.abs() > 10.0 * usual;
+            let Some(first) = steps.iter().position(jumps) else {
+                continue;
+            };
+            let n = steps.iter().filter(|step| jumps(step)).count();
+            let times = if n == 1 { "once" } else { "first" };
+            let all = if n == 1 {
+                String::new()
+            } else {
+                format!(", {n} times in all")
+            };
+            return Some(Note::warning(format!(
+                "`{name}` in {} jumps by {name_of_turn}, {times} from {} to {} at t = {} s (line {}){all}: the angle \
+                 seems to be wrapped{besides}. Record it without jumps, or add whole turns; derivatives and filters \
+                 take them for motion.",
+                self.file(),
+                q[first],
+                q[first + 1],
+                time[first + 1],
+                self.line(first + 1).unwrap_or(0),
+            )));
+        }
+        None
+    }
+
+    /// Rates and accelerations that are not the derivatives of what stands beside them, one note for each
+    /// explanation; and whether there were any rates that are.
+    fn rates(&self, coordinates: &[(String, bool)], time: &[f64]) -> (Vec<Note>, bool) {
+        let mut found: Vec<(String, Vec<String>, Vec<String>, f64)> = Vec::new();
+        let mut settled = false;
+        for (name, is_angle) in coordinates {
+            for (of, rate) in [("", "_d"), ("_d", "_dd")] {
+                let [of, rate] = [of, rate].map(|suffix| format!("{name}{suffix}"));
+                let (Ok(q), Ok(qd)) = (self.column(&of), self.column(&rate)) else {
+                    continue;
+                };
+                let Some((ratio, misfit)) = compare(time, q, qd) else {
+                    continue;
+                };
+                if misfit < MISFIT && (ratio - 1.0).abs() < RATIO_TOLERANCE {
+                    settled = true;
+                    continue;
+                }
+                let why = if misfit < MISFIT {
+                    explain(ratio, *is_angle)
+                } else {
+                    String::new()
+                };
+                match found.iter_mut().find(|(other, .., r)| {
+                    *other == why && (why.is_empty() || (r / ratio - 1.0).abs() < 0.05)
+                }) {
+                    Some((_, ofs, rates, _)) => {
+                        ofs.push(of);
+                        rates.push(rate);
+                    }
+                    None => found.push((why, vec![of], vec![rate], ratio)),
+                }
+            }
+        }
+        let notes = found.into_iter().map(|(why, ofs, rates, ratio)| {
+            let (is, derivative) = if rates.len() == 1 {
+                ("is", "the derivative")
+            } else {
+                ("are", "the derivatives")
+            };
+            let how = if why.is_empty() {
+                "nor a multiple of it: check which column is which (--map)".to_owned()
+            } else {
+                format!("but about {} times as large: {why}", short(ratio))
+            };
+            Note::warning(format!(
+                "{} in {} {is} not {derivative} of {} with respect to `t`, {how}. Mend the columns, or take derivatives \
+                 from positions (--derivatives positions).",
+                list(&rates),
+                self.file(),
+                list(&ofs),
+            ))
+        });
+        (notes.collect(), settled)
+    }
+
+    /// The recording cut at its gaps in time, each stretch with its lines; the whole if there are none.
+    pub(crate) fn stretches(&self) -> Vec<Self> {
+        let Ok(time) = self.column("t") else {
+            return vec![self.clone()];
+        };
+        let usual = median(time.windows(2).map(|w| w[1] - w[0]).collect());
+        let mut edges = vec![0];
+        edges.extend(
+            (1..time.len()).filter(|i| time[*i] - time[*i - 1] > GAP * usual && usual > 0.0),
+        );
+        edges.push(time.len());
+        if edges.len() == 2 {
+            return vec![self.clone()];
+        }
+        edges
+            .windows(2)
+            .map(|edge| {
+                let name = format!("{} from t = {} s on", self.file(), time[edge[0]]);
+                self.stretch(name, edge[0], edge[1])
+            })
+            .collect()
+    }
+}
+
+/// How many times as large a rate is as the derivative of a position, and the part of it that the position does not
+/// explain; `None` where the position hardly moves or is mostly noise.
+///
+/// The integral of the rate is held against the position, for differences of the position would amplify its noise.
+/// Each stretch between gaps counts from its own mean.
+fn compare(time: &[f64], position: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
+    let usual = median(time.windows(2).map(|w| w[1] - w[0]).collect());
+    let (mut qq, mut qi, mut ii, mut steps) = (0.0, 0.0, 0.0, 0.0);
+    let largest = position.iter().fold(0.0_f64, |most, q| most.max(q.abs()));
+    let mut start = 0;
+    for end in 1..=time.len() {
+        if end < time.len() && time[end] - time[end - 1] <= GAP * usual {
+            continue;
+        }
+        let mut integral = vec![0.0];
+        for i in start + 1..end {
+            let sum = integral[i - start - 1];
+            integral.push(sum + 0.5 * (rate[i] + rate[i - 1]) * (time[i] - time[i - 1]));
+            steps += (position[i] - position[i - 1]).powi(2);
+        }
+        let n = (end - start) as f64;
+        let mean_q = position[start..end].iter().sum::<f64>() / n;
+        let mean_i = integral.iter().sum::<f64>() / n;
+        for (q, sum) in position[start..end].iter().zip(&integral) {
+            let (q, sum) = (q - mean_q, sum - mean_i);
+            qq += q * q;
+            qi += q * sum;
+            ii += sum * sum;
+        }
+        start = end;
+    }
+    // A coordinate that rests away from zero differs from its mean by rounding, which is no motion.
+    let rounding = (1e-12 * largest).powi(2) * time.len() as f64;
+    // What changes as much from sample to sample as over the whole is noise, or sampled too coarsely to tell.
+    if time.len() < 16 || qq <= rounding || steps > 0.5 * qq {
+        return None;
+    }
+    if ii <= 0.0 {
+        return Some((0.0, 1.0));
+    }
+    let ratio = qi / qq;
+    Some((ratio, (1.0 - qi * qi / (qq * ii)).max(0.0).sqrt()))
+}
+
+/// The slip of units behind a ratio of a rate to the derivative of its position.
+fn explain(ratio: f64, is_angle: bool) -> String {
+    let degree = 180.0 / PI;
+    let is = |value: f64| (ratio.abs() / value - 1.0).abs() < RATIO_TOLERANCE;
+    let mut why = if is(1.0) {
+        String::new()
+    } else if is(degree) && is_angle {
+        "it seems to be per second in degrees, where what it derives from is in rad".to_owned()
+    } else if is(1.0 / degree) && is_angle {
+        "what it derives from seems to be in degrees".to_owned()
+    } else if is(1e3) && is_angle {
+        "time seems to be in ms, and must be in s".to_owned()
+    } else if is(1e3) {
+        "time seems to be in ms, or lengths differ by m and mm".to_owned()
+    } else if is(1e3 * degree) && is_angle {
+        "time seems to be in ms and the rate in degrees".to_owned()
+    } else if is(1e3 / degree) && is_angle {
+        "time seems to be in ms and the angle in degrees".to_owned()
+    } else if is(1e6) {
+        "time seems to be in microseconds, and must be in s".to_owned()
+    } else if is(1e-3) && !is_angle {
+        "lengths seem to be in mm, and must be in m".to_owned()
+    } else if is(30.0 / PI) && is_angle {
+        "it seems to be in revolutions per minute, and must be in rad/s".to_owned()
+    } else if is(0.5 / PI) && is_angle {
+        "it seems to be in revolutions per second, and must be in rad/s".to_owned()
+    } else {
+        "check the units (rad, m, s) and which column is which (--map)".to_owned()
+    };
+    if ratio < 0.0 {
+        let and = if why.is_empty() { "" } else { ", and " };
+        why = format!("the signs differ{and}{why}");
+    }
+    why
+}
+
+/// Three significant digits without trailing zeros.
+fn short(value: f64) -> String {
+    let scientific = format!("{value:.2e}");
+    scientific
+        .parse::<f64>()
+        .map_or(scientific, |rounded| format!("{rounded}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+
+    use super::*;
+    use crate::test_noise::Noise;
+    use crate::{Preparation, ReadOptions};
+
+    /// A recording of one angle with its rate, each number by its own function of the time.
+    fn recording(
+        samples: u32,
+        time: impl Fn(f64) -> f64,
+        q: impl Fn(f64) -> f64,
+        qd: impl Fn(f64) -> f64,
+    ) -> Recording {
+        let mut text = "t,q,q_d,motor\n".to_owned();
+        for i in 0..samples {
+            let t = f64::from(i) * 0.004;
+            let _ = writeln!(text, "{},{},{},{}", time(t), q(t), qd(t), t.sin());
+        }
+        Recording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap()
+    }
+
+    fn says(recording: &Recording) -> String {
+        recording
+            .suspicions(&[("q".to_owned(), true)], Source::RecordedFirst)
+            .iter()
+            .map(|note| note.says.as_str())
+            .collect::<Vec<_>>()
+            .join("\n")
+    }
+
+    #[track_caller]
+    fn check(recording: &Recording, expected: &str) {
+        let says = says(recording);
+        if expected.is_empty() {
+            assert_eq!(says, "");
+        } else {
+            assert!(says.contains(expected), "{says}");
+            assert_eq!(says.lines().count(), 1, "{says}");
+        }
+    }
+
+    const A: f64 = 1.7;
+    fn q(t: f64) -> f64 {
+        (A * t).sin() + 0.3 * (3.1 * t).cos()
+    }
+    fn qd(t: f64) -> f64 {
+        A * (A * t).cos() - 0.93 * (3.1 * t).sin()
+    }
+
+    #[test]
+    fn slips_of_units_are_named() {
+        let n = 2000;
+        check(&recording(n, |t| t, q, qd), "");
+        check(
+            &recording(n, |t| t, q, |t| qd(t).to_degrees()),
+            "about 57.3 times",
+        );
+        check(&recording(n, |t| t, q, |t| qd(t).to_degrees()), "degrees");
+        check(&recording(n, |t| 1e3 * t, q, qd), "time seems to be in ms");
+        check(&recording(n, |t| t, q, |t| -qd(t)), "the signs differ");
+        check(&recording(n, |t| t, q, |t| 2.0 * qd(t)), "check the units");
+        check(
+            &recording(n, |t| t, q, |t| (7.0 * t).sin()),
+            "which column is which",
+        );
+    }
+
+    #[test]
+    fn noise_bias_and_coarse_steps_are_no_suspicion() {
+        let noise = std::cell::RefCell::new(Noise::new(3));
+        let draw = |size: f64| size * noise.borrow_mut().normal();
+        // A quantised and noisy position, a rate with noise and some offset.
+        let rough = recording(
+            5000,
+            |t| t,
+            |t| (q(t) * 2000.0).round() / 2000.0 + draw(1e-3),
+            |t| qd(t) + 0.01 + draw(0.3),
+        );
+        check(&rough, "");
+        let coarse = recording(300, |t| t, |t| q(40.0 * t), |t| 40.0 * qd(40.0 * t));
+        check(&coarse, "");
+        for rest in [0.0, 1.0, 0.3, -0.7] {
+            check(&recording(500, |t| t, |_| rest, |_| 0.0), "");
+        }
+    }
+
+    #[test]
+    fn time_in_milliseconds_is_seen_without_rates() {
+        let slow = recording(500, |t| 1e3 * t, q, qd);
+        let notes = slow.suspicions(&[("q".to_owned(), true)], Source::Positions);
+        assert!(
+            notes.len() == 1 && notes[0].says.contains("is it in ms?"),
+            "{notes:?}"
+        );
+    }
+
+    #[test]
+    fn a_wrapped_angle_is_named_with_its_line() {
+        let wrap = |t: f64| (0.8 * t + PI).rem_euclid(2.0 * PI) - PI;
+        let wrapped = recording(4000, |t| t, wrap, |_| 0.8);
+        let notes = wrapped.suspicions(&[("q".to_owned(), true)], Source::Positions);
+        assert!(
+            notes.len() == 1
+                && notes[0].says.contains("jumps by 2 pi")
+                && notes[0].says.contains("2 times in all")
+                && notes[0].says.contains("(line 984)"),
+            "{notes:?}"
+        );
+        // A length may jump as it likes.
+        assert_eq!(
+            wrapped.suspicions(&[("q".to_owned(), false)], Source::Positions),
+            []
+        );
+    }
+
+    /// Two stretches with a second between them: each is prepared on its own, so no rate shows the jump.
+    #[test]
+    fn nothing_is_filtered_across_a_gap() {
+        let broken = recording(
+            3000,
+            |t| if t < 5.0 { t } else { t + 1.0 },
+            |t| if t < 5.0 { q(t) } else { q(t) + 2.0 },
+            qd,
+        );
+        let names = ["q".to_owned()];
+        let drives = ["motor".to_owned()];
+        let positions = Preparation {
+            source: Source::Positions,
+            ..Preparation::default()
+        };
+        let runs = broken.runs_with(&names, &drives, &positions).unwrap();
+        assert_eq!(runs.len(), 2);
+        assert!(
+            runs[0].notes[0].says.contains("1 gap")
+                && runs[0].notes[0].says.contains("after line 1251"),
+            "{:?}",
+            runs[0].notes
+        );
+        for (run, shift) in runs.iter().zip([0.0, 1.0]) {
+            for (t, v) in run.time.iter().zip(&run.qd[0]) {
+                assert!((v - qd(t - shift)).abs() < 0.02, "{v} at {t}");
+            }
+        }
+        assert_eq!(runs[0].prepared.cutoff_hz, runs[1].prepared.cutoff_hz);
+        assert_eq!(runs[1].lines.len(), runs[1].samples());
+        // Recorded rates need no filter, hence no cut.
+        let recorded = recording(100, |t| if t < 0.2 { t } else { t + 1.0 }, q, qd);
+        assert_eq!(recorded.stretches().len(), 2);
+    }
+}

@@ -1,0 +1,244 @@
+//! What looks wrong with single signals of a recording: values that are held over several samples, forces that stay at
+//! a limit, angles too large for rad.
+
+use std::f64::consts::PI;
+
+use crate::recording::Recording;
+use crate::recording::error::place_word;
+use crate::recording::notes::{Note, count_of, short};
+
+/// Angles beyond this many rad are likely in degrees: two turns to each side.
+const LARGE_ANGLE: f64 = 4.0 * PI;
+/// Samples at a limit before a force counts as saturated.
+const FEWEST_AT_LIMIT: usize = 8;
+
+impl Recording {
+    /// Warnings about single signals. `coordinates` are `(name, whether it is an angle)`; columns that cannot be used
+    /// are passed over.
+    pub fn oddities(&self, coordinates: &[(String, bool)], drives: &[String]) -> Vec<Note> {
+        let positions: Vec<&[f64]> = coordinates
+            .iter()
+            .filter_map(|(name, _)| self.column(name).ok())
+            .collect();
+        let mut notes = Vec::new();
+        for (name, is_angle) in coordinates {
+            let Ok(q) = self.column(name) else { continue };
+            notes.extend(self.held(name, q));
+            if *is_angle {
+                notes.extend(self.too_large(name, q));
+            }
+        }
+        for drive in drives {
+            let Ok(force) = self.column(drive) else {
+                continue;
+            };
+            notes.extend(self.held(drive, force));
+            notes.extend(self.saturated(drive, force, &positions));
+        }
+        notes
+    }
+
+    /// A signal that changes only every so many samples was recorded at a lower rate than it is written.
+    fn held(&self, name: &str, values: &[f64]) -> Option<Note> {
+        let changes: Vec<usize> = (1..values.len())
+            .filter(|i| values[*i].total_cmp(&values[i - 1]).is_ne())
+            .collect();
+        if changes.len() < 20 {
+            return None;
+        }
+        let mut gaps: Vec<usize> = changes.windows(2).map(|w| w[1] - w[0]).collect();
+        let n = gaps.len();
+        gaps.sort_unstable();
+        let usual = gaps[n / 2];
+        let share = gaps.iter().filter(|gap| **gap == usual).count() as f64 / n as f64;
+        (usual > 1 && share > 0.9).then(|| {
+            Note::warning(format!(
+                "`{name}` in {} changes only every {usual} samples: each value is repeated, so it was recorded at a lower \
+                 rate than it is written. Rates from such steps are wrong: keep one sample of each, or a lower cut-off \
+                 (--cutoff).",
+                self.file()
+            ))
+        })
+    }
+
+    fn too_large(&self, name: &str, q: &[f64]) -> Option<Note> {
+        let largest = q.iter().map(|v| v.abs()).fold(0.0, f64::max);
+        let rounded = |value: f64| match value {
+            value if value < 1e7 => format!("{value:.1}"),
+            value => short(value),
+        };
+        (largest > LARGE_ANGLE).then(|| {
+            Note::warning(format!(
+                "`{name}` in {} reaches {}, which is {} turns if it is in rad, as it must be; if it is in \
+                 degrees, say so: `{}`.",
+                self.file(),
+                rounded(largest),
+                rounded(largest / (2.0 * PI)),
+                self.maps_from_degrees(name)
+            ))
+        })
+    }
+
+    /// A force that stays exactly at its largest or smallest value while something moves.
+    fn saturated(&self, name: &str, force: &[f64], positions: &[&[f64]]) -> Option<Note> {
+        let low = force.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = force.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if low >= high {
+            // Forces of 0 are said beside the drives' other ones, by `suspicious_forces`.
+            return (force.len() > 1 && low != 0.0).then(|| {
+                Note::warning(format!(
+                    "The force of `{name}` in {} is {low} throughout: it is no measurement of a drive that works.",
+                    self.file()
+                ))
+            });
+        }
+        let mut found: Vec<(f64, usize, usize)> = Vec::new();
+        for limit in [high, low] {
+            let (mut count, mut first) = (0, None);
+            let mut i = 0;
+            while i < force.len() {
+                let start = i;
+                while i < force.len() && force[i].total_cmp(&limit).is_eq() {
+                    i += 1;
+                }
+                let moves = |q: &&[f64]| i > start && q[start].total_cmp(&q[i - 1]).is_ne();
+                if i - start >= 3 && positions.iter().any(moves) {
+                    count += i - start;
+                    first.get_or_insert(start);
+                }
+                i = i.max(start + 1);
+            }
+            if let Some(first) = first.filter(|_| count >= FEWEST_AT_LIMIT) {
+                found.push((limit, count, first));
+            }
+        }
+        let (limit, count, first) = *found.first()?;
+        let other = found
+            .get(1)
+            .map(|(limit, count, _)| {
+                let samples = count_of(*count, "sample", "samples");
+                format!(", and {samples} at {}", plain(*limit))
+            })
+            .unwrap_or_default();
+        Some(Note::warning(format!(
+            "The force of `{name}` in {} stays exactly at {} for {} while the mechanism moves, first in {} {}{other}: \
+             the drive or its measurement seems to be saturated. The true force is not known there; use a gentler motion, \
+             or leave these times out (--between).",
+            self.file(),
+            plain(limit),
+            count_of(count, "sample", "samples"),
+            place_word(self.file()),
+            self.line(first).unwrap_or(0),
+        )))
+    }
+}
+
+/// A recorded number as it stands in the file, unless it is very long.
+fn plain(value: f64) -> String {
+    if value.abs() < 1e12 {
+        value.to_string()
+    } else {
+        short(value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+
+    use super::*;
+    use crate::ReadOptions;
+
+    fn says(q: impl Fn(f64) -> f64, force: impl Fn(f64) -> f64) -> Vec<String> {
+        let mut text = "t,q,motor\n".to_owned();
+        for i in 0..1000 {
+            let t = f64::from(i) * 0.002;
+            let _ = writeln!(text, "{t},{},{}", q(t), force(t));
+        }
+        let recording =
+            Recording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap();
+        let notes = recording.oddities(&[("q".to_owned(), true)], &["motor".to_owned()]);
+        notes.into_iter().map(|note| note.says).collect()
+    }
+
+    #[test]
+    fn sound_signals_raise_no_suspicion() {
+        let none: Vec<String> = Vec::new();
+        assert_eq!(says(|t| (3.0 * t).sin(), |t| 20.0 * (7.0 * t).cos()), none);
+        // A coarse encoder repeats values too, but as the speed has it.
+        assert_eq!(
+            says(
+                |t| ((3.0 * t).sin() * 100.0).round() / 100.0,
+                |t| 20.0 * (7.0 * t).cos()
+            ),
+            none
+        );
+        // At rest a force may stay where it is.
+        assert_eq!(
+            says(
+                |t| if t < 1.0 { 0.3 } else { t },
+                |t| if t < 1.0 { 9.0 } else { 8.0 - t }
+            ),
+            none
+        );
+    }
+
+    #[test]
+    fn a_clipped_force_is_named_with_its_limit_and_line() {
+        let found = says(
+            |t| (3.0 * t).sin(),
+            |t| (20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0),
+        );
+        assert_eq!(found.len(), 1);
+        assert!(
+            found[0].contains("stays exactly at 15") && found[0].contains("at -15"),
+            "{found:?}"
+        );
+        // sin(7 t) passes 3/4 at t = 0.1212 s, in the 61st sample, on line 63.
+        assert!(found[0].contains("first in line 63"), "{found:?}");
+    }
+
+    /// Recorded rates go along, unless they are in rad already.
+    #[test]
+    fn rates_in_degrees_are_named_with_their_angles() {
+        let of = |scale: f64| {
+            let mut text = "t,q,q_d,q_dd\n".to_owned();
+            for k in 0..400 {
+                let t = 0.01 * f64::from(k);
+                let (sin, cos) = (3.0 * t).sin_cos();
+                let (q, rate, acceleration) = (900.0 * sin, 2700.0 * cos, -8100.0 * sin);
+                writeln!(text, "{t},{q},{},{}", scale * rate, scale * acceleration).unwrap();
+            }
+            let recording =
+                Recording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default());
+            recording.unwrap().maps_from_degrees("q")
+        };
+        assert_eq!(
+            of(1.0),
+            "--map \"q=q [deg]\" --map \"q_d=q_d [deg/s]\" --map \"q_dd=q_dd [deg/s^2]\""
+        );
+        assert_eq!(of(PI / 180.0), "--map \"q=q [deg]\"");
+    }
+
+    #[test]
+    fn held_values_degrees_and_dead_forces_are_named() {
+        let held = says(
+            |t| (3.0 * (t / 0.008 + 1e-9).floor() * 0.008).sin(),
+            |t| (5.0 * t).sin(),
+        );
+        assert!(
+            held.len() == 1 && held[0].contains("every 4 samples"),
+            "{held:?}"
+        );
+        let degrees = says(|t| 90.0 * (3.0 * t).sin(), |t| (5.0 * t).sin());
+        assert!(
+            degrees.len() == 1 && degrees[0].ends_with("say so: `--map \"q=q [deg]\"`."),
+            "{degrees:?}"
+        );
+        let dead = says(|t| (3.0 * t).sin(), |_| 4.0);
+        assert!(
+            dead.len() == 1 && dead[0].contains("is 4 throughout"),
+            "{dead:?}"
+        );
+    }
+}

@@ -1,0 +1,259 @@
+//! Instrumental variables, for states that are noisy themselves: rows of instruments beside rows
+//! of the regressor go in, a solution without the bias of least squares comes out.
+//!
+//! In a closed loop the noise of the encoders runs through the controller into the forces, and the
+//! regressor is made from the same noisy states; least squares then misses the truth however long
+//! the recording. The remedy is a second regressor `Z` whose errors have nothing to do with those
+//! of the forces, `p = (Z'W)^-1 Z'y`: from the reference motion that the robot was told to follow,
+//! or from another period of the same motion. Source: A. Janot, P.-O. Vandanjon and M. Gautier,
+//! "A generic instrumental variable approach for industrial robot identification", IEEE Trans.
+//! CST 22 (2014), who make `Z` by simulating the closed loop, which needs its controller; P. C.
+//! Young, "Recursive Estimation and Time-Series Analysis" (2011), chapter 6.
+//!
+//! The stacked rows `[Z W y]` are reduced by reflections as in [`crate::estimate::least_squares`]; with
+//! `Q'Z = R`, `Q'W = B` and `Q'y = b` the solution is `B^-1 b`, and no products of rows are formed.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::estimate::deviations::{Deviations, Visit, from_influences};
+use crate::estimate::least_squares::{LeastSquares, LeastSquaresError, check_rows};
+use crate::estimate::solution::Solution;
+
+/// Canonical correlations below this say nothing.
+const WEAKEST: f64 = 1e-6;
+
+/// What instruments make of a recording.
+#[derive(Debug, Clone)]
+pub struct Instrumented {
+    /// The solution.
+    pub solution: Solution,
+    /// Its deviations, which allow for autocorrelation.
+    pub deviations: Deviations,
+    /// What least squares finds on the same rows.
+    pub least_squares: Solution,
+    /// The smallest canonical correlation between instruments and regressor, 0 to 1: near 1 they say as much as the
+    /// regressor itself, below 0.2 little.
+    pub strength: f64,
+}
+
+/// Estimates `n` parameters; `show` presents rows of `2 n` numbers, instruments first, interleaved per sample, in order of
+/// time, the same in each of three showings.
+/// Fails when `show` fails, a number is not finite, or the instruments do not determine the parameters.
+pub fn instrumental<E: From<LeastSquaresError>>(
+    n: usize,
+    channels: usize,
+    mut show: impl FnMut(&mut Visit<'_>) -> Result<(), E>,
+) -> Result<Instrumented, E> {
+    if n == 0 {
+        return Err(LeastSquaresError::NoParameters.into());
+    }
+    let channels = channels.max(1);
+    let mut regression = LeastSquares::with_channels(2 * n, channels);
+    show(&mut |rows, y| regression.add_rows(rows, y))?;
+    if regression.rows() == 0 {
+        return Err(LeastSquaresError::NoRows.into());
+    }
+    let found = solve(&regression, n)?;
+    let mut gradient = DVector::zeros(n);
+    let mut influence = DVector::zeros(n);
+    let mut errors = vec![0.0; channels];
+    let deviations = from_influences::<E>(&found.solution, channels, |take| {
+        let mut rows = 0;
+        show(&mut |block, measured| {
+            check_rows(block, measured, 2 * n, rows)?;
+            rows += measured.len();
+            let samples = block
+                .chunks_exact(2 * n * channels)
+                .zip(measured.chunks_exact(channels));
+            for (sample, measured) in samples {
+                gradient.fill(0.0);
+                for (channel, row) in sample.chunks_exact(2 * n).enumerate() {
+                    let (z, w) = row.split_at(n);
+                    let model: f64 = w
+                        .iter()
+                        .zip(&found.solution.values)
+                        .map(|(w, p)| w * p)
+                        .sum();
+                    errors[channel] = measured[channel] - model;
+                    for (g, z) in gradient.iter_mut().zip(z) {
+                        *g += z * errors[channel];
+                    }
+                }
+                influence.gemv(1.0, &found.to_parameters, &gradient, 0.0);
+                take(influence.as_slice(), &errors);
+            }
+            Ok(())
+        })?;
+        if rows == regression.rows() {
+            Ok(())
+        } else {
+            let (first, now) = (regression.rows(), rows);
+            Err(LeastSquaresError::PassesDiffer { first, now }.into())
+        }
+    })?;
+    Ok(Instrumented {
+        solution: found.solution,
+        deviations,
+        least_squares: found.least_squares,
+        strength: found.strength,
+    })
+}
+
+struct Solved {
+    solution: Solution,
+    least_squares: Solution,
+    strength: f64,
+    /// `(Z'W)^-1`
+    to_parameters: DMatrix<f64>,
+}
+
+fn solve(regression: &LeastSquares, n: usize) -> Result<Solved, LeastSquaresError> {
+    let width = 2 * n + 1;
+    let triangle = regression.reduced();
+    let entry = |i: usize, j: usize| triangle[i * width + j];
+    let r_z = DMatrix::from_fn(n, n, &entry);
+    let b = DMatrix::from_fn(n, n, |i, j| entry(i, n + j));
+    let right = DVector::from_fn(n, |i, _| entry(i, 2 * n));
+    // The rows of W and y alone: what least squares would see.
+    let mut plain = LeastSquares::new(n);
+    for row in triangle.chunks_exact(width) {
+        plain.add_rows(&row[n..2 * n], &row[2 * n..])?;
+    }
+    let mut least_squares = crate::Triangle::of(&plain);
+    least_squares.count_rows(regression.row_count());
+    let least_squares = least_squares.solve_near(&vec![0.0; n])?;
+    let weak = |correlation| LeastSquaresError::WeakInstruments { correlation };
+    if least_squares.rank < n {
+        return Err(weak(0.0));
+    }
+    // Q'W R_W^-1 has the cosines between both spans as singular values.
+    let cosines = (&b * &least_squares.r_inverse)
+        .try_svd(false, false, f64::EPSILON, 10_000)
+        .ok_or(LeastSquaresError::NoConvergence)?;
+    let strength = cosines.singular_values.min();
+    let b_inverse = b
+        .clone()
+        .try_inverse()
+        .filter(|_| strength > WEAKEST)
+        .ok_or(weak(strength))?;
+    let r_inverse = r_z
+        .solve_upper_triangular(&DMatrix::identity(n, n))
+        .filter(|inverse| inverse.iter().all(|x| x.is_finite()))
+        .ok_or(weak(strength))?;
+    let values = b.lu().solve(&right).ok_or(weak(strength))?;
+    let mut solution = least_squares.clone();
+    let r_w = crate::Triangle::of(&plain);
+    let misfit = r_w.right() - r_w.r() * &values;
+    solution.residual_norm = misfit.norm().hypot(r_w.corner());
+    solution.values = values.iter().copied().collect();
+    let to_parameters = &b_inverse * r_inverse.transpose();
+    solution.r_inverse = b_inverse;
+    let sigma = solution.residual_variance().sqrt();
+    solution.classical_std = (0..n)
+        .map(|i| sigma * solution.r_inverse.row(i).norm())
+        .collect();
+    Ok(Solved {
+        solution,
+        least_squares,
+        strength,
+        to_parameters,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_noise::Noise;
+
+    type Rows = (Vec<f64>, Vec<f64>);
+
+    /// A spring and a constant force on a coordinate whose encoder is noisy; the force follows the noisy coordinate through
+    /// a controller, so that both errors are the same. Instruments: the coordinate that was asked for.
+    fn rows(seed: u64, samples: i32) -> Rows {
+        let mut noise = Noise::new(seed);
+        let (mut rows, mut y) = (Vec::new(), Vec::new());
+        for i in 0..samples {
+            let t = 0.02 * f64::from(i);
+            let reference = t.sin() + 0.5 * (2.3 * t).sin();
+            let seen = reference + 0.3 * noise.normal();
+            rows.extend([reference, 1.0, seen, 1.0]);
+            y.push(4.0 * reference - 1.0 - 0.5 * (seen - reference) + 0.1 * noise.normal());
+        }
+        (rows, y)
+    }
+
+    fn found((rows, y): &Rows) -> Instrumented {
+        instrumental(2, 1, |visit| -> Result<(), LeastSquaresError> {
+            visit(rows, y)
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn instruments_remove_the_bias_that_more_samples_do_not() {
+        let (mut worst, mut inside) = (0.0_f64, 0.0);
+        for seed in 0..100 {
+            let data = rows(seed, 2000);
+            let one = found(&data);
+            let bias = one.least_squares.values[0] - 4.0;
+            assert!(bias < -0.4, "least squares is off by {bias} only");
+            worst = worst.max((one.solution.values[0] - 4.0).abs());
+            let error = (one.solution.values[0] - 4.0).abs();
+            inside += f64::from(u8::from(error <= 2.0 * one.deviations.std[0]));
+            assert!(one.strength > 0.9);
+        }
+        assert!(worst < 0.2, "{worst}");
+        assert!(
+            (88.0..=100.0).contains(&inside),
+            "{inside} of 100 within two deviations"
+        );
+    }
+
+    /// The formula with products of rows, which the reflections avoid.
+    #[test]
+    fn reflections_give_the_textbook_solution() {
+        let (rows, y) = rows(3, 500);
+        let table = DMatrix::from_row_slice(500, 4, &rows);
+        let (z, w) = (
+            table.columns(0, 2).clone_owned(),
+            table.columns(2, 2).clone_owned(),
+        );
+        let y_vector = DVector::from_column_slice(&y);
+        let expected = (z.transpose() * &w)
+            .lu()
+            .solve(&(z.transpose() * y_vector))
+            .unwrap();
+        let one = found(&(rows, y));
+        for j in 0..2 {
+            assert!((one.solution.values[j] - expected[j]).abs() < 1e-12 * expected[j].abs());
+        }
+        let same: Vec<f64> = table
+            .row_iter()
+            .flat_map(|r| [r[2], r[3], r[2], r[3]])
+            .collect();
+        let plain = found(&(same, one_right(3)));
+        for j in 0..2 {
+            assert!((plain.solution.values[j] - plain.least_squares.values[j]).abs() < 1e-10);
+        }
+    }
+
+    fn one_right(seed: u64) -> Vec<f64> {
+        rows(seed, 500).1
+    }
+
+    #[test]
+    fn instruments_of_another_motion_are_refused() {
+        let rows: Vec<f64> = (0..1000)
+            .flat_map(|i| {
+                let t = f64::from(i) * std::f64::consts::PI / 500.0;
+                [(2.0 * t).sin(), t.sin()]
+            })
+            .collect();
+        let y: Vec<f64> = (0..1000).map(f64::from).collect();
+        let error = instrumental(1, 1, |visit| visit(&rows, &y)).unwrap_err();
+        assert!(
+            matches!(error, LeastSquaresError::WeakInstruments { .. }),
+            "{error}"
+        );
+    }
+}

@@ -1,0 +1,644 @@
+//! Least squares, eq. (12) of the paper: `p_min = argmin |W p - y|`, from a stream of rows.
+//!
+//! Rows go in block by block and are reduced at once by Householder reflections to the upper
+//! triangle `[R | Q'y]` with the residual norm in its corner, so the memory needed does not
+//! depend on the number of samples and the normal equations, which would square the condition
+//! number, are never formed. Rows of one channel are reduced together: the force of a joint does
+//! not depend on the links before it, and columns that are zero in a whole block cost nothing.
+//! Sources: G. H. Golub, "Numerical methods for solving linear least squares problems", Numer.
+//! Math. 7 (1965); J. Demmel et al., "Communication-optimal parallel and sequential QR and LU
+//! factorizations", SIAM J. Sci. Comput. 34 (2012) for the sequential tall-skinny form;
+//! A. van der Sluis (1969) for scaling columns to equal norm.
+
+use std::fmt;
+
+use nalgebra::DMatrix;
+
+use crate::estimate::reflections::{Block, LANES, fold};
+use crate::estimate::solution::{RowCount, Solution, solve_triangle};
+
+/// Why a regression cannot be set up or solved.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum LeastSquaresError {
+    /// The regressor has no columns.
+    NoParameters,
+    /// Rows and measured values do not fit together.
+    Shape {
+        /// Numbers of the regressor given.
+        regressor: usize,
+        /// Measured values given.
+        measured: usize,
+        /// Columns of the regressor.
+        columns: usize,
+    },
+    /// A block does not hold whole samples of all channels.
+    Channels {
+        /// Rows of the block.
+        rows: usize,
+        /// Rows per sample.
+        channels: usize,
+    },
+    /// A number of the regressor or of the measured values is NaN or infinite.
+    NotFinite {
+        /// Row among all that were given, from 0.
+        row: usize,
+        /// Column of the regressor; `None` for the measured value.
+        column: Option<usize>,
+    },
+    /// No rows were given.
+    NoRows,
+    /// The list of nominal values has another length than the parameters.
+    NominalLength {
+        /// Values given.
+        have: usize,
+        /// Parameters.
+        expected: usize,
+    },
+    /// The singular value iteration did not converge; only extreme numbers can cause it.
+    NoConvergence,
+    /// The instruments say too little about the regressor.
+    WeakInstruments {
+        /// The smallest canonical correlation between both.
+        correlation: f64,
+    },
+    /// The second pass over the rows did not show the rows of the first.
+    PassesDiffer {
+        /// Rows of the first pass.
+        first: usize,
+        /// Rows of this pass.
+        now: usize,
+    },
+}
+
+impl fmt::Display for LeastSquaresError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoParameters => f.write_str("there is no parameter to identify; the regressor has no columns"),
+            Self::Shape { regressor, measured, columns } => write!(
+                f,
+                "{regressor} numbers of the regressor do not make {measured} rows of {columns} columns"
+            ),
+            Self::Channels { rows, channels } => {
+                write!(f, "{rows} rows are not whole samples of {channels} channels; give whole samples in each block")
+            }
+            Self::NotFinite { row, column: Some(column) } => write!(
+                f,
+                "column {column} of the regressor is not finite in row {row}; \
+                 is the mechanism out of reach or singular there?"
+            ),
+            Self::NotFinite { row, column: None } => write!(f, "the measured value of row {row} is not finite"),
+            Self::NoRows => f.write_str("there are no samples to identify from"),
+            Self::NominalLength { have, expected } => {
+                write!(f, "{have} nominal values were given for {expected} parameters")
+            }
+            Self::NoConvergence => f.write_str(
+                "the singular values do not converge; the numbers of the regressor differ too much in size",
+            ),
+            Self::WeakInstruments { correlation } => write!(
+                f,
+                "the instruments do not determine the parameters: the smallest canonical correlation between them and the \
+                 regressor is {correlation:.1e}; are they of the same motion, and in step with the recording? Does the \
+                 recording itself determine all parameters? Identify without instruments to see"
+            ),
+            Self::PassesDiffer { first, now } => write!(
+                f,
+                "the second pass showed {now} rows where the first showed {first}; show the same rows in all passes"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for LeastSquaresError {}
+
+/// Numbers that are reduced together at most, so that they stay in the fastest caches.
+const BLOCK_NUMBERS: usize = 4096;
+
+/// Rows that are reduced together for that many columns.
+fn block_rows(width: usize) -> usize {
+    (BLOCK_NUMBERS / width)
+        .clamp(64, 512)
+        .next_multiple_of(LANES)
+}
+
+/// A regression that takes its rows block by block.
+///
+/// ```
+/// use modelmill_identify::LeastSquares;
+/// let mut regression = LeastSquares::new(2);
+/// // Two columns, row by row: the constant and the time.
+/// regression.add_rows(&[1.0, 0.0, 1.0, 1.0, 1.0, 2.0], &[1.0, 3.0, 5.0])?;
+/// let solution = regression.solve()?;
+/// assert!((solution.values[1] - 2.0).abs() < 1e-12);
+/// # Ok::<(), modelmill_identify::LeastSquaresError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct LeastSquares {
+    n_parameters: usize,
+    rows: usize,
+    /// Rows of zeros among them.
+    idle: usize,
+    /// `(n + 1) x (n + 1)`, row-major upper triangle `[R, Q'y; 0, +-|residual|]`.
+    triangle: Vec<f64>,
+    /// Rows per block.
+    block_rows: usize,
+    /// For each channel a block of rows.
+    channels: Vec<Pending>,
+}
+
+/// Rows that wait to be reduced: `n + 1` columns of `block_rows`, filled up to `rows`.
+#[derive(Debug, Clone)]
+struct Pending {
+    block: Vec<f64>,
+    rows: usize,
+}
+
+impl LeastSquares {
+    /// A regression for `n_parameters` parameters, without rows yet.
+    pub fn new(n_parameters: usize) -> Self {
+        Self::with_channels(n_parameters, 1)
+    }
+
+    /// The same for rows that take turns between channels (`row = sample * channels + channel`): those of one channel are
+    /// reduced together, which saves work where a channel does not depend on all parameters. The result is the same.
+    pub fn with_channels(n_parameters: usize, channels: usize) -> Self {
+        let width = n_parameters + 1;
+        let block_rows = block_rows(width);
+        let pending = Pending {
+            block: vec![0.0; width * block_rows],
+            rows: 0,
+        };
+        Self {
+            n_parameters,
+            rows: 0,
+            idle: 0,
+            triangle: vec![0.0; width * width],
+            block_rows,
+            channels: vec![pending; channels.max(1)],
+        }
+    }
+
+    /// Number of parameters.
+    pub fn n_parameters(&self) -> usize {
+        self.n_parameters
+    }
+
+    /// Rows taken so far.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    pub(crate) fn row_count(&self) -> RowCount {
+        RowCount {
+            shown: self.rows,
+            telling: self.rows - self.idle,
+        }
+    }
+
+    /// Takes rows: `regressor[row * n_parameters + column]` and `measured[row]`.
+    /// To weigh a row, scale it and its measured value.
+    /// Fails when the lengths do not fit or a number is not finite; nothing is taken then.
+    pub fn add_rows(
+        &mut self,
+        regressor: &[f64],
+        measured: &[f64],
+    ) -> Result<(), LeastSquaresError> {
+        let n = self.n_parameters;
+        check_rows(regressor, measured, n, self.rows)?;
+        let n_channels = self.channels.len();
+        for (i, (row, y)) in regressor.chunks_exact(n).zip(measured).enumerate() {
+            let channel = (self.rows + i) % n_channels;
+            let (stride, pending) = (self.block_rows, &mut self.channels[channel]);
+            for (column, value) in row.iter().enumerate() {
+                pending.block[column * stride + pending.rows] = *value;
+            }
+            pending.block[n * stride + pending.rows] = *y;
+            pending.rows += 1;
+            self.idle += usize::from(is_left_out(row, *y));
+            if pending.rows == stride {
+                self.reduce_block(channel);
+            }
+        }
+        self.rows += measured.len();
+        Ok(())
+    }
+
+    /// Takes rows of one channel, column by column: the fastest way in. All columns are as long as `measured`.
+    /// Fails as [`LeastSquares::add_rows`] does; nothing is taken then.
+    ///
+    /// ```
+    /// use modelmill_identify::LeastSquares;
+    /// let mut regression = LeastSquares::new(2);
+    /// regression.add_columns(0, &[&[1.0, 1.0, 1.0], &[0.0, 1.0, 2.0]], &[1.0, 3.0, 5.0])?;
+    /// assert!((regression.solve()?.values[1] - 2.0).abs() < 1e-12);
+    /// # Ok::<(), modelmill_identify::LeastSquaresError>(())
+    /// ```
+    pub fn add_columns(
+        &mut self,
+        channel: usize,
+        columns: &[&[f64]],
+        measured: &[f64],
+    ) -> Result<(), LeastSquaresError> {
+        let n = self.n_parameters;
+        if n == 0 {
+            return Err(LeastSquaresError::NoParameters);
+        }
+        let rows = measured.len();
+        if columns.len() != n || columns.iter().any(|column| column.len() != rows) {
+            return Err(LeastSquaresError::Shape {
+                regressor: columns.iter().map(|column| column.len()).sum(),
+                measured: rows,
+                columns: n,
+            });
+        }
+        let all = columns
+            .iter()
+            .map(|column| (*column, true))
+            .chain([(measured, false)]);
+        for (place, (column, is_regressor)) in all.enumerate() {
+            if !all_finite(column)
+                && let Some(i) = column.iter().position(|value| !value.is_finite())
+            {
+                return Err(LeastSquaresError::NotFinite {
+                    row: self.rows + i,
+                    column: is_regressor.then_some(place),
+                });
+            }
+        }
+        // Few measured values are zero, so that this costs next to nothing.
+        let silent = measured.iter().enumerate().filter(|(_, y)| **y == 0.0);
+        self.idle += silent
+            .filter(|(i, _)| columns.iter().all(|column| column[*i] == 0.0))
+            .count();
+        let channel = channel % self.channels.len();
+        let stride = self.block_rows;
+        let mut done = 0;
+        while done < rows {
+            let pending = &mut self.channels[channel];
+            let (from, more) = (pending.rows, (stride - pending.rows).min(rows - done));
+            let slots = pending.block.chunks_exact_mut(stride);
+            for (slot, column) in slots.zip(columns.iter().chain([&measured])) {
+                slot[from..from + more].copy_from_slice(&column[done..done + more]);
+            }
+            pending.rows += more;
+            done += more;
+            if pending.rows == stride {
+                self.reduce_block(channel);
+            }
+        }
+        self.rows += rows;
+        Ok(())
+    }
+
+    /// Folds in another regression for the same parameters, e.g. one that ran on another core.
+    /// Fails when the numbers of parameters differ.
+    pub fn merge(&mut self, mut other: Self) -> Result<(), LeastSquaresError> {
+        let n = self.n_parameters;
+        if other.n_parameters != n {
+            return Err(LeastSquaresError::NominalLength {
+                have: other.n_parameters,
+                expected: n,
+            });
+        }
+        other.reduce();
+        let (rows, idle) = (self.rows + other.rows, self.idle + other.idle);
+        for row in other.triangle.chunks_exact(n + 1) {
+            self.add_rows(&row[..n], &row[n..])?;
+        }
+        (self.rows, self.idle) = (rows, idle);
+        Ok(())
+    }
+
+    /// Folds the pending rows of a channel into the triangle.
+    fn reduce_block(&mut self, channel: usize) {
+        let (stride, pending) = (self.block_rows, &mut self.channels[channel]);
+        let rows = pending.rows.next_multiple_of(LANES);
+        for column in pending.block.chunks_exact_mut(stride) {
+            column[pending.rows..rows].fill(0.0);
+        }
+        let block = Block {
+            columns: &mut pending.block,
+            stride,
+            rows,
+        };
+        fold(&mut self.triangle, block);
+        pending.rows = 0;
+    }
+
+    /// Folds all pending rows into the triangle.
+    fn reduce(&mut self) {
+        for channel in 0..self.channels.len() {
+            self.reduce_block(channel);
+        }
+    }
+
+    /// The whole triangle `[R, Q'y; 0, +-|residual|]`, `(n + 1) x (n + 1)` by rows.
+    pub(crate) fn reduced(&self) -> Vec<f64> {
+        let mut complete = self.clone();
+        complete.reduce();
+        complete.triangle
+    }
+
+    /// The triangle `R` of the regressor, `n x n`: same singular values, same column norms and
+    /// same dependencies as the stacked regressor.
+    pub fn triangle(&self) -> DMatrix<f64> {
+        let (n, triangle) = (self.n_parameters, self.reduced());
+        DMatrix::from_fn(n, n, |i, j| triangle[i * (n + 1) + j])
+    }
+
+    /// The least-squares solution. Where the rows do not determine all parameters, the
+    /// undetermined directions keep the value 0 (in columns of equal norm: the shortest
+    /// solution), and [`Solution::undetermined`] names them.
+    /// Fails when there are no rows or no parameters.
+    pub fn solve(&self) -> Result<Solution, LeastSquaresError> {
+        self.solve_near(&vec![0.0; self.n_parameters])
+    }
+
+    /// [`LeastSquares::solve`], but undetermined directions stay at `nominal`. Determined
+    /// parameters do not depend on `nominal`.
+    pub fn solve_near(&self, nominal: &[f64]) -> Result<Solution, LeastSquaresError> {
+        let n = self.n_parameters;
+        if n == 0 {
+            return Err(LeastSquaresError::NoParameters);
+        }
+        if nominal.len() != n {
+            return Err(LeastSquaresError::NominalLength {
+                have: nominal.len(),
+                expected: n,
+            });
+        }
+        if self.rows == 0 {
+            return Err(LeastSquaresError::NoRows);
+        }
+        solve_triangle(&self.reduced(), self.row_count(), nominal)
+    }
+}
+
+/// Whether a row was given the weight 0, or says nothing for another reason: its residual is no sample of any noise.
+pub(crate) fn is_left_out(row: &[f64], measured: f64) -> bool {
+    measured == 0.0 && row.iter().all(|w| *w == 0.0)
+}
+
+/// Checks one block of rows; `before` rows came earlier.
+pub(crate) fn check_rows(
+    regressor: &[f64],
+    measured: &[f64],
+    columns: usize,
+    before: usize,
+) -> Result<(), LeastSquaresError> {
+    if columns == 0 {
+        return Err(LeastSquaresError::NoParameters);
+    }
+    if regressor.len() != measured.len() * columns {
+        return Err(LeastSquaresError::Shape {
+            regressor: regressor.len(),
+            measured: measured.len(),
+            columns,
+        });
+    }
+    if !all_finite(regressor)
+        && let Some(i) = regressor.iter().position(|value| !value.is_finite())
+    {
+        return Err(LeastSquaresError::NotFinite {
+            row: before + i / columns,
+            column: Some(i % columns),
+        });
+    }
+    if !all_finite(measured)
+        && let Some(i) = measured.iter().position(|value| !value.is_finite())
+    {
+        return Err(LeastSquaresError::NotFinite {
+            row: before + i,
+            column: None,
+        });
+    }
+    Ok(())
+}
+
+/// Whether all numbers are finite; a sum is not when a summand is not. Independent sums go at the speed of memory.
+fn all_finite(values: &[f64]) -> bool {
+    let mut sums = [0.0; 8];
+    let eights = values.chunks_exact(8);
+    let rest: f64 = eights.remainder().iter().sum();
+    for eight in eights {
+        for lane in 0..8 {
+            sums[lane] += 0.0 * eight[lane];
+        }
+    }
+    (sums.iter().sum::<f64>() + 0.0 * rest).is_finite()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DVector;
+
+    use super::*;
+    use crate::test_noise::Noise;
+
+    #[track_caller]
+    fn near(actual: f64, expected: f64, relative: f64) {
+        assert!(
+            (actual - expected).abs() <= relative * expected.abs().max(1e-300),
+            "{actual} instead of {expected}"
+        );
+    }
+
+    /// 1 to degree 6 in 1000 points, in one go and in odd pieces, against nalgebra's own QR.
+    #[test]
+    fn streaming_equals_a_dense_solution() {
+        let mut noise = Noise::new(1);
+        let (n, rows) = (7, 1003);
+        let w = DMatrix::from_fn(rows, n, |i, j| {
+            (i as f64 / 500.0 - 1.0).powi(i32::try_from(j).unwrap())
+        });
+        let y = DVector::from_fn(rows, |i, _| (i as f64 / 100.0).sin() + 0.1 * noise.normal());
+        let flat: Vec<f64> = w.transpose().iter().copied().collect();
+        let mut pieces = LeastSquares::new(n);
+        let mut done = 0;
+        for size in [1, 2, 300, 5, 255, 256, 184] {
+            pieces
+                .add_rows(
+                    &flat[done * n..(done + size) * n],
+                    &y.as_slice()[done..done + size],
+                )
+                .unwrap();
+            done += size;
+        }
+        assert_eq!(done, rows);
+        let dense = w.clone().svd(true, true).solve(&y, 0.0).unwrap();
+        let solution = pieces.solve().unwrap();
+        for j in 0..n {
+            near(solution.values[j], dense[j], 1e-11);
+        }
+        near(solution.residual_norm, (&w * &dense - &y).norm(), 1e-12);
+        near(solution.measured_norm, y.norm(), 1e-12);
+        let s = w.clone().svd(false, false).singular_values;
+        near(solution.condition_number, s.max() / s.min(), 1e-10);
+        let covariance = (w.transpose() * &w).try_inverse().unwrap();
+        let variance = (&w * &dense - &y).norm_squared() / (rows - n) as f64;
+        for j in 0..n {
+            near(
+                solution.classical_std[j],
+                (variance * covariance[(j, j)]).sqrt(),
+                1e-9,
+            );
+        }
+        let mut halves = LeastSquares::new(n);
+        let mut second = LeastSquares::new(n);
+        halves
+            .add_rows(&flat[..401 * n], &y.as_slice()[..401])
+            .unwrap();
+        second
+            .add_rows(&flat[401 * n..], &y.as_slice()[401..])
+            .unwrap();
+        halves.merge(second).unwrap();
+        assert_eq!(halves.rows(), rows);
+        near(halves.solve().unwrap().values[3], dense[3], 1e-11);
+    }
+
+    /// Rows of three channels, of which the later ones do not see the first columns: by rows, by channels and by columns.
+    #[test]
+    fn channels_and_columns_reduce_to_the_same_triangle() {
+        let mut noise = Noise::new(6);
+        let (n, samples) = (11, 777);
+        let sees = |channel: usize, j: usize| j >= 4 * channel;
+        let w: Vec<f64> = (0..3 * samples * n)
+            .map(|i| {
+                if sees(i / n % 3, i % n) {
+                    noise.normal()
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        let y: Vec<f64> = (0..3 * samples).map(|_| noise.normal()).collect();
+        let mut by_rows = LeastSquares::new(n);
+        by_rows.add_rows(&w, &y).unwrap();
+        let mut by_channels = LeastSquares::with_channels(n, 3);
+        for (w, y) in w.chunks(3 * n * 50).zip(y.chunks(3 * 50)) {
+            by_channels.add_rows(w, y).unwrap();
+        }
+        let mut by_columns = LeastSquares::with_channels(n, 3);
+        for start in (0..samples).step_by(64) {
+            let end = (start + 64).min(samples);
+            for channel in 0..3 {
+                let rows = (start..end).map(|sample| 3 * sample + channel);
+                let columns: Vec<Vec<f64>> = (0..n)
+                    .map(|j| rows.clone().map(|row| w[row * n + j]).collect())
+                    .collect();
+                let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+                let right: Vec<f64> = rows.map(|row| y[row]).collect();
+                by_columns.add_columns(channel, &columns, &right).unwrap();
+            }
+        }
+        let dense = DMatrix::from_row_slice(3 * samples, n, &w);
+        let expected = dense
+            .svd(true, true)
+            .solve(&DVector::from_column_slice(&y), 0.0)
+            .unwrap();
+        for regression in [&by_rows, &by_channels, &by_columns] {
+            assert_eq!(regression.rows(), 3 * samples);
+            let solution = regression.solve().unwrap();
+            for j in 0..n {
+                near(solution.values[j], expected[j], 1e-10);
+            }
+        }
+        let bad = [1.0, f64::NAN, 1.0];
+        let columns = vec![&bad[..]; n];
+        let error = by_columns.add_columns(0, &columns, &[1.0; 3]).unwrap_err();
+        assert_eq!(
+            error,
+            LeastSquaresError::NotFinite {
+                row: 3 * samples + 1,
+                column: Some(0)
+            }
+        );
+        assert!(by_columns.add_columns(0, &columns[1..], &[1.0; 3]).is_err());
+        assert_eq!(by_columns.rows(), 3 * samples);
+    }
+
+    /// The normal equations lose everything at a condition number of 1e8; the QR must not.
+    #[test]
+    fn an_ill_conditioned_problem_keeps_its_digits() {
+        let mut regression = LeastSquares::new(2);
+        for i in 0..1000 {
+            let t = f64::from(i) / 1000.0;
+            let row = [1.0, 1.0 + 1e-8 * t];
+            regression
+                .add_rows(&row, &[3.0 * row[0] - 2.0 * row[1]])
+                .unwrap();
+        }
+        let solution = regression.solve().unwrap();
+        near(solution.values[0], 3.0, 1e-6);
+        near(solution.values[1], -2.0, 1e-6);
+        assert_eq!(solution.rank, 2);
+    }
+
+    #[test]
+    fn what_is_not_determined_is_named_and_stays_nominal() {
+        let mut regression = LeastSquares::new(4);
+        for i in 0..200 {
+            let t = f64::from(i);
+            let (a, b) = ((0.1 * t).sin(), (0.23 * t).cos());
+            // Columns: a, b, 2 a - or so they say - and nothing at all.
+            regression
+                .add_rows(&[a, b, 2.0 * a, 0.0], &[7.0 * a + 5.0 * b])
+                .unwrap();
+        }
+        let nominal = [1.0, 1.0, 1.0, 1.0];
+        let solution = regression.solve_near(&nominal).unwrap();
+        assert_eq!(solution.rank, 2);
+        assert_eq!(solution.determined, [false, true, false, false]);
+        near(solution.values[1], 5.0, 1e-12);
+        near(solution.values[0] + 2.0 * solution.values[2], 7.0, 1e-12);
+        near(solution.values[3], 1.0, 1e-12);
+        assert!(solution.classical_std[0].is_infinite() && solution.classical_std[1].is_finite());
+        assert!(solution.condition_number.is_infinite());
+        let names: Vec<String> = ["p1", "p2", "p3", "p4"].map(str::to_owned).into();
+        let mut says = solution.says_undetermined(&names);
+        says.sort();
+        assert_eq!(
+            says,
+            [
+                "only a combination of p1 and p3 is determined: p1 + 1 with p3 - 0.5 changes nothing",
+                "p4 has no effect on these samples"
+            ]
+        );
+    }
+
+    #[test]
+    fn faulty_input_is_an_error_and_takes_nothing() {
+        let mut regression = LeastSquares::new(2);
+        assert_eq!(regression.solve().unwrap_err(), LeastSquaresError::NoRows);
+        assert!(regression.add_rows(&[1.0, 2.0, 3.0], &[1.0]).is_err());
+        let error = regression
+            .add_rows(&[1.0, 2.0, 3.0, f64::NAN], &[1.0, 2.0])
+            .unwrap_err();
+        assert_eq!(
+            error,
+            LeastSquaresError::NotFinite {
+                row: 1,
+                column: Some(1)
+            }
+        );
+        let error = regression
+            .add_rows(&[1.0, 2.0], &[f64::INFINITY])
+            .unwrap_err();
+        assert_eq!(
+            error,
+            LeastSquaresError::NotFinite {
+                row: 0,
+                column: None
+            }
+        );
+        assert_eq!(regression.rows(), 0);
+        assert_eq!(
+            LeastSquares::new(0).solve().unwrap_err(),
+            LeastSquaresError::NoParameters
+        );
+        regression.add_rows(&[1.0, 2.0], &[1.0]).unwrap();
+        let single = regression.solve().unwrap();
+        assert_eq!(single.rank, 1);
+        assert!(single.residual_variance().is_nan() || single.residual_norm < 1e-12);
+    }
+}

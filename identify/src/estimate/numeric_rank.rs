@@ -1,0 +1,314 @@
+//! Rank of a regressor on given values, eq. (9) of the paper, and the reduction that pivoted QR
+//! offers on them. Numeric throughout: valid for these values and these samples, to rounding;
+//! the exact reduction is another matter and another crate.
+//!
+//! Sources: G. H. Golub and C. F. Van Loan, "Matrix Computations", 5.5; M. Gautier, "Numerical
+//! calculation of the base inertial parameters of robots", J. Robotic Systems 8 (1991).
+
+use nalgebra::{ColPivQR, DMatrix};
+use serde::{Deserialize, Serialize};
+
+use crate::estimate::least_squares::LeastSquaresError;
+
+/// Rank of a regressor by its singular values.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NumericRank {
+    /// Singular values of the regressor with all columns scaled to norm 1, largest first;
+    /// columns that are zero throughout add zeros.
+    pub singular_values: Vec<f64>,
+    /// How many of them stand above the largest gap.
+    pub rank: usize,
+    /// Ratio of the last singular value that counts to the first that does not (or to the level
+    /// of rounding, when that is higher or all count). Below some 1e3 the rank is a matter of
+    /// opinion.
+    pub gap: f64,
+    /// Ratio of the first singular value to the last one that counts, of the scaled columns.
+    pub scaled_condition_number: f64,
+    /// The same for the regressor as it is, in its units.
+    pub condition_number: f64,
+}
+
+/// A numeric reduction: columns that are kept, and the others as combinations of them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NumericReduction {
+    /// Columns kept, in ascending order; as many as the rank.
+    pub kept: Vec<usize>,
+    /// The other columns, in ascending order.
+    pub dependencies: Vec<Dependency>,
+    /// Largest residual of a dependency, relative to the norm of its column.
+    pub largest_residual: f64,
+}
+
+/// `column = sum of factor * kept column`; no factors for a column that is zero throughout.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Dependency {
+    /// The column that is not kept.
+    pub column: usize,
+    /// `(kept column, factor)`, without factors that are zero to rounding.
+    pub factors: Vec<(usize, f64)>,
+}
+
+/// The numeric rank of a stacked regressor, or of the triangle
+/// [`LeastSquares::triangle`](crate::LeastSquares::triangle) that stands for it.
+///
+/// The rank is where the singular values of the scaled columns fall by the largest ratio; values
+/// below the level of rounding, `max(rows, columns) * epsilon * largest`, are taken as being at it.
+/// Fails when an entry is not finite or there are no columns.
+pub fn numeric_rank(w: &DMatrix<f64>) -> Result<NumericRank, LeastSquaresError> {
+    let (scaled, _) = scale(w)?;
+    let singular_values = singular_values(&scaled)?;
+    let largest = singular_values[0];
+    if largest == 0.0 {
+        return Ok(NumericRank {
+            singular_values,
+            rank: 0,
+            gap: f64::INFINITY,
+            scaled_condition_number: f64::INFINITY,
+            condition_number: f64::INFINITY,
+        });
+    }
+    let floor = largest * f64::EPSILON * w.nrows().max(w.ncols()) as f64;
+    let level = |i: usize| singular_values.get(i).map_or(floor, |s| s.max(floor));
+    let mut best = (1, 0.0);
+    for rank in 1..=singular_values.len() {
+        let gap = level(rank - 1) / level(rank);
+        if gap > best.1 {
+            best = (rank, gap);
+        }
+    }
+    let (rank, gap) = best;
+    let plain = self::singular_values(w)?;
+    Ok(NumericRank {
+        scaled_condition_number: largest / singular_values[rank - 1],
+        condition_number: plain[0] / plain[rank - 1],
+        singular_values,
+        rank,
+        gap,
+    })
+}
+
+/// Which `rank` columns to keep, by QR with column pivoting on columns of norm 1, and the numeric
+/// factors of the others: the fallback where no exact reduction is at hand.
+/// Fails when an entry is not finite or there are no columns; `rank` is cut to what there is.
+pub fn reduce_numerically(
+    w: &DMatrix<f64>,
+    rank: usize,
+) -> Result<NumericReduction, LeastSquaresError> {
+    let (scaled, norms) = scale(w)?;
+    let n = w.ncols();
+    let rank = rank
+        .min(n)
+        .min(w.nrows())
+        .min(norms.iter().filter(|norm| **norm > 0.0).count());
+    let qr = ColPivQR::new(scaled.clone());
+    let mut order = DMatrix::from_fn(1, n, |_, j| j);
+    qr.p().permute_columns(&mut order);
+    let mut kept: Vec<usize> = order.iter().copied().take(rank).collect();
+    kept.sort_unstable();
+    // Once the columns are chosen, their own QR gives the factors in the order of the file.
+    let basis = scaled.select_columns(&kept).qr();
+    let (q, r) = (basis.q(), basis.r());
+    let mut largest_residual: f64 = 0.0;
+    let mut dependencies = Vec::with_capacity(n - rank);
+    for column in (0..n).filter(|column| !kept.contains(column)) {
+        let mut factors = Vec::new();
+        if norms[column] > 0.0 && rank > 0 {
+            let target = scaled.column(column);
+            let coordinates = q.transpose() * target;
+            let solution = r
+                .solve_upper_triangular(&coordinates)
+                .ok_or(LeastSquaresError::NoConvergence)?;
+            largest_residual = largest_residual.max((target - &q * coordinates).norm());
+            for (&column_kept, factor) in kept.iter().zip(solution.iter()) {
+                if factor.abs() > 1e-9 {
+                    factors.push((column_kept, factor * norms[column] / norms[column_kept]));
+                }
+            }
+        }
+        dependencies.push(Dependency { column, factors });
+    }
+    Ok(NumericReduction {
+        kept,
+        dependencies,
+        largest_residual,
+    })
+}
+
+/// Columns whose norm is below this fraction of the largest one's are rounding noise, and count as zero: scaled to norm 1
+/// they would look like information.
+pub(crate) const NOISE_TOLERANCE: f64 = 1e-12;
+
+/// Sets norms that are rounding noise beside the largest one to zero.
+pub(crate) fn without_noise(norms: &mut [f64]) {
+    let largest = norms.iter().copied().fold(0.0, f64::max);
+    for norm in norms {
+        if *norm < NOISE_TOLERANCE * largest {
+            *norm = 0.0;
+        }
+    }
+}
+
+/// The matrix with columns of norm 1 (zero columns and rounding noise become zero), and the norms.
+fn scale(w: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<f64>), LeastSquaresError> {
+    if w.ncols() == 0 {
+        return Err(LeastSquaresError::NoParameters);
+    }
+    if w.nrows() == 0 {
+        return Err(LeastSquaresError::NoRows);
+    }
+    if let Some(i) = w.iter().position(|value| !value.is_finite()) {
+        return Err(LeastSquaresError::NotFinite {
+            row: i % w.nrows(),
+            column: Some(i / w.nrows()),
+        });
+    }
+    let mut norms: Vec<f64> = w.column_iter().map(|column| column.norm()).collect();
+    without_noise(&mut norms);
+    let mut scaled = w.clone();
+    for (mut column, norm) in scaled.column_iter_mut().zip(&norms) {
+        if *norm > 0.0 {
+            column.unscale_mut(*norm);
+        } else {
+            column.fill(0.0);
+        }
+    }
+    Ok((scaled, norms))
+}
+
+/// As many singular values as there are columns, largest first.
+fn singular_values(w: &DMatrix<f64>) -> Result<Vec<f64>, LeastSquaresError> {
+    // A tall matrix is reduced to its triangle first: same values, far less work.
+    let small = if w.nrows() > w.ncols() {
+        w.clone().qr().r()
+    } else {
+        w.clone()
+    };
+    let svd = small
+        .try_svd(false, false, f64::EPSILON, 10_000)
+        .ok_or(LeastSquaresError::NoConvergence)?;
+    let mut values: Vec<f64> = svd.singular_values.iter().copied().collect();
+    values.resize(w.ncols(), 0.0);
+    values.sort_by(|a, b| b.total_cmp(a));
+    Ok(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::LeastSquares;
+    use crate::test_noise::Noise;
+
+    /// Six columns of rank 3 in very different units, one of them zero.
+    fn sample() -> DMatrix<f64> {
+        let mut noise = Noise::new(8);
+        let free = DMatrix::from_fn(80, 3, |_, _| noise.normal());
+        DMatrix::from_fn(80, 6, |i, j| match j {
+            0 => free[(i, 0)],
+            1 => 1e-4 * free[(i, 1)],
+            2 => 1e3 * free[(i, 2)],
+            3 => 2.0 * free[(i, 0)] - 3.0 * free[(i, 1)],
+            4 => 0.0,
+            _ => 1e-2 * (free[(i, 2)] + 0.5 * free[(i, 1)]),
+        })
+    }
+
+    #[test]
+    fn the_rank_stands_at_the_gap() {
+        let rank = numeric_rank(&sample()).unwrap();
+        assert_eq!(rank.rank, 3);
+        assert!(
+            rank.gap > 1e10 && rank.scaled_condition_number < 10.0,
+            "{rank:?}"
+        );
+        assert_eq!(rank.singular_values.len(), 6);
+        let full = numeric_rank(&sample().columns(0, 3).into_owned()).unwrap();
+        assert_eq!(full.rank, 3);
+        assert!(full.gap > 1e10);
+        assert!((full.condition_number / 1e7 - 1.0).abs() < 0.5);
+    }
+
+    #[test]
+    fn the_triangle_of_a_stream_has_the_rank_of_its_rows() {
+        let w = sample();
+        let mut regression = LeastSquares::new(6);
+        for row in w.row_iter() {
+            let row: Vec<f64> = row.iter().copied().collect();
+            regression.add_rows(&row, &[0.0]).unwrap();
+        }
+        let (direct, streamed) = (
+            numeric_rank(&w).unwrap(),
+            numeric_rank(&regression.triangle()).unwrap(),
+        );
+        assert_eq!(direct.rank, streamed.rank);
+        for (a, b) in direct.singular_values.iter().zip(&streamed.singular_values) {
+            assert!((a - b).abs() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn pivoted_qr_gives_dependencies_that_hold() {
+        let w = sample();
+        let reduction = reduce_numerically(&w, 3).unwrap();
+        assert_eq!(reduction.kept.len(), 3);
+        assert!(reduction.largest_residual < 1e-13);
+        assert!(
+            reduction
+                .dependencies
+                .iter()
+                .any(|d| d.column == 4 && d.factors.is_empty())
+        );
+        for dependency in &reduction.dependencies {
+            for i in 0..w.nrows() {
+                let sum: f64 = dependency.factors.iter().map(|(k, a)| a * w[(i, *k)]).sum();
+                let scale = w.column(dependency.column).amax().max(1e-300);
+                assert!((sum - w[(i, dependency.column)]).abs() < 1e-12 * scale.max(1e-12));
+            }
+        }
+    }
+
+    /// A column of rounding noise was scaled to norm 1 and counted.
+    #[test]
+    fn rounding_noise_is_no_column() {
+        let mut noise = Noise::new(5);
+        let w = DMatrix::from_fn(80, 3, |_, j| noise.normal() * [1e3, 1e-4, 1e-13][j]);
+        let rank = numeric_rank(&w).unwrap();
+        assert_eq!(rank.rank, 2);
+        assert!(rank.gap > 1e10);
+        let reduction = reduce_numerically(&w, 3).unwrap();
+        assert_eq!(reduction.kept, [0, 1]);
+        assert_eq!(reduction.dependencies[0].factors, []);
+        let mut regression = LeastSquares::new(3);
+        for row in w.row_iter() {
+            let row: Vec<f64> = row.iter().copied().collect();
+            regression.add_rows(&row, &[row[0] + 2.0 * row[1]]).unwrap();
+        }
+        let solution = regression.solve_near(&[0.0, 0.0, 7.0]).unwrap();
+        assert_eq!(
+            (solution.rank, solution.values[2].to_bits()),
+            (2, 7.0_f64.to_bits())
+        );
+        assert_eq!(solution.determined, [true, true, false]);
+        assert!((solution.values[1] - 2.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn degenerate_matrices_are_no_trouble() {
+        assert!(numeric_rank(&DMatrix::zeros(3, 0)).is_err());
+        assert!(numeric_rank(&DMatrix::zeros(0, 3)).is_err());
+        assert!(numeric_rank(&DMatrix::from_element(3, 2, f64::NAN)).is_err());
+        assert_eq!(numeric_rank(&DMatrix::zeros(5, 3)).unwrap().rank, 0);
+        assert_eq!(
+            reduce_numerically(&DMatrix::zeros(5, 3), 2)
+                .unwrap()
+                .kept
+                .len(),
+            0
+        );
+        assert_eq!(
+            numeric_rank(&DMatrix::from_element(2, 5, 1.0))
+                .unwrap()
+                .rank,
+            1
+        );
+    }
+}

@@ -1,0 +1,110 @@
+//! Nominal values as soft constraints: a solution and what is believed beforehand go in, the most
+//! plausible parameters of both come out.
+//!
+//! Each belief is one more row, `p_j / s_j = nominal_j / s_j`, in units of the residuals' standard
+//! deviation (generalised Tikhonov regularisation; A. Tarantola, "Inverse Problem Theory", 2005,
+//! section 3.2). As neighbouring residuals repeat each other, a recording weighs only as much as
+//! its effective samples: the residuals' variance is inflated by the median of
+//! `(std / classical)^2` before the two are balanced.
+
+use nalgebra::DMatrix;
+
+use crate::estimate::deviations::Deviations;
+use crate::estimate::least_squares::LeastSquaresError;
+use crate::estimate::solution::Solution;
+use crate::estimate::triangle::Triangle;
+
+/// What is believed of one parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Belief {
+    /// The parameter, by position.
+    pub parameter: usize,
+    /// Its value beforehand.
+    pub value: f64,
+    /// The standard deviation of that value; positive.
+    pub std: f64,
+}
+
+/// The solution and its deviations when `beliefs` count as measurements.
+///
+/// `solution` and `deviations` are those of `triangle` alone. Parameters without a belief that the rows do not determine
+/// stay at `nominal`. The residual norm and the condition numbers remain those of the measured rows.
+/// Fails when a list has the wrong length or a number is not finite.
+pub fn with_prior(
+    triangle: &Triangle,
+    solution: &Solution,
+    deviations: &Deviations,
+    nominal: &[f64],
+    beliefs: &[Belief],
+) -> Result<(Solution, Deviations), LeastSquaresError> {
+    let n = triangle.n_parameters();
+    let noise = (solution.residual_variance() * inflation(solution, deviations)).sqrt();
+    // Without residuals the recording is believed as far as rounding allows.
+    let least = 1e-9 * solution.measured_norm / (solution.rows.max(1) as f64).sqrt();
+    let noise = if noise > least {
+        noise
+    } else {
+        least.max(f64::MIN_POSITIVE.sqrt())
+    };
+    let (mut rows, mut right) = (Vec::new(), Vec::new());
+    for belief in beliefs {
+        let factor = noise / belief.std;
+        let mut row = vec![0.0; n];
+        row[belief.parameter] = factor;
+        rows.extend(row);
+        right.push(factor * belief.value);
+    }
+    let both = triangle.with_rows(&rows, &right)?;
+    let mut found = both.solve_near(nominal)?;
+    let inverse = found.unit_covariance();
+    let r = triangle.r();
+    let information = r.transpose() * &r;
+    let scores = &information * &deviations.covariance * &information;
+    let mut prior = DMatrix::zeros(n, n);
+    for belief in beliefs {
+        prior[(belief.parameter, belief.parameter)] += (noise / belief.std).powi(2) * noise * noise;
+    }
+    let covariance = &inverse * (scores + prior) * &inverse;
+    let mut after = deviations.clone();
+    after.std = (0..n)
+        .map(|j| {
+            if found.determined[j] {
+                covariance[(j, j)].sqrt()
+            } else {
+                f64::INFINITY
+            }
+        })
+        .collect();
+    after.covariance = covariance;
+    let misfit = triangle.right() - &r * nalgebra::DVector::from_column_slice(&found.values);
+    found.residual_norm = misfit.norm().hypot(triangle.corner());
+    found.measured_norm = solution.measured_norm;
+    found.condition_number = solution.condition_number;
+    found.scaled_condition_number = solution.scaled_condition_number;
+    let variance = found.residual_variance();
+    found.classical_std = (0..n)
+        .map(|j| {
+            if found.determined[j] {
+                (variance * inverse[(j, j)]).sqrt()
+            } else {
+                f64::INFINITY
+            }
+        })
+        .collect();
+    Ok((found, after))
+}
+
+/// How much larger the variances are than for independent residuals: the median over the parameters, at least 1.
+pub(crate) fn inflation(solution: &Solution, deviations: &Deviations) -> f64 {
+    let mut ratios: Vec<f64> = deviations
+        .std
+        .iter()
+        .zip(&solution.classical_std)
+        .map(|(honest, classical)| (honest / classical).powi(2))
+        .filter(|ratio| ratio.is_finite())
+        .collect();
+    ratios.sort_by(f64::total_cmp);
+    ratios
+        .get(ratios.len() / 2)
+        .map_or(1.0, |ratio| ratio.max(1.0))
+}

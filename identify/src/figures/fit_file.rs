@@ -1,0 +1,539 @@
+//! The result of an identification as a file: what `identify --json` prints, and what
+//! `--parameters FIT.json` reads back.
+
+use std::fmt;
+use std::path::Path;
+
+use indexmap::IndexMap;
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use crate::estimate::deviations::Deviations;
+use crate::estimate::solution::Solution;
+use crate::figures::Figures;
+use crate::recording::error::list;
+use crate::recording::notes::{Note, nearest};
+
+/// A base parameter as the model describes it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterInfo {
+    /// Its name, such as `p1_min`.
+    pub name: String,
+    /// Its expression in the physical parameters.
+    pub expression: String,
+    /// Its unit.
+    pub unit: String,
+    /// Its value from the model file's nominal values, where all of them are given.
+    pub nominal: Option<f64>,
+}
+
+/// How a value of a fit came about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// The recordings say it.
+    #[default]
+    Identified,
+    /// The recordings do not say it: the value is the nearest to the nominal ones that fits.
+    Undetermined,
+    /// Left out at 0, as the recordings do not support it beside the others (`identify --essential`).
+    NotEssential,
+    /// A number of the model file, which was taken off the measured forces before the fit.
+    Known,
+}
+
+impl Status {
+    #[allow(
+        clippy::trivially_copy_pass_by_ref,
+        reason = "serde asks with a reference"
+    )]
+    fn is_identified(&self) -> bool {
+        *self == Self::Identified
+    }
+}
+
+/// A base parameter with its identified value.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FitParameter {
+    /// Its name, such as `p1_min`.
+    pub name: String,
+    /// Its expression in the physical parameters.
+    pub expression: String,
+    /// The identified value; the nominal one (or 0) where the recording does not determine it.
+    pub value: f64,
+    /// Standard deviation allowing for autocorrelated residuals; `null` where the parameter is not identified, and
+    /// where there are no more equations than parameters.
+    pub std: Option<f64>,
+    /// Standard deviation for independent residuals, for comparison only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub classical_std: Option<f64>,
+    /// How many independent samples would give the same standard deviation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub effective_samples: Option<f64>,
+    /// Unit of the values.
+    pub unit: String,
+    /// The value that the model file's nominal values give.
+    pub nominal: Option<f64>,
+    /// Left away for what is identified.
+    #[serde(default, skip_serializing_if = "Status::is_identified")]
+    pub status: Status,
+}
+
+/// An identification: the JSON of `identify`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FitFile {
+    /// Name of the model.
+    pub model: String,
+    /// Samples that the fit was made from, each of all channels.
+    pub samples: usize,
+    /// Condition number of the regressor (2-norm); `null` when its rank is deficient.
+    pub condition_number: Option<f64>,
+    /// The same for columns of norm 1.
+    #[serde(default)]
+    pub scaled_condition_number: Option<f64>,
+    /// The base parameters, in the order of the regressor's columns.
+    pub parameters: Vec<FitParameter>,
+    /// Covariance of the values, row by row in the order of `parameters`, in the products of their units; left away
+    /// where a deviation is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<Vec<Vec<f64>>>,
+    /// Values of the model's constants, on which the regressor and the expressions depend.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub constants: IndexMap<String, f64>,
+    /// What the recording does not determine, one sentence for each direction.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub undetermined: Vec<String>,
+    /// Error figures on the recordings of the fit.
+    pub fit: Figures,
+    /// Error figures on the recordings of the check, if any.
+    pub check: Option<Figures>,
+    /// Remarks on the data.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub data: Vec<Note>,
+}
+
+/// Why a fit file cannot be used.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitFileError {
+    /// The file as the user named it.
+    pub file: String,
+    /// What is wrong.
+    pub fault: FitFault,
+}
+
+/// The kinds of faults of a fit file.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum FitFault {
+    /// The file cannot be opened or read.
+    Unreadable {
+        /// The operating system's words.
+        reason: String,
+    },
+    /// The text is not the JSON of `identify`.
+    NotAFit {
+        /// Line of the fault.
+        line: usize,
+        /// Column of the fault.
+        column: usize,
+        /// What is wrong there.
+        reason: String,
+    },
+    /// The text does not begin as JSON does: a recording or a model file, perhaps.
+    NoJson,
+    /// A parameter of the model is not in the file.
+    MissingParameter {
+        /// The parameter.
+        name: String,
+        /// The closest name in the file.
+        nearest: Option<String>,
+        /// The names in the file.
+        present: Vec<String>,
+    },
+    /// The file holds parameters that the model does not have.
+    UnknownParameters {
+        /// Those parameters.
+        names: Vec<String>,
+    },
+    /// The file holds a parameter twice.
+    DuplicateParameter {
+        /// The parameter.
+        name: String,
+    },
+    /// A constant that an expression of the base parameters holds has another value.
+    OtherConstant {
+        /// The constant.
+        name: String,
+        /// Its value in the file.
+        file: f64,
+        /// Its value in the model.
+        model: f64,
+    },
+    /// A parameter has the same name but stands for another expression.
+    OtherExpression {
+        /// The parameter.
+        name: String,
+        /// The expression in the file.
+        file: String,
+        /// The expression of the model.
+        model: String,
+    },
+}
+
+impl fmt::Display for FitFileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let file = &self.file;
+        match &self.fault {
+            FitFault::Unreadable { reason } => {
+                write!(
+                    f,
+                    "{file}: the fit cannot be read: {reason}; make it with `modelmill identify ... --json > {file}`"
+                )
+            }
+            FitFault::NotAFit {
+                line,
+                column,
+                reason,
+            } => write!(
+                f,
+                "{file}, line {line}, column {column}: this is not the JSON that `modelmill identify --json` prints: \
+                 {reason}"
+            ),
+            FitFault::NoJson => write!(
+                f,
+                "{file} is no fit: the JSON that `modelmill identify ... --out FIT.json` writes is expected; recordings go \
+                 to --data, the model file comes first"
+            ),
+            FitFault::MissingParameter {
+                name,
+                nearest,
+                present,
+            } => {
+                write!(
+                    f,
+                    "{file}: the model's parameter `{name}` is not in the fit"
+                )?;
+                if let Some(nearest) = nearest {
+                    write!(f, " (the closest is `{nearest}`)")?;
+                }
+                write!(
+                    f,
+                    ", which holds {}; identify this model again",
+                    list(present)
+                )
+            }
+            FitFault::UnknownParameters { names } => write!(
+                f,
+                "{file}: the fit holds {}, which the model does not have; identify this model again",
+                list(names)
+            ),
+            FitFault::DuplicateParameter { name } => {
+                write!(f, "{file}: the fit holds `{name}` twice; remove one")
+            }
+            FitFault::OtherConstant {
+                name,
+                file: theirs,
+                model,
+            } => write!(
+                f,
+                "{file}: the fit was made with {name} = {theirs}, but the model has {name} = {model}, and base parameters \
+                 depend on it: identify again"
+            ),
+            FitFault::OtherExpression {
+                name,
+                file: theirs,
+                model,
+            } => write!(
+                f,
+                "{file}: `{name}` is `{theirs}` in the fit but `{model}` in the model; \
+                 the fit belongs to another model or to an earlier state of it: identify again"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for FitFileError {}
+
+/// The parameters of a fit file from the model's description, the solution and its deviations,
+/// all in the order of the regressor's columns (asserted to be of one length).
+pub fn fit_parameters(
+    infos: &[ParameterInfo],
+    solution: &Solution,
+    deviations: &Deviations,
+) -> Vec<FitParameter> {
+    assert_eq!(
+        infos.len(),
+        solution.values.len(),
+        "one description per column"
+    );
+    assert_eq!(
+        infos.len(),
+        deviations.std.len(),
+        "one deviation per column"
+    );
+    let finite = |value: f64| value.is_finite().then_some(value);
+    infos
+        .iter()
+        .enumerate()
+        .map(|(i, info)| FitParameter {
+            name: info.name.clone(),
+            expression: info.expression.clone(),
+            value: solution.values[i],
+            std: finite(deviations.std[i]),
+            classical_std: finite(solution.classical_std[i]),
+            effective_samples: finite(deviations.effective_samples[i]).filter(|x| *x > 0.0),
+            unit: info.unit.clone(),
+            nominal: info.nominal,
+            status: if solution.determined[i] {
+                Status::Identified
+            } else {
+                Status::Undetermined
+            },
+        })
+        .collect()
+}
+
+impl FitFile {
+    /// Covariance of some of the parameters, by their positions: the file's, or else the squares of its standard
+    /// deviations as if the values were independent; `None` where a deviation is missing. The flag says whether the
+    /// file's own was taken.
+    pub fn covariance_of(&self, parameters: &[usize]) -> Option<(DMatrix<f64>, bool)> {
+        let n = parameters.len();
+        let std: Option<Vec<f64>> = parameters
+            .iter()
+            .map(|k| self.parameters.get(*k)?.std)
+            .collect();
+        let std = std?;
+        let whole = self.covariance.as_ref().filter(|rows| {
+            let m = self.parameters.len();
+            rows.len() == m && rows.iter().all(|row| row.len() == m)
+        });
+        Some(match whole {
+            Some(rows) => {
+                let entry = |a: usize, b: usize| rows[parameters[a]][parameters[b]];
+                (DMatrix::from_fn(n, n, entry), true)
+            }
+            None => {
+                let diagonal = std.iter().map(|s| s * s);
+                let diagonal = DVector::from_iterator(n, diagonal);
+                (DMatrix::from_diagonal(&diagonal), false)
+            }
+        })
+    }
+
+    /// Reads a fit; fails when the file cannot be read or is something else.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, FitFileError> {
+        let path = path.as_ref();
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|error| FitFileError {
+            file: file.clone(),
+            fault: FitFault::Unreadable {
+                reason: error.to_string(),
+            },
+        })?;
+        Self::parse(&text, &file)
+    }
+
+    /// Reads a fit from its text; `file` is what messages call it.
+    pub fn parse(text: &str, file: &str) -> Result<Self, FitFileError> {
+        if !text.trim_start().starts_with('{') {
+            return Err(FitFileError {
+                file: file.to_owned(),
+                fault: FitFault::NoJson,
+            });
+        }
+        serde_json::from_str(text).map_err(|error| {
+            let full = error.to_string();
+            let reason = full.split(" at line ").next().unwrap_or(&full).to_owned();
+            let fault = FitFault::NotAFit {
+                line: error.line(),
+                column: error.column(),
+                reason,
+            };
+            FitFileError {
+                file: file.to_owned(),
+                fault,
+            }
+        })
+    }
+
+    /// Constants of the model whose values were others when the fit was made: `(name, value then, value now)`.
+    /// `model` holds `(name, value)`; a fit without constants, as earlier versions wrote it, has none that differ.
+    /// Fails when such a constant stands in an expression of the base parameters, which then are others.
+    /// `file` is what messages call the fit.
+    pub fn other_constants(
+        &self,
+        model: &[(&str, f64)],
+        file: &str,
+    ) -> Result<Vec<(String, f64, f64)>, FitFileError> {
+        let mut others = Vec::new();
+        for (name, now) in model {
+            let Some(then) = self.constants.get(*name) else {
+                continue;
+            };
+            if (then - now).abs() <= 1e-12 * then.abs().max(now.abs()) {
+                continue;
+            }
+            if self
+                .parameters
+                .iter()
+                .any(|p| mentions(&p.expression, name))
+            {
+                return Err(FitFileError {
+                    file: file.to_owned(),
+                    fault: FitFault::OtherConstant {
+                        name: (*name).to_owned(),
+                        file: *then,
+                        model: *now,
+                    },
+                });
+            }
+            others.push(((*name).to_owned(), *then, *now));
+        }
+        Ok(others)
+    }
+
+    /// The values for a model's base parameters, `(name, expression)` in the model's order.
+    /// `file` is what messages call the fit.
+    /// Fails when the parameters of the file are not exactly these.
+    pub fn values_for(&self, model: &[(&str, &str)], file: &str) -> Result<Vec<f64>, FitFileError> {
+        let fail = |fault| FitFileError {
+            file: file.to_owned(),
+            fault,
+        };
+        for (i, parameter) in self.parameters.iter().enumerate() {
+            if self.parameters[..i]
+                .iter()
+                .any(|other| other.name == parameter.name)
+            {
+                return Err(fail(FitFault::DuplicateParameter {
+                    name: parameter.name.clone(),
+                }));
+            }
+        }
+        let mut values = Vec::with_capacity(model.len());
+        for (name, expression) in model {
+            let Some(parameter) = self
+                .parameters
+                .iter()
+                .find(|parameter| parameter.name == *name)
+            else {
+                let present: Vec<String> = self.parameters.iter().map(|p| p.name.clone()).collect();
+                return Err(fail(FitFault::MissingParameter {
+                    name: (*name).to_owned(),
+                    nearest: nearest(name, present.iter().map(String::as_str)).map(str::to_owned),
+                    present,
+                }));
+            };
+            if parameter.expression != *expression {
+                return Err(fail(FitFault::OtherExpression {
+                    name: parameter.name.clone(),
+                    file: parameter.expression.clone(),
+                    model: (*expression).to_owned(),
+                }));
+            }
+            values.push(parameter.value);
+        }
+        let known = |name: &str| model.iter().any(|(ours, _)| *ours == name);
+        let unknown: Vec<String> = self
+            .parameters
+            .iter()
+            .map(|p| p.name.clone())
+            .filter(|name| !known(name))
+            .collect();
+        if unknown.is_empty() {
+            Ok(values)
+        } else {
+            Err(fail(FitFault::UnknownParameters { names: unknown }))
+        }
+    }
+}
+
+/// Whether a name stands in an expression.
+fn mentions(expression: &str, name: &str) -> bool {
+    expression
+        .split(|c: char| !(c.is_alphanumeric() || c == '_'))
+        .any(|word| word == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = r#"{"model": "axis", "samples": 10, "condition_number": 2.0,
+        "parameters": [
+            {"name": "p1_min", "expression": "m", "value": 95.1, "std": 0.2, "unit": "kg", "nominal": 90.0},
+            {"name": "p2_min", "expression": "fv", "value": 203.5, "std": null, "unit": "N s/m", "nominal": null}],
+        "fit": {"nrms": 0.04, "rms": 1.0, "samples": 10,
+            "channels": {"axis": {"nrms": 0.04, "mean_relative": 0.1, "max_abs": 3.0, "rms": 1.0, "zero_measured": 0}}},
+        "check": null}"#;
+
+    #[test]
+    fn a_fit_survives_writing_and_reading() {
+        let fit = FitFile::parse(TEXT, "fit.json").unwrap();
+        let again =
+            FitFile::parse(&serde_json::to_string_pretty(&fit).unwrap(), "fit.json").unwrap();
+        assert_eq!(fit, again);
+        assert_eq!(
+            fit.values_for(&[("p2_min", "fv"), ("p1_min", "m")], "fit.json")
+                .unwrap(),
+            [203.5, 95.1]
+        );
+    }
+
+    #[test]
+    fn other_constants_are_told_and_refused_where_parameters_hold_them() {
+        let text = TEXT
+            .replace("\"expression\": \"m\"", "\"expression\": \"m + L*m2\"")
+            .replace(
+                "\"parameters\"",
+                "\"constants\": {\"L\": 0.5, \"g\": 9.81}, \"parameters\"",
+            );
+        let fit = FitFile::parse(&text, "fit.json").unwrap();
+        let others = |model: &[(&str, f64)]| fit.other_constants(model, "fit.json");
+        assert_eq!(others(&[("L", 0.5), ("g", 9.81), ("new", 1.0)]), Ok(vec![]));
+        assert_eq!(
+            others(&[("L", 0.5), ("g", 9.80)]),
+            Ok(vec![("g".to_owned(), 9.81, 9.80)])
+        );
+        let says = others(&[("L", 0.6)]).unwrap_err().to_string();
+        assert!(
+            says.contains("L = 0.5") && says.contains("L = 0.6"),
+            "{says}"
+        );
+        let earlier = FitFile::parse(TEXT, "fit.json").unwrap();
+        assert_eq!(
+            earlier.other_constants(&[("m", 1.0)], "fit.json"),
+            Ok(vec![])
+        );
+    }
+
+    #[test]
+    fn a_fit_of_another_model_is_refused_with_the_reason() {
+        let fit = FitFile::parse(TEXT, "fit.json").unwrap();
+        let says =
+            |model: &[(&str, &str)]| fit.values_for(model, "fit.json").unwrap_err().to_string();
+        assert_eq!(
+            says(&[("p1_min", "m"), ("p3_min", "fc"), ("p2_min", "fv")]),
+            "fit.json: the model's parameter `p3_min` is not in the fit (the closest is `p1_min`), \
+             which holds `p1_min`, `p2_min`; identify this model again"
+        );
+        assert!(says(&[("p1_min", "m")]).contains("holds `p2_min`, which the model does not have"));
+        assert!(
+            says(&[("p1_min", "m + d"), ("p2_min", "fv")])
+                .contains("`m` in the fit but `m + d` in the model")
+        );
+        let broken = FitFile::parse(&TEXT.replace("\"fit\"", "\"fits\""), "fit.json")
+            .unwrap_err()
+            .to_string();
+        assert!(
+            broken.contains("line") && broken.contains("missing field `fit`"),
+            "{broken}"
+        );
+        let absent = FitFile::read("no/such/fit.json").unwrap_err().to_string();
+        assert!(
+            absent.contains("no/such/fit.json") && absent.contains("modelmill identify"),
+            "{absent}"
+        );
+    }
+}

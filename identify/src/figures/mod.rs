@@ -1,0 +1,286 @@
+//! Error figures: measured and model forces go in, the numbers of a comparison come out, as
+//! `identify` and `compare` print them.
+//!
+//! `nrms` is `|measured - model| / |measured|` in the 2-norm over the samples, all channels
+//! stacked for the total. `mean_relative` is the paper's mean of `|error| / |measured|`, whose
+//! peaks where the measured force passes through zero are the reason to read `nrms` beside it.
+//! `abs_ratio` is `sum |error| / sum |measured|`, as Volkmann et al. (IEEE ICMA 2020) give it.
+
+pub mod fit_file;
+pub mod locate;
+
+use std::fmt;
+
+use indexmap::IndexMap;
+use serde::{Deserialize, Serialize};
+
+/// Error figures of a comparison.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Figures {
+    /// Relative error over all channels stacked; absent when nothing but zero was measured.
+    pub nrms: Option<f64>,
+    /// Root mean square of the error over all channels, in the unit of the forces.
+    pub rms: f64,
+    /// Samples, each of all channels.
+    pub samples: usize,
+    /// The figures of each channel, in the order of the drives.
+    pub channels: IndexMap<String, ChannelFigures>,
+}
+
+/// Error figures of one channel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ChannelFigures {
+    /// Relative error; absent when nothing but zero was measured.
+    pub nrms: Option<f64>,
+    /// Mean of `|error| / |measured|` over samples with a measured value other than zero;
+    /// absent when there are none.
+    pub mean_relative: Option<f64>,
+    /// `sum |error| / sum |measured|`; absent when nothing but zero was measured.
+    #[serde(default)]
+    pub abs_ratio: Option<f64>,
+    /// Largest `|error|`, in the unit of the force.
+    pub max_abs: f64,
+    /// Root mean square of the error, in the unit of the force.
+    pub rms: f64,
+    /// Samples that `mean_relative` leaves out because exactly zero was measured.
+    pub zero_measured: usize,
+}
+
+/// Why figures cannot be computed.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum FiguresError {
+    /// Measured and model values differ in number, or are no whole samples of the channels.
+    Shape {
+        /// Measured values.
+        measured: usize,
+        /// Model values.
+        model: usize,
+        /// Channels.
+        channels: usize,
+    },
+    /// A value is NaN or infinite.
+    NotFinite {
+        /// The channel.
+        channel: String,
+        /// The sample, from 0.
+        sample: usize,
+    },
+    /// No samples were given.
+    NoSamples,
+}
+
+impl fmt::Display for FiguresError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Shape {
+                measured,
+                model,
+                channels,
+            } => write!(
+                f,
+                "{measured} measured and {model} model values are no matching samples of {channels} channels"
+            ),
+            Self::NotFinite { channel, sample } => write!(
+                f,
+                "the measured or the model force of `{channel}` is not finite in sample {sample}; \
+                 is the mechanism out of reach or singular there?"
+            ),
+            Self::NoSamples => f.write_str("there are no samples to compare"),
+        }
+    }
+}
+
+impl std::error::Error for FiguresError {}
+
+/// Takes samples block by block; its memory does not depend on their number.
+///
+/// ```
+/// use modelmill_identify::figures::Comparison;
+/// let mut comparison = Comparison::new(["left".to_owned(), "right".to_owned()]);
+/// comparison.add(&[3.0, 4.0], &[3.0, 5.0])?;
+/// let figures = comparison.finish()?;
+/// assert_eq!(figures.nrms, Some(0.2));
+/// assert_eq!(figures.channels["right"].mean_relative, Some(0.25));
+/// # Ok::<(), modelmill_identify::FiguresError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Comparison {
+    channels: IndexMap<String, Sums>,
+    samples: usize,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Sums {
+    error: f64,
+    measured: f64,
+    relative: f64,
+    abs_error: f64,
+    abs_measured: f64,
+    max_abs: f64,
+    zero_measured: usize,
+}
+
+impl Comparison {
+    /// A comparison of the named channels, without samples yet.
+    pub fn new(channels: impl IntoIterator<Item = String>) -> Self {
+        Self {
+            channels: channels
+                .into_iter()
+                .map(|name| (name, Sums::default()))
+                .collect(),
+            samples: 0,
+        }
+    }
+
+    /// Takes whole samples, interleaved `[sample * n_channels + channel]`.
+    /// Fails when the lengths do not fit or a value is not finite.
+    pub fn add(&mut self, measured: &[f64], model: &[f64]) -> Result<(), FiguresError> {
+        let channels = self.channels.len();
+        if channels == 0
+            || measured.len() != model.len()
+            || !measured.len().is_multiple_of(channels)
+        {
+            return Err(FiguresError::Shape {
+                measured: measured.len(),
+                model: model.len(),
+                channels,
+            });
+        }
+        for (measured, model) in measured
+            .chunks_exact(channels)
+            .zip(model.chunks_exact(channels))
+        {
+            for ((name, sums), (y, m)) in self.channels.iter_mut().zip(measured.iter().zip(model)) {
+                let error = (y - m).abs();
+                if !error.is_finite() {
+                    return Err(FiguresError::NotFinite {
+                        channel: name.clone(),
+                        sample: self.samples,
+                    });
+                }
+                sums.error += error * error;
+                sums.measured += y * y;
+                sums.abs_error += error;
+                sums.abs_measured += y.abs();
+                sums.max_abs = sums.max_abs.max(error);
+                if *y == 0.0 {
+                    sums.zero_measured += 1;
+                } else {
+                    sums.relative += error / y.abs();
+                }
+            }
+            self.samples += 1;
+        }
+        Ok(())
+    }
+
+    /// The figures of all samples taken; fails when there were none.
+    pub fn finish(&self) -> Result<Figures, FiguresError> {
+        if self.samples == 0 {
+            return Err(FiguresError::NoSamples);
+        }
+        let samples = self.samples as f64;
+        let ratio = |error: f64, measured: f64| (measured > 0.0).then(|| (error / measured).sqrt());
+        let error: f64 = self.channels.values().map(|sums| sums.error).sum();
+        let measured: f64 = self.channels.values().map(|sums| sums.measured).sum();
+        let channels = self.channels.iter().map(|(name, sums)| {
+            let counted = self.samples - sums.zero_measured;
+            let figures = ChannelFigures {
+                nrms: ratio(sums.error, sums.measured),
+                mean_relative: (counted > 0).then(|| sums.relative / counted as f64),
+                abs_ratio: (sums.abs_measured > 0.0).then(|| sums.abs_error / sums.abs_measured),
+                max_abs: sums.max_abs,
+                rms: (sums.error / samples).sqrt(),
+                zero_measured: sums.zero_measured,
+            };
+            (name.clone(), figures)
+        });
+        Ok(Figures {
+            nrms: ratio(error, measured),
+            rms: (error / (samples * self.channels.len() as f64)).sqrt(),
+            samples: self.samples,
+            channels: channels.collect(),
+        })
+    }
+}
+
+/// Figures of whole columns, `measured[channel][sample]` and `model[channel][sample]`.
+/// Fails when the shapes differ, a value is not finite or there are no samples.
+pub fn compare(
+    channels: &[String],
+    measured: &[Vec<f64>],
+    model: &[Vec<f64>],
+) -> Result<Figures, FiguresError> {
+    let samples = measured.first().map_or(0, Vec::len);
+    let fits = |columns: &[Vec<f64>]| {
+        columns.len() == channels.len() && columns.iter().all(|column| column.len() == samples)
+    };
+    if !fits(measured) || !fits(model) {
+        let count = |columns: &[Vec<f64>]| columns.iter().map(Vec::len).sum();
+        return Err(FiguresError::Shape {
+            measured: count(measured),
+            model: count(model),
+            channels: channels.len(),
+        });
+    }
+    let mut comparison = Comparison::new(channels.iter().cloned());
+    let (mut y, mut m) = (Vec::new(), Vec::new());
+    for sample in 0..samples {
+        y.clear();
+        m.clear();
+        y.extend(measured.iter().map(|column| column[sample]));
+        m.extend(model.iter().map(|column| column[sample]));
+        comparison.add(&y, &m)?;
+    }
+    comparison.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_are_what_they_say() {
+        let names = ["a".to_owned(), "b".to_owned()];
+        let measured = [vec![1.0, -2.0, 0.0, 2.0], vec![4.0, 0.0, 0.0, 0.0]];
+        let model = [vec![1.5, -2.0, 1.0, 2.0], vec![4.0, 0.0, 0.0, -1.0]];
+        let figures = compare(&names, &measured, &model).unwrap();
+        let a = &figures.channels["a"];
+        assert!((a.nrms.unwrap() - (1.25_f64 / 9.0).sqrt()).abs() < 1e-15);
+        assert!((a.mean_relative.unwrap() - 0.5 / 3.0).abs() < 1e-15);
+        assert!((a.abs_ratio.unwrap() - 1.5 / 5.0).abs() < 1e-15);
+        assert_eq!(
+            (a.max_abs.to_bits(), a.zero_measured),
+            (1.0_f64.to_bits(), 1)
+        );
+        assert!((figures.nrms.unwrap() - (2.25_f64 / 25.0).sqrt()).abs() < 1e-15);
+        assert!((figures.rms - (2.25_f64 / 8.0).sqrt()).abs() < 1e-15);
+        let json = serde_json::to_value(&figures).unwrap();
+        assert!(json["channels"]["b"]["mean_relative"].is_number());
+        assert_eq!(serde_json::from_value::<Figures>(json).unwrap(), figures);
+    }
+
+    #[test]
+    fn nothing_measured_gives_no_ratio_and_bad_values_are_refused() {
+        let names = ["a".to_owned()];
+        let silent = compare(&names, &[vec![0.0, 0.0]], &[vec![1.0, 0.0]]).unwrap();
+        assert_eq!(
+            (silent.nrms, silent.channels["a"].mean_relative),
+            (None, None)
+        );
+        let error = compare(&names, &[vec![0.0, 1.0]], &[vec![0.0, f64::NAN]]).unwrap_err();
+        assert_eq!(
+            error,
+            FiguresError::NotFinite {
+                channel: "a".to_owned(),
+                sample: 1
+            }
+        );
+        assert_eq!(
+            compare(&names, &[vec![]], &[vec![]]).unwrap_err(),
+            FiguresError::NoSamples
+        );
+        assert!(compare(&names, &[vec![1.0]], &[vec![]]).is_err());
+    }
+}

@@ -1,0 +1,250 @@
+//! Where motion ends and noise begins: signals that are to be differentiated go in; the cut-off of the low-pass that
+//! promises the smallest error of the accelerations comes out.
+//!
+//! The trade-off is N. Wiener's (signal lost against noise kept, frequency by frequency), restricted to the shape of
+//! Butterworth's filter run both ways and central differences. What counts as signal, how coordinates are weighed, and
+//! the search are our own.
+
+use std::f64::consts::{LN_10, PI, TAU};
+
+use crate::audit::columns::median;
+use crate::motion::spectrum::hann_power;
+
+/// A band of the spectrum holds motion where its power is above so many times the noise.
+/// Within the narrowest bands chance reaches that about once in a thousand.
+const ABOVE_NOISE: f64 = 4.0;
+/// Relative width of a band.
+const BAND: f64 = 0.15;
+/// Periods of the cut-off that are dropped at each end for the transients, which reach 0.1 % there.
+pub(crate) const TRIMMED_PERIODS: f64 = 3.0;
+/// At most one sample in so many is dropped at each end.
+pub(crate) const LONGEST_TRIM: f64 = 6.0;
+/// Cut-offs tried.
+const STEPS: u32 = 128;
+
+/// A signal that is differentiated to accelerations.
+#[derive(Debug, Clone, Copy)]
+pub struct Signal<'a> {
+    /// Its samples, evenly spaced.
+    pub values: &'a [f64],
+    /// How often: twice for positions, once for rates.
+    pub times: u8,
+}
+
+/// The cut-off, Hz, that promises nearly the smallest error of the accelerations of all signals together, each relative
+/// to its size, for signals of one length sampled at `rate_hz`; `None` when none of them holds motion above its noise.
+///
+/// The spectrum of the differences is signal plus noise. White noise of the measured values has the known shape
+/// `(2 rate sin(pi f/rate))^(2 times)` there; its level is the median of means over the upper quarter of the band, so that
+/// quantisation counts as the noise it is. Motion is what stands above it on the average over bands, for single lines
+/// far up are seldom motion, and their share in the acceleration is huge. A cut-off then costs the signal it takes,
+/// the noise it leaves, and what the transients at the ends of a short recording spoil. The error of a coordinate is bounded by its size, so that one which hardly moves does not decide
+/// for the others.
+///
+/// A low cut-off loses more samples at the ends, so the highest one is returned whose expected error is within a quarter
+/// of the smallest, or below 0.03 % of the acceleration; never above a fifth of the sampling rate, where central
+/// differences take more than the filter leaves.
+pub fn choose_cutoff(signals: &[Signal<'_>], rate_hz: f64, order: usize) -> Option<f64> {
+    let samples = signals.first()?.values.len();
+    if samples < 32 || !(rate_hz > 0.0 && rate_hz.is_finite()) {
+        return None;
+    }
+    let spectra: Vec<Spectrum> = signals
+        .iter()
+        .filter_map(|signal| Spectrum::of(*signal, rate_hz))
+        .collect();
+    if spectra.is_empty() {
+        return None;
+    }
+    let lowest = 4.0 * rate_hz / samples as f64;
+    let highest = 0.2 * rate_hz;
+    let costs: Vec<(f64, f64)> = (0..=STEPS)
+        .map(|i| lowest * (highest / lowest).powf(f64::from(i) / f64::from(STEPS)))
+        .map(|cutoff| {
+            let transient = transients(cutoff / rate_hz, samples);
+            let errors = spectra
+                .iter()
+                .map(|s| s.relative_error(cutoff, order, transient));
+            (cutoff, errors.sum())
+        })
+        .collect();
+    let smallest = costs
+        .iter()
+        .map(|(_, cost)| *cost)
+        .fold(f64::INFINITY, f64::min);
+    let bearable = (1.25_f64.powi(2) * smallest).max(1e-7 * spectra.len() as f64);
+    costs
+        .into_iter()
+        .filter(|(_, cost)| *cost <= bearable)
+        .map(|(cutoff, _)| cutoff)
+        .reduce(f64::max)
+}
+
+/// What transients at both ends leave in the samples that are kept, relative to the square of the acceleration, for a
+/// cut-off in parts of the sampling rate: three periods of it are dropped, or what a short recording can spare, and the
+/// transient falls tenfold in each.
+fn transients(cutoff: f64, samples: usize) -> f64 {
+    let periods = cutoff * samples as f64;
+    let dropped = (periods / LONGEST_TRIM).min(TRIMMED_PERIODS);
+    10.0_f64.powf(-2.0 * dropped) / (LN_10 * (periods - 2.0 * dropped))
+}
+
+/// Power of an acceleration over frequency, split into motion and noise.
+struct Spectrum {
+    rate_hz: f64,
+    times: u8,
+    /// Power of the true acceleration at each frequency, 0 where the noise hides it.
+    motion: Vec<f64>,
+    /// Power of the noise of the measured values, the same at all frequencies.
+    noise: f64,
+}
+
+impl Spectrum {
+    /// `None` where no motion stands above the noise.
+    fn of(signal: Signal<'_>, rate_hz: f64) -> Option<Self> {
+        let mut differences = signal.values.to_vec();
+        for _ in 0..signal.times {
+            differences = differences
+                .windows(2)
+                .map(|w| (w[1] - w[0]) * rate_hz)
+                .collect();
+        }
+        let power = hann_power(&differences);
+        let bins = power.len();
+        let angle = |k: usize| PI * k as f64 / (bins - 1) as f64;
+        let shape =
+            |k: usize| (2.0 * rate_hz * (0.5 * angle(k)).sin()).powi(2 * i32::from(signal.times));
+        let upper: Vec<f64> = (bins * 3 / 4..bins - 1)
+            .map(|k| power[k] / shape(k))
+            .collect();
+        // The median passes over lines; means below it hold where noise itself is made of lines, as in a run that was
+        // put together from copies.
+        let means = upper.chunks(upper.len().div_ceil(64).max(16));
+        let noise = median(
+            means
+                .map(|c| c.iter().sum::<f64>() / c.len() as f64)
+                .collect(),
+        );
+        let mut motion = vec![0.0; bins];
+        // A window of von Hann and padding spread one frequency over some bins.
+        let narrowest = (8 * bins).div_ceil(differences.len());
+        let mut start = 1;
+        while start < bins {
+            let width = crate::motion::periods::count(BAND * start as f64).max(narrowest);
+            let end = (start + width).min(bins);
+            let band: f64 = (start..end).map(|k| power[k] / shape(k)).sum();
+            if band > ABOVE_NOISE * noise * (end - start) as f64 {
+                for k in start..end {
+                    // What differences of neighbours take of a motion at this frequency.
+                    let half = 0.5 * angle(k);
+                    let taken = (half.sin() / half).powi(2 * i32::from(signal.times));
+                    motion[k] = (power[k] - noise * shape(k)).max(0.0) / taken;
+                }
+            }
+            start = end;
+        }
+        motion.iter().any(|power| *power > 0.0).then_some(Self {
+            rate_hz,
+            times: signal.times,
+            motion,
+            noise,
+        })
+    }
+
+    /// Expected square error of the filtered acceleration, relative to the square of its size plus that error.
+    fn relative_error(&self, cutoff_hz: f64, order: usize, transient: f64) -> f64 {
+        let bins = self.motion.len();
+        let warped = (PI * cutoff_hz / self.rate_hz).tan();
+        let power = 2 * i32::try_from(order).unwrap_or(i32::MAX / 2);
+        let (mut error, mut size) = (0.0, 0.0);
+        for (k, motion) in self.motion.iter().enumerate().skip(1) {
+            let angle = 0.5 * TAU * k as f64 / (bins - 1) as f64;
+            let passed = 1.0 / (1.0 + ((0.5 * angle).tan() / warped).powi(power));
+            // Central differences over two steps.
+            let difference = angle.sin();
+            let gain = passed * (difference / angle).powi(i32::from(self.times));
+            let left = self.noise
+                * (passed * (difference * self.rate_hz).powi(i32::from(self.times))).powi(2);
+            error += (1.0 - gain).powi(2) * motion + left;
+            size += motion;
+        }
+        error += transient * size;
+        error / (error + size)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::derivatives::prepare;
+    use crate::test_noise::Noise;
+
+    fn twice(values: &[f64]) -> Signal<'_> {
+        Signal { values, times: 2 }
+    }
+
+    /// The chosen cut-off gives nearly the smallest error that any cut-off could give.
+    #[test]
+    fn the_chosen_cutoff_is_nearly_the_best_there_is() {
+        let rate = 250.0;
+        let time: Vec<f64> = (0..3645).map(|k| f64::from(k) / rate).collect();
+        let harmonics: Vec<(f64, f64, f64)> = (1..=7)
+            .map(|h| {
+                (
+                    f64::from(h) * 2.0 * PI / 7.29,
+                    0.2 / f64::from(h),
+                    0.7 * f64::from(h * h),
+                )
+            })
+            .collect();
+        for sigma in [1e-3, 4e-6, 1e-8] {
+            let mut noise = Noise::new(5);
+            let truth = |t: f64| -> f64 {
+                harmonics
+                    .iter()
+                    .map(|(w, a, phase)| -a * w * w * (w * t + phase).sin())
+                    .sum()
+            };
+            let positions: Vec<f64> = time
+                .iter()
+                .map(|t| {
+                    harmonics
+                        .iter()
+                        .map(|(w, a, phase)| a * (w * t + phase).sin())
+                        .sum::<f64>()
+                        + sigma * noise.normal()
+                })
+                .collect();
+            let error = |cutoff: f64| {
+                let qdd = prepare(&time, &positions, cutoff, 4).unwrap().qdd;
+                let inner = 400..3245;
+                (inner
+                    .clone()
+                    .map(|i| (qdd[i] - truth(time[i])).powi(2))
+                    .sum::<f64>()
+                    / inner.len() as f64)
+                    .sqrt()
+            };
+            let size =
+                (time.iter().map(|t| truth(*t).powi(2)).sum::<f64>() / time.len() as f64).sqrt();
+            let chosen = choose_cutoff(&[twice(&positions)], rate, 4).unwrap();
+            let best = (0..60)
+                .map(|i| error(0.6 * 1.09_f64.powi(i)))
+                .fold(f64::INFINITY, f64::min);
+            assert!(
+                error(chosen) < (1.6 * best).max(1.5e-3 * size),
+                "sigma {sigma}: {chosen} Hz gives {} not {best}",
+                error(chosen)
+            );
+        }
+    }
+
+    #[test]
+    fn a_coordinate_at_rest_has_no_cutoff() {
+        assert_eq!(choose_cutoff(&[twice(&[1.0; 500])], 250.0, 4), None);
+        let mut noise = Noise::new(2);
+        let still: Vec<f64> = (0..500).map(|_| 1.0 + 1e-6 * noise.normal()).collect();
+        // Chance peaks may pass for motion; nothing below may panic on them.
+        let _ = choose_cutoff(&[twice(&still)], 250.0, 4);
+    }
+}

@@ -1,0 +1,103 @@
+//! Fewer samples of the same motion: the parallel filter of identification, on regressors and forces alike.
+
+use crate::motion::filters::{FilterError, LowPass};
+
+/// Columns that are filtered side by side.
+const LANES: usize = 8;
+
+/// The low-pass that [`decimate`] uses: Chebyshev 1, order 8, 0.05 dB, up to 0.8 of the new
+/// half rate.
+fn anti_alias(factor: usize) -> Result<LowPass, FilterError> {
+    LowPass::chebyshev1(8, 0.05, 0.4 / factor as f64, 1.0)
+}
+
+/// Every `factor`-th sample, starting with the first, of the zero-phase low-passed signal
+/// (Chebyshev 1, order 8, 0.05 dB of ripple): MATLAB's and scipy's `decimate`.
+/// A factor of 1 returns the signal as it is.
+/// Fails when the factor is 0 or the signal has 27 samples or fewer.
+///
+/// ```
+/// let ramp: Vec<f64> = (0..200).map(f64::from).collect();
+/// let short = modelmill_identify::decimation::decimate(&ramp, 10)?;
+/// assert_eq!(short.len(), 20);
+/// # Ok::<(), modelmill_identify::FilterError>(())
+/// ```
+pub fn decimate(signal: &[f64], factor: usize) -> Result<Vec<f64>, FilterError> {
+    match factor {
+        0 => Err(FilterError::FactorOutOfRange { factor }),
+        1 => Ok(signal.to_vec()),
+        _ if factor >= signal.len() => Err(FilterError::FactorOutOfRange { factor }),
+        _ => Ok(anti_alias(factor)?
+            .zero_phase(signal)?
+            .into_iter()
+            .step_by(factor)
+            .collect()),
+    }
+}
+
+/// Every `factor`-th time stamp, those that [`decimate`] keeps; times are picked, not filtered.
+pub fn decimate_time(time: &[f64], factor: usize) -> Vec<f64> {
+    time.iter().copied().step_by(factor.max(1)).collect()
+}
+
+/// [`decimate`] on each of some columns of equal length, several at once.
+/// Fails as [`decimate`] does.
+pub fn decimate_columns(columns: &[&[f64]], factor: usize) -> Result<Vec<Vec<f64>>, FilterError> {
+    if factor < 2 {
+        return columns
+            .iter()
+            .map(|column| decimate(column, factor))
+            .collect();
+    }
+    let filter = anti_alias(factor)?;
+    let mut short = Vec::with_capacity(columns.len());
+    for group in columns.chunks(LANES) {
+        let samples = group.iter().map(|column| column.len()).min().unwrap_or(0);
+        if factor >= samples {
+            return Err(FilterError::FactorOutOfRange { factor });
+        }
+        let mut lanes = vec![[0.0; LANES]; samples];
+        for (k, column) in group.iter().enumerate() {
+            for (lane, value) in lanes.iter_mut().zip(*column) {
+                lane[k] = *value;
+            }
+        }
+        let filtered = filter.zero_phase_lanes(&lanes)?;
+        short.extend((0..group.len()).map(|k| {
+            let kept = filtered.iter().step_by(factor);
+            kept.map(|lane| lane[k]).collect::<Vec<f64>>()
+        }));
+    }
+    Ok(short)
+}
+
+/// [`decimate`] on each of `width` interleaved columns: `table[sample * width + column]` in, the
+/// same layout out. With `width = n_channels * n_columns` this is the parallel filter on a
+/// regressor whose rows are interleaved per sample; with `width = n_channels` on the forces.
+/// Fails as [`decimate`] does, and when the length is no multiple of `width`.
+pub fn decimate_table(table: &[f64], width: usize, factor: usize) -> Result<Vec<f64>, FilterError> {
+    if width == 0 || !table.len().is_multiple_of(width) {
+        return Err(FilterError::Shape {
+            have: table.len(),
+            per_sample: width,
+        });
+    }
+    if factor == 1 {
+        return Ok(table.to_vec());
+    }
+    let samples = table.len() / width;
+    let mut short = vec![0.0; samples.div_ceil(factor.max(1)) * width];
+    // A few at a time, so that a long table is not held twice.
+    for first in (0..width).step_by(LANES) {
+        let some: Vec<Vec<f64>> = (first..width.min(first + LANES))
+            .map(|column| table.iter().skip(column).step_by(width).copied().collect())
+            .collect();
+        let some: Vec<&[f64]> = some.iter().map(Vec::as_slice).collect();
+        for (column, values) in (first..).zip(decimate_columns(&some, factor)?) {
+            for (sample, value) in values.into_iter().enumerate() {
+                short[sample * width + column] = value;
+            }
+        }
+    }
+    Ok(short)
+}

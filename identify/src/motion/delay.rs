@@ -1,0 +1,121 @@
+//! Forces that are read later than they act: the states of a run are taken that much earlier.
+//!
+//! The forces keep their samples, noise and jumps included; states are smooth, so that they can be read off between samples
+//! by the cubic through the four nearest (Lagrange). A sample whose states would lie before the first or behind the last
+//! one has no partner and is dropped.
+
+use crate::motion::run::Run;
+
+impl Run {
+    /// Pairs every force with the states `delay` seconds before it was read, and gives how many samples at the start and at
+    /// the end are dropped for lack of states. A negative delay pairs it with later ones.
+    ///
+    /// `None` leaves the run as it is: fewer than four samples would be left.
+    pub fn pair_with_earlier_states(&mut self, delay: f64) -> Option<(usize, usize)> {
+        let n = self.time.len();
+        let (Some(&first), Some(&last)) = (self.time.first(), self.time.last()) else {
+            return None;
+        };
+        // A delay by whole samples must not fail by rounding.
+        let slack = 1e-9 * (last - first);
+        let start = self.time.partition_point(|t| t - delay < first - slack);
+        let end = self.time.partition_point(|t| t - delay <= last + slack);
+        if n < 4 || end < start + 4 {
+            return None;
+        }
+        let stencils: Vec<(usize, [f64; 4])> = self.time[start..end]
+            .iter()
+            .map(|t| stencil(&self.time, t - delay))
+            .collect();
+        let states = (self.q.iter_mut()).chain(&mut self.qd).chain(&mut self.qdd);
+        for column in states {
+            *column = stencils
+                .iter()
+                .map(|(at, weights)| (0..4).map(|k| weights[k] * column[at + k]).sum())
+                .collect();
+        }
+        let cut = |column: &mut Vec<f64>| {
+            column.truncate(end);
+            column.drain(..start);
+        };
+        cut(&mut self.time);
+        self.force.iter_mut().flatten().for_each(cut);
+        self.lines.truncate(end);
+        self.lines.drain(..start);
+        Some((start, n - end))
+    }
+}
+
+/// The first of the four samples around a time, and their weights in the cubic through them.
+fn stencil(time: &[f64], at: f64) -> (usize, [f64; 4]) {
+    let above = time.partition_point(|t| *t < at);
+    let first = above.saturating_sub(2).min(time.len() - 4);
+    let nodes = &time[first..first + 4];
+    let weight = |k: usize| {
+        (0..4)
+            .filter(|j| *j != k)
+            .map(|j| (at - nodes[j]) / (nodes[k] - nodes[j]))
+            .product()
+    };
+    (first, std::array::from_fn(weight))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::run::PreparedAs;
+
+    /// Uneven samples of cubics, with the time itself as the force.
+    fn run(n: u32) -> Run {
+        let time: Vec<f64> = (0..n)
+            .map(|i| 0.01 * f64::from(i) + 0.003 * f64::from(i % 3))
+            .collect();
+        let column = |of: fn(f64) -> f64| vec![time.iter().map(|t| of(*t)).collect()];
+        Run {
+            file: "run.csv".to_owned(),
+            q: column(|t| t * t * t - t),
+            qd: column(|t| 3.0 * t * t - 1.0),
+            qdd: column(|t| 6.0 * t),
+            force: Some(vec![time.clone()]),
+            missing_force: Vec::new(),
+            lines: (2..u64::from(n) + 2).collect(),
+            repeats: None,
+            prepared: PreparedAs::default(),
+            notes: Vec::new(),
+            time,
+        }
+    }
+
+    #[test]
+    fn cubics_are_met_exactly_and_lost_samples_are_counted() {
+        for delay in [0.0, 0.0042, -0.0042, 0.013, 0.25] {
+            let mut moved = run(60);
+            let lost = moved
+                .pair_with_earlier_states(delay)
+                .expect("samples are left");
+            let n = moved.time.len();
+            assert_eq!(n + lost.0 + lost.1, 60);
+            assert_eq!(lost.0 > 0, delay > 0.0);
+            assert_eq!(lost.1 > 0, delay < 0.0);
+            assert_eq!(moved.lines.len(), n);
+            for i in 0..n {
+                let t = moved.time[i] - delay;
+                assert!((moved.q[0][i] - (t * t * t - t)).abs() < 1e-14);
+                assert!((moved.qd[0][i] - (3.0 * t * t - 1.0)).abs() < 1e-13);
+                assert!((moved.qdd[0][i] - 6.0 * t).abs() < 1e-13);
+                let force = moved.force.as_ref().expect("a force")[0][i];
+                assert_eq!(force.to_bits(), moved.time[i].to_bits(), "forces stay");
+                let line = u64::try_from(i + lost.0 + 2).expect("a line");
+                assert_eq!(moved.lines[i], line);
+            }
+        }
+    }
+
+    #[test]
+    fn a_delay_beyond_the_recording_leaves_it() {
+        let mut short = run(10);
+        assert_eq!(short.pair_with_earlier_states(5.0), None);
+        assert_eq!(short.time.len(), 10);
+        assert_eq!(run(3).pair_with_earlier_states(0.0), None);
+    }
+}

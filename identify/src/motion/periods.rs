@@ -1,0 +1,312 @@
+//! Periodic runs: positions go in; the period, and what the forces repeat themselves by, come out.
+//!
+//! Sources: J. Swevers, C. Ganseman, D. B. Tuekel, J. de Schutter, H. Van Brussel, "Optimal robot excitation and
+//! identification", IEEE Trans. Robotics and Automation 13 (1997): the spread over the periods is the noise.
+//! The motion itself is a finite Fourier series: see [`crate::motion::series`].
+
+use indexmap::IndexMap;
+use serde::{Deserialize, Serialize};
+
+use crate::audit::columns::median;
+
+/// Points of the coarse search for a period.
+const GRID: usize = 2048;
+/// Two motions a period apart may differ by this part of the motion's variance.
+const SAME: f64 = 2e-3;
+
+/// A step of a force so many times the usual one is a jump.
+const JUMP: f64 = 8.0;
+
+/// How well a periodic run repeats itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Repeats {
+    /// The period, s.
+    pub period: f64,
+    /// Whole periods in the run.
+    pub periods: usize,
+    /// Spread of the forces over the periods, relative to their size (2-norms, all drives together): no model can be
+    /// better than that on one period.
+    pub noise_floor: f64,
+    /// The same for each drive.
+    pub channels: IndexMap<String, f64>,
+}
+
+/// The shortest period after which all positions are where they were, s; `None` if there is none of which the run holds
+/// two, the last of which ends a step after the last sample. Positions that do not move say nothing.
+pub fn find_period(time: &[f64], positions: &[&[f64]]) -> Option<f64> {
+    let moving: Vec<(&[f64], f64)> = positions
+        .iter()
+        .map(|q| (*q, variance(q)))
+        .filter(|(q, variance)| *variance > 0.0 && !is_noise(q, *variance))
+        .collect();
+    if moving.is_empty() || time.len() < 16 {
+        return None;
+    }
+    let (start, end) = (time[0], time[time.len() - 1]);
+    // Half a step more, since the period is not known better yet.
+    let longest = 0.5 * (end - start) * (1.0 + 1.5 / (time.len() - 1) as f64);
+    // Ever longer beginnings of the run, on ever coarser grids, so that many short periods are found as such.
+    let mut samples = time.len().min(GRID);
+    loop {
+        let found = coarse_period(&time[..samples], &moving)
+            .map(|(period, step)| refine(time, &moving, period, step))
+            .filter(|(period, apart)| *apart < SAME && *period <= longest);
+        if let Some((period, _)) = found {
+            return Some(period);
+        }
+        if samples == time.len() {
+            return None;
+        }
+        samples = (4 * samples).min(time.len());
+    }
+}
+
+/// Whether neighbours are hardly more alike than any two samples, as in a coordinate that is held still (the ratio of
+/// J. von Neumann, 1941, twice as large for noise as the bar here).
+fn is_noise(values: &[f64], variance: f64) -> bool {
+    let steps: f64 = values.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum();
+    steps > variance * (values.len() - 1) as f64
+}
+
+/// A period by the first return of a motion to itself on an even grid, with the grid's step.
+fn coarse_period(time: &[f64], moving: &[(&[f64], f64)]) -> Option<(f64, f64)> {
+    let (start, end) = (*time.first()?, *time.last()?);
+    let m = time.len().min(GRID);
+    let step = (end - start) / (m - 1) as f64;
+    let grids: Vec<Vec<f64>> = moving
+        .iter()
+        .map(|(q, variance)| {
+            let scale = (2.0 * variance * moving.len() as f64).sqrt();
+            let at =
+                |i: usize| interpolate(time, &q[..time.len()], start + step * i as f64) / scale;
+            (0..m).map(at).collect()
+        })
+        .collect();
+    // How far the motion is from itself some steps later, 1 for unrelated motions.
+    let apart = |lag: usize| -> f64 {
+        let sum: f64 = grids
+            .iter()
+            .map(|q| {
+                let pairs = q.iter().zip(&q[lag..]);
+                pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>()
+            })
+            .sum();
+        sum / (m - lag) as f64
+    };
+    // Two lags beyond half the run, so that half of it can be told to be the nearest.
+    let far: Vec<f64> = (0..=m / 2 + 2).map(apart).collect();
+    let left = far.iter().position(|d| *d > 0.3)?;
+    let candidate = (left + 1..far.len() - 1)
+        .find(|i| far[*i] < 0.1 && far[*i] <= far[i - 1] && far[*i] <= far[i + 1])?;
+    Some((step * candidate as f64, step))
+}
+
+/// A period on the true time base of the whole run, to a small part of a step, and how far the motion is from itself
+/// after it.
+fn refine(time: &[f64], moving: &[(&[f64], f64)], period: f64, step: f64) -> (f64, f64) {
+    let end = time[time.len() - 1];
+    let stride = (time.len() / (4 * GRID)).max(1);
+    let apart = |period: f64| -> f64 {
+        let (mut sum, mut n) = (0.0, 0);
+        for i in (0..time.len()).step_by(stride) {
+            if time[i] + period > end {
+                break;
+            }
+            for (q, variance) in moving {
+                let other = interpolate(time, q, time[i] + period);
+                sum += (other - q[i]).powi(2) / (2.0 * variance * moving.len() as f64);
+            }
+            n += 1;
+        }
+        sum / f64::from(n.max(1))
+    };
+    let period = smallest(apart, period - 1.5 * step, period + 1.5 * step);
+    (period, apart(period))
+}
+
+/// The spread of forces over the periods of a run; `None` where it holds fewer than two, or no force.
+pub fn repeats(
+    time: &[f64],
+    period: f64,
+    names: &[String],
+    forces: &[Vec<f64>],
+) -> Option<Repeats> {
+    let (start, end) = (*time.first()?, *time.last()?);
+    let step = (end - start) / (time.len() - 1) as f64;
+    // The last sample of the last period lies one step before the next one would begin.
+    // The period is known to a part of a step.
+    let periods = count((end + 1.5 * step - start) / period);
+    let phases = count((period / step).round());
+    if periods < 2 || phases < 2 {
+        return None;
+    }
+    // Samples of different periods seldom have the same phase, so forces are interpolated between neighbours; that
+    // lowers their noise, which is allowed for as if it were white. Where neighbours are missing a phase says nothing.
+    let mut places = Vec::with_capacity(phases);
+    for phase in 0..phases {
+        let all = (0..periods).map(|k| {
+            let t = start + period * (k as f64 + phase as f64 / phases as f64);
+            between(time, t, 1.5 * step)
+        });
+        places.extend(all.collect::<Option<Vec<_>>>());
+    }
+    let spread = |force: &[f64]| {
+        let (mut error, mut noise, mut size) = (0.0, 0.0, 0.0);
+        // Between two samples where friction turns round, a force has no value that could be told.
+        let usual = median(force.windows(2).map(|w| (w[1] - w[0]).abs()).collect());
+        let jumps = |(i, part): &(usize, f64)| {
+            (0.02..0.98).contains(part) && (force[i + 1] - force[*i]).abs() > JUMP * usual
+        };
+        let mut values = 0;
+        for place in places.iter().filter(|place| !place.iter().any(jumps)) {
+            values += periods;
+            let at = |(i, part): &(usize, f64)| (1.0 - part) * force[*i] + part * force[*i + 1];
+            let mean = place.iter().map(at).sum::<f64>() / periods as f64;
+            let lowered = |(_, part): &(usize, f64)| (1.0 - part).powi(2) + part.powi(2);
+            noise += place.iter().map(lowered).sum::<f64>() * (1.0 - 1.0 / periods as f64);
+            error += place.iter().map(|p| (at(p) - mean).powi(2)).sum::<f64>();
+            size += place.iter().map(|p| at(p).powi(2)).sum::<f64>();
+        }
+        if values == 0 {
+            return (0.0, 0.0);
+        }
+        (error / noise, size / values as f64)
+    };
+    let sums: Vec<(f64, f64)> = forces.iter().map(|force| spread(force)).collect();
+    let ratio = |(error, size): (f64, f64)| (size > 0.0).then(|| (error / size).sqrt());
+    let total = sums
+        .iter()
+        .fold((0.0, 0.0), |(e, s), (error, size)| (e + error, s + size));
+    Some(Repeats {
+        period,
+        periods,
+        noise_floor: ratio(total)?,
+        channels: names
+            .iter()
+            .cloned()
+            .zip(sums)
+            .filter_map(|(name, sums)| Some((name, ratio(sums)?)))
+            .collect(),
+    })
+}
+
+/// A count that was computed as a float, rounded down; what is negative counts as none.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a float becomes the nearest count there is"
+)]
+pub(crate) fn count(value: f64) -> usize {
+    value as usize
+}
+
+fn variance(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n
+}
+
+/// The sample before a time and the part of the way to the next one; `None` where these are more than `apart` from each
+/// other. Beyond the ends the first and the last pair go on for half as long.
+fn between(time: &[f64], at: f64, apart: f64) -> Option<(usize, f64)> {
+    let after = time.partition_point(|t| *t < at).clamp(1, time.len() - 1);
+    let (t0, t1) = (time[after - 1], time[after]);
+    let is_near = t1 - t0 <= apart && at >= t0 - 0.5 * apart && at <= t1 + 0.5 * apart;
+    is_near.then(|| (after - 1, ((at - t0) / (t1 - t0)).clamp(0.0, 1.0)))
+}
+
+fn interpolate(time: &[f64], values: &[f64], at: f64) -> f64 {
+    let after = time.partition_point(|t| *t < at).clamp(1, time.len() - 1);
+    let (t0, t1) = (time[after - 1], time[after]);
+    let part = ((at - t0) / (t1 - t0)).clamp(0.0, 1.0);
+    values[after - 1] + part * (values[after] - values[after - 1])
+}
+
+/// Where a function with one dip is smallest, by golden sections.
+fn smallest(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    for _ in 0..40 {
+        let (a, b) = (high - golden * (high - low), low + golden * (high - low));
+        if f(a) < f(b) {
+            high = b;
+        } else {
+            low = a;
+        }
+    }
+    0.5 * (low + high)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::test_noise::Noise;
+
+    const PERIOD: f64 = 2.37;
+
+    fn motion(t: f64) -> f64 {
+        let w = TAU / PERIOD;
+        0.8 * (w * t + 0.3).sin() + 0.3 * (3.0 * w * t + 1.1).sin()
+    }
+
+    /// Uneven times, as a clock that drifts gives them.
+    fn times(n: u32) -> Vec<f64> {
+        (0..n)
+            .map(|i| f64::from(i) * 0.004 + 0.0009 * (f64::from(i) * 0.7).sin())
+            .collect()
+    }
+
+    #[test]
+    fn the_period_is_found_on_the_true_time_base() {
+        let time = times(2500);
+        let mut noise = Noise::new(4);
+        let q: Vec<f64> = time
+            .iter()
+            .map(|t| motion(*t) + 1e-4 * noise.normal())
+            .collect();
+        let period = find_period(&time, &[&q, &vec![1.0; q.len()]]).expect("a period");
+        assert!((period - PERIOD).abs() < 1e-3, "{period}");
+        // Less than two periods, or none at all.
+        assert_eq!(find_period(&time[..1100], &[&q[..1100]]), None);
+        let drifting: Vec<f64> = time.iter().map(|t| t * t).collect();
+        assert_eq!(find_period(&time, &[&drifting]), None);
+        assert_eq!(find_period(&time, &[&vec![1.0; q.len()]]), None);
+    }
+
+    #[test]
+    fn many_short_periods_are_not_taken_for_few_long_ones() {
+        let time = times(200_000);
+        let q: Vec<f64> = time.iter().map(|t| motion(*t)).collect();
+        let period = find_period(&time, &[&q]).expect("a period");
+        assert!((period - PERIOD).abs() < 1e-3, "{period}");
+    }
+
+    /// The period is half a step longer than 592 steps, so that samples of two periods never have the same phase; forces
+    /// jump with the sign of a rate, and a piece of the run is missing.
+    #[test]
+    fn the_spread_over_periods_is_the_noise() {
+        let mut noise = Noise::new(9);
+        for (jump, missing) in [(0.0, 0), (20.0, 0), (20.0, 100)] {
+            let time: Vec<f64> = (0..5925)
+                .filter(|i| !(1500..1500 + missing).contains(i))
+                .map(|i| f64::from(i) * 0.004)
+                .collect();
+            let force: Vec<f64> = time
+                .iter()
+                .map(|t| {
+                    let rate = motion(t + 1e-4) - motion(*t);
+                    100.0 * motion(*t) + jump * rate.signum() + 0.3 * noise.normal()
+                })
+                .collect();
+            let size = (force.iter().map(|f| f * f).sum::<f64>() / force.len() as f64).sqrt();
+            let found = repeats(&time, PERIOD, &["a".to_owned()], &[force]).expect("ten periods");
+            assert_eq!(found.periods, 10);
+            assert!(
+                (found.noise_floor * size / 0.3 - 1.0).abs() < 0.05,
+                "{jump} {missing}: {found:?}"
+            );
+            assert!((found.channels["a"] - found.noise_floor).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,393 @@
+//! From a recording to states: times, coordinates with their derivatives, and drive forces.
+//!
+//! Derivatives that the file lacks are prepared by [`crate::motion::derivatives`]; every choice that is
+//! made on the way is written into the notes.
+
+use std::fmt::Write as _;
+
+use serde::{Deserialize, Serialize};
+
+use crate::audit::columns::{GAP, median};
+use crate::motion::derivatives::{Preparation, Smoothing, Source};
+use crate::motion::periods::Repeats;
+use crate::motion::prepare::series_of;
+use crate::motion::smoothing::Recorded;
+use crate::recording::Recording;
+use crate::recording::error::{Fault, RecordingError, list};
+use crate::recording::notes::{Note, Severity, count_of};
+
+/// States along a run, ready for the regressor. All columns have the length of `time`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// What messages call the recording.
+    pub file: String,
+    /// Times, s.
+    pub time: Vec<f64>,
+    /// `q[coordinate][sample]`, rad or m.
+    pub q: Vec<Vec<f64>>,
+    /// `qd[coordinate][sample]`, rad/s or m/s.
+    pub qd: Vec<Vec<f64>>,
+    /// `qdd[coordinate][sample]`, rad/s^2 or m/s^2.
+    pub qdd: Vec<Vec<f64>>,
+    /// `force[drive][sample]`, N or N m, in the order of the drives that were asked for; `None`
+    /// when the file lacks the force of any drive. See [`Run::measured`].
+    pub force: Option<Vec<Vec<f64>>>,
+    /// Drives whose force the file lacks.
+    pub missing_force: Vec<String>,
+    /// Line in the file for each sample.
+    pub lines: Vec<u64>,
+    /// How well the run repeats itself, if its motion is periodic and the forces are known.
+    pub repeats: Option<Repeats>,
+    /// What was done to the recording.
+    pub prepared: PreparedAs,
+    /// What the user should know, the recording's own notes included.
+    pub notes: Vec<Note>,
+}
+
+/// What was done on the way from the recording to the states.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct PreparedAs {
+    /// Cut-off of the low-pass, Hz, when anything was filtered.
+    pub cutoff_hz: Option<f64>,
+    /// Whether the cut-off was chosen from the signal rather than given.
+    pub cutoff_chosen: bool,
+    /// Period of the Fourier series that the motion was taken for, s, if it was.
+    #[serde(default)]
+    pub period: Option<f64>,
+    /// Coordinates whose rates or accelerations were prepared.
+    pub coordinates: Vec<String>,
+    /// Samples dropped at the start and at the end.
+    pub trimmed: (usize, usize),
+    /// Whether the caller asked for those, rather than the filter.
+    #[serde(default)]
+    pub trim_asked_for: bool,
+    /// The parallel decimation that the regression is to apply to the columns of the regressor
+    /// and to the forces ([`crate::motion::decimation::decimate_table`]); the columns here are not decimated.
+    pub decimate: usize,
+}
+
+impl Recording {
+    /// States of the given coordinates and forces of the given drives, with the default
+    /// [`Preparation`]: columns `t`, `NAME`, `NAME_d`, `NAME_dd` and the drive's name.
+    pub fn states(&self, coordinates: &[String], drives: &[String]) -> Result<Run, RecordingError> {
+        self.states_with(coordinates, drives, &Preparation::default())
+    }
+
+    /// [`Recording::states_with`] for each stretch between gaps in time, so that no filter and no difference reaches
+    /// across a gap. Stretches that are too short to be prepared are left out, which the notes say; where nothing is
+    /// to be filtered the recording stays whole.
+    pub fn runs_with(
+        &self,
+        coordinates: &[String],
+        drives: &[String],
+        preparation: &Preparation,
+    ) -> Result<Vec<Run>, RecordingError> {
+        // What is wrong with the whole is said of the whole, before it is cut.
+        let wanted = wanted_names(coordinates, drives);
+        self.check_time(self.column_beside("t", &wanted)?, &mut Vec::new())?;
+        let columns: Result<Vec<Recorded<'_>>, _> = coordinates
+            .iter()
+            .map(|name| self.recorded(name, preparation.source, &wanted))
+            .collect();
+        let columns = columns?;
+        let is_filtered = preparation.decimate > 1 || columns.iter().any(|c| !c.is_complete());
+        let stretches = if is_filtered {
+            self.stretches()
+        } else {
+            Vec::new()
+        };
+        // A series is fitted on the true times, so gaps do it no harm; only decimation would reach across them.
+        let is_whole = stretches.len() < 2
+            || preparation.decimate <= 1
+                && series_of(self.column("t")?, &columns, preparation).is_some();
+        if is_whole {
+            return Ok(vec![self.states_with(coordinates, drives, preparation)?]);
+        }
+        let preparation = &Preparation {
+            smoothing: match preparation.smoothing {
+                Smoothing::Automatic => Smoothing::Butterworth,
+                chosen => chosen,
+            },
+            ..preparation.clone()
+        };
+        let longest = (0..stretches.len()).max_by_key(|i| stretches[*i].samples());
+        let longest = longest.unwrap_or(0);
+        let first = stretches[longest].states_with(coordinates, drives, preparation)?;
+        // One cut-off for all: that which suits the longest.
+        let preparation = Preparation {
+            cutoff_hz: preparation.cutoff_hz.or(first.prepared.cutoff_hz),
+            ..preparation.clone()
+        };
+        let mut runs = Vec::new();
+        let (mut short, mut left_out) = (0, 0);
+        for (i, stretch) in stretches.iter().enumerate() {
+            let run = if i == longest {
+                Ok(first.clone())
+            } else {
+                stretch.states_with(coordinates, drives, &preparation)
+            };
+            match run {
+                Ok(run) => runs.push(run),
+                Err(error)
+                    if matches!(
+                        error.fault,
+                        Fault::TooFewSamples { .. } | Fault::CutoffTooLow { .. }
+                    ) =>
+                {
+                    short += 1;
+                    left_out += stretch.samples();
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        let mut notes = self.notes().to_vec();
+        let breaks = stretches[..stretches.len() - 1].iter();
+        let places = breaks.filter_map(|stretch| stretch.line(stretch.samples() - 1));
+        let mut says = format!(
+            "{} has {} in time of more than {GAP} usual steps, the first after line {}: the {} stretches are filtered and \
+             differentiated each on its own.",
+            self.file(),
+            count_of(stretches.len() - 1, "gap", "gaps"),
+            places.min().unwrap_or(0),
+            stretches.len(),
+        );
+        if short > 0 {
+            let _ = write!(
+                says,
+                " {} too short for that and left out, {} of {} samples.",
+                if short == 1 {
+                    "One is".to_owned()
+                } else {
+                    format!("{short} are")
+                },
+                left_out,
+                self.samples()
+            );
+        }
+        notes.push(Note::warning(says));
+        for (i, run) in runs.iter_mut().enumerate() {
+            if i > 0 {
+                run.notes.retain(|note| note.severity == Severity::Warning);
+            }
+        }
+        if let Some(run) = runs.first_mut() {
+            notes.append(&mut run.notes);
+            run.notes = notes;
+        }
+        Ok(runs)
+    }
+
+    /// [`Recording::states`] with another preparation.
+    ///
+    /// Fails when a column is missing or unusable, when time does not increase, or when the
+    /// recording is too short for the filter.
+    /// Forces may be missing: `evaluate` needs none.
+    pub fn states_with(
+        &self,
+        coordinates: &[String],
+        drives: &[String],
+        preparation: &Preparation,
+    ) -> Result<Run, RecordingError> {
+        let wanted = wanted_names(coordinates, drives);
+        let time = self.column_beside("t", &wanted)?;
+        let mut notes = self.notes().to_vec();
+        self.check_time(time, &mut notes)?;
+        let missing_force: Vec<String> = drives
+            .iter()
+            .filter(|drive| !self.has(drive))
+            .cloned()
+            .collect();
+        let force = if missing_force.is_empty() {
+            let columns: Result<Vec<Vec<f64>>, _> = drives
+                .iter()
+                .map(|drive| self.column(drive).map(<[f64]>::to_vec))
+                .collect();
+            Some(columns?)
+        } else {
+            notes.push(Note::info(format!(
+                "{} holds no measured force of {}.",
+                self.file(),
+                list(&missing_force)
+            )));
+            None
+        };
+        let columns: Result<Vec<Recorded<'_>>, _> = coordinates
+            .iter()
+            .map(|name| self.recorded(name, preparation.source, &wanted))
+            .collect();
+        let columns = columns?;
+        let mut prepared = PreparedAs {
+            decimate: preparation.decimate,
+            ..PreparedAs::default()
+        };
+        let states = self.prepare_states(time, &columns, preparation, &mut prepared, &mut notes)?;
+        prepared.trimmed = preparation.trim.unwrap_or(prepared.trimmed);
+        prepared.trim_asked_for = preparation.trim.is_some();
+        let mut run = Run {
+            file: self.file().to_owned(),
+            time: time.to_vec(),
+            q: Vec::new(),
+            qd: Vec::new(),
+            qdd: Vec::new(),
+            force,
+            missing_force,
+            lines: (0..time.len()).map(|i| self.line(i).unwrap_or(0)).collect(),
+            repeats: None,
+            prepared,
+            notes,
+        };
+        self.note_repeats(&columns, drives, &mut run);
+        for [q, qd, qdd] in states {
+            run.q.push(q);
+            run.qd.push(qd);
+            run.qdd.push(qdd);
+        }
+        self.trim(&mut run)?;
+        self.note_standstill(coordinates, &mut run);
+        Ok(run)
+    }
+
+    fn recorded(
+        &self,
+        name: &str,
+        source: Source,
+        wanted: &[String],
+    ) -> Result<Recorded<'_>, RecordingError> {
+        let optional = |suffix: &str| {
+            let derivative = format!("{name}{suffix}");
+            let wanted = source == Source::RecordedFirst && self.has(&derivative);
+            wanted.then(|| self.column(&derivative)).transpose()
+        };
+        Ok(Recorded {
+            name: name.to_owned(),
+            q: self.column_beside(name, wanted)?,
+            qd: optional("_d")?,
+            qdd: optional("_dd")?,
+        })
+    }
+
+    /// Time must increase; uneven steps and gaps are worth a note.
+    fn check_time(&self, time: &[f64], notes: &mut Vec<Note>) -> Result<(), RecordingError> {
+        if let Some(i) = time.windows(2).position(|w| w[1] <= w[0]) {
+            let line = self.line(i + 1).unwrap_or(0);
+            return Err(self.fault(Fault::TimeNotIncreasing {
+                line,
+                previous: time[i],
+                here: time[i + 1],
+            }));
+        }
+        let steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
+        if steps.is_empty() {
+            return Ok(());
+        }
+        let median = median(steps.clone());
+        let shortest = steps.iter().copied().fold(f64::INFINITY, f64::min);
+        let longest = steps.iter().copied().fold(0.0, f64::max);
+        let gaps = steps.iter().filter(|step| **step > 1.5 * median).count();
+        if gaps > 0 {
+            let first = time
+                .windows(2)
+                .position(|w| w[1] - w[0] > 1.5 * median)
+                .unwrap_or(0);
+            notes.push(Note::warning(format!(
+                "{} has {} in time: steps up to {longest:.6} s where {median:.6} s is usual, the first after line {}. \
+                 Derivatives and filters, where any are made, bridge them as they are.",
+                self.file(),
+                count_of(gaps, "gap", "gaps"),
+                self.line(first).unwrap_or(0)
+            )));
+        } else if longest - shortest > 0.01 * median {
+            notes.push(Note::warning(format!(
+                "The steps of {} are uneven, from {shortest:.6} s to {longest:.6} s; \
+                 differences use the true times, the low-pass takes the steps as even \
+                 (`--smoothing savitzky-golay` uses the true times there too).",
+                self.file()
+            )));
+        }
+        Ok(())
+    }
+
+    fn trim(&self, run: &mut Run) -> Result<(), RecordingError> {
+        let (start, end) = run.prepared.trimmed;
+        let have = run.time.len();
+        if have < start.saturating_add(end).saturating_add(1) {
+            return Err(self.fault(Fault::TooFewSamples {
+                have,
+                need: start.saturating_add(end).saturating_add(1),
+                purpose: if run.prepared.trim_asked_for {
+                    "dropping as many at both ends as `--trim` asks for"
+                } else {
+                    "dropping the filter's transients at both ends"
+                },
+            }));
+        }
+        if start + end == 0 {
+            return Ok(());
+        }
+        let cut = |column: &mut Vec<f64>| {
+            column.truncate(have - end);
+            column.drain(..start);
+        };
+        cut(&mut run.time);
+        run.lines.truncate(have - end);
+        run.lines.drain(..start);
+        let forces = run.force.iter_mut().flatten();
+        for column in run
+            .q
+            .iter_mut()
+            .chain(&mut run.qd)
+            .chain(&mut run.qdd)
+            .chain(forces)
+        {
+            cut(column);
+        }
+        run.notes.push(Note::info(format!(
+            "The first {start} and the last {end} of {have} samples of {} are dropped ({}).",
+            self.file(),
+            if run.prepared.trim_asked_for {
+                "as asked for by --trim"
+            } else {
+                "transients of the filter"
+            }
+        )));
+        Ok(())
+    }
+}
+
+impl Run {
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.time.len()
+    }
+
+    /// The measured forces, `force[drive][sample]`; fails when the file lacks any of them.
+    pub fn measured(&self) -> Result<&[Vec<f64>], RecordingError> {
+        self.force.as_deref().ok_or_else(|| RecordingError {
+            file: self.file.clone(),
+            fault: Fault::MissingForce {
+                drives: self.missing_force.clone(),
+            },
+        })
+    }
+
+    /// The measured forces interleaved per sample, `[sample * n_drives + drive]`, as the rows of
+    /// the regression are; fails when the file lacks any of them.
+    pub fn measured_interleaved(&self) -> Result<Vec<f64>, RecordingError> {
+        let force = self.measured()?;
+        Ok((0..self.samples())
+            .flat_map(|sample| force.iter().map(move |channel| channel[sample]))
+            .collect())
+    }
+}
+
+/// All names that a model has for columns.
+fn wanted_names(coordinates: &[String], drives: &[String]) -> Vec<String> {
+    let mut names = vec!["t".to_owned()];
+    for name in coordinates {
+        names.extend([name.clone(), format!("{name}_d"), format!("{name}_dd")]);
+    }
+    for drive in drives {
+        names.extend([drive.clone(), format!("{drive}_var")]);
+    }
+    names
+}

@@ -1,0 +1,417 @@
+//! Periodic motions as finite Fourier series: samples go in; the period, found to a small part of a step, the series
+//! with exact derivatives, and whether it leaves anything but noise come out.
+//!
+//! Sources: J. Swevers, C. Ganseman, D. B. Tuekel, J. de Schutter, H. Van Brussel, "Optimal robot excitation and
+//! identification", IEEE Trans. Robotics and Automation 13 (1997), for motions as series; G. H. Golub and V. Pereyra,
+//! SIAM J. Numerical Analysis 10 (1973), for the period as the one unknown that is left when the linear ones are
+//! projected out.
+
+use std::f64::consts::{LN_2, TAU};
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use crate::motion::derivatives::Prepared;
+use crate::motion::periods::{count, find_period};
+use crate::motion::spectrum::hann_power;
+
+/// Harmonics that a motion is searched for at most.
+const MOST_HARMONICS: usize = 100;
+/// Runs of more samples are not tried as a single period: it would take long, and nobody moves so slowly.
+const LONGEST_ALONE: usize = 1 << 18;
+/// Samples of a long run in which harmonics are counted first.
+const BEGINNING: usize = 1 << 16;
+/// A line stands out when its power is so many times what noise has on the average: chance lifts one in three million.
+const STANDS_OUT: f64 = 15.0;
+
+/// A motion that repeats itself, and what else is in its samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Periodic {
+    /// The period, s.
+    pub period: f64,
+    /// Harmonics that stand above the noise.
+    pub harmonics: usize,
+    /// Standard deviation of what the series leaves of each signal, in its unit.
+    pub noise: Vec<f64>,
+}
+
+/// The least squares projection of signals on a Fourier series of one period: what depends on the times alone.
+struct Basis<'a> {
+    time: &'a [f64],
+    period: f64,
+    harmonics: usize,
+    normal: Cholesky<f64, Dyn>,
+}
+
+impl<'a> Basis<'a> {
+    /// `None` if there are too few samples for so many harmonics, or their times do not tell them apart.
+    fn new(time: &'a [f64], period: f64, harmonics: usize) -> Option<Self> {
+        let columns = 2 * harmonics + 1;
+        if time.len() < 2 * columns || !(period > 0.0 && period.is_finite()) {
+            return None;
+        }
+        // Products of sines and cosines are sums of those of twice as many harmonics, so that all products of columns
+        // follow from as many sums as there are columns.
+        let (mut cosines, mut sines) = (vec![0.0; columns], vec![0.0; columns]);
+        for t in time {
+            for_each_harmonic(TAU * (t - time[0]) / period, columns - 1, |k, cos, sin| {
+                cosines[k] += cos;
+                sines[k] += sin;
+            });
+        }
+        let half = |a: f64, b: f64| 0.5 * (a + b);
+        let mut normal = DMatrix::zeros(columns, columns);
+        normal[(0, 0)] = time.len() as f64;
+        cosines[0] = time.len() as f64;
+        for j in 1..=harmonics {
+            let (cos_j, sin_j) = (2 * j - 1, 2 * j);
+            normal[(cos_j, 0)] = cosines[j];
+            normal[(sin_j, 0)] = sines[j];
+            for k in 1..=j {
+                let (cos_k, sin_k) = (2 * k - 1, 2 * k);
+                normal[(cos_j, cos_k)] = half(cosines[j - k], cosines[j + k]);
+                normal[(sin_j, sin_k)] = half(cosines[j - k], -cosines[j + k]);
+                normal[(sin_j, cos_k)] = half(sines[j + k], sines[j - k]);
+                // The lower triangle is all that is read.
+                if k < j {
+                    normal[(cos_j, sin_k)] = half(sines[j + k], -sines[j - k]);
+                }
+            }
+        }
+        let normal = normal.cholesky()?;
+        // Normal equations are as good as the columns are near to orthogonal, as they are over whole periods.
+        let diagonal = normal.l_dirty().diagonal();
+        let is_sound = diagonal.min() > 1e-3 * diagonal.max();
+        is_sound.then_some(Self {
+            time,
+            period,
+            harmonics,
+            normal,
+        })
+    }
+
+    /// Coefficients: the constant, then cosine and sine of each harmonic.
+    fn series(&self, values: &[f64]) -> DVector<f64> {
+        let mut right = DVector::zeros(2 * self.harmonics + 1);
+        for (t, value) in self.time.iter().zip(values) {
+            right[0] += value;
+            for_each_harmonic(self.angle(*t), self.harmonics, |k, cos, sin| {
+                right[2 * k - 1] += value * cos;
+                right[2 * k] += value * sin;
+            });
+        }
+        self.normal.solve(&right)
+    }
+
+    fn angle(&self, t: f64) -> f64 {
+        TAU * (t - self.time[0]) / self.period
+    }
+
+    /// Value and both derivatives at a time.
+    fn at(&self, series: &DVector<f64>, t: f64) -> [f64; 3] {
+        let w = TAU / self.period;
+        let mut sum = [series[0], 0.0, 0.0];
+        for_each_harmonic(self.angle(t), self.harmonics, |k, cos, sin| {
+            let (a, b) = (series[2 * k - 1], series[2 * k]);
+            let (value, turned) = (a * cos + b * sin, b * cos - a * sin);
+            let w = w * k as f64;
+            sum[0] += value;
+            sum[1] += w * turned;
+            sum[2] -= w * w * value;
+        });
+        sum
+    }
+
+    /// What the series leaves of the values.
+    fn residual(&self, series: &DVector<f64>, values: &[f64]) -> Vec<f64> {
+        let pairs = self.time.iter().zip(values);
+        pairs
+            .map(|(t, value)| value - self.at(series, *t)[0])
+            .collect()
+    }
+
+    /// One step of Gauss and Newton towards the period that leaves least of all signals, s; each signal counts by its
+    /// residual, so that units do not matter.
+    fn step(&self, signals: &[&[f64]]) -> Option<f64> {
+        let (mut slope, mut curvature) = (0.0, 0.0);
+        for values in signals {
+            let series = self.series(values);
+            let residual = self.residual(&series, values);
+            let size: f64 = residual.iter().map(|r| r * r).sum();
+            if size == 0.0 {
+                continue;
+            }
+            // A longer period slows the motion down about its start; the series itself takes part of that up.
+            let changes: Vec<f64> = self
+                .time
+                .iter()
+                .map(|t| -(t - self.time[0]) / self.period * self.at(&series, *t)[1])
+                .collect();
+            let changes = self.residual(&self.series(&changes), &changes);
+            let pairs = changes.iter().zip(&residual);
+            slope += pairs.map(|(c, r)| c * r).sum::<f64>() / size;
+            curvature += changes.iter().map(|c| c * c).sum::<f64>() / size;
+        }
+        let step = slope / curvature;
+        step.is_finite().then_some(step)
+    }
+}
+
+/// Calls `visit` with `k`, `cos(k angle)` and `sin(k angle)` for all `k` from 1 on, by turning step by step.
+fn for_each_harmonic(angle: f64, harmonics: usize, mut visit: impl FnMut(usize, f64, f64)) {
+    let (sin1, cos1) = angle.sin_cos();
+    let (mut cos, mut sin) = (1.0, 0.0);
+    for k in 1..=harmonics {
+        (cos, sin) = (cos * cos1 - sin * sin1, sin * cos1 + cos * sin1);
+        visit(k, cos, sin);
+    }
+}
+
+/// The least squares projection of positions on a Fourier series of `harmonics` of the period, and its exact
+/// derivatives; `None` if there are too few samples for so many harmonics, or the run is far shorter than the period.
+pub fn project(time: &[f64], positions: &[f64], period: f64, harmonics: usize) -> Option<Prepared> {
+    let basis = Basis::new(time, period, harmonics)?;
+    let series = basis.series(positions);
+    let mut prepared = Prepared {
+        q: Vec::with_capacity(time.len()),
+        qd: Vec::with_capacity(time.len()),
+        qdd: Vec::with_capacity(time.len()),
+    };
+    for t in time {
+        let [q, qd, qdd] = basis.at(&series, *t);
+        prepared.q.push(q);
+        prepared.qd.push(qd);
+        prepared.qdd.push(qdd);
+    }
+    Some(prepared)
+}
+
+/// The series of which the signals are samples with nothing but white noise beside; `None` if there is none.
+///
+/// The period is the shortest after which the run returns to itself, as [`find_period`] sees it, or else the length of
+/// the run, with or without the first sample repeated at its end; then it is what leaves least.
+/// Harmonics count up to the last that stands above the noise. What is left is noise if its spectrum is flat: where
+/// the harmonics are no line may stand out, and the mean must be that of the upper half of the band.
+pub fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<Periodic> {
+    let moving: Vec<&[f64]> = signals
+        .iter()
+        .copied()
+        .filter(|values| values.iter().any(|v| v.total_cmp(&values[0]).is_ne()))
+        .collect();
+    if moving.is_empty() || time.len() < 64 {
+        return None;
+    }
+    let duration = time[time.len() - 1] - time[0];
+    let step = duration / (time.len() - 1) as f64;
+    let found = find_period(time, &moving);
+    let whole = [duration + step, duration]
+        .into_iter()
+        .filter(|_| found.is_none() && time.len() <= LONGEST_ALONE)
+        .filter(|_| moving.iter().all(|values| closes(values)));
+    let (period, harmonics) = found
+        .into_iter()
+        .chain(whole)
+        .find_map(|period| settle(time, &moving, period, duration + 1.5 * step))?;
+    let basis = Basis::new(time, period, harmonics)?;
+    let noise = signals
+        .iter()
+        .map(|values| {
+            let residual = basis.residual(&basis.series(values), values);
+            let left = (time.len() - 2 * harmonics - 1) as f64;
+            (residual.iter().map(|r| r * r).sum::<f64>() / left).sqrt()
+        })
+        .collect();
+    Some(Periodic {
+        period,
+        harmonics,
+        noise,
+    })
+}
+
+/// Whether a signal might go on at its end with its beginning: the gap between is no larger than a few of its steps.
+fn closes(values: &[f64]) -> bool {
+    let largest = values
+        .windows(2)
+        .map(|w| (w[1] - w[0]).abs())
+        .fold(0.0, f64::max);
+    (values[values.len() - 1] - values[0]).abs() <= 3.0 * largest
+}
+
+/// The period near the one given, and as many harmonics as stand out, if they leave nothing but noise.
+fn settle(time: &[f64], signals: &[&[f64]], mut period: f64, longest: f64) -> Option<(f64, usize)> {
+    let n = time.len();
+    let step = (time[n - 1] - time[0]) / (n - 1) as f64;
+    let most = count(0.2 * period / step).min(MOST_HARMONICS);
+    if most == 0 {
+        return None;
+    }
+    let refined = |period: f64, samples: usize, harmonics: usize| {
+        let signals: Vec<&[f64]> = signals.iter().map(|values| &values[..samples]).collect();
+        let mut period = period;
+        for _ in 0..4 {
+            let change = Basis::new(&time[..samples], period, harmonics)?.step(&signals)?;
+            period = (period + change.clamp(-step, step)).clamp(2.0 * step, longest);
+        }
+        Some(period)
+    };
+    let harmonics_in = |samples: usize, period: f64, most: usize| {
+        let signals: Vec<&[f64]> = signals.iter().map(|values| &values[..samples]).collect();
+        standing_out(&time[..samples], &signals, period, most)
+    };
+    // A long run tells its harmonics in its beginning; all of it would take minutes for a hundred of them.
+    let mut samples = count(3.0 * period / step).max(BEGINNING).min(n);
+    // Fewer harmonics first: their phases bear an error of the period that would turn high ones round after many periods.
+    // Fewer last: what they leave free makes the period vague, and a wrong period adds harmonics.
+    period = refined(period, samples, most.min(20))?;
+    period = refined(period, samples, most)?;
+    let few = harmonics_in(samples, period, most)?;
+    period = refined(period, samples, few)?;
+    if samples == n {
+        return Some((period, harmonics_in(n, period, most)?.min(few)));
+    }
+    while samples < n {
+        samples = (4 * samples).min(n);
+        period = refined(period, samples, few)?;
+    }
+    // A longer run has a lower noise floor, above which some more may stand.
+    Some((period, harmonics_in(n, period, most.min(2 * few + 8))?))
+}
+
+/// The last harmonic that stands above the noise in any signal; `None` if what all harmonics leave is no white noise, or
+/// none stands out.
+fn standing_out(time: &[f64], signals: &[&[f64]], period: f64, most: usize) -> Option<usize> {
+    let step = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
+    let basis = Basis::new(time, period, most)?;
+    let mut harmonics = 0;
+    for values in signals {
+        let series = basis.series(values);
+        let residual = basis.residual(&series, values);
+        let variance = white_variance(&residual, step, 2.0 * most as f64 / period)?;
+        // The series took its share of the noise.
+        let variance = variance * time.len() as f64 / (time.len() - 2 * most - 1) as f64;
+        // The square of a line's amplitude that white noise gives on the average.
+        let average = 4.0 * variance / time.len() as f64;
+        let stands_out =
+            |k: &usize| series[2 * k - 1].powi(2) + series[2 * k].powi(2) > STANDS_OUT * average;
+        harmonics = harmonics.max((1..=most).rev().find(stands_out).unwrap_or(0));
+    }
+    (harmonics > 0).then_some(harmonics)
+}
+
+/// The variance of a residual if it is white; `None` if it is not. Lines and the mean are looked at up to `up_to`, Hz,
+/// where motion is.
+fn white_variance(residual: &[f64], step: f64, up_to: f64) -> Option<f64> {
+    let power = hann_power(residual);
+    let bins = power.len();
+    let mut upper = power[bins / 2..].to_vec();
+    upper.sort_by(f64::total_cmp);
+    let level = upper[upper.len() / 2] / LN_2;
+    let low = count((2.0 * step * up_to * (bins - 1) as f64).ceil()).clamp(8, bins / 2);
+    let lower = &power[1..low];
+    let mean = lower.iter().sum::<f64>() / lower.len() as f64;
+    // Padding and the window make neighbours alike, which leaves about so many independent ones.
+    let independent = lower.len() as f64 * residual.len() as f64 / (3 * bins) as f64;
+    let is_flat = mean <= level * (1.0 + 5.0 / independent.sqrt().max(1.0));
+    let stands_out = lower.iter().any(|p| *p > STANDS_OUT * level);
+    let variance = residual.iter().map(|r| r * r).sum::<f64>() / residual.len() as f64;
+    (is_flat && !stands_out && variance > 0.0).then_some(variance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_noise::Noise;
+
+    const PERIOD: f64 = 2.37;
+
+    fn motion(t: f64) -> [f64; 3] {
+        let w = TAU / PERIOD;
+        let term = |k: f64, a: f64, phase: f64| {
+            let angle = k * w * t + phase;
+            [
+                a * angle.sin(),
+                a * k * w * angle.cos(),
+                -a * (k * w).powi(2) * angle.sin(),
+            ]
+        };
+        let (a, b) = (term(1.0, 0.8, 0.3), term(3.0, 0.3, 1.1));
+        [0, 1, 2].map(|i| a[i] + b[i])
+    }
+
+    /// Uneven times, as a clock that drifts gives them.
+    fn times(n: u32) -> Vec<f64> {
+        (0..n)
+            .map(|i| f64::from(i) * 0.004 + 0.0009 * (f64::from(i) * 0.7).sin())
+            .collect()
+    }
+
+    fn noisy(time: &[f64], sigma: f64, truth: impl Fn(f64) -> f64) -> Vec<f64> {
+        let mut noise = Noise::new(11);
+        let sample = |t: &f64| truth(*t) + sigma * noise.normal();
+        time.iter().map(sample).collect()
+    }
+
+    #[test]
+    fn a_series_gives_exact_derivatives() {
+        let time = times(2500);
+        let q: Vec<f64> = time.iter().map(|t| motion(*t)[0]).collect();
+        let prepared = project(&time, &q, PERIOD, 5).expect("enough samples");
+        for (i, t) in time.iter().enumerate() {
+            let truth = motion(*t);
+            assert!((prepared.q[i] - truth[0]).abs() < 1e-9);
+            assert!((prepared.qd[i] - truth[1]).abs() < 1e-8);
+            assert!((prepared.qdd[i] - truth[2]).abs() < 1e-7);
+        }
+        assert_eq!(project(&time[..10], &q[..10], PERIOD, 5), None);
+    }
+
+    /// Over part of a period the columns are far from orthogonal; the shortcut for their products stays right.
+    #[test]
+    fn products_of_columns_are_those_of_the_columns() {
+        let time = times(400);
+        let basis = Basis::new(&time, PERIOD, 3).expect("two thirds of a period");
+        let rows = DMatrix::from_fn(time.len(), 7, |i, j| {
+            let angle = TAU * j.div_ceil(2) as f64 * (time[i] - time[0]) / PERIOD;
+            if j % 2 == 0 && j > 0 {
+                angle.sin()
+            } else {
+                angle.cos()
+            }
+        });
+        let factor = basis.normal.l();
+        let difference = &factor * factor.transpose() - rows.transpose() * &rows;
+        assert!(difference.amax() < 1e-9, "{difference}");
+    }
+
+    /// Two and a half periods, two to the sample, and one: with and without the first sample repeated.
+    #[test]
+    fn a_periodic_run_is_a_series_and_noise() {
+        for n in [1482, 1185, 593, 594] {
+            let step = if n < 600 { PERIOD / 593.0 } else { 0.004 };
+            let time: Vec<f64> = (0..n).map(|i| f64::from(i) * step).collect();
+            let q = noisy(&time, 1e-5, |t| motion(t)[0]);
+            let still = noisy(&time, 1e-6, |_| 0.2);
+            let found = find_series(&time, &[&q, &still]).expect("a series");
+            assert!((found.period - PERIOD).abs() < 3e-5, "{n}: {found:?}");
+            assert_eq!(found.harmonics, 3, "{n}");
+            assert!((found.noise[0] / 1e-5 - 1.0).abs() < 0.1, "{n}: {found:?}");
+            assert!((found.noise[1] / 1e-6 - 1.0).abs() < 0.1, "{n}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn what_leaves_more_than_noise_is_no_series() {
+        let refused = |time: &[f64], truth: &dyn Fn(f64) -> f64| {
+            let q = noisy(time, 1e-5, truth);
+            assert_eq!(find_series(time, &[&q]), None);
+        };
+        let long = times(1482);
+        // A vibration beside the period, a drift, a controller that does not repeat itself.
+        refused(&long, &|t| motion(t)[0] + 1e-5 * (11.3 * t).sin());
+        refused(&long, &|t| motion(t)[0] + 2e-5 * t);
+        refused(&long, &|t| motion(t)[0] * (1.0 + 1e-4 * (0.9 * t).sin()));
+        // Part of a period; one that ends where it began, but not as fast.
+        refused(&times(430), &|t| motion(t)[0]);
+        refused(&times(593), &|t| (t - 1.186).powi(2));
+        refused(&long, &|_| 0.0);
+    }
+}

@@ -1,0 +1,484 @@
+//! What can be wrong with a recording, each with the place, what was expected and what to do.
+
+use std::fmt;
+
+use crate::motion::filters::FilterError;
+use crate::recording::notes::count_of;
+
+/// A fault of a recording. Its `Display` names the file, the line and the column where they are
+/// known, and ends with what to do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordingError {
+    /// The file as the user named it, or a word for a stream.
+    pub file: String,
+    /// What is wrong.
+    pub fault: Fault,
+}
+
+/// The kinds of faults of a recording. Lines count from 1 with the header.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Fault {
+    /// The file cannot be opened or read.
+    Unreadable {
+        /// The operating system's words.
+        reason: String,
+    },
+    /// The file has no bytes, or only white space.
+    Empty,
+    /// A header, but no sample.
+    NoSamples,
+    /// The file is not CSV text: another known format or other bytes.
+    NotCsv {
+        /// What it looks like.
+        looks_like: &'static str,
+    },
+    /// The file is of a format that is read, but not in this form.
+    Format {
+        /// What it is.
+        format: &'static str,
+        /// What is wrong, and what to do.
+        says: String,
+    },
+    /// The recording holds more numbers than may be kept in memory.
+    TooLarge {
+        /// The line at which reading ended.
+        line: u64,
+        /// Samples before it.
+        samples: usize,
+        /// Columns that are needed.
+        columns: usize,
+        /// First and last time of those samples, s, where they are known.
+        until: Option<(f64, f64)>,
+    },
+    /// No sample lies in the time that was asked for.
+    NoneBetween {
+        /// From, s.
+        from: f64,
+        /// To, s.
+        to: f64,
+    },
+    /// The first line holds numbers where column names are expected.
+    NoHeader,
+    /// The separator cannot be told from the first line.
+    UnclearSeparator {
+        /// The first line, shortened.
+        header: String,
+    },
+    /// A column has no name.
+    UnnamedColumn {
+        /// Its place, from 1.
+        place: usize,
+    },
+    /// Two columns have the same name.
+    DuplicateColumn {
+        /// The name.
+        name: String,
+        /// Places of the first two that have it, from 1.
+        places: [usize; 2],
+        /// Whether a renaming brought this about.
+        by_renaming: bool,
+    },
+    /// A renaming is given twice for the same name.
+    DuplicateRenaming {
+        /// The name in question.
+        name: String,
+    },
+    /// A line has another number of fields than the header.
+    RaggedLine {
+        /// The line.
+        line: u64,
+        /// Fields there.
+        have: usize,
+        /// Fields of the header.
+        expected: usize,
+    },
+    /// A column that is needed is not there.
+    MissingColumn {
+        /// The name that was looked for.
+        name: String,
+        /// The closest name that is there.
+        nearest: Option<String>,
+        /// All names that are there.
+        present: Vec<String>,
+        /// Whether the name comes from a renaming (`theirs`).
+        by_renaming: bool,
+    },
+    /// A needed column holds text that is no number.
+    NotANumber {
+        /// The column.
+        column: String,
+        /// The first such line.
+        line: u64,
+        /// The text there.
+        text: String,
+        /// How many fields of the column are concerned.
+        count: usize,
+    },
+    /// A needed column holds NaN, infinite or empty fields.
+    NotFinite {
+        /// The column.
+        column: String,
+        /// The first such line.
+        line: u64,
+        /// The text there.
+        text: String,
+        /// How many fields of the column are concerned.
+        count: usize,
+    },
+    /// The measured force of a drive is needed and not there.
+    MissingForce {
+        /// The drives without a column.
+        drives: Vec<String>,
+    },
+    /// Time does not increase.
+    TimeNotIncreasing {
+        /// The line.
+        line: u64,
+        /// Time before, s.
+        previous: f64,
+        /// Time there, s.
+        here: f64,
+    },
+    /// A quote opens a field that does not end in its line.
+    OpenQuote {
+        /// The line in which it opens.
+        line: u64,
+    },
+    /// Too few samples for what is asked.
+    TooFewSamples {
+        /// Samples there are.
+        have: usize,
+        /// Samples there must be.
+        need: usize,
+        /// What they are needed for.
+        purpose: &'static str,
+    },
+    /// A Fourier series was asked for, but the motion has no period that could be found.
+    NoPeriod,
+    /// The period asked for is too short for the samples, or too long for the recording.
+    Period {
+        /// The period, s.
+        period: f64,
+        /// The shortest that samples can show, s.
+        shortest: f64,
+        /// The longest that the recording can show, s.
+        longest: f64,
+    },
+    /// The cut-off's period is longer than the recording.
+    CutoffTooLow {
+        /// The cut-off, Hz.
+        cutoff_hz: f64,
+        /// The lowest that leaves something, Hz.
+        lowest_hz: f64,
+        /// Length of the recording, s.
+        duration: f64,
+    },
+    /// The filter that was asked for does not suit the recording.
+    Filter {
+        /// The coordinate that was being prepared.
+        column: String,
+        /// The filter's complaint.
+        error: FilterError,
+    },
+}
+
+impl fmt::Display for RecordingError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let file = &self.file;
+        match self.fault.line() {
+            Some(line) => write!(f, "{file}, {} {line}: {}", place_word(file), self.fault),
+            None => write!(f, "{file}: {}", self.fault),
+        }
+    }
+}
+
+impl std::error::Error for RecordingError {}
+
+/// What messages call a recording whose bytes came without a file: its name, and what they are unless they are text.
+pub fn name_of_bytes(name: &str, bytes: &[u8]) -> String {
+    let kind = match bytes {
+        [b'P', b'A', b'R', b'1', ..] => PARQUET,
+        _ if bytes.starts_with(b"MATLAB 5") => MATLAB,
+        _ => "",
+    };
+    format!("{name}{kind}")
+}
+
+const PARQUET: &str = " (Parquet)";
+const MATLAB: &str = " (MATLAB)";
+
+/// What a sample of a file, or of bytes that [`name_of_bytes`] names, stands in: text has lines, tables have rows.
+pub fn place_word(file: &str) -> &'static str {
+    let ends = |end: &str| {
+        std::path::Path::new(file)
+            .extension()
+            .is_some_and(|extension| extension.eq_ignore_ascii_case(end))
+    };
+    let is_table = file.ends_with(PARQUET) || file.ends_with(MATLAB);
+    if is_table || ends("parquet") || ends("pq") || ends("mat") {
+        "row"
+    } else {
+        "line"
+    }
+}
+
+impl Fault {
+    /// The line concerned, where there is one.
+    pub fn line(&self) -> Option<u64> {
+        match self {
+            Self::RaggedLine { line, .. }
+            | Self::NotANumber { line, .. }
+            | Self::NotFinite { line, .. }
+            | Self::OpenQuote { line }
+            | Self::TimeNotIncreasing { line, .. }
+            | Self::TooLarge { line, .. } => Some(*line),
+            Self::NoHeader | Self::UnclearSeparator { .. } => Some(1),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Fault {
+    #[allow(clippy::too_many_lines, reason = "one arm per fault, each a sentence")]
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unreadable { reason } => {
+                write!(
+                    f,
+                    "the recording cannot be read: {reason}; check the path and the permissions"
+                )
+            }
+            Self::Empty => f.write_str(
+                "the recording is empty; a header line and one line per sample are expected",
+            ),
+            Self::NoSamples => f.write_str(
+                "there is a header but no sample; one line of numbers per sample is expected",
+            ),
+            Self::NotCsv { looks_like } => write!(
+                f,
+                "this looks like {looks_like}, not like a recording; save it as CSV (UTF-8, with a header), Parquet or MATLAB's format 5"
+            ),
+            Self::Format { format, says } => write!(f, "this is {format}: {says}"),
+            Self::TooLarge {
+                samples,
+                columns,
+                until,
+                ..
+            } => {
+                write!(
+                    f,
+                    "the recording is too large to be kept in memory: up to here {samples} samples of {columns} columns are \
+                     {:.1} GB; ",
+                    8e-9 * (*samples as f64) * (*columns as f64)
+                )?;
+                match until {
+                    Some((from, to)) => write!(
+                        f,
+                        "take a part of it, for example `--between {from},{to}`, or several such parts one after the other"
+                    ),
+                    None => f.write_str("take a part of it with `--between FROM,TO` (s)"),
+                }
+            }
+            Self::NoneBetween { from, to } => write!(
+                f,
+                "no sample lies between t = {from} s and {to} s, as `--between` asks; give times that the recording has"
+            ),
+            Self::NoHeader => f.write_str(
+                "the first line holds numbers, but column names are expected there; \
+                 put a line such as `t,theta1,spindle_left` on top",
+            ),
+            Self::UnclearSeparator { header } if header.starts_with('#') => write!(
+                f,
+                "the first line must name the columns, but it is `{header}`; comment lines are not read, delete them"
+            ),
+            Self::UnclearSeparator { header } => write!(
+                f,
+                "it cannot be told what separates the columns of `{header}`; \
+                 use a comma (or `;` or a tab) throughout and a point for decimals"
+            ),
+            Self::UnnamedColumn { place } => {
+                write!(
+                    f,
+                    "column {place} has no name; name it, or remove a separator at the end of the lines"
+                )
+            }
+            Self::DuplicateColumn {
+                name,
+                places: [a, b],
+                by_renaming,
+            } => {
+                write!(f, "columns {a} and {b} are both called `{name}`; ")?;
+                if *by_renaming {
+                    f.write_str("a renaming brings this about: leave it out, or rename the other column too")
+                } else {
+                    f.write_str("give every column a name of its own")
+                }
+            }
+            Self::DuplicateRenaming { name } => {
+                write!(
+                    f,
+                    "`{name}` is renamed twice; give each name and each column one renaming (`--map ours=theirs`)"
+                )
+            }
+            Self::RaggedLine { have, expected, .. } => write!(
+                f,
+                "{} where the header has {expected}; complete or remove the line",
+                count_of(*have, "field", "fields")
+            ),
+            Self::MissingColumn {
+                name,
+                nearest,
+                present,
+                by_renaming,
+            } => {
+                if *by_renaming {
+                    write!(
+                        f,
+                        "a renaming asks for the column `{name}`, which is not there"
+                    )?;
+                } else {
+                    write!(f, "there is no column `{name}`")?;
+                }
+                match nearest {
+                    Some(nearest) => write!(f, "; is `{nearest}` meant?")?,
+                    None => f.write_str(".")?,
+                }
+                write!(f, " The columns are: {}.", list(present))?;
+                if present.first().is_some_and(|first| first.starts_with('#')) {
+                    f.write_str(
+                        " The first line must name the columns: comment lines are not read, delete them.",
+                    )?;
+                }
+                if *by_renaming {
+                    f.write_str(" Renamings read `--map ours=theirs`.")
+                } else {
+                    write!(
+                        f,
+                        " Map one onto it with `--map {name}={}`.",
+                        nearest.as_deref().unwrap_or("THEIRS")
+                    )
+                }
+            }
+            Self::NotANumber {
+                column,
+                text,
+                count,
+                ..
+            } => {
+                write!(
+                    f,
+                    "column `{column}` holds `{text}` where a number is expected"
+                )?;
+                others(f, *count, "fields of the column are no numbers")?;
+                if looks_like_decimal_comma(text) {
+                    f.write_str("; write decimals with a point")
+                } else {
+                    f.write_str("; correct or remove it")
+                }
+            }
+            Self::NotFinite {
+                column,
+                text,
+                count,
+                ..
+            } => {
+                if text.is_empty() {
+                    write!(f, "column `{column}` is empty where a number is expected")?;
+                } else {
+                    let expected = match text.parse::<f64>() {
+                        Ok(value) if value.is_finite() => "a number that was measured",
+                        _ => "a finite number",
+                    };
+                    write!(
+                        f,
+                        "column `{column}` holds `{text}` where {expected} is expected"
+                    )?;
+                }
+                others(f, *count, "fields of the column are not finite or empty")?;
+                f.write_str("; repair the recording, or leave such samples out with `--skip-bad-samples` (they are counted)")
+            }
+            Self::MissingForce { drives } => write!(
+                f,
+                "the measured force of {} is needed, but there is no such column; \
+                 map one onto it with `--map {}=THEIRS`",
+                list(drives),
+                drives.first().map_or("DRIVE", String::as_str)
+            ),
+            Self::TimeNotIncreasing { previous, here, .. } => write!(
+                f,
+                "time goes from {previous} s to {here} s, but must increase from sample to sample; \
+                 remove repeated samples, or split the file where the clock was reset"
+            ),
+            Self::TooFewSamples {
+                have,
+                need,
+                purpose,
+            } => {
+                write!(
+                    f,
+                    "{} too few for {purpose}, which takes at least {need}; use a longer recording",
+                    match have {
+                        1 => "1 sample is".to_owned(),
+                        n => format!("{n} samples are"),
+                    }
+                )
+            }
+            Self::OpenQuote { .. } => f.write_str(
+                "a quote opens here, but the field that it begins does not end in the same line; delete the quote, or \
+                 close it",
+            ),
+            Self::NoPeriod => f.write_str(
+                "the motion does not repeat itself within the recording, so no period can be found; give it with \
+                 `--period S`, or take another smoothing",
+            ),
+            Self::Period {
+                period,
+                shortest,
+                longest,
+            } => write!(
+                f,
+                "a period of {period} s was asked for, but this recording can show periods from {shortest:.6} s to \
+                 {longest:.6} s only; choose one of them, or another smoothing"
+            ),
+            Self::CutoffTooLow {
+                cutoff_hz,
+                lowest_hz,
+                duration,
+            } => write!(
+                f,
+                "a cut-off of {cutoff_hz} Hz is too low for a recording of {duration:.4} s, of which no motion would be \
+                 left; choose one above {lowest_hz:.4} Hz, or leave `--cutoff` away and have it chosen from the signal"
+            ),
+            Self::Filter { column, error } => write!(f, "`{column}` cannot be filtered: {error}"),
+        }
+    }
+}
+
+/// Says how many other fields share the fault.
+fn others(f: &mut fmt::Formatter<'_>, count: usize, what: &str) -> fmt::Result {
+    if count > 1 {
+        write!(f, " ({count} {what})")
+    } else {
+        Ok(())
+    }
+}
+
+fn looks_like_decimal_comma(text: &str) -> bool {
+    text.matches(',').count() == 1 && text.replace(',', ".").parse::<f64>().is_ok()
+}
+
+/// Names in backquotes; a long list is cut short with its length said.
+pub(crate) fn list(names: &[String]) -> String {
+    const SHOWN: usize = 40;
+    let shown: Vec<String> = names
+        .iter()
+        .take(SHOWN)
+        .map(|name| format!("`{name}`"))
+        .collect();
+    if names.len() > SHOWN {
+        format!("{} and {} more", shown.join(", "), names.len() - SHOWN)
+    } else {
+        shown.join(", ")
+    }
+}

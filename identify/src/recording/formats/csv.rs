@@ -1,0 +1,261 @@
+//! Recordings as CSV text: one header line, one line per sample, separated by commas, semicolons or tabs.
+//!
+//! A UTF-8 byte order mark and CR LF are fine, and so are blank lines.
+
+use std::io::{self, BufRead, BufReader, Cursor, Read};
+
+use crate::recording::error::Fault;
+use crate::recording::intake::{Field, Flow, Intake};
+use crate::recording::notes::Note;
+use crate::recording::{ReadOptions, Recording};
+
+/// The longest header line that is looked at; beyond it the file is no recording.
+const LONGEST_HEADER: u64 = 1 << 20;
+
+/// Reads CSV text; `file` is what messages call it.
+pub(crate) fn read(
+    stream: impl Read,
+    file: &str,
+    options: &ReadOptions,
+) -> Result<Recording, Fault> {
+    let (mut reader, separator, header_line) = open(stream)?;
+    let theirs = names(&mut reader, header_line)?;
+    let mut intake = Intake::new(theirs, options)?;
+    if separator != b',' {
+        let name = if separator == b';' {
+            "semicolons"
+        } else {
+            "tabs"
+        };
+        intake.note(Note::info(format!(
+            "The columns of {file} are separated by {name}."
+        )));
+    }
+    let mut record = csv::ByteRecord::new();
+    let mut sample = Vec::new();
+    while reader.read_byte_record(&mut record).map_err(unreadable)? {
+        // The reader stands behind the line's end here; where it began, blank lines are not
+        // passed over yet.
+        let line = reader.position().line() - 1;
+        if let Some(line) = quote_left_open(&record, line, &intake) {
+            return Err(Fault::OpenQuote { line });
+        }
+        if record.len() != intake.width() {
+            return Err(Fault::RaggedLine {
+                line,
+                have: record.len(),
+                expected: intake.width(),
+            });
+        }
+        sample.clear();
+        sample.extend(record.iter().enumerate().map(|(place, text)| {
+            if intake.reads(place) {
+                parse(text)
+            } else {
+                Field::Number(0.0)
+            }
+        }));
+        let text = |place: usize| {
+            let bytes = record.get(place).unwrap_or_default().trim_ascii();
+            String::from_utf8_lossy(bytes).chars().take(60).collect()
+        };
+        if intake.take(line, &sample, &text)? == Flow::Stop {
+            break;
+        }
+    }
+    intake.finish(file)
+}
+
+/// Names of the columns of CSV text.
+pub(crate) fn names_of(stream: impl Read) -> Result<Vec<String>, Fault> {
+    let (mut reader, _, header_line) = open(stream)?;
+    names(&mut reader, header_line)
+}
+
+/// A reader that stands before the header, what separates the columns, and the line of the header.
+fn open(stream: impl Read) -> Result<(csv::Reader<impl Read>, u8, u64), Fault> {
+    let mut stream = BufReader::with_capacity(1 << 16, stream);
+    let (header, first_lines) = read_header(&mut stream)?;
+    let separator = find_separator(&header)?;
+    let blank = first_lines.len() - first_lines.trim_ascii_start().len();
+    let header_line = 1 + newlines(&first_lines[..blank]);
+    let lines_of_text = EvenLines::new(Cursor::new(first_lines).chain(stream));
+    let reader = csv::ReaderBuilder::new()
+        .delimiter(separator)
+        .flexible(true)
+        .trim(csv::Trim::Headers)
+        .from_reader(lines_of_text);
+    Ok((reader, separator, header_line))
+}
+
+fn names(reader: &mut csv::Reader<impl Read>, line: u64) -> Result<Vec<String>, Fault> {
+    let header = reader.headers().map_err(unreadable)?;
+    if header.iter().any(|name| name.contains('\n')) {
+        return Err(Fault::OpenQuote { line });
+    }
+    Ok(header.iter().map(str::to_owned).collect())
+}
+
+/// The line in which a quote opens a field that goes on in the next line and takes in samples: to the end of the text,
+/// or so that fields are missing or no numbers. A remark of two lines is none. `last` is the line that ends the record.
+fn quote_left_open(record: &csv::ByteRecord, last: u64, intake: &Intake<'_>) -> Option<u64> {
+    let first = record.iter().position(|field| field.contains(&b'\n'))?;
+    let below: u64 = record.iter().skip(first).map(newlines).sum();
+    // A quote that is open to the end of the text has taken in the last line's end too.
+    let is_open = record
+        .iter()
+        .next_back()
+        .is_some_and(|field| field.ends_with(b"\n"));
+    let harms = is_open || record.len() != intake.width() || intake.reads(first);
+    harms.then(|| last + u64::from(is_open) - below)
+}
+
+fn newlines(bytes: &[u8]) -> u64 {
+    bytes.split(|byte| *byte == b'\n').count() as u64 - 1
+}
+
+fn parse(bytes: &[u8]) -> Field {
+    let bytes = bytes.trim_ascii();
+    if bytes.is_empty() {
+        return Field::NotFinite;
+    }
+    match std::str::from_utf8(bytes)
+        .ok()
+        .and_then(|text| text.parse::<f64>().ok())
+    {
+        Some(number) => Field::of(number),
+        None => Field::Text,
+    }
+}
+
+/// The same text with LF at the end of every line, the last one included, so that the lines of
+/// records can be told: the CSV reader counts a line only when it meets its LF.
+struct EvenLines<R> {
+    inner: R,
+    last: u8,
+    ended: bool,
+}
+
+impl<R: Read> EvenLines<R> {
+    fn new(inner: R) -> Self {
+        Self {
+            inner,
+            last: b'\n',
+            ended: false,
+        }
+    }
+}
+
+impl<R: Read> Read for EvenLines<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if buffer.is_empty() || self.ended {
+            return Ok(0);
+        }
+        loop {
+            let have = self.inner.read(buffer)?;
+            if have == 0 {
+                self.ended = true;
+                if self.last == b'\n' {
+                    return Ok(0);
+                }
+                buffer[0] = b'\n';
+                return Ok(1);
+            }
+            let mut kept = 0;
+            for i in 0..have {
+                if buffer[i] != b'\r' {
+                    buffer[kept] = buffer[i];
+                    kept += 1;
+                }
+            }
+            // Zero would mean the end of the text.
+            if kept > 0 {
+                self.last = buffer[kept - 1];
+                return Ok(kept);
+            }
+        }
+    }
+}
+
+/// The header as text without its byte order mark, and the bytes to read again, from the header on.
+fn read_header(stream: &mut impl BufRead) -> Result<(String, Vec<u8>), Fault> {
+    let mut bytes = Vec::new();
+    let unreadable = |error: io::Error| Fault::Unreadable {
+        reason: error.to_string(),
+    };
+    // Blank lines on top stay in the text, so that the lines are counted as in the file.
+    let mut limited = stream.take(LONGEST_HEADER);
+    while bytes.trim_ascii().is_empty() {
+        if limited.read_until(b'\n', &mut bytes).map_err(unreadable)? == 0 {
+            return Err(Fault::Empty);
+        }
+    }
+    let looks_like = match bytes.as_slice() {
+        [b'P', b'A', b'R', b'1', ..] => Some("a Parquet file"),
+        [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] => Some("UTF-16 text"),
+        [b'P', b'K', 3, 4, ..] => Some("a spreadsheet or ZIP archive"),
+        [0x1F, 0x8B, ..] => Some("a gzip archive"),
+        [b'M', b'A', b'T', b'L', b'A', b'B', ..] => Some("a MATLAB file"),
+        _ if bytes.contains(&0) => Some("binary data"),
+        line if line.trim_ascii().contains(&b'\r') => {
+            Some("text with lone carriage returns as line ends")
+        }
+        _ if bytes.len() as u64 == LONGEST_HEADER => Some("a file without lines"),
+        _ => None,
+    };
+    if let Some(looks_like) = looks_like {
+        return Err(Fault::NotCsv { looks_like });
+    }
+    let text = bytes
+        .strip_prefix(b"\xEF\xBB\xBF")
+        .unwrap_or(&bytes)
+        .to_vec();
+    let Ok(header) = std::str::from_utf8(&text) else {
+        return Err(Fault::NotCsv {
+            looks_like: "text in another encoding than UTF-8",
+        });
+    };
+    let header = header.trim().to_owned();
+    if header.is_empty() {
+        return Err(Fault::Empty);
+    }
+    Ok((header, text))
+}
+
+fn find_separator(header: &str) -> Result<u8, Fault> {
+    let present: Vec<u8> = [b',', b';', b'\t']
+        .into_iter()
+        .filter(|s| header.as_bytes().contains(s))
+        .collect();
+    let is_number = |text: &str| text.trim().trim_matches('"').parse::<f64>().is_ok();
+    match present.as_slice() {
+        [separator] => {
+            let mut fields = header.split(char::from(*separator));
+            if fields.all(is_number) {
+                Err(Fault::NoHeader)
+            } else {
+                Ok(*separator)
+            }
+        }
+        [] if is_number(header) => Err(Fault::NoHeader),
+        // A single column is hardly a recording, but it is clear what it says.
+        [] if !header.contains([' ', '|', ':']) => Ok(b','),
+        _ => Err(Fault::UnclearSeparator {
+            header: header.chars().take(80).collect(),
+        }),
+    }
+}
+
+fn unreadable(error: csv::Error) -> Fault {
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => Fault::Unreadable {
+            reason: error.to_string(),
+        },
+        csv::ErrorKind::Utf8 { .. } => Fault::NotCsv {
+            looks_like: "text in another encoding than UTF-8",
+        },
+        other => Fault::Unreadable {
+            reason: format!("{other:?}"),
+        },
+    }
+}

@@ -1,0 +1,236 @@
+//! Recordings as Parquet files: the flat columns of numbers and times, read in batches of samples.
+//!
+//! Time stamps and times of day become seconds from the first one on, exactly, before they are rounded to a float.
+
+use parquet::basic::{ConvertedType, LogicalType, TimeUnit};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::DataType;
+use parquet::errors::ParquetError;
+use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
+use parquet::schema::types::ColumnDescriptor;
+
+use crate::recording::error::Fault;
+use crate::recording::intake::{Field, Flow, Intake};
+use crate::recording::notes::Note;
+use crate::recording::{ReadOptions, Recording};
+
+/// Samples that are read at once.
+const BATCH: usize = 8192;
+
+/// Reads a Parquet file; `file` is what messages call it.
+pub(crate) fn read(
+    stream: impl ChunkReader + 'static,
+    file: &str,
+    options: &ReadOptions,
+) -> Result<Recording, Fault> {
+    let reader = SerializedFileReader::new(stream).map_err(fault)?;
+    let schema = reader.metadata().file_metadata().schema_descr_ptr();
+    let width = schema.num_columns();
+    let mut intake = Intake::new(names(&reader), options)?;
+    let mut kinds: Vec<Kind> = (0..width).map(|i| Kind::of(&schema.column(i))).collect();
+    for (i, kind) in kinds.iter().enumerate() {
+        if intake.reads(i) && matches!(kind, Kind::Ticks { .. }) {
+            intake.note(Note::info(format!(
+                "`{}` of {file} holds time stamps: it counts in seconds from the first one on.",
+                schema.column(i).path().string()
+            )));
+        }
+    }
+    let mut sample = vec![Field::Number(0.0); width];
+    let mut row = 0;
+    for group in 0..reader.num_row_groups() {
+        let group = reader.get_row_group(group).map_err(fault)?;
+        let mut columns = Vec::new();
+        for i in 0..width {
+            let is_read = intake.reads(i) && !matches!(kinds[i], Kind::Unusable);
+            let column = if is_read {
+                Some(group.get_column_reader(i).map_err(fault)?)
+            } else {
+                None
+            };
+            columns.push(column);
+        }
+        let mut left = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
+        while left > 0 {
+            let n = left.min(BATCH);
+            let mut fields: Vec<Vec<Field>> = Vec::with_capacity(width);
+            for (column, kind) in columns.iter_mut().zip(&mut kinds) {
+                fields.push(match column {
+                    Some(column) => batch(column, kind, n)?,
+                    None => Vec::new(),
+                });
+            }
+            for k in 0..n {
+                row += 1;
+                for (i, field) in sample.iter_mut().enumerate() {
+                    *field = match fields[i].get(k) {
+                        Some(field) => *field,
+                        // A column that nobody reads, or that holds no numbers.
+                        None if columns[i].is_none() && !intake.reads(i) => Field::Number(0.0),
+                        None => Field::Text,
+                    };
+                }
+                let text = |i: usize| match sample[i] {
+                    Field::Text => "a value of another type".to_owned(),
+                    _ => "null or NaN".to_owned(),
+                };
+                if intake.take(row, &sample, &text)? == Flow::Stop {
+                    return intake.finish(file);
+                }
+            }
+            left -= n;
+        }
+    }
+    intake.finish(file)
+}
+
+/// Names of the columns; those of nested ones hold points.
+pub(crate) fn names_of(stream: impl ChunkReader + 'static) -> Result<Vec<String>, Fault> {
+    Ok(names(&SerializedFileReader::new(stream).map_err(fault)?))
+}
+
+fn names<R: ChunkReader + 'static>(reader: &SerializedFileReader<R>) -> Vec<String> {
+    let schema = reader.metadata().file_metadata().schema_descr();
+    let columns = schema.columns().iter();
+    columns.map(|column| column.path().string()).collect()
+}
+
+/// What the numbers of a column mean.
+enum Kind {
+    Numbers,
+    /// Whole numbers of this many to the second; the first one is zero once it is known.
+    Ticks {
+        per_second: f64,
+        first: Option<i64>,
+    },
+    /// Whole numbers with so many decimals.
+    Decimal(i32),
+    Unusable,
+}
+
+impl Kind {
+    fn of(column: &ColumnDescriptor) -> Self {
+        let ticks = |per_second| Self::Ticks {
+            per_second,
+            first: None,
+        };
+        if column.max_rep_level() > 0 {
+            return Self::Unusable;
+        }
+        match column.logical_type_ref() {
+            Some(LogicalType::Timestamp(stamp)) => return ticks(per_second(stamp.unit)),
+            Some(LogicalType::Time(time)) => return ticks(per_second(time.unit)),
+            Some(LogicalType::Decimal(decimal)) => return Self::Decimal(decimal.scale),
+            _ => {}
+        }
+        match column.converted_type() {
+            ConvertedType::TIMESTAMP_MILLIS | ConvertedType::TIME_MILLIS => ticks(1e3),
+            ConvertedType::TIMESTAMP_MICROS | ConvertedType::TIME_MICROS => ticks(1e6),
+            ConvertedType::DECIMAL => Self::Decimal(column.type_scale()),
+            _ => Self::Numbers,
+        }
+    }
+
+    /// A whole number in seconds or with its decimals.
+    fn whole(&mut self, value: i64) -> f64 {
+        match self {
+            // Differences of ticks within a recording are far below 2^53, where floats are exact.
+            Self::Ticks { per_second, first } => {
+                value.wrapping_sub(*first.get_or_insert(value)) as f64 / *per_second
+            }
+            Self::Decimal(scale) => value as f64 / 10.0_f64.powi(*scale),
+            Self::Numbers | Self::Unusable => value as f64,
+        }
+    }
+}
+
+fn per_second(unit: TimeUnit) -> f64 {
+    match unit {
+        TimeUnit::MILLIS => 1e3,
+        TimeUnit::MICROS => 1e6,
+        TimeUnit::NANOS => 1e9,
+    }
+}
+
+/// The next `n` fields of a column.
+fn batch(column: &mut ColumnReader, kind: &mut Kind, n: usize) -> Result<Vec<Field>, Fault> {
+    match column {
+        ColumnReader::BoolColumnReader(reader) => values(reader, n, |value| {
+            Field::Number(f64::from(u8::from(*value)))
+        }),
+        ColumnReader::Int32ColumnReader(reader) => {
+            values(reader, n, |value| Field::of(kind.whole(i64::from(*value))))
+        }
+        ColumnReader::Int64ColumnReader(reader) => {
+            values(reader, n, |value| Field::of(kind.whole(*value)))
+        }
+        ColumnReader::Int96ColumnReader(reader) => {
+            let mut ticks = Kind::Ticks {
+                per_second: 1e9,
+                first: match kind {
+                    Kind::Ticks { first, .. } => *first,
+                    _ => None,
+                },
+            };
+            let fields = values(reader, n, |value| Field::of(ticks.whole(value.to_nanos())));
+            *kind = ticks;
+            fields
+        }
+        ColumnReader::FloatColumnReader(reader) => {
+            values(reader, n, |value| Field::of(f64::from(*value)))
+        }
+        ColumnReader::DoubleColumnReader(reader) => values(reader, n, |value| Field::of(*value)),
+        ColumnReader::ByteArrayColumnReader(reader) => values(reader, n, |_| Field::Text),
+        ColumnReader::FixedLenByteArrayColumnReader(reader) => values(reader, n, |_| Field::Text),
+    }
+}
+
+/// The next `n` values of a column, those that are null among them.
+fn values<T: DataType>(
+    reader: &mut ColumnReaderImpl<T>,
+    n: usize,
+    mut field: impl FnMut(&T::T) -> Field,
+) -> Result<Vec<Field>, Fault> {
+    let mut fields = Vec::with_capacity(n);
+    while fields.len() < n {
+        let (mut levels, mut values) = (Vec::new(), Vec::new());
+        let wanted = n - fields.len();
+        let (records, n_values, n_levels) = reader
+            .read_records(wanted, Some(&mut levels), None, &mut values)
+            .map_err(fault)?;
+        if records == 0 {
+            return Err(Fault::Format {
+                format: "a Parquet file",
+                says: "a column ends before the others do; write the file again".to_owned(),
+            });
+        }
+        if n_values == records || n_levels == 0 {
+            fields.extend(values.iter().map(&mut field));
+            continue;
+        }
+        let most = levels.iter().copied().max().unwrap_or(0);
+        let mut values = values.iter();
+        fields.extend(levels.iter().map(|level| {
+            // Fewer values than levels: the highest level is that of a value, unless all are null.
+            if *level == most && n_values > 0 {
+                values.next().map_or(Field::NotFinite, &mut field)
+            } else {
+                Field::NotFinite
+            }
+        }));
+    }
+    Ok(fields)
+}
+
+fn fault(error: ParquetError) -> Fault {
+    let says = match error {
+        ParquetError::General(says) | ParquetError::NYI(says) | ParquetError::EOF(says) => says,
+        other => other.to_string(),
+    };
+    Fault::Format {
+        format: "a Parquet file",
+        says: format!(
+            "it cannot be read: {says}; write it again, uncompressed or compressed by snappy, gzip or lz4"
+        ),
+    }
+}

@@ -1,0 +1,354 @@
+//! Samples of a recording on their way into memory, whatever the format of the file: names are checked and
+//! changed, columns that nobody needs are passed over, and fields that are no numbers are noted with their place.
+
+use indexmap::IndexMap;
+
+use crate::recording::error::Fault;
+use crate::recording::notes::{Note, count_of};
+use crate::recording::{Column, Computed, Defect, NotFinite, ReadOptions, Recording, missing};
+
+/// No quantity that is measured in SI units comes near this, and squares of smaller numbers do not overflow.
+pub(crate) const LARGEST: f64 = 1e100;
+
+/// One field of a sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Field {
+    Number(f64),
+    NotFinite,
+    Text,
+}
+
+impl Field {
+    /// A number, unless it is none that can be computed with.
+    pub(crate) fn of(value: f64) -> Self {
+        if value.abs() <= LARGEST {
+            Self::Number(value)
+        } else {
+            Self::NotFinite
+        }
+    }
+}
+
+/// Whether more samples are wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Flow {
+    Go,
+    Stop,
+}
+
+/// Takes samples one by one.
+pub(crate) struct Intake<'a> {
+    options: &'a ReadOptions,
+    theirs: Vec<String>,
+    names: Vec<String>,
+    /// Places of the columns that are kept.
+    kept: Vec<bool>,
+    columns: Vec<Column>,
+    lines: Vec<u64>,
+    left_out: Vec<u64>,
+    /// How the time of a sample follows from its fields, where samples are chosen by it.
+    time: Option<(Vec<(usize, f64)>, f64)>,
+    before: usize,
+    /// The line from which on nothing was read.
+    stopped: Option<u64>,
+    notes: Vec<Note>,
+}
+
+impl<'a> Intake<'a> {
+    /// Ready for samples of columns that the file calls `theirs`.
+    /// Fails when names are missing or double, or a renaming or computed column asks for one that is not there.
+    pub(crate) fn new(theirs: Vec<String>, options: &'a ReadOptions) -> Result<Self, Fault> {
+        check_names(&theirs)?;
+        let place = |name: &String| {
+            let place = theirs.iter().position(|other| other == name);
+            place.ok_or_else(|| missing(name, theirs.iter().map(String::as_str), true))
+        };
+        let mut sources = Vec::new();
+        for computed in &options.computed {
+            for (name, _) in &computed.terms {
+                sources.push(place(name)?);
+            }
+        }
+        let mut names = rename(&theirs, &options.renames)?;
+        // A computed column takes the place of one that the file calls so.
+        for computed in &options.computed {
+            for (name, of_theirs) in names.iter_mut().zip(&theirs) {
+                if *name == computed.name {
+                    *name = format!("{of_theirs} (as recorded)");
+                }
+            }
+        }
+        find_duplicate(&names, true)?;
+        let is_wanted = |name: &String| {
+            let wanted = options.wanted.as_ref();
+            wanted.is_none_or(|wanted| wanted.contains(name))
+        };
+        let mut kept: Vec<bool> = names.iter().map(is_wanted).collect();
+        for place in sources {
+            kept[place] = true;
+        }
+        let time = match options.between {
+            None => None,
+            Some(_) => match options.computed.iter().find(|one| one.name == "t") {
+                Some(Computed { terms, offset, .. }) => {
+                    let terms = terms
+                        .iter()
+                        .map(|(name, factor)| Ok((place(name)?, *factor)));
+                    Some((terms.collect::<Result<Vec<_>, Fault>>()?, *offset))
+                }
+                None => match names.iter().position(|name| name == "t") {
+                    Some(place) => Some((vec![(place, 1.0)], 0.0)),
+                    None => {
+                        return Err(missing("t", names.iter().map(String::as_str), false));
+                    }
+                },
+            },
+        };
+        Ok(Self {
+            options,
+            columns: vec![Column::default(); names.len()],
+            theirs,
+            names,
+            kept,
+            lines: Vec::new(),
+            left_out: Vec::new(),
+            time,
+            before: 0,
+            stopped: None,
+            notes: Vec::new(),
+        })
+    }
+
+    /// Fields of a sample.
+    pub(crate) fn width(&self) -> usize {
+        self.names.len()
+    }
+
+    /// Whether the fields at this place are looked at.
+    pub(crate) fn reads(&self, place: usize) -> bool {
+        self.kept[place] || place_in(self.time.as_ref(), place)
+    }
+
+    /// A remark on the file.
+    pub(crate) fn note(&mut self, note: Note) {
+        self.notes.push(note);
+    }
+
+    /// Takes a sample; `text` gives a field as it stands in the file, for messages.
+    /// Fails when more numbers would be kept than allowed.
+    pub(crate) fn take(
+        &mut self,
+        line: u64,
+        sample: &[Field],
+        text: &dyn Fn(usize) -> String,
+    ) -> Result<Flow, Fault> {
+        if let (Some((from, to)), Some(time)) = (self.options.between, self.time_of(sample)) {
+            if time < from {
+                self.before += 1;
+                return Ok(Flow::Go);
+            }
+            if time > to {
+                self.stopped = Some(line);
+                return Ok(Flow::Stop);
+            }
+        }
+        let is_read = |place: usize| self.kept[place];
+        if self.options.not_finite == NotFinite::LeaveOut
+            && (0..sample.len()).any(|i| is_read(i) && sample[i] == Field::NotFinite)
+        {
+            self.left_out.push(line);
+            return Ok(Flow::Go);
+        }
+        let n_kept = self.kept.iter().filter(|kept| **kept).count() + self.options.computed.len();
+        if (self.lines.len() + 1) * n_kept > self.options.most_numbers {
+            return Err(Fault::TooLarge {
+                line,
+                samples: self.lines.len(),
+                columns: n_kept,
+                until: self.last_time(),
+            });
+        }
+        self.lines.push(line);
+        for place in 0..sample.len() {
+            if self.kept[place] {
+                self.columns[place].push(sample[place], line, &|| text(place));
+            }
+        }
+        Ok(Flow::Go)
+    }
+
+    fn time_of(&self, sample: &[Field]) -> Option<f64> {
+        let (terms, offset) = self.time.as_ref()?;
+        let mut time = *offset;
+        for (place, factor) in terms {
+            match sample[*place] {
+                Field::Number(value) => time += factor * value,
+                // What has no time is kept: the check of time will name it.
+                Field::NotFinite | Field::Text => return None,
+            }
+        }
+        Some(time)
+    }
+
+    /// First and last time that were taken, where they are known.
+    fn last_time(&self) -> Option<(f64, f64)> {
+        let place = self.names.iter().position(|name| name == "t")?;
+        let column = &self.columns[place].values;
+        Some((*column.first()?, *column.last()?))
+    }
+
+    /// The recording; fails when there are no samples.
+    pub(crate) fn finish(self, file: &str) -> Result<Recording, Fault> {
+        if self.lines.is_empty() {
+            if let (Some((from, to)), true) = (
+                self.options.between,
+                self.before > 0 || self.stopped.is_some(),
+            ) {
+                return Err(Fault::NoneBetween { from, to });
+            }
+            return Err(Fault::NoSamples);
+        }
+        let mut notes = self.notes;
+        if let Some((from, to)) = self.options.between {
+            let rest = match self.stopped {
+                Some(line) => format!(", and nothing from line {line} on"),
+                None => String::new(),
+            };
+            notes.push(Note::info(format!(
+                "Of {file} the {} from t = {from} s to {to} s are read; {} before{rest} {} not.",
+                count_of(self.lines.len(), "sample", "samples"),
+                count_of(self.before, "sample", "samples"),
+                if self.before == 1 { "is" } else { "are" },
+            )));
+        }
+        if let Some(first) = self.left_out.first() {
+            notes.push(Note::warning(format!(
+                "{} of {} samples of {file} {} NaN, infinite or empty fields and {} left out, the first in line {first}.",
+                self.left_out.len(),
+                self.left_out.len() + self.lines.len(),
+                if self.left_out.len() == 1 { "holds" } else { "hold" },
+                if self.left_out.len() == 1 { "is" } else { "are" },
+            )));
+        }
+        let mut computed = IndexMap::new();
+        for one in &self.options.computed {
+            computed.insert(one.name.clone(), compute(one, &self.theirs, &self.columns));
+        }
+        let wanted = self.options.wanted.as_ref();
+        let mut columns = IndexMap::new();
+        let mut others = Vec::new();
+        for (name, column) in self.names.into_iter().zip(self.columns) {
+            if wanted.is_none_or(|wanted| wanted.contains(&name)) {
+                columns.insert(name, column);
+            } else {
+                others.push(name);
+            }
+        }
+        columns.extend(computed);
+        for (name, column) in &columns {
+            for (defect, what) in [
+                (&column.text, "text that is no number"),
+                (&column.not_finite, "NaN, infinite or empty fields"),
+            ] {
+                if let Some(Defect { line, count, .. }) = defect {
+                    notes.push(Note::warning(format!(
+                        "Column `{name}` of {file} holds {what} ({}, the first in line {line}) and cannot be used.",
+                        count_of(*count, "field", "fields")
+                    )));
+                }
+            }
+        }
+        Ok(Recording {
+            file: file.to_owned(),
+            columns,
+            others,
+            lines: self.lines,
+            notes,
+        })
+    }
+}
+
+fn place_in(time: Option<&(Vec<(usize, f64)>, f64)>, place: usize) -> bool {
+    time.is_some_and(|(terms, _)| terms.iter().any(|(other, _)| *other == place))
+}
+
+/// The sum of columns; what is wrong with any of them is wrong with the sum.
+fn compute(computed: &Computed, theirs: &[String], columns: &[Column]) -> Column {
+    let mut sum = Column::default();
+    for (name, factor) in &computed.terms {
+        let Some(place) = theirs.iter().position(|other| other == name) else {
+            continue;
+        };
+        let column = &columns[place];
+        if sum.values.is_empty() {
+            sum.values = vec![computed.offset; column.values.len()];
+        }
+        for (total, value) in sum.values.iter_mut().zip(&column.values) {
+            *total += factor * value;
+        }
+        sum.text = sum.text.or_else(|| column.text.clone());
+        sum.not_finite = sum.not_finite.or_else(|| column.not_finite.clone());
+    }
+    sum
+}
+
+impl Column {
+    fn push(&mut self, field: Field, line: u64, text: &dyn Fn() -> String) {
+        let defect = match field {
+            Field::Number(number) => {
+                self.values.push(number);
+                return;
+            }
+            Field::NotFinite => &mut self.not_finite,
+            Field::Text => &mut self.text,
+        };
+        self.values.push(f64::NAN);
+        defect
+            .get_or_insert_with(|| Defect {
+                line,
+                text: text(),
+                count: 0,
+            })
+            .count += 1;
+    }
+}
+
+fn check_names(names: &[String]) -> Result<(), Fault> {
+    for (i, name) in names.iter().enumerate() {
+        if name.is_empty() {
+            return Err(Fault::UnnamedColumn { place: i + 1 });
+        }
+    }
+    find_duplicate(names, false)
+}
+
+fn find_duplicate(names: &[String], by_renaming: bool) -> Result<(), Fault> {
+    let mut seen = std::collections::BTreeMap::new();
+    for (i, name) in names.iter().enumerate() {
+        if let Some(first) = seen.insert(name, i) {
+            return Err(Fault::DuplicateColumn {
+                name: name.clone(),
+                places: [first + 1, i + 1],
+                by_renaming,
+            });
+        }
+    }
+    Ok(())
+}
+
+fn rename(names: &[String], renames: &[(String, String)]) -> Result<Vec<String>, Fault> {
+    let mut renamed = names.to_vec();
+    for (i, (ours, theirs)) in renames.iter().enumerate() {
+        if renames[..i].iter().any(|(o, t)| o == ours || t == theirs) {
+            let twice_ours = renames[..i].iter().any(|(o, _)| o == ours);
+            return Err(Fault::DuplicateRenaming {
+                name: if twice_ours { ours } else { theirs }.clone(),
+            });
+        }
+        match names.iter().position(|name| name == theirs) {
+            Some(place) => renamed[place].clone_from(ours),
+            None => return Err(missing(theirs, names.iter().map(String::as_str), true)),
+        }
+    }
+    Ok(renamed)
+}
