@@ -7,8 +7,8 @@ use super::body::Body;
 use super::functions::{Kind, Method, list, reads_passive, rows};
 use super::items::{count, input};
 use crate::Derivation;
-use crate::dynamics::Dynamics;
 use crate::lower::Program;
+use crate::on_request::dynamics::Dynamics;
 
 /// How the result of a program is written.
 type Written<'a> = &'a dyn Fn(&Body<'_>) -> TokenStream;

@@ -8,8 +8,8 @@ use super::body::Body;
 use super::functions::{inverse_dynamics, model};
 use super::identifier::of_field;
 use crate::Derivation;
-use crate::closure::coordinates_of;
 use crate::expr::Atom;
+use crate::loops::closure::coordinates_of;
 use crate::lower::{Op, OperationCount, Program, Stage};
 use crate::programs::PassivePosition;
 

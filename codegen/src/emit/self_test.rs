@@ -9,7 +9,7 @@ use super::functions::{Kind, Method, reads_passive, rows};
 use super::identifier::of_field;
 use super::items::{input, nominal, scale, uses_load};
 use crate::Derivation;
-use crate::self_test::reaches;
+use crate::derive::self_test::reaches;
 
 /// The function `self_test`, and the regressor of all products that it needs.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]

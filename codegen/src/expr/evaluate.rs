@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{AngleSum, Atom, ExprId, Graph, Node, Rational, Unary};
-use crate::field::{Element, Number, Stream};
+use modelmill_algebra::field::{Element, Number, Stream};
 
 /// A number system in which expressions can be evaluated. `None` means that the value does not exist there:
 /// a division by zero, a root that is not in the field, a function that the domain does not know.

@@ -9,11 +9,12 @@ mod angle;
 mod construct;
 mod differentiate;
 mod evaluate;
+pub(crate) mod linear;
 pub mod print;
-mod rational;
 mod substitute;
 #[cfg(test)]
 mod tests;
+pub(crate) mod vector;
 
 use std::collections::BTreeSet;
 
@@ -21,7 +22,7 @@ use rustc_hash::FxHashMap;
 
 pub use angle::AngleSum;
 pub use evaluate::{Domain, F64, FieldPoint, RationalPoint, Tape};
-pub use rational::Rational;
+pub use modelmill_algebra::Rational;
 
 /// Index of an expression in its [`Graph`]. Children have smaller indices than their parents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

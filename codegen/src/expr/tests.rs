@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::{
     AngleSum, Atom, Domain, ExprId, F64, FieldPoint, Graph, Rational, RationalPoint, Tape, Unary,
 };
-use crate::field::{Element, MODULUS};
+use modelmill_algebra::field::{Element, MODULUS};
 
 /// A random expression as a program for the constructors: each step uses values made before.
 #[derive(Clone, Debug)]

@@ -2,9 +2,9 @@
 
 use super::project::project;
 use super::{Side, Style, Wrench, turn_out_all};
+use crate::expr::vector::Vector;
 use crate::expr::{ExprId, Graph, Rational};
 use crate::tree::{Link, Tree};
-use crate::vector::Vector;
 
 /// Generalised forces of the coordinates, as terms that are still to be added.
 pub(super) struct Rows(Vec<Vec<(ExprId, Rational)>>);

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use super::motion::LinkMotion;
 use super::{Element, Inertia, Motion, Side, Wrench};
+use crate::expr::vector::{self, Turn, Vector};
 use crate::expr::{ExprId, Graph, Rational};
 use crate::tree::Tree;
-use crate::vector::{self, Turn, Vector};
 
 /// The diagonal of the inertia.
 #[derive(Clone, Copy, Debug)]

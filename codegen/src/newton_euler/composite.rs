@@ -4,9 +4,9 @@
 //! alone, read off at the joints above, gives a column of the mass matrix; what lies below follows by symmetry.
 
 use super::{Body, Depths, Side, Spread, Style, Wrench, carry};
+use crate::expr::vector::{self, Turn, Vector};
 use crate::expr::{ExprId, Graph, Rational};
 use crate::tree::{Link, Tree};
-use crate::vector::{self, Turn, Vector};
 
 /// Mass, first moment and second moments of mass (xx, yy, zz; yz, xz, xy) about the origin of a frame.
 #[derive(Clone, Copy)]

@@ -3,8 +3,8 @@
 use super::backward::{join, to_parent};
 use super::{Side, Style, Wrench};
 use crate::expr::Graph;
+use crate::expr::vector;
 use crate::tree::Tree;
-use crate::vector;
 
 /// A wrench that the joints above a link supply, about the link's origin and in its axes.
 pub(crate) struct Load {

@@ -8,13 +8,14 @@
 mod backward;
 mod body;
 mod composite;
+pub(crate) mod inertia;
 mod joints;
 mod motion;
 mod project;
 
+use crate::expr::vector::{self, Turn, Vector};
 use crate::expr::{ExprId, Graph};
 use crate::tree::{Link, Tree};
-use crate::vector::{self, Turn, Vector};
 
 pub(crate) use backward::{Depths, backward, carry};
 pub(crate) use body::{Body, Spread, flatten_along_axes, wrenches};

@@ -1,9 +1,9 @@
 //! The forward recursion: motion of every link as expressions in coordinates, rates and accelerations.
 
 use super::{Side, Style, turn_in_all};
+use crate::expr::vector::{self, Vector};
 use crate::expr::{Atom, ExprId, Graph, Rational};
 use crate::tree::{Link, Tree};
-use crate::vector::{self, Vector};
 
 /// Motion of every link in its own frame.
 pub(crate) struct Motion {
@@ -238,7 +238,7 @@ impl Motion {
         i: usize,
     ) -> Option<LinkMotion> {
         let link = &tree.links[i];
-        let quarter = |t: &crate::vector::Turn| t.sum.is_empty() && t.pi12 % 6 == 0;
+        let quarter = |t: &crate::expr::vector::Turn| t.sum.is_empty() && t.pi12 % 6 == 0;
         if !link.pre.iter().all(quarter) || !link.slides.is_empty() {
             return None;
         }

@@ -4,9 +4,9 @@
 
 use super::backward::{Rows, back_along_axis};
 use super::{Style, Wrench, turn_in_all};
+use crate::expr::vector::{self, Vector};
 use crate::expr::{ExprId, Graph};
 use crate::tree::Tree;
-use crate::vector::{self, Vector};
 
 /// Leaves the forces of a wrench at all joints above `at`.
 pub(super) fn project(

@@ -7,7 +7,7 @@ use super::relations::{self, Related, Relation};
 use super::{Pattern, SampledRegressor};
 use crate::DeriveError;
 use crate::expr::FieldPoint;
-use crate::field::{Element, Stream};
+use modelmill_algebra::field::{Element, Stream};
 
 /// Operations of the field that factors may take: a minute or so.
 pub(super) const MOST_OPERATIONS: u64 = 20_000_000_000;

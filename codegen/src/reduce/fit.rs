@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use super::eliminate;
-use super::lift::lift;
 use super::rational_function::{Polynomial, Powers, RationalFunction, Variable, monomial_value};
 use super::reconstruct::{Occurrence, Oracle};
 use super::support::support;
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
-use crate::field::{Element, MODULUS, PRIMES, Stream};
+use modelmill_algebra::eliminate;
+use modelmill_algebra::field::{Element, MODULUS, PRIMES, Stream};
+use modelmill_algebra::lift::lift;
 
 /// What is known about one function before its coefficients are.
 #[derive(Clone, Debug, Default)]

@@ -4,44 +4,31 @@
 //! linear dependences found by elimination there, and the constant factors of eq. (6) reconstructed as rational functions
 //! of the model's constants. A wrong answer has a probability below 1e-15 (Schwartz 1980, Zippel 1979).
 
-mod branches;
-mod eliminate;
 mod factors;
 mod fit;
-mod lift;
 mod numeric;
-mod plan;
-mod poses;
 mod print;
 mod rational_function;
 mod reconstruct;
 mod relations;
 mod sample;
 mod support;
-mod univariate;
 
 use std::collections::BTreeSet;
 
 use modelmill_spec::Mechanism;
 
-pub(crate) use branches::closed_form;
-pub(crate) use eliminate::null_space;
-pub(crate) use lift::lift;
-pub(crate) use plan::Plan;
 pub use rational_function::{Polynomial, Powers, RationalFunction, Variable};
-pub(crate) use univariate::interpolate;
 
 use crate::DeriveError;
-use crate::exact::Monomial;
 use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Tape, Unary};
-use crate::field::{Element, MODULUS, PRIMES, Stream};
-use crate::projection::Projection;
-use eliminate::Echelon;
+use crate::loops::SEED;
+use crate::regressor::projection::Projection;
+use crate::tree::expressions::Monomial;
+use modelmill_algebra::eliminate::{self, Echelon};
+use modelmill_algebra::field::{Element, MODULUS, PRIMES, Stream};
 use relations::Relation;
 use sample::Sampler;
-
-/// Seed of the draws: the same model gives the same text on any machine.
-const SEED: u64 = 0x6D6F_6465_6C6D_696C;
 
 /// How many points in a row must show nothing new. At a random point the rows of H leave a space that is not yet all of
 /// theirs with certainty but for a chance of about 2^-55, so that one would do.

@@ -7,11 +7,11 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{Dependency, Method, RationalFunction, Reduction};
 use crate::DeriveError;
-use crate::exact::Monomial;
 use crate::expr::{Atom, ExprId, F64, Graph, Rational, Tape};
-use crate::field::Stream;
-use crate::numeric_pose::{Loops, symmetric};
-use crate::projection::Projection;
+use crate::loops::numeric_poses::{Loops, symmetric};
+use crate::regressor::projection::Projection;
+use crate::tree::expressions::Monomial;
+use modelmill_algebra::field::Stream;
 
 /// What is left of a column, relative to its size, below which it counts as dependent.
 const DEPENDENT: f64 = 1e-9;

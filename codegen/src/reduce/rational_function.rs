@@ -6,7 +6,7 @@ use num_rational::BigRational;
 use num_traits::{ToPrimitive, Zero};
 
 use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Rational};
-use crate::field::Element;
+use modelmill_algebra::field::Element;
 
 /// What a factor may depend on: a constant, or the cosine or sine of a constant angle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -3,10 +3,10 @@
 
 use super::fit::{Fields, Shape};
 use super::rational_function::RationalFunction;
-use super::univariate;
 use crate::DeriveError;
 use crate::expr::{Atom, FieldPoint};
-use crate::field::{Element, Stream};
+use modelmill_algebra::field::{Element, Stream};
+use modelmill_algebra::univariate;
 
 /// Points at which degrees are looked for, at most.
 const MOST_POINTS: usize = 26;

@@ -7,11 +7,11 @@
 
 use std::collections::BTreeMap;
 
-use super::eliminate::{self, Echelon};
 use super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
-use crate::field::Element;
+use modelmill_algebra::eliminate::{self, Echelon};
+use modelmill_algebra::field::Element;
 
 /// One column in terms of others, all by position among the effective ones.
 #[derive(Clone, Debug)]

@@ -7,13 +7,13 @@
 
 use modelmill_spec::Mechanism;
 
-use super::branches::{self, Branch};
-use super::plan::{Unknowns, plan};
-use super::poses::{MOST_DRAWS, Poses};
 use crate::DeriveError;
 use crate::expr::{Atom, ExprId, FieldPoint, Graph, Tape};
-use crate::field::{Element, Extended, Number, Stream};
-use crate::projection::Projection;
+use crate::loops::branches::{self, Branch};
+use crate::loops::field_poses::{MOST_DRAWS, Poses};
+use crate::loops::plan::{Unknowns, plan};
+use crate::regressor::projection::Projection;
+use modelmill_algebra::field::{Element, Extended, Number, Stream};
 
 /// Draws points.
 pub(super) struct Sampler {

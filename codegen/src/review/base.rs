@@ -7,11 +7,11 @@ use super::document::{
 };
 use super::equations::{NumericRank, base_name};
 use crate::Derivation;
-use crate::base::unit;
-use crate::exact::Monomial;
+use crate::derive::base::unit;
 use crate::expr::Rational;
 use crate::expr::print::{Formula, Symbol};
 use crate::reduce::{Method, RationalFunction};
+use crate::tree::expressions::Monomial;
 
 /// Base parameter `k` written out term by term: what a script reads.
 pub fn base_expression(derivation: &Derivation, k: usize) -> Formula {

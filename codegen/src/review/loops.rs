@@ -5,8 +5,8 @@ use modelmill_spec::{DriveKind, Mechanism, Motion};
 use super::document::{Block, Document, Equation, Inline, Line, Table, cell, code, text};
 use crate::expr::print::{Formula, angle_sum, formula, tree_size};
 use crate::expr::{ExprId, Graph, Rational};
+use crate::loops::branches::closed_form;
 use crate::programs::nominal_value;
-use crate::reduce::closed_form;
 use crate::{Derivation, PassivePosition};
 
 /// Expressions with more nodes than this are shown in a program rather than in one line.

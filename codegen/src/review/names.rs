@@ -8,11 +8,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use modelmill_spec::{DriveKind, Mechanism};
 
 use crate::expr::print::Symbol;
+use crate::expr::vector::{self, Vector};
 use crate::expr::{Atom, ExprId, F64, Graph, Node, Tape};
-use crate::field::Stream;
 use crate::lower::{Op, Program};
-use crate::vector::{self, Vector};
 use crate::{Derivation, Evaluator, States};
+use modelmill_algebra::field::Stream;
 
 /// A state with all its atoms' values, and the quantities with a meaning there.
 pub(super) struct Meanings {
@@ -300,7 +300,7 @@ fn links(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
     let Ok(gravity) = mechanism
         .gravity
         .iter()
-        .map(|g| crate::exact::expression(graph, g))
+        .map(|g| crate::tree::expressions::expression(graph, g))
         .collect::<Result<Vec<_>, _>>()
     else {
         return Vec::new();
@@ -394,7 +394,7 @@ fn points(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
         });
     }
     let places: Option<Vec<Vector>> = (0..mechanism.points.len())
-        .map(|i| crate::closure::position_in_base(graph, &mechanism, tree, i).ok())
+        .map(|i| crate::loops::closure::position_in_base(graph, &mechanism, tree, i).ok())
         .collect();
     let Some(places) = places else {
         return Vec::new();

@@ -6,10 +6,7 @@
 //! unknowns are solved exactly (`roots`), so that no real solution is missed; more equations than unknowns by
 //! weighted least squares (`nearest`). Deviations follow from those of the base parameters by the Jacobian.
 
-mod groebner;
 mod nearest;
-mod polynomial;
-mod real_roots;
 mod roots;
 
 use std::fmt;
@@ -20,7 +17,7 @@ use num_traits::Zero;
 
 use crate::estimate::undetermined::{Direction, null_directions};
 
-pub use polynomial::{Polynomial, exact};
+pub use modelmill_algebra::polynomial::{Polynomial, exact};
 
 /// What is to be solved.
 #[derive(Clone, Debug)]

@@ -5,12 +5,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::polynomial::Polynomial;
 use super::roots::{RealSolutions, solve};
 use super::{
     Interpretation, Physical, Problem, equation, jacobian_at, residuals, roots_of_diagonal,
     whitened,
 };
+use modelmill_algebra::polynomial::Polynomial;
 
 /// Subsets of the equations that are solved for starts.
 const MOST_SUBSETS: usize = 40;

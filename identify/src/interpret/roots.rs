@@ -9,9 +9,13 @@
 use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
 
-use super::groebner::{TooHard, Work, groebner, is_contradiction, remainder, standard_terms};
-use super::polynomial::{Polynomial, Powers, float, unknown};
-use super::real_roots::{Interval, Univariate, halve, is_squarefree, isolate, squarefree};
+use modelmill_algebra::groebner::{
+    TooHard, Work, groebner, is_contradiction, remainder, standard_terms,
+};
+use modelmill_algebra::polynomial::{Polynomial, Powers, float, unknown};
+use modelmill_algebra::real_roots::{
+    Interval, Univariate, halve, is_squarefree, isolate, squarefree,
+};
 
 /// Most complex solutions of a system.
 const MOST_SOLUTIONS: usize = 64;

@@ -128,17 +128,3 @@ fn more_equations_than_unknowns_are_weighed() {
     assert_eq!(values.len(), 2);
     assert!((values[0] + 2.0).abs() < 1e-9 && (values[1] - 2.0).abs() < 1e-9);
 }
-
-#[test]
-fn decimals_are_taken_as_they_are_printed() {
-    assert_eq!(exact(1.13), BigRational::new(113.into(), 100.into()));
-    assert_eq!(
-        exact(-2.5e-7),
-        BigRational::new((-1).into(), 4_000_000.into())
-    );
-    assert_eq!(
-        exact(3e20),
-        BigRational::from_integer(300_000_000_000_000_000_000_i128.into())
-    );
-    assert_eq!(polynomial::float(&exact(0.1)).to_bits(), 0.1_f64.to_bits());
-}

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use super::parse::parse;
 use super::{Formula, Function, Symbol, atom, formula};
 use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Rational, Tape, Unary};
-use crate::field::Stream;
+use modelmill_algebra::field::Stream;
 
 /// How to build an expression.
 #[derive(Clone, Debug)]

@@ -1,0 +1,97 @@
+//! Gaussian elimination in the prime field, row by row.
+
+use crate::field::Element;
+
+/// The reduced row echelon form of the rows seen so far. It does not depend on their order.
+#[derive(Clone, Debug)]
+pub struct Echelon<const P: u64> {
+    /// In which order columns are tried as pivots; others hold none.
+    order: Vec<usize>,
+    /// Columns that hold a pivot, in the order in which their rows came.
+    pub pivots: Vec<usize>,
+    /// One row per pivot.
+    rows: Vec<Vec<Element<P>>>,
+}
+
+impl<const P: u64> Echelon<P> {
+    /// No rows yet.
+    pub fn new(order: &[usize]) -> Self {
+        Self {
+            order: order.to_vec(),
+            pivots: Vec::new(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// Takes a row; tells whether it says anything new.
+    pub fn insert(&mut self, mut row: Vec<Element<P>>) -> bool {
+        for (pivot, known) in self.pivots.iter().zip(&self.rows) {
+            let factor = -row[*pivot];
+            add_multiple(&mut row, factor, known);
+        }
+        let Some(pivot) = self
+            .order
+            .iter()
+            .copied()
+            .find(|c| row[*c] != Element::ZERO)
+        else {
+            return false;
+        };
+        let inverse = row[pivot].inverse().expect("a pivot is not zero");
+        for x in &mut row {
+            *x = *x * inverse;
+        }
+        for known in &mut self.rows {
+            let factor = -known[pivot];
+            add_multiple(known, factor, &row);
+        }
+        self.pivots.push(pivot);
+        self.rows.push(row);
+        true
+    }
+
+    /// Whether a column has shown any value but zero. Rows that say nothing new cannot be the first to show one.
+    pub fn is_seen(&self, column: usize) -> bool {
+        self.rows.iter().any(|row| row[column] != Element::ZERO)
+    }
+
+    /// The entry of a column in the row of a pivot; `None` if that column holds no pivot.
+    pub fn entry(&self, pivot: usize, column: usize) -> Option<Element<P>> {
+        let row = self.pivots.iter().position(|p| *p == pivot)?;
+        Some(self.rows[row][column])
+    }
+}
+
+fn add_multiple<const P: u64>(row: &mut [Element<P>], factor: Element<P>, other: &[Element<P>]) {
+    if factor == Element::ZERO {
+        return;
+    }
+    for (x, y) in row.iter_mut().zip(other) {
+        if *y != Element::ZERO {
+            *x = *x + factor * *y;
+        }
+    }
+}
+
+/// A basis of the solutions of `rows * x = 0`, one vector per column without pivot.
+pub fn null_space<const P: u64>(
+    rows: Vec<Vec<Element<P>>>,
+    n_columns: usize,
+) -> Vec<Vec<Element<P>>> {
+    let order: Vec<usize> = (0..n_columns).collect();
+    let mut echelon = Echelon::new(&order);
+    for row in rows {
+        echelon.insert(row);
+    }
+    (0..n_columns)
+        .filter(|c| !echelon.pivots.contains(c))
+        .map(|free| {
+            let mut x = vec![Element::ZERO; n_columns];
+            x[free] = Element::ONE;
+            for (row, pivot) in echelon.rows.iter().zip(&echelon.pivots) {
+                x[*pivot] = -row[free];
+            }
+            x
+        })
+        .collect()
+}

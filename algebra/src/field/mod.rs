@@ -1,0 +1,243 @@
+//! The prime fields in which the mill decides what depends on what.
+//!
+//! The moduli lie just below 2^61 and are 23 modulo 24, so that square roots are one power. The primes up to 13 have
+//! roots in all of them: the sines and cosines of all multiples of pi/12 exist there, and most roots that a model file
+//! writes down. One field finds everything but long coefficients; the others lend them more digits.
+
+mod extension;
+mod number;
+
+use std::ops::{Add, Mul, Neg, Sub};
+
+use num_bigint::BigInt;
+use num_traits::{Signed, ToPrimitive};
+
+pub use extension::Extended;
+pub use number::Number;
+
+use crate::Rational;
+
+/// The moduli.
+pub const PRIMES: [u64; 8] = [
+    (1 << 61) - 11_913,
+    (1 << 61) - 14_241,
+    (1 << 61) - 20_961,
+    (1 << 61) - 21_633,
+    (1 << 61) - 23_481,
+    (1 << 61) - 26_961,
+    (1 << 61) - 27_033,
+    (1 << 61) - 30_873,
+];
+
+/// The modulus that is used unless another one is named.
+pub const MODULUS: u64 = PRIMES[0];
+
+/// An element of the field with `P` elements, always below `P`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct Element<const P: u64 = MODULUS>(u64);
+
+impl<const P: u64> Element<P> {
+    /// 0
+    pub const ZERO: Self = Self(0);
+    /// 1
+    pub const ONE: Self = Self(1);
+
+    /// The element congruent to an integer.
+    pub fn from_i64(value: i64) -> Self {
+        let magnitude = Self(value.unsigned_abs() % P);
+        if value < 0 { -magnitude } else { magnitude }
+    }
+
+    /// The smallest representative that is not negative.
+    pub fn representative(self) -> u64 {
+        self.0
+    }
+
+    /// The element congruent to a rational; `None` if the modulus divides its denominator.
+    pub fn from_rational(value: &Rational) -> Option<Self> {
+        if let Some((n, d)) = value.as_small() {
+            let n = Self::from_i64(n);
+            return if d == 1 {
+                Some(n)
+            } else {
+                Some(n * Self::from_i64(d).inverse()?)
+            };
+        }
+        let big = value.to_big();
+        let reduce = |n: &BigInt| {
+            let magnitude = (n.abs() % BigInt::from(P))
+                .to_u64()
+                .expect("a remainder fits");
+            if n.is_negative() {
+                -Self(magnitude)
+            } else {
+                Self(magnitude)
+            }
+        };
+        Some(reduce(big.numer()) * reduce(big.denom()).inverse()?)
+    }
+
+    /// Power with a non-negative exponent.
+    #[must_use]
+    pub fn power(self, mut exponent: u64) -> Self {
+        let (mut base, mut result) = (self, Self::ONE);
+        while exponent > 0 {
+            if exponent & 1 == 1 {
+                result = result * base;
+            }
+            base = base * base;
+            exponent >>= 1;
+        }
+        result
+    }
+
+    /// Multiplicative inverse; `None` for 0.
+    pub fn inverse(self) -> Option<Self> {
+        if self.0 == 0 {
+            return None;
+        }
+        // Extended Euclid: far fewer steps than a power of 61 bits. The cofactors stay below the modulus.
+        let (mut r0, mut r1) = (P, self.0);
+        let (mut t0, mut t1) = (0_i64, 1_i64);
+        while r1 != 0 {
+            let q = r0 / r1;
+            (r0, r1) = (r1, r0 - q * r1);
+            let q = i64::try_from(q).expect("a quotient below 2^61");
+            (t0, t1) = (t1, t0 - q * t1);
+        }
+        // Two folds of a number between -P and P.
+        let inverse = Self(t0.unsigned_abs() % P);
+        Some(if t0 < 0 { -inverse } else { inverse })
+    }
+
+    /// A square root if there is one.
+    pub fn square_root(self) -> Option<Self> {
+        let root = self.power(P.div_ceil(4));
+        (root * root == self).then_some(root)
+    }
+}
+
+fn reduce<const P: u64>(x: u128) -> Element<P> {
+    const MASK: u128 = (1 << 61) - 1;
+    let excess = u128::from((1 << 61) - P);
+    let x = (x & MASK) + (x >> 61) * excess;
+    let x = (x & MASK) + (x >> 61) * excess;
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "below 2^62 after two folds"
+    )]
+    let x = x as u64;
+    Element(if x >= P { x - P } else { x })
+}
+
+impl<const P: u64> Add for Element<P> {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        let sum = self.0 + other.0;
+        Self(if sum >= P { sum - P } else { sum })
+    }
+}
+
+impl<const P: u64> Sub for Element<P> {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+impl<const P: u64> Neg for Element<P> {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self(if self.0 == 0 { 0 } else { P - self.0 })
+    }
+}
+
+impl<const P: u64> Mul for Element<P> {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        reduce(u128::from(self.0) * u128::from(other.0))
+    }
+}
+
+/// A reproducible stream of elements (SplitMix64, Steele 2014): the same seed gives the same model text on any machine.
+#[derive(Clone, Debug)]
+pub struct Stream(u64);
+
+impl Stream {
+    /// A stream that starts from a seed.
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    /// The next 64 bits.
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        mix(self.0)
+    }
+
+    /// The next element, uniformly distributed to within 2^-52.
+    pub fn element<const P: u64>(&mut self) -> Element<P> {
+        reduce((u128::from(self.bits()) << 50) ^ u128::from(self.bits()))
+    }
+
+    /// A point (cosine, sine) of the unit circle, from its rational parametrisation.
+    pub fn circle<const P: u64>(&mut self) -> (Element<P>, Element<P>) {
+        let t: Element<P> = self.element();
+        // -1 is not a square in the field, so 1 + t^2 has an inverse.
+        let scale = (Element::ONE + t * t)
+            .inverse()
+            .expect("-1 is no square modulo a prime that is 3 modulo 4");
+        ((Element::ONE - t * t) * scale, (t + t) * scale)
+    }
+}
+
+/// A value that depends on `key` and `seed` alone and otherwise looks random.
+pub fn hashed<const P: u64>(seed: u64, key: Element<P>) -> Element<P> {
+    let mut stream = Stream::new(mix(seed ^ mix(key.0)));
+    stream.element()
+}
+
+fn mix(mut z: u64) -> u64 {
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn laws<const P: u64>() {
+        let mut stream = Stream::new(7);
+        for _ in 0..500 {
+            let (a, b, c): (Element<P>, Element<P>, Element<P>) =
+                (stream.element(), stream.element(), stream.element());
+            assert_eq!(a * (b + c), a * b + a * c);
+            assert_eq!((a - b) + b, a);
+            assert_eq!(a * a.inverse().unwrap(), Element::ONE);
+            assert_eq!((a * a).square_root().map(|r| r * r), Some(a * a));
+            let wide = u128::from(a.0) * u128::from(b.0) % u128::from(P);
+            assert_eq!(u128::from((a * b).0), wide);
+            let (cos, sin) = stream.circle::<P>();
+            assert_eq!(cos * cos + sin * sin, Element::ONE);
+        }
+        for n in [2, 3, 5, 7, 11, 13] {
+            assert!(Element::<P>::from_i64(n).square_root().is_some());
+        }
+        assert!(Element::<P>::from_i64(-1).square_root().is_none());
+        let largest = Element::<P>(P - 1);
+        assert_eq!(largest * largest, Element::ONE);
+    }
+
+    #[test]
+    fn every_modulus_makes_a_field_with_the_roots_that_are_promised() {
+        laws::<{ PRIMES[0] }>();
+        laws::<{ PRIMES[1] }>();
+        laws::<{ PRIMES[2] }>();
+        laws::<{ PRIMES[3] }>();
+        laws::<{ PRIMES[4] }>();
+        laws::<{ PRIMES[5] }>();
+        laws::<{ PRIMES[6] }>();
+        laws::<{ PRIMES[7] }>();
+    }
+}

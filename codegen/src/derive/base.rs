@@ -1,0 +1,156 @@
+//! What a derivation says about its base parameters: names, expressions, units and values.
+
+use modelmill_spec::Mechanism;
+use num_rational::BigRational;
+use num_traits::One;
+
+use crate::Derivation;
+use crate::expr::print::Formula;
+use crate::expr::{Atom, ExprId, Graph, Rational};
+use crate::reduce::Reduction;
+use crate::tree::expressions::Monomial;
+
+/// One base parameter, for people and programs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BaseParameter {
+    /// `p1_min`, `p2_min`, ...
+    pub name: String,
+    /// The product whose column is retained.
+    pub retained: String,
+    /// Eq. (16): the parameter as an expression of dynamic parameters and constants.
+    pub expression: String,
+    /// SI unit.
+    pub unit: String,
+}
+
+impl Derivation {
+    /// Indices of the active and of the passive coordinates.
+    pub fn coordinates(&self) -> (Vec<usize>, Vec<usize>) {
+        (
+            self.equations.projection.active.clone(),
+            self.equations.projection.passive.clone(),
+        )
+    }
+
+    /// The base parameters in the order of p_min.
+    pub fn base_parameters(&self) -> Vec<BaseParameter> {
+        let reduction = &self.reduction;
+        (0..reduction.retained.len())
+            .map(|k| {
+                let product = &reduction.products[reduction.retained[k]];
+                BaseParameter {
+                    name: format!("p{}_min", k + 1),
+                    retained: product.text(&self.mechanism),
+                    expression: crate::review::base_expression(self, k).text(),
+                    unit: unit(&self.mechanism, product),
+                }
+            })
+            .collect()
+    }
+
+    /// Eq. (6), one line per dependent product: `h[m2] = d1*h[m1*dc1] + ...`.
+    pub fn dependency_texts(&self) -> Vec<String> {
+        let column = |product: usize| {
+            format!(
+                "h[{}]",
+                self.reduction.products[product].text(&self.mechanism)
+            )
+        };
+        let lines = self.reduction.dependencies.iter().map(|line| {
+            let terms = line.equals.iter().map(|(k, factor)| {
+                let retained = Formula::name(column(self.reduction.retained[*k]));
+                Formula::product(Rational::ONE, [factor.formula(&self.mechanism), retained])
+            });
+            format!("{} = {}", column(line.product), Formula::sum(terms).text())
+        });
+        lines.collect()
+    }
+
+    /// Values of the base parameters for given parameters and constants, both in the order of the model file.
+    pub fn base_values(&self, parameters: &[f64], constants: &[f64]) -> Vec<f64> {
+        let reduction = &self.reduction;
+        let value = |product: usize| reduction.products[product].value(parameters);
+        let mut base: Vec<f64> = reduction.retained.iter().map(|k| value(*k)).collect();
+        for line in &reduction.dependencies {
+            for (k, factor) in &line.equals {
+                base[*k] += factor.value_f64(constants) * value(line.product);
+            }
+        }
+        base
+    }
+
+    /// Eq. (7) for given values of the constants, in the order of the model file: each base parameter as a sum of
+    /// products of dynamic parameters with exact factors. Sines, cosines and roots of constants are those of floating
+    /// point.
+    pub fn base_polynomials(&self, constants: &[BigRational]) -> Vec<Vec<(Monomial, BigRational)>> {
+        let reduction = &self.reduction;
+        let product = |k: usize| reduction.products[k].clone();
+        let retained = reduction.retained.iter();
+        let mut polynomials: Vec<Vec<(Monomial, BigRational)>> = retained
+            .map(|k| vec![(product(*k), BigRational::one())])
+            .collect();
+        for line in &reduction.dependencies {
+            for (k, factor) in &line.equals {
+                polynomials[*k].push((product(line.product), factor.value_exact(constants)));
+            }
+        }
+        polynomials
+    }
+
+    /// Values of the base parameters for the model file's values.
+    pub fn nominal_base_values(&self) -> Vec<f64> {
+        let parameters: Vec<f64> = self
+            .mechanism
+            .parameters
+            .iter()
+            .map(|p| p.nominal)
+            .collect();
+        let constants: Vec<f64> = self.mechanism.constants.iter().map(|c| c.value).collect();
+        self.base_values(&parameters, &constants)
+    }
+}
+
+/// The base parameters as expressions of the graph: eq. (7) carried out.
+pub(crate) fn expressions(graph: &mut Graph, reduction: &Reduction) -> Vec<ExprId> {
+    let mut terms: Vec<Vec<ExprId>> = reduction
+        .retained
+        .iter()
+        .map(|k| vec![product(graph, &reduction.products[*k])])
+        .collect();
+    for line in &reduction.dependencies {
+        let value = product(graph, &reduction.products[line.product]);
+        for (k, factor) in &line.equals {
+            let factor = factor.expression(graph);
+            terms[*k].push(graph.mul(factor, value));
+        }
+    }
+    terms.iter().map(|terms| graph.add_all(terms)).collect()
+}
+
+/// A product of parameters as an expression.
+pub(crate) fn product(graph: &mut Graph, product: &Monomial) -> ExprId {
+    let factors: Vec<_> = product
+        .0
+        .iter()
+        .map(|(p, n)| {
+            let power = i32::try_from(*n).expect("a small power");
+            (graph.atom(Atom::Parameter(*p)), power)
+        })
+        .collect();
+    graph.product(&factors)
+}
+
+/// Unit of a product of parameters.
+pub(crate) fn unit(mechanism: &Mechanism, product: &Monomial) -> String {
+    let factors: Vec<(&str, i32)> = product
+        .0
+        .iter()
+        .map(|(p, n)| {
+            (
+                mechanism.parameters[*p].unit.as_str(),
+                i32::try_from(*n).expect("a small power"),
+            )
+        })
+        .collect();
+    modelmill_spec::unit_product(&factors)
+}

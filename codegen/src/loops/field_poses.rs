@@ -1,0 +1,123 @@
+//! Random poses of a mechanism in the prime field: angles as rational points of the circle, loops solved by square roots
+//! in the field.
+
+use modelmill_spec::{Mechanism, Motion};
+
+use super::plan::{Plan, SolveStep};
+use crate::DeriveError;
+use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Tape, Unary};
+use modelmill_algebra::field::{Element, Number, Stream};
+
+/// How often a draw is repeated until all square roots exist.
+pub(crate) const MOST_DRAWS: usize = 4000;
+
+/// Draws poses that a plan solves for.
+pub(crate) struct Poses {
+    coordinates: Vec<(usize, Motion)>,
+    n_constants: usize,
+    /// Functions of constants that exist only for some of them.
+    of_constants: Tape,
+    pub(crate) steps: Vec<SolveStep>,
+}
+
+impl Poses {
+    /// Makes a plan evaluable at constants for which also `outputs` may exist.
+    pub(crate) fn new(
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        plan: Plan,
+        outputs: &[ExprId],
+    ) -> Self {
+        let mut all = outputs.to_vec();
+        let steps = plan
+            .steps
+            .into_iter()
+            .map(|step| SolveStep::new(graph, step, &mut all))
+            .collect();
+        let coordinates = mechanism.coordinates.iter().enumerate();
+        Self {
+            coordinates: coordinates.map(|(i, c)| (i, c.motion)).collect(),
+            n_constants: mechanism.constants.len(),
+            of_constants: functions_of_constants(graph, &all),
+            steps,
+        }
+    }
+
+    /// Random constants whose functions that do not depend on the motion all exist.
+    pub(crate) fn constants<const P: u64>(
+        &self,
+        stream: &mut Stream,
+    ) -> Result<FieldPoint<Element<P>>, DeriveError> {
+        (0..MOST_DRAWS)
+            .find_map(|_| {
+                let mut point = FieldPoint {
+                    seed: stream.bits(),
+                    root_seed: stream.bits(),
+                    ..FieldPoint::default()
+                };
+                point.values.insert(Atom::Pi, stream.element());
+                for i in 0..self.n_constants {
+                    let atom = Atom::Constant(i);
+                    point.values.insert(atom, stream.element());
+                    point.angles.insert(atom, stream.circle());
+                }
+                self.of_constants.evaluate(&point).map(|_| point)
+            })
+            .ok_or(DeriveError::NoPointFound { draws: MOST_DRAWS })
+    }
+
+    /// Some values for all coordinates, loops still open. They lie in the prime field, over whichever field the loops
+    /// are closed.
+    pub(crate) fn open<const P: u64, N: Number + From<Element<P>>>(
+        &self,
+        constants: &FieldPoint<Element<P>>,
+        stream: &mut Stream,
+    ) -> FieldPoint<N> {
+        let mut point = constants.extended();
+        for (i, motion) in &self.coordinates {
+            if *motion == Motion::Revolute {
+                let angle = N::draw_circle(stream);
+                point.angles.insert(Atom::Coordinate(*i), angle);
+            }
+            point.values.insert(Atom::Coordinate(*i), N::draw(stream));
+        }
+        point
+    }
+
+    /// The loops of a point closed; `None` if they do not close for its free coordinates.
+    pub(crate) fn close<N: Number>(&self, mut point: FieldPoint<N>) -> Option<FieldPoint<N>> {
+        for step in &self.steps {
+            step.solve(&mut point)?;
+        }
+        Some(point)
+    }
+}
+
+/// Functions under `roots` that depend on constants alone and do not exist for all of them.
+fn functions_of_constants(graph: &Graph, roots: &[ExprId]) -> Tape {
+    let mut moves = vec![false; graph.len()];
+    let mut found = Vec::new();
+    for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
+        if !needed {
+            continue;
+        }
+        let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
+        let is_fixed = |atom: Atom| matches!(atom, Atom::Constant(_) | Atom::Pi);
+        let mut moving = match graph.node(id) {
+            Node::Atom(atom) => !is_fixed(*atom),
+            Node::Sin(angle) | Node::Cos(angle) => !angle.atoms().all(is_fixed),
+            _ => false,
+        };
+        graph.for_each_child(id, |child| moving |= moves[child.index()]);
+        moves[i] = moving;
+        let partial = match graph.node(id) {
+            Node::Unary(function, _) => *function == Unary::Sqrt,
+            Node::Product(factors) => factors.iter().any(|(_, n)| *n < 0),
+            _ => false,
+        };
+        if partial && !moving {
+            found.push(id);
+        }
+    }
+    Tape::new(graph, &found)
+}

@@ -1,0 +1,245 @@
+//! Magnitudes of loop residuals, coordinates and determinants: what Newton's method holds residuals and steps against, and
+//! what singular poses are told by, so that neither depends on the unit of length.
+
+use std::collections::{BTreeMap, HashMap};
+
+use modelmill_spec::{Mechanism, Motion};
+use num_rational::BigRational;
+use num_traits::One;
+
+use crate::expr::{Atom, ExprId, F64, Graph, Node, Tape, Unary};
+use crate::loops::closure::coordinates_of;
+use crate::lower::is_fixed;
+use crate::programs::{nominal_of, nominal_value};
+use crate::regressor::projection::Projection;
+
+/// Scales of the residuals, of the passive coordinates and of the active ones, one after the other.
+///
+/// A residual's scale is the sum of the magnitudes of its terms, a sine counting as 1. A coordinate's is 1 for an angle,
+/// the sum of its residuals' scales for a length, and 0 if no loop depends on it.
+pub(crate) fn scales(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    projection: &Projection,
+) -> Vec<ExprId> {
+    let mut known = HashMap::new();
+    let residuals: Vec<ExprId> = projection
+        .residual
+        .iter()
+        .map(|r| magnitude(graph, mechanism, &mut known, *r))
+        .collect();
+    let of: Vec<Vec<usize>> = projection
+        .residual
+        .iter()
+        .map(|r| coordinates_of(graph, &[*r]))
+        .collect();
+    let mut scales = residuals.clone();
+    for i in projection.passive.iter().chain(&projection.active) {
+        let rows = residuals.iter().zip(&of).filter(|(_, of)| of.contains(i));
+        let rows: Vec<ExprId> = rows.map(|(scale, _)| *scale).collect();
+        scales.push(match mechanism.coordinates[*i].motion {
+            Motion::Revolute if !rows.is_empty() => Graph::ONE,
+            _ => graph.add_all(&rows),
+        });
+    }
+    scales
+}
+
+/// The sum of the magnitudes of all terms of some expressions at the nominal pose: the size of a mechanism's loops in m.
+/// It is 1 where there is none.
+pub(crate) fn at_nominal(graph: &mut Graph, mechanism: &Mechanism, roots: &[ExprId]) -> f64 {
+    let mut known = HashMap::new();
+    let terms: Vec<ExprId> = roots
+        .iter()
+        .map(|root| magnitude(graph, mechanism, &mut known, *root))
+        .collect();
+    let total = graph.add_all(&terms);
+    nominal_value(graph, mechanism, total)
+        .filter(|size| size.is_normal())
+        .unwrap_or(1.0)
+}
+
+/// The size of a mechanism's loops: the magnitudes of all lengths in them, without those that move.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Size {
+    /// A sum of magnitudes of constants, in m; 0 where there is none.
+    pub(crate) total: ExprId,
+    /// Its value for the mechanism's constants.
+    pub(crate) nominal: f64,
+}
+
+impl Size {
+    pub(crate) fn of(graph: &mut Graph, mechanism: &Mechanism, residual: &[ExprId]) -> Self {
+        let mut known = HashMap::new();
+        let terms: Vec<ExprId> = residual
+            .iter()
+            .map(|r| magnitude(graph, mechanism, &mut known, *r))
+            .collect();
+        let total = graph.add_all(&terms);
+        let still = lengths(graph, mechanism, |_, _| Graph::ZERO);
+        let total = graph.substitute(&[total], &still)[0];
+        let nominal = nominal_value(graph, mechanism, total).filter(|size| size.is_normal());
+        match nominal {
+            Some(nominal) if graph.atoms(&[total]).into_iter().all(is_fixed) => {
+                Self { total, nominal }
+            }
+            _ => Self {
+                total: Graph::ZERO,
+                nominal: 0.0,
+            },
+        }
+    }
+
+    /// How large these loops are beside those of the mechanism's constants; 1 for those.
+    pub(crate) fn scale(&self, graph: &mut Graph) -> ExprId {
+        self.scaled(graph, 1.0)
+    }
+
+    /// A length of the mechanism, longer by as much as the loops are larger.
+    fn scaled(&self, graph: &mut Graph, length: f64) -> ExprId {
+        if self.nominal == 0.0 {
+            return number(graph, length);
+        }
+        let share = number(graph, length / self.nominal);
+        graph.mul(share, self.total)
+    }
+
+    /// The sum of the magnitudes of all terms of an expression that depends on the pose: for any lengths, with sines and
+    /// cosines of 1 and slides as far out as at the nominal pose. Fractions have the values of the nominal pose, and grow
+    /// with the loops.
+    pub(crate) fn of_terms(&self, graph: &mut Graph, mechanism: &Mechanism, id: ExprId) -> ExprId {
+        let found = magnitude(graph, mechanism, &mut HashMap::new(), id);
+        let out = lengths(graph, mechanism, |graph, nominal| {
+            self.scaled(graph, nominal)
+        });
+        let at_any_pose = graph.substitute(&[found], &out)[0];
+        let is_known = graph.atoms(&[at_any_pose]).into_iter().all(is_fixed);
+        let is_there = nominal_value(graph, mechanism, at_any_pose).is_some_and(f64::is_normal);
+        if is_known && is_there {
+            return at_any_pose;
+        }
+        let nominal = at_nominal(graph, mechanism, &[id]);
+        let nominal = number(graph, nominal);
+        // Its own lengths say how large it is: drives between points have some without a loop.
+        let lengths: Vec<Atom> = graph.atoms(&[found]).into_iter().collect();
+        let is_metre =
+            |atom: &Atom| matches!(atom, Atom::Constant(i) if mechanism.constants[*i].unit == "m");
+        let lengths: Vec<Atom> = lengths.into_iter().filter(is_metre).collect();
+        let degree = degree(graph, mechanism, found, &lengths);
+        let own = Self::sum(graph, mechanism, &lengths).unwrap_or(*self);
+        match degree {
+            Some(degree) => {
+                let scale = own.scale(graph);
+                let grown = graph.pow(scale, degree);
+                graph.mul(nominal, grown)
+            }
+            None => nominal,
+        }
+    }
+
+    /// The size that some constants make up, if they do.
+    fn sum(graph: &mut Graph, mechanism: &Mechanism, constants: &[Atom]) -> Option<Self> {
+        let terms: Vec<ExprId> = constants
+            .iter()
+            .map(|constant| {
+                let constant = graph.atom(*constant);
+                graph.unary(Unary::Abs, constant)
+            })
+            .collect();
+        let total = graph.add_all(&terms);
+        let nominal = nominal_value(graph, mechanism, total).filter(|size| size.is_normal())?;
+        Some(Self { total, nominal })
+    }
+}
+
+/// The power of the unit of length with which an expression grows, if it does so with one: `lengths` are those of its
+/// constants that are in it, besides the coordinates that slide.
+fn degree(graph: &Graph, mechanism: &Mechanism, id: ExprId, lengths: &[Atom]) -> Option<i32> {
+    let value = |unit: f64| {
+        let atom = |atom: Atom| {
+            let moves = matches!(atom, Atom::Coordinate(i)
+                if mechanism.coordinates[i].motion != Motion::Revolute);
+            let is_length = moves || lengths.contains(&atom);
+            nominal_of(mechanism, atom) * if is_length { unit } else { 1.0 }
+        };
+        let values = Tape::new(graph, &[id]).evaluate(&F64(atom))?;
+        Some(values[0].abs().log2()).filter(|size| size.is_finite())
+    };
+    let [one, two, four] = [value(1.0)?, value(2.0)?, value(4.0)?];
+    let degree = (two - one).round();
+    let is_power = [two - one, four - two]
+        .iter()
+        .all(|d| (d - degree).abs() < 1e-6);
+    #[allow(clippy::cast_possible_truncation, reason = "it is small, as just seen")]
+    (is_power && degree.abs() < 100.0).then_some(degree as i32)
+}
+
+/// What stands for each coordinate that is a length, by its nominal value in m.
+fn lengths(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    of: impl Fn(&mut Graph, f64) -> ExprId,
+) -> BTreeMap<ExprId, ExprId> {
+    let coordinates = mechanism.coordinates.iter().enumerate();
+    let slides = coordinates.filter(|(_, c)| c.motion != Motion::Revolute);
+    slides
+        .map(|(i, c)| (graph.atom(Atom::Coordinate(i)), of(graph, c.nominal)))
+        .collect()
+}
+
+/// A number that is exact to rounding.
+fn number(graph: &mut Graph, value: f64) -> ExprId {
+    let value = BigRational::from_float(value).unwrap_or_else(BigRational::one);
+    graph.rational(value.into())
+}
+
+/// An expression with every term taken by its magnitude.
+fn magnitude(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    known: &mut HashMap<ExprId, ExprId>,
+    id: ExprId,
+) -> ExprId {
+    if let Some(found) = known.get(&id) {
+        return *found;
+    }
+    let found = match graph.node(id).clone() {
+        Node::Rational(value) => graph.rational(value.abs()),
+        Node::Sin(_)
+        | Node::Cos(_)
+        | Node::Unary(Unary::Sign | Unary::Tanh | Unary::Sin | Unary::Cos, _) => Graph::ONE,
+        // An angle that stands for itself; its turns are known to Newton's method.
+        Node::Atom(Atom::Coordinate(i)) if mechanism.coordinates[i].motion == Motion::Revolute => {
+            Graph::ONE
+        }
+        Node::Atom(_) | Node::Unary(Unary::Exp, _) => graph.unary(Unary::Abs, id),
+        Node::Unary(Unary::Abs, inner) => magnitude(graph, mechanism, known, inner),
+        Node::Unary(Unary::Sqrt, inner) => {
+            let inner = magnitude(graph, mechanism, known, inner);
+            graph.unary(Unary::Sqrt, inner)
+        }
+        Node::Sum(terms) => {
+            let terms: Vec<_> = terms
+                .into_iter()
+                .map(|(term, factor)| (magnitude(graph, mechanism, known, term), factor.abs()))
+                .collect();
+            graph.sum(&terms)
+        }
+        Node::Product(factors) => {
+            let factors: Vec<_> = factors
+                .into_iter()
+                .map(|(base, n)| {
+                    let base = if n > 0 {
+                        magnitude(graph, mechanism, known, base)
+                    } else {
+                        graph.unary(Unary::Abs, base)
+                    };
+                    (base, n)
+                })
+                .collect();
+            graph.product(&factors)
+        }
+    };
+    known.insert(id, found);
+    found
+}

@@ -1,0 +1,360 @@
+//! Closed form of a planar loop with two unknown coordinates: the intersection of two circles, of a circle and a line,
+//! or of two lines (the dyads of mechanism theory, e.g. Erdman and Sandor 1997).
+//!
+//! The same expressions serve the emitted code and the exact sampling of the loop's variety in a prime field.
+
+use std::collections::BTreeSet;
+
+use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational};
+use crate::loops::closure::{Closure, Leg, coordinates_of};
+use crate::loops::parallelogram::Relation;
+use crate::loops::whole_root;
+
+/// What a dyad yields.
+#[derive(Clone, Debug)]
+pub(crate) struct Solved {
+    /// Cosine and sine of sums of angles, each of which holds unknown coordinates.
+    pub(crate) angles: Vec<(AngleSum, [ExprId; 2])>,
+    /// Angles that are integer combinations of known ones.
+    pub(crate) relations: Vec<Relation>,
+    /// Values of prismatic coordinates.
+    pub(crate) lengths: Vec<(usize, ExprId)>,
+    /// The square root that chooses between the two assembly modes: its sign is `branch`'s.
+    pub(crate) root: Option<Root>,
+}
+
+/// A square root whose sign depends on the assembly mode.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Root {
+    /// What must not be negative for the loop to close.
+    pub(crate) radicand: ExprId,
+    /// An expression of the coordinates that equals the signed root.
+    pub(crate) witness: ExprId,
+    /// The function that the root is, if it needs no root sign: the two modes are then two motions, each by itself.
+    pub(crate) whole: Option<ExprId>,
+}
+
+/// The vectors that turn with one set of unknown angles, as one vector in a frame turned by `angle`.
+struct Group {
+    unknown: BTreeSet<(usize, i32)>,
+    angle: AngleSum,
+    vector: [ExprId; 2],
+}
+
+/// Solves `closure` for the coordinates `unknown` (one or two); every other coordinate is known.
+///
+/// `positive` chooses the sign of the square root. Returns `None` where no closed form of this family applies.
+pub(crate) fn solve(
+    graph: &mut Graph,
+    closure: &Closure,
+    unknown: &[usize],
+    positive: bool,
+) -> Option<Solved> {
+    if !closure.relations.is_empty() {
+        let relations = closure.relations.clone();
+        return Some(Solved {
+            angles: Vec::new(),
+            relations,
+            lengths: Vec::new(),
+            root: None,
+        });
+    }
+    let legs = closure.chain.as_ref()?;
+    let mut known = [Graph::ZERO; 2];
+    let mut groups: Vec<Group> = Vec::new();
+    let slides: Vec<usize> = unknown
+        .iter()
+        .copied()
+        .filter(|c| legs.iter().any(|leg| depends(graph, &leg.vector, *c)))
+        .collect();
+    for leg in legs {
+        let inside: BTreeSet<(usize, i32)> = leg
+            .angle
+            .terms()
+            .iter()
+            .filter_map(|(atom, n)| match atom {
+                Atom::Coordinate(i) if unknown.contains(i) => Some((*i, *n)),
+                _ => None,
+            })
+            .collect();
+        if inside.is_empty() {
+            let v = turned(graph, leg, &AngleSum::NONE);
+            known = [graph.add(known[0], v[0]), graph.add(known[1], v[1])];
+            continue;
+        }
+        match groups.iter_mut().find(|g| g.unknown == inside) {
+            Some(group) => {
+                let v = turned(graph, leg, &group.angle);
+                group.vector = [
+                    graph.add(group.vector[0], v[0]),
+                    graph.add(group.vector[1], v[1]),
+                ];
+            }
+            None => {
+                let v = turned(
+                    graph,
+                    &Leg {
+                        angle: AngleSum::NONE,
+                        ..leg.clone()
+                    },
+                    &AngleSum::NONE,
+                );
+                groups.push(Group {
+                    unknown: inside,
+                    angle: leg.angle.clone(),
+                    vector: v,
+                });
+            }
+        }
+    }
+    match (groups.as_slice(), slides.as_slice()) {
+        ([first, second], []) => two_circles(graph, known, first, second, positive),
+        ([group], [slide]) => circle_and_line(graph, known, group, *slide, positive),
+        ([], [a, b]) => two_lines(graph, known, *a, *b),
+        _ => None,
+    }
+    .filter(|solved| determines(solved, unknown))
+}
+
+/// Whether the solved angles determine every unknown coordinate (their integer matrix is unimodular and triangular).
+fn determines(solved: &Solved, unknown: &[usize]) -> bool {
+    let mut left: BTreeSet<usize> = unknown.iter().copied().collect();
+    for (slide, _) in &solved.lengths {
+        left.remove(slide);
+    }
+    loop {
+        let found = solved.angles.iter().find_map(|(angle, _)| {
+            let inside: Vec<_> = angle
+                .terms()
+                .iter()
+                .filter(|(atom, _)| matches!(atom, Atom::Coordinate(i) if left.contains(i)))
+                .collect();
+            match inside.as_slice() {
+                [(Atom::Coordinate(i), 1 | -1)] => Some(*i),
+                _ => None,
+            }
+        });
+        match found {
+            Some(i) => _ = left.remove(&i),
+            None => return left.is_empty(),
+        }
+    }
+}
+
+fn depends(graph: &Graph, roots: &[ExprId], coordinate: usize) -> bool {
+    graph.atoms(roots).contains(&Atom::Coordinate(coordinate))
+}
+
+/// The leg's vector in a frame turned by `reference`.
+fn turned(graph: &mut Graph, leg: &Leg, reference: &AngleSum) -> [ExprId; 2] {
+    let rest = leg.angle.plus(reference, -1);
+    let (c, s) = graph.cos_sin(&rest, leg.pi12);
+    turn(graph, [c, s], leg.vector)
+}
+
+/// The vector turned by the angle of the given cosine and sine.
+pub(crate) fn turn(graph: &mut Graph, [c, s]: [ExprId; 2], [x, y]: [ExprId; 2]) -> [ExprId; 2] {
+    let products = [(c, x), (s, y), (s, x), (c, y)].map(|(a, b)| graph.mul(a, b));
+    [
+        graph.sub(products[0], products[1]),
+        graph.add(products[2], products[3]),
+    ]
+}
+
+fn dot(graph: &mut Graph, a: [ExprId; 2], b: [ExprId; 2]) -> ExprId {
+    let (x, y) = (graph.mul(a[0], b[0]), graph.mul(a[1], b[1]));
+    graph.add(x, y)
+}
+
+fn cross(graph: &mut Graph, a: [ExprId; 2], b: [ExprId; 2]) -> ExprId {
+    let (x, y) = (graph.mul(a[0], b[1]), graph.mul(a[1], b[0]));
+    graph.sub(x, y)
+}
+
+/// Cosine and sine of the angle that turns `arm` into `v`; both have the same length.
+fn direction(
+    graph: &mut Graph,
+    v: [ExprId; 2],
+    arm: [ExprId; 2],
+    arm_squared: ExprId,
+) -> [ExprId; 2] {
+    if arm[1] == Graph::ZERO {
+        return v.map(|x| graph.div(x, arm[0]));
+    }
+    let inverse = graph.pow(arm_squared, -1);
+    let (along, across) = (dot(graph, arm, v), cross(graph, arm, v));
+    [graph.mul(along, inverse), graph.mul(across, inverse)]
+}
+
+fn signed(graph: &mut Graph, root: ExprId, positive: bool) -> ExprId {
+    if positive { root } else { graph.neg(root) }
+}
+
+fn root_of(graph: &mut Graph, radicand: ExprId) -> ExprId {
+    graph.unary(crate::expr::Unary::Sqrt, radicand)
+}
+
+/// `known + v1 + v2 = 0`, both of known length: `v1 = alpha d + beta d'`, with `d = -known` and `d'` normal to it.
+fn two_circles(
+    graph: &mut Graph,
+    known: [ExprId; 2],
+    first: &Group,
+    second: &Group,
+    positive: bool,
+) -> Option<Solved> {
+    let d = known.map(|x| graph.neg(x));
+    let [dd, aa, bb] = [d, first.vector, second.vector].map(|v| dot(graph, v, v));
+    if [dd, aa, bb].contains(&Graph::ZERO) {
+        return None;
+    }
+    let inverse = graph.pow(dd, -1);
+    // alpha = (d^2 + a^2 - b^2) / (2 d^2), beta^2 = a^2 / d^2 - alpha^2
+    let difference = graph.sub(aa, bb);
+    let ratio = graph.mul(difference, inverse);
+    let half = Rational::new(1, 2);
+    let one_half = graph.rational(half.clone());
+    let alpha = graph.combine([(one_half, Rational::ONE), (ratio, half)]);
+    let (square, alpha_square) = (graph.mul(aa, inverse), graph.mul(alpha, alpha));
+    let radicand = graph.sub(square, alpha_square);
+    // 4 d^4 beta^2 = 4 a^2 d^2 - (d^2 + a^2 - b^2)^2, sixteen times the square of the triangle's area
+    let sum = graph.add(dd, difference);
+    let (four, square_of_sum) = (graph.mul(aa, dd), graph.mul(sum, sum));
+    let four = graph.scale(four, &Rational::integer(4));
+    let area = graph.sub(four, square_of_sum);
+    let whole = whole_root::exact_root(graph, area).map(|root| {
+        let root = graph.mul(root, inverse);
+        graph.scale(root, &Rational::new(1, 2))
+    });
+    let root = whole.unwrap_or_else(|| root_of(graph, radicand));
+    let beta = signed(graph, root, positive);
+    let normal = [graph.neg(d[1]), d[0]];
+    let v1: [ExprId; 2] = std::array::from_fn(|i| {
+        let (x, y) = (graph.mul(alpha, d[i]), graph.mul(beta, normal[i]));
+        graph.add(x, y)
+    });
+    let v2: [ExprId; 2] = std::array::from_fn(|i| graph.sub(d[i], v1[i]));
+    let (c, s) = graph.cos_sin(&first.angle, 0);
+    let actual = turn(graph, [c, s], first.vector);
+    let across = cross(graph, d, actual);
+    let witness = graph.mul(across, inverse);
+    Some(Solved {
+        angles: vec![
+            (first.angle.clone(), direction(graph, v1, first.vector, aa)),
+            (
+                second.angle.clone(),
+                direction(graph, v2, second.vector, bb),
+            ),
+        ],
+        relations: Vec::new(),
+        lengths: Vec::new(),
+        root: Some(Root {
+            radicand,
+            witness,
+            whole,
+        }),
+    })
+}
+
+/// `known(s) + R(angle) arm(s) = 0` with one of the two independent of the sliding coordinate or both linear in it.
+fn circle_and_line(
+    graph: &mut Graph,
+    known: [ExprId; 2],
+    group: &Group,
+    slide: usize,
+    positive: bool,
+) -> Option<Solved> {
+    let (k0, k1) = linear(graph, known, slide)?;
+    let (a0, a1) = linear(graph, group.vector, slide)?;
+    // |k0 + s k1|^2 = |a0 + s a1|^2, that is p s^2 + 2 q s + r = 0
+    let mut gap = |x: [ExprId; 2], y: [ExprId; 2], u: [ExprId; 2], v: [ExprId; 2]| {
+        let (one, two) = (dot(graph, x, y), dot(graph, u, v));
+        graph.sub(one, two)
+    };
+    let (p, q, r) = (
+        gap(k1, k1, a1, a1),
+        gap(k0, k1, a0, a1),
+        gap(k0, k0, a0, a0),
+    );
+    let at = graph.atom(Atom::Coordinate(slide));
+    let (value, root) = if p == Graph::ZERO {
+        // Equal directions of sliding: the equation is linear.
+        if q == Graph::ZERO {
+            return None;
+        }
+        let ratio = graph.div(r, q);
+        (graph.scale(ratio, &Rational::new(-1, 2)), None)
+    } else {
+        // Divided by a length of the arm, so that loops of equal shape and unequal size have the same radicand.
+        let one = a0
+            .into_iter()
+            .find(|x| *x != Graph::ZERO && coordinates_of(graph, &[*x]).is_empty())
+            .unwrap_or(Graph::ONE);
+        let inverse = graph.pow(one, -2);
+        let (square, product) = (graph.mul(q, q), graph.mul(p, r));
+        let difference = graph.sub(square, product);
+        let radicand = graph.mul(difference, inverse);
+        let whole = whole_root::exact_root(graph, difference).map(|root| graph.div(root, one));
+        let root = whole.unwrap_or_else(|| root_of(graph, radicand));
+        let root = signed(graph, root, positive);
+        let root_of_length = graph.mul(root, one);
+        let numerator = graph.sub(root_of_length, q);
+        let linear = graph.mul(p, at);
+        let sum = graph.add(linear, q);
+        let witness = graph.div(sum, one);
+        let root = Root {
+            radicand,
+            witness,
+            whole,
+        };
+        (graph.div(numerator, p), Some(root))
+    };
+    let put = |graph: &mut Graph, v0: [ExprId; 2], v1: [ExprId; 2]| -> [ExprId; 2] {
+        std::array::from_fn(|i| {
+            let moved = graph.mul(value, v1[i]);
+            graph.add(v0[i], moved)
+        })
+    };
+    let v = put(graph, k0, k1).map(|x| graph.neg(x));
+    let arm = put(graph, a0, a1);
+    let arm_squared = dot(graph, arm, arm);
+    let angles = vec![(group.angle.clone(), direction(graph, v, arm, arm_squared))];
+    Some(Solved {
+        angles,
+        relations: Vec::new(),
+        lengths: vec![(slide, value)],
+        root,
+    })
+}
+
+/// `k0 + s a + t b = 0`
+fn two_lines(graph: &mut Graph, known: [ExprId; 2], first: usize, second: usize) -> Option<Solved> {
+    let (rest, a) = linear(graph, known, first)?;
+    let (k0, b) = linear(graph, rest, second)?;
+    let determinant = cross(graph, a, b);
+    if determinant == Graph::ZERO || depends(graph, &a, second) {
+        return None;
+    }
+    let (s, t) = (cross(graph, b, k0), cross(graph, k0, a));
+    let (s, t) = (graph.div(s, determinant), graph.div(t, determinant));
+    Some(Solved {
+        angles: Vec::new(),
+        relations: Vec::new(),
+        lengths: vec![(first, s), (second, t)],
+        root: None,
+    })
+}
+
+/// Splits a vector into what does not depend on a coordinate and its factor; `None` if it is not linear in it.
+fn linear(
+    graph: &mut Graph,
+    v: [ExprId; 2],
+    coordinate: usize,
+) -> Option<([ExprId; 2], [ExprId; 2])> {
+    let slope = graph.differentiate(&v, Atom::Coordinate(coordinate));
+    if depends(graph, &slope, coordinate) {
+        return None;
+    }
+    let at = graph.atom(Atom::Coordinate(coordinate));
+    let offset = graph.substitute(&v, &std::collections::BTreeMap::from([(at, Graph::ZERO)]));
+    Some(([offset[0], offset[1]], [slope[0], slope[1]]))
+}

@@ -1,0 +1,210 @@
+//! Inertia of the links as polynomials in the dynamic parameters, and from them the products of eq. (5).
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use modelmill_spec::{Action, EffectTerm, Exact, Inertial, LumpedMass, Mechanism, Place, Point};
+
+use crate::DeriveError;
+use crate::expr::{ExprId, Graph, Rational};
+use crate::newton_euler::{ELEMENTS, Element, Inertia};
+use crate::tree::Tree;
+use crate::tree::expressions::{self, Monomial, Polynomial};
+
+/// For every product of parameters, the inertia that it has on each link.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct InertiaByProduct(BTreeMap<Monomial, BTreeMap<usize, Inertia>>);
+
+impl InertiaByProduct {
+    pub(crate) fn new(
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        tree: &Tree,
+    ) -> Result<Self, DeriveError> {
+        let mut by_product = Self::default();
+        for part in &mechanism.parts {
+            let elements = part_elements(graph, &part.inertial)?;
+            by_product.add(graph, tree.link_of(part.frame), elements);
+        }
+        for lump in &mechanism.lumped_masses {
+            let elements = lump_elements(graph, lump)?;
+            by_product.add(graph, tree.link_of(lump.frame), elements);
+        }
+        for effect in &mechanism.effects {
+            if let Action::Bodies {
+                parts,
+                lumped_masses,
+            } = &effect.action
+            {
+                for part in parts {
+                    let elements = part_elements(graph, &part.inertial)?;
+                    by_product.add(graph, tree.link_of(part.frame), elements);
+                }
+                for lump in lumped_masses {
+                    let elements = lump_elements(graph, lump)?;
+                    by_product.add(graph, tree.link_of(lump.frame), elements);
+                }
+                continue;
+            }
+            for place in &effect.places {
+                let Place::Point(point) = place else { continue };
+                let point = &mechanism.points[point.0];
+                for term in &effect.terms {
+                    let lump = mass_at(point, term);
+                    let elements = lump_elements(graph, &lump)?;
+                    by_product.add(graph, tree.link_of(point.frame), elements);
+                }
+            }
+        }
+        Ok(by_product)
+    }
+
+    /// The products that occur, in the order of eq. (5).
+    pub(crate) fn products(&self) -> BTreeSet<Monomial> {
+        self.0.keys().cloned().collect()
+    }
+
+    /// The inertia of each link that belongs to one product.
+    pub(crate) fn of(&self, product: &Monomial) -> impl Iterator<Item = (usize, &Inertia)> {
+        self.0
+            .get(product)
+            .into_iter()
+            .flatten()
+            .map(|(link, inertia)| (*link, inertia))
+    }
+
+    /// The inertia of each link when every product has the value that `value` gives it.
+    pub(crate) fn total(
+        &self,
+        graph: &mut Graph,
+        value: impl Fn(&Monomial) -> ExprId,
+    ) -> BTreeMap<usize, Inertia> {
+        let mut terms: BTreeMap<usize, [Vec<ExprId>; ELEMENTS]> = BTreeMap::new();
+        for (product, links) in &self.0 {
+            let value = value(product);
+            for (link, inertia) in links {
+                let slots = terms.entry(*link).or_default();
+                for (slot, factor) in slots.iter_mut().zip(inertia) {
+                    slot.push(graph.mul(*factor, value));
+                }
+            }
+        }
+        terms
+            .into_iter()
+            .map(|(link, slots)| (link, slots.map(|slot| graph.add_all(&slot))))
+            .collect()
+    }
+
+    fn add(&mut self, graph: &mut Graph, link: Option<usize>, elements: [Polynomial; ELEMENTS]) {
+        // What is fixed to the base moves nothing; its products stay known, with no inertia anywhere.
+        for (element, polynomial) in elements.into_iter().enumerate() {
+            for (product, factor) in polynomial.0 {
+                let links = self.0.entry(product).or_default();
+                if let Some(link) = link {
+                    let inertia = links.entry(link).or_insert([Graph::ZERO; ELEMENTS]);
+                    inertia[element] = graph.add(inertia[element], factor);
+                }
+            }
+        }
+    }
+}
+
+/// The mass that a term of an effect adds at a point.
+fn mass_at(point: &Point, term: &EffectTerm) -> LumpedMass {
+    let parameter = Exact::Symbol(modelmill_spec::Symbol::Parameter(term.parameter));
+    LumpedMass {
+        mass: Exact::Product(vec![parameter, term.expression.clone()]),
+        share: num_rational::BigRational::from_integer(1.into()),
+        frame: point.frame,
+        force_at: point.at.clone(),
+        moment_at: point.at.clone(),
+    }
+}
+
+fn part_elements(
+    graph: &mut Graph,
+    inertial: &Inertial,
+) -> Result<[Polynomial; ELEMENTS], DeriveError> {
+    let mut elements: [Polynomial; ELEMENTS] = Default::default();
+    match inertial {
+        Inertial::Linear {
+            mass,
+            first_moment,
+            inertia,
+        } => {
+            elements[Element::Mass.index()] = expressions::polynomial(graph, mass)?;
+            for i in 0..3 {
+                let moment = expressions::polynomial(graph, &first_moment[i])?;
+                elements[Element::ForceMoment(i).index()] = moment.clone();
+                elements[Element::MomentMoment(i).index()] = moment;
+            }
+            for i in 0..6 {
+                elements[Element::Inertia(i).index()] =
+                    expressions::polynomial(graph, &inertia[i])?;
+            }
+        }
+        Inertial::AboutCentre {
+            mass,
+            centre,
+            inertia,
+        } => {
+            let mass = expressions::polynomial(graph, mass)?;
+            let centre = polynomials(graph, centre)?;
+            elements = point_elements(graph, &mass, &centre, &centre)?;
+            for i in 0..6 {
+                let own = expressions::polynomial(graph, &inertia[i])?;
+                let slot = &mut elements[Element::Inertia(i).index()];
+                *slot = slot.plus(&own, graph);
+            }
+        }
+    }
+    Ok(elements)
+}
+
+fn lump_elements(
+    graph: &mut Graph,
+    lump: &LumpedMass,
+) -> Result<[Polynomial; ELEMENTS], DeriveError> {
+    let share = Rational::from(lump.share.clone());
+    let mass = expressions::polynomial(graph, &lump.mass)?.scaled(&share, graph);
+    let force_at = polynomials(graph, &lump.force_at)?;
+    let moment_at = polynomials(graph, &lump.moment_at)?;
+    point_elements(graph, &mass, &force_at, &moment_at)
+}
+
+fn polynomials(graph: &mut Graph, exact: &[Exact; 3]) -> Result<[Polynomial; 3], DeriveError> {
+    Ok([
+        expressions::polynomial(graph, &exact[0])?,
+        expressions::polynomial(graph, &exact[1])?,
+        expressions::polynomial(graph, &exact[2])?,
+    ])
+}
+
+/// A point mass: `m`, `m c` and `m (c'c 1 - c c')` about the origin (Steiner).
+fn point_elements(
+    graph: &mut Graph,
+    mass: &Polynomial,
+    force_at: &[Polynomial; 3],
+    moment_at: &[Polynomial; 3],
+) -> Result<[Polynomial; ELEMENTS], DeriveError> {
+    let mut elements: [Polynomial; ELEMENTS] = Default::default();
+    elements[Element::Mass.index()] = mass.clone();
+    for i in 0..3 {
+        elements[Element::ForceMoment(i).index()] = mass.times(&force_at[i], graph)?;
+        elements[Element::MomentMoment(i).index()] = mass.times(&moment_at[i], graph)?;
+    }
+    let mut second = |i: usize, j: usize| {
+        let product = moment_at[i].times(&moment_at[j], graph)?;
+        mass.times(&product, graph)
+    };
+    let squares = [second(0, 0)?, second(1, 1)?, second(2, 2)?];
+    let pairs = [second(0, 1)?, second(0, 2)?, second(1, 2)?];
+    let mut set =
+        |position: usize, value: Polynomial| elements[Element::Inertia(position).index()] = value;
+    set(0, squares[1].plus(&squares[2], graph));
+    set(3, squares[0].plus(&squares[2], graph));
+    set(5, squares[0].plus(&squares[1], graph));
+    for (position, pair) in [1, 2, 4].into_iter().zip(pairs) {
+        set(position, pair.scaled(&Rational::MINUS_ONE, graph));
+    }
+    Ok(elements)
+}

@@ -1,0 +1,298 @@
+//! Loads on the tree besides its bodies: forces at the cuts of loops, along linear drives, and at the ends of rods.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use modelmill_spec::{Action, Axis, DriveKind, Mechanism, Place, PointIdx};
+
+use super::through;
+use crate::DeriveError;
+use crate::expr::vector::{self, Turn, Vector, push_turn};
+use crate::expr::{Atom, ExprId, Graph};
+use crate::loops::closure::{self, Between, fixed_turns, inverse, point_at, sum_of};
+use crate::newton_euler::{Load, Wrench, turn_in_all};
+use crate::regressor::Equations;
+use crate::regressor::rod;
+use crate::tree::Tree;
+use crate::tree::expressions::Monomial;
+
+/// A loop cut open: the force and the moment that its first side gets from the second, as unknown numbers.
+pub(super) struct Cut {
+    pub(super) name: String,
+    /// What closes the loop, along three axes that stand still on the common link.
+    pub(super) gap: Vector,
+    /// Unknown force along these axes.
+    pub(super) force: [Atom; 3],
+    /// Unknown moment about two of them that a pin could transmit; none for loops in space, whose cut is a ball joint.
+    pub(super) moment: Option<[Atom; 2]>,
+    /// The link with the joint in whose axes the force is shown.
+    pub(super) shown_in: usize,
+    common: Option<usize>,
+    /// Turns from the three axes to each link, and the links' points.
+    sides: [Side; 2],
+    shown: Vec<Turn>,
+}
+
+struct Side {
+    link: Option<usize>,
+    turns: Vec<Turn>,
+    at: Vector,
+}
+
+/// Paths of two points from the link that carries both, that link, and the points' places in their own frames.
+struct Paths {
+    links: [Vec<usize>; 2],
+    common: Option<usize>,
+    of_points: [Option<usize>; 2],
+    at: [Vector; 2],
+}
+
+fn paths(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    tree: &Tree,
+    points: [PointIdx; 2],
+) -> Result<Paths, DeriveError> {
+    let points = points.map(|p| &mechanism.points[p.0]);
+    let of_points = points.map(|p| tree.link_of(p.frame));
+    let [a, b] = of_points.map(|link| tree.path(link));
+    let shared = a.iter().zip(&b).take_while(|(x, y)| x == y).count();
+    Ok(Paths {
+        common: shared.checked_sub(1).map(|last| a[last]),
+        links: [a[shared..].to_vec(), b[shared..].to_vec()],
+        of_points,
+        at: [point_at(graph, points[0])?, point_at(graph, points[1])?],
+    })
+}
+
+/// Turns along a path of links, behind others.
+fn turns_along(tree: &Tree, start: &[Turn], links: &[usize]) -> Vec<Turn> {
+    let mut turns = Vec::new();
+    let of_links = links.iter().map(|i| &tree.links[*i]);
+    let along = of_links.flat_map(|link| link.pre.iter().chain([&link.joint]));
+    for turn in start.iter().chain(along) {
+        push_turn(&mut turns, turn);
+    }
+    turns
+}
+
+/// Whether turns, but for fixed ones at their inner end, are one about z.
+fn turns_about_z(turns: &[Turn]) -> bool {
+    let fixed = turns.iter().rev().take_while(|turn| turn.sum.is_empty());
+    match &turns[..turns.len() - fixed.count()] {
+        [] => true,
+        [turn] => turn.axis == Axis::Z,
+        _ => false,
+    }
+}
+
+/// Unknown number `k` of cut `l`. Base parameters have no part in reactions, so that their atoms are free.
+fn unknown(l: usize, k: usize) -> Atom {
+    Atom::Base(5 * l + k)
+}
+
+/// All loops, cut open; `free` are links whose joints transmit nothing.
+pub(super) fn cuts(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    equations: &Equations,
+    free: &BTreeSet<usize>,
+) -> Result<Vec<Cut>, DeriveError> {
+    let tree = &equations.tree;
+    let mut cuts = Vec::new();
+    for (l, closed) in mechanism.loops.iter().enumerate() {
+        let paths = paths(graph, mechanism, tree, closed.joins)?;
+        let [first, second] = &paths.links;
+        let into = fixed_turns(tree, first)
+            .or_else(|| fixed_turns(tree, second))
+            .unwrap_or_default();
+        let start = inverse(&into);
+        let between = Between {
+            paths: [first, second],
+            at: paths.at,
+        };
+        let path = between.stretches(graph, tree, &start);
+        let gap = sum_of(graph, &path);
+        let told = |i: usize| tree.links[i].is_moving() && !free.contains(&i);
+        let moving = |i: usize| tree.links[i].is_moving();
+        let last_joint = |links: &[usize], of: &dyn Fn(usize) -> bool| {
+            let upto = links.iter().rposition(|i| of(*i))?;
+            Some((links[upto], turns_along(tree, &start, &links[..=upto])))
+        };
+        let found = last_joint(first, &told)
+            .or_else(|| last_joint(second, &told))
+            .or_else(|| last_joint(first, &moving))
+            .or_else(|| last_joint(second, &moving));
+        // A loop without a joint closes nothing that could move.
+        let Some((shown_in, shown)) = found else {
+            continue;
+        };
+        let side = |k: usize| Side {
+            link: paths.of_points[k],
+            turns: turns_along(tree, &start, &paths.links[k]),
+            at: paths.at[k],
+        };
+        let sides = [side(0), side(1)];
+        // Points stay in one plane, and their frames turn about its normal alone.
+        let is_planar = gap[2] == Graph::ZERO && sides.iter().all(|s| turns_about_z(&s.turns));
+        cuts.push(Cut {
+            name: closed.name.clone(),
+            gap,
+            force: [0, 1, 2].map(|k| unknown(l, k)),
+            moment: is_planar.then(|| [3, 4].map(|k| unknown(l, k))),
+            shown_in,
+            common: paths.common,
+            sides,
+            shown,
+        });
+    }
+    Ok(cuts)
+}
+
+impl Cut {
+    /// What the joints must supply because of the cut.
+    pub(super) fn loads(&self, graph: &mut Graph, tree: &Tree) -> Vec<Load> {
+        debug_assert!(self.common.is_none_or(|c| c < tree.links.len()));
+        let force = self.force.map(|atom| graph.atom(atom));
+        let moment = match self.moment {
+            Some([x, y]) => [graph.atom(x), graph.atom(y), Graph::ZERO],
+            None => vector::ZERO,
+        };
+        let mut loads = Vec::new();
+        for (k, side) in self.sides.iter().enumerate() {
+            let Some(link) = side.link.filter(|link| Some(*link) != self.common) else {
+                continue;
+            };
+            let [force, moment] = [force, moment].map(|v| {
+                // The first side is pushed, so that its joints supply less.
+                let v = if k == 0 { v.map(|x| graph.neg(x)) } else { v };
+                turn_in_all(graph, &side.turns, &v)
+            });
+            let wrench = through(graph, &side.at, force);
+            let moment = graph.add_vectors(&[wrench.moment, moment]);
+            loads.push(Load {
+                link,
+                wrench: Wrench { force, moment },
+                until: self.common,
+            });
+        }
+        loads
+    }
+
+    /// The force on the first side, in the axes in which it is shown.
+    pub(super) fn force_to_show(&self, graph: &mut Graph, tree: &Tree) -> Vector {
+        let force = self.force.map(|atom| graph.atom(atom));
+        let force = turn_in_all(graph, &self.shown, &force);
+        tree.links[self.shown_in].to_named_axes(graph, &force)
+    }
+}
+
+/// Values for the unknown numbers: forces along the gaps, and nothing where there is no equation. A gap that two loops
+/// share is closed by the first of them; how they share its force is not determined.
+pub(super) fn known(
+    graph: &mut Graph,
+    cuts: &[Cut],
+    of_gap: &BTreeMap<ExprId, ExprId>,
+) -> BTreeMap<ExprId, ExprId> {
+    let mut left = of_gap.clone();
+    let mut known = BTreeMap::new();
+    for cut in cuts {
+        for (gap, atom) in cut.gap.iter().zip(cut.force) {
+            let value = left.remove(gap).unwrap_or(Graph::ZERO);
+            known.insert(graph.atom(atom), value);
+        }
+        for atom in cut.moment.into_iter().flatten() {
+            known.insert(graph.atom(atom), Graph::ZERO);
+        }
+    }
+    known
+}
+
+/// Forces of linear drives, which push their points apart.
+pub(super) fn drives(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    equations: &Equations,
+    forces: &[ExprId],
+) -> Result<Vec<Load>, DeriveError> {
+    let tree = &equations.tree;
+    let mut loads = Vec::new();
+    for (d, drive) in mechanism.drives.iter().enumerate() {
+        let DriveKind::Linear { from, to } = drive.kind else {
+            continue;
+        };
+        let paths = paths(graph, mechanism, tree, [to, from])?;
+        let between = Between {
+            paths: [&paths.links[0], &paths.links[1]],
+            at: paths.at,
+        };
+        let path = between.stretches(graph, tree, &[]);
+        let along = sum_of(graph, &path);
+        let length = equations.projection.drives[d].coordinate;
+        let per_length = graph.pow(length, -1);
+        let scale = graph.mul(forces[d], per_length);
+        let force = graph.scale_vector(scale, &along);
+        for k in 0..2 {
+            let Some(link) = paths.of_points[k].filter(|link| Some(*link) != paths.common) else {
+                continue;
+            };
+            let supplied = if k == 0 {
+                force.map(|x| graph.neg(x))
+            } else {
+                force
+            };
+            let turns = turns_along(tree, &[], &paths.links[k]);
+            let supplied = turn_in_all(graph, &turns, &supplied);
+            loads.push(Load {
+                link,
+                wrench: through(graph, &paths.at[k], supplied),
+                until: paths.common,
+            });
+        }
+    }
+    Ok(loads)
+}
+
+/// What rods along drives need at their ends.
+pub(super) fn rods(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    equations: &Equations,
+    value: &dyn Fn(&Monomial) -> ExprId,
+) -> Result<Vec<Load>, DeriveError> {
+    let tree = &equations.tree;
+    let mut loads = Vec::new();
+    for effect in &mechanism.effects {
+        let Action::Rod = effect.action else { continue };
+        let moments: Vec<ExprId> = effect
+            .terms
+            .iter()
+            .map(|term| value(&Monomial(vec![(term.parameter.0, 1)])))
+            .collect();
+        for place in &effect.places {
+            let Place::Drive(d) = place else { continue };
+            let DriveKind::Linear { from, to } = mechanism.drives[d.0].kind else {
+                continue;
+            };
+            let length = equations.projection.drives[d.0].coordinate;
+            let ends = [from.0, to.0]
+                .map(|point| closure::position_in_base(graph, mechanism, tree, point));
+            let [a, b] = ends;
+            let forces = rod::end_forces(graph, [a?, b?], length, &equations.gravity, &moments);
+            for (point, force) in [from, to].into_iter().zip(forces) {
+                let point = &mechanism.points[point.0];
+                let Some(link) = tree.link_of(point.frame) else {
+                    continue;
+                };
+                let turns = turns_along(tree, &[], &tree.path(Some(link)));
+                let force = turn_in_all(graph, &turns, &force);
+                let at = point_at(graph, point)?;
+                loads.push(Load {
+                    link,
+                    wrench: through(graph, &at, force),
+                    until: None,
+                });
+            }
+        }
+    }
+    Ok(loads)
+}

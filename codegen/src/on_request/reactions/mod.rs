@@ -1,0 +1,388 @@
+//! What joints transmit: forces and moments in the joints of the tree and at the points where loops are closed.
+//!
+//! Newton and Euler's equations of the tree (Luh, Walker and Paul 1980) with the forces of the loops as further loads:
+//! the equations of the passive coordinates determine them, `J' lambda = tau - (d l / d q)' f` with the Jacobian J of the
+//! closing equations and the forces f of the drives. Where a mechanism is overconstrained, as a planar one in space is,
+//! equations of motion say only some of them (`determined`); the others are left out.
+//!
+//! Reactions depend on all inertial parameters: many that no drive feels, and that base parameters therefore do not hold,
+//! load a bearing all the same.
+
+mod determined;
+mod loads;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use modelmill_spec::{Axis, Mechanism, Place};
+use nalgebra::DMatrix;
+
+use crate::derive::base;
+use crate::expr::vector::Vector;
+use crate::expr::{Atom, ExprId, Graph};
+use crate::loops::branches::closed_form;
+use crate::lower::Program;
+use crate::newton_euler::{self, Load, Style, Wrench, joint_wrenches};
+use crate::programs::closing::Closing;
+use crate::programs::nominal_value;
+use crate::regressor::Equations;
+use crate::regressor::projection::most_different_rows;
+use crate::tree::Tree;
+use crate::tree::expressions::Monomial;
+use crate::{Derivation, DeriveError};
+
+use loads::Cut;
+
+/// Reactions of a mechanism: where they act, and the program that computes those that are determined.
+#[derive(Clone, Debug)]
+pub struct Reactions {
+    /// Joints of the tree, from the base outwards.
+    pub joints: Vec<JointReaction>,
+    /// Closed loops, in the order of the model file.
+    pub loops: Vec<LoopReaction>,
+    /// All components that are determined; inputs are the parameters of the model file, not base parameters.
+    pub program: Program,
+}
+
+/// What a joint transmits to the side away from the base, drive and friction in it included.
+///
+/// Components are along the axes that the frame's steps reach behind the joint (the frame's own if nothing follows), the
+/// moment is about the origin reached there, which lies on the joint's axis.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct JointReaction {
+    /// Name of the frame, followed by the coordinate where the frame has several joints: `upper`, `wrist.q4`.
+    pub name: String,
+    /// Coordinates that move the joint.
+    pub coordinates: Vec<String>,
+    /// The axis about or along which it moves.
+    pub axis: Axis,
+    /// Place of each component in the program's outputs; `None` for what equations of motion do not determine.
+    pub force: [Option<usize>; 3],
+    /// The same of the moment.
+    pub moment: [Option<usize>; 3],
+}
+
+/// The force at the point where a loop is closed, on the side of the first point that it joins.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LoopReaction {
+    /// Name of the loop.
+    pub name: String,
+    /// The joint along whose axes its components are: the last one before the first point, or before the second one if
+    /// the first lies on a free body.
+    pub axes: String,
+    /// Place of each component in the program's outputs; `None` for what equations of motion do not determine.
+    pub force: [Option<usize>; 3],
+}
+
+impl Derivation {
+    /// Forces and moments that the joints transmit. They are derived here, on demand.
+    ///
+    /// # Errors
+    /// Loops that are too large to be solved for their forces.
+    pub fn reactions(&self) -> Result<Reactions, DeriveError> {
+        let mut graph = self.graph.clone();
+        reactions(&mut graph, &self.mechanism, &self.equations)
+    }
+}
+
+fn reactions(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    equations: &Equations,
+) -> Result<Reactions, DeriveError> {
+    let tree = &equations.tree;
+    let free = free_links(mechanism, equations);
+    let cuts = loads::cuts(graph, mechanism, equations, &free)?;
+    let value = values(graph, equations);
+    let value = |m: &Monomial| value.get(m).copied().unwrap_or(Graph::ZERO);
+    let mut all = bodies(graph, equations, &value);
+    let on_tree = needed(graph, mechanism, equations, &value, &all)?;
+    let drives = equations.projection.drive_forces(graph, &on_tree)?;
+    let closing_forces = closing_forces(graph, mechanism, equations, &cuts, &on_tree, &drives)?;
+    all.extend(loads::drives(graph, mechanism, equations, &drives)?);
+    all.extend(loads::rods(graph, mechanism, equations, &value)?);
+    for cut in &cuts {
+        all.extend(cut.loads(graph, tree));
+    }
+
+    let places = places(mechanism, equations, &free);
+    let mut components: Vec<[ExprId; 3]> = Vec::new();
+    let wrenches = joint_wrenches(graph, tree, all);
+    for place in &places {
+        let (link, wrench) = (&tree.links[place.link], &wrenches[place.link]);
+        components.push(link.to_named_axes(graph, &wrench.force));
+        components.push(link.to_named_axes(graph, &wrench.moment));
+    }
+    for cut in &cuts {
+        components.push(cut.force_to_show(graph, tree));
+    }
+    let components: Vec<ExprId> = components.concat();
+    let determined = determined::determined(graph, mechanism, equations, &cuts, &components);
+
+    // What is not determined may be anything, so it may be nothing.
+    let known = loads::known(graph, &cuts, &closing_forces.of_gap);
+    let outputs: Vec<ExprId> = components
+        .iter()
+        .zip(&determined)
+        .filter_map(|(component, determined)| determined.then_some(*component))
+        .collect();
+    let outputs = graph.substitute(&outputs, &known);
+    let plan = closed_form(graph, mechanism, &equations.projection);
+    let mut closing = Closing::new(graph, mechanism, equations, plan)?;
+    closing.guard(graph, mechanism, &closing_forces.determinants);
+    let program = closing.program(graph, equations, &outputs);
+
+    let mut next = 0;
+    let mut place_of = determined.iter().map(|determined| {
+        determined.then(|| {
+            next += 1;
+            next - 1
+        })
+    });
+    let mut three = || [(); 3].map(|()| place_of.next().flatten());
+    let joints = places.iter().map(|place| JointReaction {
+        name: place.name.clone(),
+        coordinates: place.coordinates.clone(),
+        axis: tree.links[place.link].named,
+        force: three(),
+        moment: three(),
+    });
+    let joints: Vec<JointReaction> = joints.collect();
+    let names = all_names(mechanism, tree);
+    let loops = cuts.iter().map(|cut| LoopReaction {
+        name: cut.name.clone(),
+        axes: names[cut.shown_in].clone(),
+        force: three(),
+    });
+    let loops = loops.collect();
+    Ok(Reactions {
+        joints,
+        loops,
+        program,
+    })
+}
+
+/// Every product of parameters as an expression.
+fn values(graph: &mut Graph, equations: &Equations) -> BTreeMap<Monomial, ExprId> {
+    let products = equations.products.iter();
+    products
+        .map(|m| (m.clone(), base::product(graph, m)))
+        .collect()
+}
+
+/// What moves the bodies, link by link.
+fn bodies(
+    graph: &mut Graph,
+    equations: &Equations,
+    value: &dyn Fn(&Monomial) -> ExprId,
+) -> Vec<Load> {
+    let tree = &equations.tree;
+    let motion = newton_euler::forward(graph, tree, &equations.gravity, Style::PLAIN);
+    let inertia = equations.inertia.total(graph, value);
+    let loads = inertia.into_iter().map(|(link, inertia)| Load {
+        link,
+        wrench: motion.wrench(graph, link, &newton_euler::Body::new(&inertia)),
+        until: None,
+    });
+    loads.collect()
+}
+
+/// Generalised forces that the open tree needs on its coordinates, effects included.
+fn needed(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    equations: &Equations,
+    value: &dyn Fn(&Monomial) -> ExprId,
+    bodies: &[Load],
+) -> Result<Vec<ExprId>, DeriveError> {
+    let n = mechanism.coordinates.len();
+    let wrenches: Vec<_> = bodies
+        .iter()
+        .map(|load| (load.link, newton_euler::Side::Moving, load.wrench))
+        .collect();
+    let on_tree = newton_euler::backward(graph, &equations.tree, Style::PLAIN, n, wrenches);
+    let effects = equations.effect_forces(graph, mechanism, value)?;
+    Ok(on_tree
+        .iter()
+        .zip(effects.on_tree)
+        .map(|(a, b)| graph.add(*a, b))
+        .collect())
+}
+
+/// Forces along the gaps of loops.
+struct ClosingForces {
+    /// By the closing equation; those of all others are taken as nothing.
+    of_gap: BTreeMap<ExprId, ExprId>,
+    /// What must not vanish for them to exist.
+    determinants: Vec<ExprId>,
+}
+
+/// Forces that close the loops, where the drives act with the given forces.
+fn closing_forces(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    equations: &Equations,
+    cuts: &[Cut],
+    on_tree: &[ExprId],
+    drives: &[ExprId],
+) -> Result<ClosingForces, DeriveError> {
+    let projection = &equations.projection;
+    if projection.passive.is_empty() {
+        return Ok(ClosingForces {
+            of_gap: BTreeMap::new(),
+            determinants: Vec::new(),
+        });
+    }
+    let coordinates: Vec<ExprId> = projection.drives.iter().map(|d| d.coordinate).collect();
+    let left: Vec<ExprId> = (0..mechanism.coordinates.len())
+        .map(|i| {
+            let slopes = graph.differentiate(&coordinates, Atom::Coordinate(i));
+            let driven: Vec<ExprId> = slopes
+                .iter()
+                .zip(drives)
+                .map(|(slope, force)| graph.mul(*slope, *force))
+                .collect();
+            let driven = graph.add_all(&driven);
+            graph.sub(on_tree[i], driven)
+        })
+        .collect();
+    let gaps = closing_gaps(graph, mechanism, equations, cuts);
+    if gaps.len() != projection.passive.len() {
+        return Err(DeriveError::Singular {
+            what: "the loops for their forces".to_owned(),
+        });
+    }
+    let solution = projection.multipliers(graph, &gaps, &left)?;
+    let forces = solution.values.into_iter().map(|row| row[0]);
+    Ok(ClosingForces {
+        of_gap: gaps.into_iter().zip(forces).collect(),
+        determinants: solution.determinants,
+    })
+}
+
+/// As many components of the loops' gaps as determine the passive coordinates: those by which the loops were solved, or,
+/// where relations between angles took their place, those that do it best at the nominal pose.
+fn closing_gaps(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    equations: &Equations,
+    cuts: &[Cut],
+) -> Vec<ExprId> {
+    let projection = &equations.projection;
+    let mut all: Vec<ExprId> = Vec::new();
+    for gap in cuts.iter().flat_map(|cut| cut.gap) {
+        if gap != Graph::ZERO && !all.contains(&gap) {
+            all.push(gap);
+        }
+    }
+    if projection.residual.iter().all(|row| all.contains(row)) {
+        return projection.residual.clone();
+    }
+    let slopes: Vec<ExprId> = projection
+        .passive
+        .iter()
+        .flat_map(|p| graph.differentiate(&all, Atom::Coordinate(*p)))
+        .collect();
+    let values = slopes.iter().map(|slope| {
+        let value = nominal_value(graph, mechanism, *slope);
+        value.filter(|x| x.is_finite()).unwrap_or(0.0)
+    });
+    let n = projection.passive.len();
+    let jacobian = DMatrix::from_iterator(all.len(), n, values);
+    let rows = most_different_rows(&jacobian, n);
+    rows.into_iter().map(|row| all[row]).collect()
+}
+
+/// A joint whose reaction is told.
+struct JointPlace {
+    link: usize,
+    name: String,
+    coordinates: Vec<String>,
+}
+
+/// The frame that each link belongs to.
+fn frames(tree: &Tree) -> Vec<usize> {
+    let mut frames = Vec::with_capacity(tree.links.len());
+    for (frame, last) in tree.of_frame.iter().enumerate() {
+        if let Some(last) = last {
+            frames.resize(last + 1, frame);
+        }
+    }
+    frames
+}
+
+fn coordinates_of(mechanism: &Mechanism, tree: &Tree, link: usize) -> Vec<String> {
+    let link = &tree.links[link];
+    let turns = link.turns.iter().map(|(c, _)| *c);
+    let all: BTreeSet<usize> = turns.chain(link.slides.iter().map(|(c, _)| *c)).collect();
+    let name = |i: usize| mechanism.coordinates[i].name.clone();
+    all.into_iter().map(name).collect()
+}
+
+/// Names of all links by their frames, with their coordinates where a frame has several joints.
+fn all_names(mechanism: &Mechanism, tree: &Tree) -> Vec<String> {
+    let frames = frames(tree);
+    let moving = |i: &usize| tree.links[*i].is_moving();
+    (0..tree.links.len())
+        .map(|i| {
+            let frame = &mechanism.frames[frames[i]].name;
+            let others = (0..tree.links.len()).filter(|k| frames[*k] == frames[i]);
+            if others.filter(moving).count() < 2 {
+                return frame.clone();
+            }
+            format!("{frame}.{}", coordinates_of(mechanism, tree, i).join("+"))
+        })
+        .collect()
+}
+
+/// All joints but those of free bodies, which only count coordinates and transmit nothing.
+fn places(mechanism: &Mechanism, equations: &Equations, free: &BTreeSet<usize>) -> Vec<JointPlace> {
+    let tree = &equations.tree;
+    let names = all_names(mechanism, tree);
+    let joints = (0..tree.links.len()).filter(|i| tree.links[*i].is_moving() && !free.contains(i));
+    joints
+        .map(|link| JointPlace {
+            link,
+            name: names[link].clone(),
+            coordinates: coordinates_of(mechanism, tree, link),
+        })
+        .collect()
+}
+
+/// Links of frames that move in six coordinates of their own on which nothing acts.
+fn free_links(mechanism: &Mechanism, equations: &Equations) -> BTreeSet<usize> {
+    let tree = &equations.tree;
+    let frames = frames(tree);
+    let driven = |i: usize| {
+        let by_drive = mechanism
+            .drives
+            .iter()
+            .any(|d| matches!(d.kind, modelmill_spec::DriveKind::Joint(c) if c.0 == i));
+        let mut places = mechanism.effects.iter().flat_map(|e| &e.places);
+        by_drive || places.any(|p| matches!(p, Place::Coordinate(c) if c.0 == i))
+    };
+    let mut free = BTreeSet::new();
+    for frame in 1..mechanism.frames.len() {
+        let links = (0..tree.links.len()).filter(|i| frames[*i] == frame);
+        let links: Vec<usize> = links.filter(|i| tree.links[*i].is_moving()).collect();
+        let coordinates = |i: &usize| {
+            let link = &tree.links[*i];
+            let turns = link.turns.iter().map(|(c, _)| *c);
+            let slides = link.slides.iter().map(|(c, _)| *c);
+            turns.chain(slides).collect::<Vec<usize>>()
+        };
+        let all: BTreeSet<usize> = links.iter().flat_map(coordinates).collect();
+        let elsewhere = (0..tree.links.len())
+            .filter(|i| frames[*i] != frame)
+            .any(|i| coordinates(&i).iter().any(|c| all.contains(c)));
+        if all.len() == 6 && !elsewhere && !all.iter().any(|i| driven(*i)) {
+            free.extend(links);
+        }
+    }
+    free
+}
+
+/// A force through a point: its moment about the origin goes with it.
+fn through(graph: &mut Graph, at: &Vector, force: Vector) -> Wrench {
+    let moment = graph.cross(at, &force);
+    Wrench { force, moment }
+}

@@ -1,0 +1,189 @@
+//! The programs of a model: passive coordinates, regressor, inverse dynamics, Jacobian of the drives.
+//!
+//! Retained columns are original columns, so the inverse dynamics with base parameters is the same recursion with
+//! p_min put in place of the retained products and zero for all others.
+
+pub(crate) mod cheapest;
+pub(crate) mod closing;
+
+use std::collections::BTreeMap;
+
+use modelmill_spec::{Mechanism, Motion};
+
+use crate::DeriveError;
+use crate::expr::{Atom, ExprId, F64, Graph, Tape};
+use crate::loops::branches::closed_form;
+use crate::loops::magnitude::{self, Size};
+use crate::lower::{Program, Request, lower};
+use crate::programs::closing::Closing;
+use crate::reduce::Reduction;
+use crate::regressor::Equations;
+use crate::tree::expressions::Monomial;
+
+/// How the passive coordinates are found.
+#[derive(Clone, Debug)]
+pub enum PassivePosition {
+    /// There are none.
+    None,
+    /// In closed form, inside the programs.
+    Closed,
+    /// By Newton's method on the loops.
+    Newton(Box<LoopPrograms>),
+}
+
+/// What Newton's method on the loops evaluates.
+#[derive(Clone, Debug)]
+pub struct LoopPrograms {
+    /// Residuals, then their Jacobian by the passive coordinates row by row.
+    pub residual: Program,
+    /// What residuals, passive and active coordinates are held against, one after the other.
+    pub scales: Program,
+}
+
+/// Straight-line programs; outputs in the order given.
+#[derive(Clone, Debug)]
+pub struct Programs {
+    /// How the passive coordinates are found.
+    pub passive_position: PassivePosition,
+    /// Passive coordinates, their rates, their accelerations.
+    pub passive: Program,
+    /// H: rows of drives, columns of p_g, row by row.
+    pub full_regressor: Program,
+    /// H_min: rows of drives, columns of p_min, row by row.
+    pub regressor: Program,
+    /// Forces of the drives for given p_min.
+    pub inverse_dynamics: Program,
+    /// p_min of given parameters and constants; all of it is fixed.
+    pub base_parameters: Program,
+    /// Coordinates and rates of the drives, then their Jacobian by the active coordinates, row by row.
+    pub drives: Program,
+    /// How large the loops are beside those of the file's constants, if coordinates in them are lengths; fixed.
+    pub scale: Option<Program>,
+}
+
+pub(crate) fn programs(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    equations: &Equations,
+    reduction: &Reduction,
+) -> Result<Programs, DeriveError> {
+    let plan = closed_form(graph, mechanism, &equations.projection);
+    let closing = Closing::new(graph, mechanism, equations, plan)?;
+    let n_drives = mechanism.drives.len();
+
+    let base = base_atoms(graph, reduction);
+    let base_value = |m: &Monomial| base.get(m).copied().unwrap_or(Graph::ZERO);
+    let retained: Vec<Monomial> = (reduction.retained.iter())
+        .map(|k| reduction.products[*k].clone())
+        .collect();
+    let row_by_row = |columns: &[Vec<ExprId>]| -> Vec<ExprId> {
+        (0..n_drives)
+            .flat_map(|d| columns.iter().map(move |column| column[d]))
+            .collect()
+    };
+    let projection = &equations.projection;
+    let all: Vec<Vec<ExprId>> = reduction
+        .products
+        .iter()
+        .map(|m| {
+            let position = equations.products.iter().position(|p| p == m);
+            equations.columns[position.expect("a product of p_g is a candidate")].clone()
+        })
+        .collect();
+    let mut passive: Vec<ExprId> = projection
+        .passive
+        .iter()
+        .map(|p| graph.atom(Atom::Coordinate(*p)))
+        .collect();
+    passive.extend(&projection.passive_rates);
+    passive.extend(&projection.passive_accelerations);
+    let mut drives: Vec<ExprId> = projection.drives.iter().map(|d| d.coordinate).collect();
+    drives.extend(projection.drives.iter().map(|d| d.rate));
+    drives.extend(projection.drive_jacobian.iter().flatten());
+
+    let passive_position = if projection.passive.is_empty() {
+        PassivePosition::None
+    } else if closing.is_closed() {
+        PassivePosition::Closed
+    } else {
+        let mut outputs = projection.residual.clone();
+        outputs.extend(projection.residual_jacobian.iter().flatten());
+        let scales = magnitude::scales(graph, mechanism, projection);
+        PassivePosition::Newton(Box::new(LoopPrograms {
+            residual: plain(graph, &outputs),
+            scales: plain(graph, &scales),
+        }))
+    };
+    let base_expressions = crate::derive::base::expressions(graph, reduction);
+    let base_parameters = plain(graph, &base_expressions);
+    let nothing = BTreeMap::new();
+    let weigh =
+        |graph: &mut Graph, outputs: &[ExprId]| closing.weight(graph, equations, outputs, &nothing);
+    let all_passes = cheapest::PASSES.len();
+    let regressor = cheapest::columns(graph, mechanism, equations, &retained, all_passes, &weigh)?;
+    let regressor = row_by_row(&regressor);
+    let inverse_dynamics =
+        cheapest::total(graph, mechanism, equations, &base_value, all_passes, &weigh)?;
+    let slides = mechanism
+        .coordinates
+        .iter()
+        .any(|c| c.motion != Motion::Revolute);
+    let scale = (slides && !projection.residual.is_empty()).then(|| {
+        let scale = Size::of(graph, mechanism, &projection.residual).scale(graph);
+        plain(graph, &[scale])
+    });
+    let mut program = |outputs: &[ExprId]| closing.program(graph, equations, outputs);
+    let regressor = program(&regressor);
+    let inverse_dynamics = program(&inverse_dynamics);
+    Ok(Programs {
+        passive_position,
+        passive: program(&passive),
+        full_regressor: program(&row_by_row(&all)),
+        regressor,
+        inverse_dynamics,
+        base_parameters,
+        drives: program(&drives),
+        scale,
+    })
+}
+
+/// The base parameters by the products that they stand for; all other products are zero.
+pub(crate) fn base_atoms(graph: &mut Graph, reduction: &Reduction) -> BTreeMap<Monomial, ExprId> {
+    let retained = reduction.retained.iter().enumerate();
+    retained
+        .map(|(k, product)| {
+            let product = reduction.products[*product].clone();
+            (product, graph.atom(Atom::Base(k)))
+        })
+        .collect()
+}
+
+/// A program of expressions as they stand, without guards.
+fn plain(graph: &mut Graph, outputs: &[ExprId]) -> Program {
+    let request = Request {
+        may_be_undefined: false,
+        outputs,
+        reachable: &[],
+        regular: &[],
+        definitions: &[],
+    };
+    lower(graph, &request)
+}
+
+/// Value of an expression at the nominal pose, with the file's constants; rates are zero.
+pub(crate) fn nominal_value(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Option<f64> {
+    Tape::new(graph, &[id])
+        .evaluate(&F64(|atom| nominal_of(mechanism, atom)))
+        .map(|v| v[0])
+}
+
+/// Value of an atom at the nominal pose.
+pub(crate) fn nominal_of(mechanism: &Mechanism, atom: Atom) -> f64 {
+    match atom {
+        Atom::Constant(i) => mechanism.constants[i].value,
+        Atom::Coordinate(i) => mechanism.coordinates[i].nominal,
+        Atom::Parameter(i) => mechanism.parameters[i].nominal,
+        Atom::Pi => std::f64::consts::PI,
+        _ => 0.0,
+    }
+}

@@ -1,0 +1,294 @@
+//! The regressor H of eq. (4): one column per product of dynamic parameters, one row per drive.
+
+pub(crate) mod projection;
+pub(crate) mod rod;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use modelmill_spec::{
+    Action, CoordinateIdx, DriveKind, Effect, EffectTerm, Mechanism, Motion as JointMotion, Place,
+    PlaceQuantity,
+};
+
+use crate::DeriveError;
+use crate::expr::{Atom, ExprId, Graph};
+use crate::newton_euler;
+use crate::newton_euler::inertia::InertiaByProduct;
+use crate::programs::cheapest::{ColumnForm, Frames, TotalForm};
+use crate::regressor::projection::Projection;
+use crate::tree::Tree;
+use crate::tree::expressions::{self, Monomial};
+
+/// The mechanism's equations before reduction.
+pub(crate) struct Equations {
+    pub(crate) tree: Tree,
+    /// Acceleration of free fall.
+    pub(crate) gravity: crate::expr::vector::Vector,
+    pub(crate) inertia: InertiaByProduct,
+    pub(crate) projection: Projection,
+    /// For every effect that is a rod, and each of its places: generalised forces of its three terms.
+    rods: BTreeMap<(usize, usize), [Vec<ExprId>; 3]>,
+    /// Products of parameters that occur anywhere, in the order of eq. (5).
+    pub(crate) products: Vec<Monomial>,
+    /// `columns[k][d]`: force of drive `d` for product `k`.
+    pub(crate) columns: Vec<Vec<ExprId>>,
+}
+
+/// Forces of effects: generalised ones by coordinate of the open tree, and those along the drives.
+pub(crate) struct EffectForces {
+    pub(crate) on_tree: Vec<ExprId>,
+    pub(crate) on_drives: Vec<ExprId>,
+}
+
+/// Derives the regressor of all products.
+pub(crate) fn equations(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+) -> Result<Equations, DeriveError> {
+    let tree = Tree::new(graph, mechanism)?;
+    let gravity = [
+        expressions::expression(graph, &mechanism.gravity[0])?,
+        expressions::expression(graph, &mechanism.gravity[1])?,
+        expressions::expression(graph, &mechanism.gravity[2])?,
+    ];
+    let inertia = InertiaByProduct::new(graph, mechanism, &tree)?;
+    let projection = Projection::new(graph, mechanism, &tree)?;
+    let mut rods = BTreeMap::new();
+    for (e, effect) in mechanism.effects.iter().enumerate() {
+        for (p, place) in effect.places.iter().enumerate() {
+            if let (Action::Rod, Place::Drive(d)) = (&effect.action, place) {
+                let forces =
+                    rod::generalised_forces(graph, mechanism, &tree, &projection, &gravity, d.0)?;
+                rods.insert((e, p), forces);
+            }
+        }
+    }
+    let mut products: BTreeSet<Monomial> = inertia.products();
+    // Bodies of effects are among the inertia already.
+    let forces = |effect: &&Effect| matches!(effect.action, Action::Local | Action::Rod);
+    for effect in mechanism.effects.iter().filter(forces) {
+        products.extend(
+            effect
+                .terms
+                .iter()
+                .map(|term| Monomial(vec![(term.parameter.0, 1)])),
+        );
+    }
+    let products: Vec<Monomial> = products.into_iter().collect();
+    let mut equations = Equations {
+        tree,
+        gravity,
+        inertia,
+        projection,
+        rods,
+        products,
+        columns: Vec::new(),
+    };
+    let form = ColumnForm::PLAIN;
+    let frames = Frames::new(graph, &equations.tree, &gravity, form.style, false);
+    let products = equations.products.clone();
+    equations.columns = equations.columns_of(graph, mechanism, &frames, &products, form)?;
+    Ok(equations)
+}
+
+impl Equations {
+    /// Forces of the drives for each of some products of value 1, all others 0.
+    pub(crate) fn columns_of(
+        &self,
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        frames: &Frames,
+        products: &[Monomial],
+        form: ColumnForm,
+    ) -> Result<Vec<Vec<ExprId>>, DeriveError> {
+        let n = mechanism.coordinates.len();
+        let (tree, style) = (&frames.tree, form.style);
+        products
+            .iter()
+            .map(|product| {
+                let wrenches = form.wrenches(graph, self, frames, product, products);
+                let on_tree = newton_euler::carry(graph, tree, style, n, form.depths, wrenches);
+                let value = |m: &Monomial| {
+                    if m == product {
+                        Graph::ONE
+                    } else {
+                        Graph::ZERO
+                    }
+                };
+                self.forces(graph, mechanism, &on_tree, &value)
+            })
+            .collect()
+    }
+
+    /// Inverse dynamics: forces of the drives when every product has the value that `value` gives it.
+    pub(crate) fn inverse_dynamics(
+        &self,
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        frames: &Frames,
+        value: &dyn Fn(&Monomial) -> ExprId,
+        form: TotalForm,
+    ) -> Result<Vec<ExprId>, DeriveError> {
+        let wrenches = form.wrenches(graph, self, frames, value);
+        let n = mechanism.coordinates.len();
+        let on_tree = newton_euler::backward(graph, &frames.tree, form.style, n, wrenches);
+        self.forces(graph, mechanism, &on_tree, value)
+    }
+
+    fn forces(
+        &self,
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        on_tree: &[ExprId],
+        value: &dyn Fn(&Monomial) -> ExprId,
+    ) -> Result<Vec<ExprId>, DeriveError> {
+        let effects = self.effect_forces(graph, mechanism, value)?;
+        let on_tree: Vec<ExprId> = on_tree
+            .iter()
+            .zip(effects.on_tree)
+            .map(|(a, b)| graph.add(*a, b))
+            .collect();
+        let forces = self.projection.drive_forces(graph, &on_tree)?;
+        Ok(forces
+            .into_iter()
+            .zip(effects.on_drives)
+            .map(|(a, b)| graph.add(a, b))
+            .collect())
+    }
+
+    /// Generalised forces of the independent coordinates for those of the open tree and for forces along the drives.
+    pub(crate) fn on_active(
+        &self,
+        graph: &mut Graph,
+        on_tree: &[ExprId],
+        on_drives: &[ExprId],
+    ) -> Vec<ExprId> {
+        let projected = self.projection.project(graph, on_tree);
+        projected
+            .into_iter()
+            .enumerate()
+            .map(|(a, force)| {
+                let mut terms = vec![force];
+                for (row, force) in self.projection.drive_jacobian.iter().zip(on_drives) {
+                    terms.push(graph.mul(row[a], *force));
+                }
+                graph.add_all(&terms)
+            })
+            .collect()
+    }
+
+    /// What effects ask for.
+    pub(crate) fn effect_forces(
+        &self,
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        value: &dyn Fn(&Monomial) -> ExprId,
+    ) -> Result<EffectForces, DeriveError> {
+        let mut on_tree = vec![Graph::ZERO; mechanism.coordinates.len()];
+        let mut on_drives = vec![Graph::ZERO; mechanism.drives.len()];
+        for (e, effect) in mechanism.effects.iter().enumerate() {
+            for (p, place) in effect.places.iter().enumerate() {
+                for (t, term) in effect.terms.iter().enumerate() {
+                    let value = value(&Monomial(vec![(term.parameter.0, 1)]));
+                    if value == Graph::ZERO {
+                        continue;
+                    }
+                    if let Some(rod) = self.rods.get(&(e, p)) {
+                        for (slot, factor) in on_tree.iter_mut().zip(&rod[t]) {
+                            let force = graph.mul(*factor, value);
+                            *slot = graph.add(*slot, force);
+                        }
+                        continue;
+                    }
+                    let slot = match place {
+                        Place::Coordinate(i) => &mut on_tree[i.0],
+                        Place::Drive(d) => &mut on_drives[d.0],
+                        // Masses are in the inertia, and the rest has no parameters.
+                        Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => continue,
+                    };
+                    let factor = self.effect_factor(graph, mechanism, effect, p, term)?;
+                    let force = graph.mul(factor, value);
+                    *slot = graph.add(*slot, force);
+                }
+            }
+        }
+        Ok(EffectForces { on_tree, on_drives })
+    }
+
+    /// What an effect's parameter multiplies at one of its places.
+    fn effect_factor(
+        &self,
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        effect: &Effect,
+        at: usize,
+        term: &EffectTerm,
+    ) -> Result<ExprId, DeriveError> {
+        // With two places each is the other's other one.
+        let place = effect.places[at];
+        let other = match effect.places.as_slice() {
+            [_, _] => Some(effect.places[1 - at]),
+            _ => None,
+        };
+        let here = self.quantities(graph, place);
+        let there = other.map_or([None; 4], |other| self.quantities(graph, other));
+        // An angle stands as itself, so that its sine is that of a joint.
+        let mut expression = term.expression.clone();
+        let named = [
+            (Some(place), PlaceQuantity::Coordinate),
+            (other, PlaceQuantity::OtherCoordinate),
+        ];
+        for (place, quantity) in named {
+            if let Some(i) = place.and_then(|place| turning(mechanism, place)) {
+                expression = expressions::with_coordinate(&expression, quantity, i);
+            }
+        }
+        expressions::expression_at(graph, &expression, &|quantity| match quantity {
+            PlaceQuantity::Coordinate => here[0],
+            PlaceQuantity::Rate => here[1],
+            PlaceQuantity::Acceleration => here[2],
+            PlaceQuantity::Load => here[3],
+            PlaceQuantity::OtherCoordinate => there[0],
+            PlaceQuantity::OtherRate => there[1],
+            PlaceQuantity::OtherAcceleration => there[2],
+        })
+    }
+
+    /// Coordinate, rate, acceleration and load of a place.
+    fn quantities(&self, graph: &mut Graph, place: Place) -> [Option<ExprId>; 4] {
+        match place {
+            Place::Drive(d) => {
+                let drive = &self.projection.drives[d.0];
+                [
+                    Some(drive.coordinate),
+                    Some(drive.rate),
+                    Some(drive.acceleration),
+                    Some(graph.atom(Atom::Load(d.0))),
+                ]
+            }
+            Place::Coordinate(i) => {
+                let atoms = [
+                    Atom::Coordinate(i.0),
+                    Atom::Rate(i.0),
+                    Atom::Acceleration(i.0),
+                ];
+                let [q, qd, qdd] = atoms.map(|a| Some(graph.atom(a)));
+                [q, qd, qdd, None]
+            }
+            Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => [None; 4],
+        }
+    }
+}
+
+/// The angle by which a place turns, if it does.
+fn turning(mechanism: &Mechanism, place: Place) -> Option<CoordinateIdx> {
+    let coordinate = match place {
+        Place::Coordinate(i) => i,
+        Place::Drive(d) => match mechanism.drives[d.0].kind {
+            DriveKind::Joint(i) => i,
+            DriveKind::Linear { .. } => return None,
+        },
+        Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => return None,
+    };
+    (mechanism.coordinates[coordinate.0].motion == JointMotion::Revolute).then_some(coordinate)
+}

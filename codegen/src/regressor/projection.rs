@@ -1,0 +1,489 @@
+//! From the tree back to the mechanism: reactions of the loops leave by virtual power, and the drives take over.
+//!
+//! With `y` the rates in which the loops are simplest (a passive joint's absolute turning rate where axes are
+//! parallel), the differentiated loops read `J_p y_p + J_a y_a = 0`; then `tau_z = tau_a + G' tau_p` with
+//! `G = -J_p^-1 J_a`, and the drives' forces follow from `(d l / d z)' f = tau_z`.
+
+use modelmill_spec::{DriveKind, Mechanism};
+use nalgebra::DMatrix;
+
+use crate::DeriveError;
+use crate::expr::linear::{self, Solution};
+use crate::expr::{Atom, ExprId, Graph, Node, Rational, Unary};
+use crate::loops::closure::{self, Closure};
+use crate::loops::magnitude;
+use crate::loops::numeric_poses::Loops;
+use crate::loops::parallelogram;
+use crate::programs::nominal_value;
+use crate::tree::Tree;
+use modelmill_algebra::field::Stream;
+
+/// Kinematics of a drive.
+#[derive(Clone, Debug)]
+pub(crate) struct DriveMotion {
+    /// Its length or angle, and the first and second time derivative.
+    pub(crate) coordinate: ExprId,
+    pub(crate) rate: ExprId,
+    pub(crate) acceleration: ExprId,
+}
+
+/// Everything that loops and drives contribute.
+#[derive(Clone, Debug)]
+pub(crate) struct Projection {
+    pub(crate) active: Vec<usize>,
+    pub(crate) passive: Vec<usize>,
+    pub(crate) closures: Vec<Closure>,
+    /// Rate and acceleration of each passive coordinate, in the order of `passive`.
+    pub(crate) passive_rates: Vec<ExprId>,
+    pub(crate) passive_accelerations: Vec<ExprId>,
+    /// Residuals of the loops that are independent, and their derivatives by the passive coordinates.
+    pub(crate) residual: Vec<ExprId>,
+    pub(crate) residual_jacobian: Vec<Vec<ExprId>>,
+    /// Per drive.
+    pub(crate) drives: Vec<DriveMotion>,
+    /// `drive_jacobian[d][a]`: derivative of the drive's length by the active coordinate.
+    pub(crate) drive_jacobian: Vec<Vec<ExprId>>,
+    /// What must not vanish.
+    pub(crate) determinants: Vec<ExprId>,
+    /// `rates_of[i]`: rate of coordinate `i` as an integer combination of the `y`.
+    rates_of: Vec<Vec<i64>>,
+    /// `d y_p / d z_a`
+    transmission: Vec<Vec<ExprId>>,
+}
+
+impl Projection {
+    pub(crate) fn new(
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        tree: &Tree,
+    ) -> Result<Self, DeriveError> {
+        let n = mechanism.coordinates.len();
+        let (passive, active): (Vec<usize>, Vec<usize>) =
+            (0..n).partition(|i| mechanism.coordinates[*i].passive);
+        let mut closures = closure::closures(graph, mechanism, tree)?;
+        parallelogram::find(graph, mechanism, &mut closures);
+        let residual: Vec<ExprId> = closures
+            .iter()
+            .flat_map(|c| c.residual.iter().copied())
+            .collect();
+        let mut residual = independent(graph, &residual)?;
+        if residual.len() > passive.len()
+            && let Some(enough) = sufficient(graph, mechanism, &residual, passive.len())
+        {
+            residual = enough;
+        }
+        let mut left = residual.clone();
+        for closure in &mut closures {
+            let before = left.len();
+            left.retain(|r| !closure.residual.contains(r));
+            closure.n_independent = before - left.len();
+        }
+        if residual.len() != passive.len() {
+            return Err(DeriveError::LoopCount {
+                equations: residual.len(),
+                passive: passive.len(),
+            });
+        }
+        let rates_of = rate_map(tree, &passive, n);
+        let by_coordinate: Vec<Vec<ExprId>> = (0..n)
+            .map(|i| graph.differentiate(&residual, Atom::Coordinate(i)))
+            .collect();
+        let in_y = |graph: &mut Graph, by_coordinate: &[Vec<ExprId>], row: usize, j: usize| {
+            let terms: Vec<_> = (0..n)
+                .filter(|i| rates_of[*i][j] != 0)
+                .map(|i| (by_coordinate[i][row], Rational::integer(rates_of[i][j])))
+                .collect();
+            graph.sum(&terms)
+        };
+        let pick = |graph: &mut Graph, columns: &[usize]| -> Vec<Vec<ExprId>> {
+            (0..residual.len())
+                .map(|r| {
+                    columns
+                        .iter()
+                        .map(|j| in_y(graph, &by_coordinate, r, *j))
+                        .collect()
+                })
+                .collect()
+        };
+        let (loop_p, loop_a) = (pick(graph, &passive), pick(graph, &active));
+        // Right-hand sides: the active columns, then what the accelerations see besides.
+        let drift = Self::drift(graph, &residual);
+        let rhs: Vec<Vec<ExprId>> = loop_a
+            .iter()
+            .zip(&drift)
+            .map(|(row, drift)| {
+                let mut row: Vec<ExprId> = row.iter().map(|x| graph.neg(*x)).collect();
+                row.push(graph.neg(*drift));
+                row
+            })
+            .collect();
+        let solution = linear::solve(graph, &loop_p, &rhs, "the loops for the passive rates")?;
+        let transmission: Vec<Vec<ExprId>> = solution
+            .values
+            .iter()
+            .map(|row| row[..active.len()].to_vec())
+            .collect();
+        let residual_jacobian = (0..residual.len())
+            .map(|r| passive.iter().map(|p| by_coordinate[*p][r]).collect())
+            .collect();
+        let mut projection = Self {
+            active,
+            passive,
+            closures,
+            passive_rates: Vec::new(),
+            passive_accelerations: Vec::new(),
+            residual,
+            residual_jacobian,
+            drives: Vec::new(),
+            drive_jacobian: Vec::new(),
+            determinants: solution.determinants.clone(),
+            rates_of,
+            transmission,
+        };
+        projection.passive_rates = projection.passive_motion(graph, Atom::Rate, None);
+        let drift: Vec<ExprId> = solution
+            .values
+            .iter()
+            .map(|row| row.last().copied().unwrap_or(Graph::ZERO))
+            .collect();
+        projection.passive_accelerations =
+            projection.passive_motion(graph, Atom::Acceleration, Some(&drift));
+        projection.add_drives(graph, mechanism, tree)?;
+        Ok(projection)
+    }
+
+    /// Second time derivative of the residuals without the accelerations.
+    fn drift(graph: &mut Graph, residual: &[ExprId]) -> Vec<ExprId> {
+        let velocity = graph.time_derivative(residual);
+        let only_rates = |graph: &mut Graph, atom: Atom| match atom {
+            Atom::Coordinate(i) => graph.atom(Atom::Rate(i)),
+            _ => Graph::ZERO,
+        };
+        graph.directional(&velocity, only_rates)
+    }
+
+    /// Rates or accelerations of the passive coordinates from the active ones.
+    fn passive_motion(
+        &self,
+        graph: &mut Graph,
+        order: fn(usize) -> Atom,
+        drift: Option<&[ExprId]>,
+    ) -> Vec<ExprId> {
+        let n = self.rates_of.len();
+        let mut y = vec![Graph::ZERO; n];
+        for a in &self.active {
+            y[*a] = graph.atom(order(*a));
+        }
+        for (k, p) in self.passive.iter().enumerate() {
+            let mut terms: Vec<ExprId> = self
+                .active
+                .iter()
+                .enumerate()
+                .map(|(j, a)| graph.mul(self.transmission[k][j], y[*a]))
+                .collect();
+            terms.extend(drift.map(|d| d[k]));
+            y[*p] = graph.add_all(&terms);
+        }
+        self.passive
+            .iter()
+            .map(|p| {
+                let terms: Vec<_> = (0..n)
+                    .map(|j| (y[j], Rational::integer(self.rates_of[*p][j])))
+                    .collect();
+                graph.sum(&terms)
+            })
+            .collect()
+    }
+
+    /// Generalised forces of all coordinates, turned into those of the `y` and projected on the active ones.
+    pub(crate) fn project(&self, graph: &mut Graph, forces: &[ExprId]) -> Vec<ExprId> {
+        let n = self.rates_of.len();
+        let in_y: Vec<ExprId> = (0..n)
+            .map(|j| {
+                let terms: Vec<_> = (0..n)
+                    .filter(|i| self.rates_of[*i][j] != 0)
+                    .map(|i| (forces[i], Rational::integer(self.rates_of[i][j])))
+                    .collect();
+                graph.sum(&terms)
+            })
+            .collect();
+        self.active
+            .iter()
+            .enumerate()
+            .map(|(j, a)| {
+                let mut terms = vec![in_y[*a]];
+                for (k, p) in self.passive.iter().enumerate() {
+                    terms.push(graph.mul(self.transmission[k][j], in_y[*p]));
+                }
+                graph.add_all(&terms)
+            })
+            .collect()
+    }
+
+    /// Forces of the drives that balance generalised forces of all coordinates (open tree).
+    pub(crate) fn drive_forces(
+        &self,
+        graph: &mut Graph,
+        forces: &[ExprId],
+    ) -> Result<Vec<ExprId>, DeriveError> {
+        let projected = self.project(graph, forces);
+        let n = projected.len();
+        let transposed: Vec<Vec<ExprId>> = (0..n)
+            .map(|a| (0..n).map(|d| self.drive_jacobian[d][a]).collect())
+            .collect();
+        let rhs: Vec<Vec<ExprId>> = projected.into_iter().map(|x| vec![x]).collect();
+        let solution = linear::solve(
+            graph,
+            &transposed,
+            &rhs,
+            "the drives' Jacobian for the drives' forces",
+        )?;
+        Ok(solution.values.into_iter().map(|row| row[0]).collect())
+    }
+
+    /// Multipliers of some closing equations, as many as there are passive coordinates: how strongly each pushes, where
+    /// the open tree needs the given generalised forces, drives taken off. They push where their gap grows.
+    pub(crate) fn multipliers(
+        &self,
+        graph: &mut Graph,
+        gaps: &[ExprId],
+        forces: &[ExprId],
+    ) -> Result<Solution, DeriveError> {
+        let n = self.passive.len();
+        let by_passive: Vec<Vec<ExprId>> = self
+            .passive
+            .iter()
+            .map(|p| graph.differentiate(gaps, Atom::Coordinate(*p)))
+            .collect();
+        // Derivatives by the passive y; these move no coordinates but passive ones.
+        let jacobian: Vec<Vec<ExprId>> = (0..gaps.len())
+            .map(|row| {
+                let by = |j: &usize| {
+                    let terms = self.passive.iter().zip(&by_passive);
+                    let terms = terms.filter(|(i, _)| self.rates_of[**i][*j] != 0);
+                    let terms: Vec<_> = terms
+                        .map(|(i, slopes)| (slopes[row], Rational::integer(self.rates_of[*i][*j])))
+                        .collect();
+                    graph.sum(&terms)
+                };
+                self.passive.iter().map(by).collect()
+            })
+            .collect();
+        let in_y: Vec<ExprId> = self
+            .passive
+            .iter()
+            .map(|j| {
+                let terms: Vec<_> = (0..forces.len())
+                    .filter(|i| self.rates_of[*i][*j] != 0)
+                    .map(|i| (forces[i], Rational::integer(self.rates_of[i][*j])))
+                    .collect();
+                graph.sum(&terms)
+            })
+            .collect();
+        let what = "the loops for their forces";
+        let transposed: Vec<Vec<ExprId>> = (0..n)
+            .map(|p| jacobian.iter().map(|row| row[p]).collect())
+            .collect();
+        let rhs: Vec<Vec<ExprId>> = in_y.iter().map(|x| vec![*x]).collect();
+        match linear::solve(graph, &transposed, &rhs, what) {
+            // Systems of legs can be torn apart by columns only: the inverse of the untransposed one serves as well.
+            Err(DeriveError::TooLarge { .. }) => {}
+            found => return found,
+        }
+        let identity: Vec<Vec<ExprId>> = (0..n)
+            .map(|i| {
+                let one = |j| if i == j { Graph::ONE } else { Graph::ZERO };
+                (0..n).map(one).collect()
+            })
+            .collect();
+        let mut solution = linear::solve(graph, &jacobian, &identity, what)?;
+        let inverse = std::mem::take(&mut solution.values);
+        solution.values = (0..n)
+            .map(|r| {
+                let terms: Vec<ExprId> = inverse
+                    .iter()
+                    .zip(&in_y)
+                    .map(|(row, force)| graph.mul(row[r], *force))
+                    .collect();
+                vec![graph.add_all(&terms)]
+            })
+            .collect();
+        Ok(solution)
+    }
+
+    fn add_drives(
+        &mut self,
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        tree: &Tree,
+    ) -> Result<(), DeriveError> {
+        let n = mechanism.coordinates.len();
+        for drive in &mechanism.drives {
+            let coordinate = match drive.kind {
+                DriveKind::Joint(i) => graph.atom(Atom::Coordinate(i.0)),
+                DriveKind::Linear { from, to } => {
+                    let square = closure::distance_squared(graph, mechanism, tree, [to.0, from.0])?;
+                    let length = graph.unary(Unary::Sqrt, square);
+                    signed_length(graph, mechanism, length)
+                }
+            };
+            let by_coordinate: Vec<ExprId> = (0..n)
+                .map(|i| graph.differentiate(&[coordinate], Atom::Coordinate(i))[0])
+                .collect();
+            let row = self.project(graph, &by_coordinate);
+            let mut rate_terms = Vec::new();
+            for (a, slope) in self.active.iter().zip(&row) {
+                let rate = graph.atom(Atom::Rate(*a));
+                rate_terms.push(graph.mul(*slope, rate));
+            }
+            let rate = graph.add_all(&rate_terms);
+            let tree_rate = graph.time_derivative(&[coordinate]);
+            let acceleration = graph.time_derivative(&tree_rate)[0];
+            self.drives.push(DriveMotion {
+                coordinate,
+                rate,
+                acceleration,
+            });
+            self.drive_jacobian.push(row);
+        }
+        let n = self.active.len();
+        if self.drives.len() != n {
+            return Err(DeriveError::DriveCount {
+                drives: self.drives.len(),
+                freedoms: n,
+            });
+        }
+        let identity: Vec<Vec<ExprId>> = (0..n)
+            .map(|i| {
+                (0..n)
+                    .map(|j| if i == j { Graph::ONE } else { Graph::ZERO })
+                    .collect()
+            })
+            .collect();
+        let solution = linear::solve(
+            graph,
+            &self.drive_jacobian,
+            &identity,
+            "the drives' Jacobian",
+        )?;
+        self.determinants.extend(solution.determinants);
+        Ok(())
+    }
+}
+
+/// A drive's length without the magnitude's bars that it has along a slide: a drive does not reach through its own point,
+/// so that the sign is that of the nominal pose.
+fn signed_length(graph: &mut Graph, mechanism: &Mechanism, length: ExprId) -> ExprId {
+    let (base, factor) = graph.split_factor(length);
+    let Node::Unary(Unary::Abs, inner) = *graph.node(base) else {
+        return length;
+    };
+    let positive = nominal_value(graph, mechanism, inner).is_none_or(|x| x >= 0.0);
+    graph.scale(inner, &if positive { factor } else { -&factor })
+}
+
+/// How every coordinate's rate follows from the rates `y`: for a passive revolute joint `y` is the absolute rate of its
+/// link about the axes that are parallel to its own.
+fn rate_map(tree: &Tree, passive: &[usize], n: usize) -> Vec<Vec<i64>> {
+    let mut rates_of: Vec<Vec<i64>> = (0..n)
+        .map(|i| (0..n).map(|j| i64::from(i == j)).collect())
+        .collect();
+    let mut done = Vec::new();
+    for link in &tree.links {
+        let sum = &link.absolute.sum;
+        let [(p, sign @ (1 | -1))] = link.turns[..] else {
+            continue;
+        };
+        if !passive.contains(&p) || done.contains(&p) {
+            continue;
+        }
+        // q_p = sign (y_p - rest), where the rest consists of coordinates further up.
+        let mut row = vec![0; n];
+        row[p] = i64::from(sign);
+        for (atom, factor) in sum.terms() {
+            if let Atom::Coordinate(i) = atom
+                && *i != p
+            {
+                for j in 0..n {
+                    row[j] -= i64::from(sign) * i64::from(*factor) * rates_of[*i][j];
+                }
+            }
+        }
+        rates_of[p] = row;
+        done.push(p);
+    }
+    rates_of
+}
+
+/// The residuals without those that are constant combinations of others (a planar loop seen in a tilted frame).
+fn independent(graph: &Graph, residual: &[ExprId]) -> Result<Vec<ExprId>, DeriveError> {
+    let columns = crate::reduce::independent_functions(graph, residual)?;
+    Ok(columns.into_iter().map(|i| residual[i]).collect())
+}
+
+/// As many residuals as there are passive coordinates, if the others follow from them: two points on the axis of a joint
+/// that both coincide with two others leave one equation too many, since their distance is the same on both sides.
+///
+/// That this is so is seen in numbers, at poses around the nominal one at which all residuals vanish. Those equations are
+/// taken that determine the passive coordinates best at the nominal pose.
+fn sufficient(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    residual: &[ExprId],
+    n_passive: usize,
+) -> Option<Vec<ExprId>> {
+    /// Poses that are looked at besides the nominal one, and how far away, in rad or relative to the size of the loops.
+    const POSES: usize = 6;
+    const REACH: f64 = 0.05;
+    /// Residuals relative to the size of the loops, and singular values relative to the largest, that count as zero.
+    const CLOSED: f64 = 1e-10;
+    const SINGULAR: f64 = 1e-7;
+    let size = magnitude::at_nominal(graph, mechanism, residual);
+    let loops = Loops::new(graph, mechanism, residual);
+    let mut stream = Stream::new(5);
+    let mut poses = vec![loops.nominal()?];
+    for _ in 0..POSES {
+        poses.push(loops.random(REACH, &mut stream)?);
+    }
+    let is_regular = |jacobian: &DMatrix<f64>| {
+        let values = jacobian.clone().svd(false, false).singular_values;
+        values.len() == n_passive && values.min() > SINGULAR * values.max()
+    };
+    let mut chosen: Option<Vec<usize>> = None;
+    for q in &poses {
+        let (gaps, mut jacobian) = loops.linearise(q)?;
+        let passive =
+            (0..mechanism.coordinates.len()).filter(|i| mechanism.coordinates[*i].passive);
+        for (mut column, i) in jacobian.column_iter_mut().zip(passive) {
+            column *= loops.unit(i);
+        }
+        if gaps.amax() > CLOSED * size || !is_regular(&jacobian) {
+            return None;
+        }
+        let rows = chosen.get_or_insert_with(|| most_different_rows(&jacobian, n_passive));
+        if !is_regular(&jacobian.select_rows(rows.iter())) {
+            return None;
+        }
+    }
+    Some(chosen?.into_iter().map(|i| residual[i]).collect())
+}
+
+/// Rows of a matrix that span its row space well: each time the one of which most is left.
+pub(crate) fn most_different_rows(matrix: &DMatrix<f64>, n: usize) -> Vec<usize> {
+    let mut rest = matrix.clone();
+    let mut chosen = Vec::new();
+    for _ in 0..n.min(matrix.nrows()) {
+        let norms: Vec<f64> = rest.row_iter().map(|row| row.norm()).collect();
+        let best =
+            (0..norms.len()).fold(0, |best, i| if norms[i] > norms[best] { i } else { best });
+        if norms[best] <= 0.0 {
+            break;
+        }
+        let direction = rest.row(best) / norms[best];
+        let shares = &rest * direction.transpose();
+        rest -= shares * direction;
+        chosen.push(best);
+    }
+    chosen.sort_unstable();
+    chosen
+}

@@ -1,0 +1,134 @@
+//! Rods along linear drives: what a slender rod that turns about the drive's first point and slides through its second
+//! needs as generalised forces.
+//!
+//! With `a` the first point, `u` the unit vector along the drive and `g` gravity, a mass element at the distance `s`
+//! moves as `a + s u`; d'Alembert's principle, summed over the elements, gives
+//! `du'(Jr u'' + Sr (a'' - g)) + da'(Sr u'' + mr (a'' - g))` with the moments `Jr`, `Sr` and `mr` of second, first and
+//! no order of the mass along the rod.
+
+use modelmill_spec::{DriveKind, Mechanism};
+
+use crate::DeriveError;
+use crate::expr::vector::Vector;
+use crate::expr::{Atom, ExprId, Graph};
+use crate::loops::closure::position_in_base;
+use crate::regressor::projection::Projection;
+use crate::tree::Tree;
+
+/// Generalised forces on all coordinates of the open tree, for `Jr`, `Sr` and `mr` of one each.
+pub(crate) fn generalised_forces(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    tree: &Tree,
+    projection: &Projection,
+    gravity: &Vector,
+    drive: usize,
+) -> Result<[Vec<ExprId>; 3], DeriveError> {
+    let n = mechanism.coordinates.len();
+    let DriveKind::Linear { from, to } = mechanism.drives[drive].kind else {
+        // Model files are checked for this; a mechanism made by a program has no rod there.
+        return Ok([0; 3].map(|_| vec![Graph::ZERO; n]));
+    };
+    let a = position_in_base(graph, mechanism, tree, from.0)?;
+    let end = position_in_base(graph, mechanism, tree, to.0)?;
+    let d: Vector = std::array::from_fn(|i| graph.sub(end[i], a[i]));
+    let length = projection.drives[drive].coordinate;
+    let per_length = graph.pow(length, -1);
+    let per_square = graph.pow(length, -2);
+
+    let derivative = |graph: &mut Graph, v: &Vector| -> Vector {
+        let of = graph.time_derivative(v);
+        [of[0], of[1], of[2]]
+    };
+    let d1 = derivative(graph, &d);
+    let d2 = derivative(graph, &d1);
+    // `across` is l u', and `turning` l u''; neither holds a root.
+    let along = graph.dot(&d, &d1);
+    let stretch = graph.mul(along, per_square);
+    let slide = graph.scale_vector(stretch, &d);
+    let across: Vector = std::array::from_fn(|i| graph.sub(d1[i], slide[i]));
+    let swing = graph.dot(&across, &across);
+    let pull = graph.dot(&d, &d2);
+    let pull = graph.add(pull, swing);
+    let pull = graph.mul(pull, per_square);
+    let inward = graph.scale_vector(pull, &d);
+    let twice = graph.add(stretch, stretch);
+    let sideways = graph.scale_vector(twice, &across);
+    let turning: Vector = std::array::from_fn(|i| {
+        let rest = graph.sub(d2[i], inward[i]);
+        graph.sub(rest, sideways[i])
+    });
+    let centripetal = graph.mul(swing, per_square);
+
+    let pivot_speed = derivative(graph, &a);
+    let pivot = derivative(graph, &pivot_speed);
+    let lifted: Vector = std::array::from_fn(|i| graph.sub(pivot[i], gravity[i]));
+    let lifted_along = graph.dot(&d, &lifted);
+    let lifted_along = graph.mul(lifted_along, per_square);
+
+    let mut forces = [0; 3].map(|_| Vec::with_capacity(n));
+    for coordinate in 0..n {
+        let by = |graph: &mut Graph, v: &Vector| -> Vector {
+            let slopes = graph.differentiate(v, Atom::Coordinate(coordinate));
+            [slopes[0], slopes[1], slopes[2]]
+        };
+        let (by_d, by_a) = (by(graph, &d), by(graph, &a));
+        let radial = graph.dot(&by_d, &d);
+        let second = {
+            let turned = graph.dot(&by_d, &turning);
+            let inward = graph.mul(radial, centripetal);
+            let moment = graph.add(turned, inward);
+            graph.mul(moment, per_square)
+        };
+        let first = {
+            let carried = graph.dot(&by_d, &lifted);
+            let inward = graph.mul(radial, lifted_along);
+            let carried = graph.sub(carried, inward);
+            let reaction = graph.dot(&by_a, &turning);
+            let force = graph.add(carried, reaction);
+            graph.mul(force, per_length)
+        };
+        let mass = graph.dot(&by_a, &lifted);
+        for (column, force) in forces.iter_mut().zip([second, first, mass]) {
+            column.push(force);
+        }
+    }
+    Ok(forces)
+}
+
+/// Forces that a rod needs at its two ends, in the axes of the base, for given moments of second, first and no order.
+///
+/// The rod's own balance of moments about the first point gives the force at the second one, which is square to the
+/// rod since it slides there; the rest of its weight and inertia hangs on the first.
+pub(crate) fn end_forces(
+    graph: &mut Graph,
+    [a, b]: [Vector; 2],
+    length: ExprId,
+    gravity: &Vector,
+    moments: &[ExprId],
+) -> [Vector; 2] {
+    let [second, first, mass] = [0, 1, 2].map(|k| moments.get(k).copied().unwrap_or(Graph::ZERO));
+    let per_length = graph.pow(length, -1);
+    let twice_derived = |graph: &mut Graph, v: &Vector| -> Vector {
+        let once = graph.time_derivative(v);
+        let twice = graph.time_derivative(&once);
+        [twice[0], twice[1], twice[2]]
+    };
+    let d = graph.sub_vectors(&b, &a);
+    let u = graph.scale_vector(per_length, &d);
+    let turning = twice_derived(graph, &u);
+    let pivot = twice_derived(graph, &a);
+    let lifted = graph.sub_vectors(&pivot, gravity);
+    let sum = |graph: &mut Graph, [x, y]: [ExprId; 2]| {
+        let x = graph.scale_vector(x, &turning);
+        let y = graph.scale_vector(y, &lifted);
+        graph.add_vectors(&[x, y])
+    };
+    let swung = sum(graph, [second, first]);
+    let along = graph.dot(&u, &swung);
+    let along = graph.scale_vector(along, &u);
+    let square = graph.sub_vectors(&swung, &along);
+    let at_second = graph.scale_vector(per_length, &square);
+    let total = sum(graph, [first, mass]);
+    [graph.sub_vectors(&total, &at_second), at_second]
+}

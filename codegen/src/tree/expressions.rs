@@ -1,0 +1,387 @@
+//! Expressions of the model file brought into the graph, and polynomials in the dynamic parameters.
+
+use std::collections::BTreeMap;
+
+use modelmill_spec::{
+    Angle, CoordinateIdx, Exact, Function, Length, Mechanism, PlaceQuantity, Symbol,
+};
+use num_traits::ToPrimitive;
+
+use crate::DeriveError;
+use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational, Unary};
+
+/// A product of powers of dynamic parameters: `m1*dc1^2` is `[(0, 1), (4, 2)]`. Sorted by parameter.
+///
+/// Monomials are ordered as a dictionary orders the parameters written out one by one, in order of declaration;
+/// this is the order of eq. (5).
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Monomial(pub Vec<(usize, u32)>);
+
+impl Monomial {
+    /// The product of two monomials.
+    #[must_use]
+    pub fn times(&self, other: &Self) -> Self {
+        let mut powers: BTreeMap<usize, u32> = self.0.iter().copied().collect();
+        for (parameter, n) in &other.0 {
+            *powers.entry(*parameter).or_insert(0) += n;
+        }
+        Self(powers.into_iter().collect())
+    }
+
+    fn written_out(&self) -> impl Iterator<Item = usize> {
+        self.0
+            .iter()
+            .flat_map(|(p, n)| std::iter::repeat_n(*p, *n as usize))
+    }
+
+    /// As infix text: `m1*dc1^2`.
+    pub fn text(&self, mechanism: &Mechanism) -> String {
+        if self.0.is_empty() {
+            return "1".to_owned();
+        }
+        let factors: Vec<String> = self
+            .0
+            .iter()
+            .map(|(p, n)| {
+                let name = &mechanism.parameters[*p].name;
+                if *n == 1 {
+                    name.clone()
+                } else {
+                    format!("{name}^{n}")
+                }
+            })
+            .collect();
+        factors.join("*")
+    }
+
+    /// Its value for given parameters.
+    pub fn value(&self, parameters: &[f64]) -> f64 {
+        self.0
+            .iter()
+            .map(|(p, n)| parameters[*p].powi(i32::try_from(*n).unwrap_or(i32::MAX)))
+            .product()
+    }
+}
+
+impl PartialOrd for Monomial {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Monomial {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.written_out().cmp(other.written_out())
+    }
+}
+
+/// A power of a sum of parameters can have more terms than anybody wants to see.
+const MOST_TERMS: usize = 2000;
+
+/// A polynomial in the dynamic parameters whose coefficients are expressions over constants.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Polynomial(pub(crate) BTreeMap<Monomial, ExprId>);
+
+impl Polynomial {
+    fn constant(value: ExprId) -> Self {
+        let mut terms = BTreeMap::new();
+        if value != Graph::ZERO {
+            terms.insert(Monomial::default(), value);
+        }
+        Self(terms)
+    }
+
+    pub(crate) fn plus(&self, other: &Self, graph: &mut Graph) -> Self {
+        let mut terms = self.0.clone();
+        for (monomial, value) in &other.0 {
+            let old = terms.get(monomial).copied().unwrap_or(Graph::ZERO);
+            terms.insert(monomial.clone(), graph.add(old, *value));
+        }
+        terms.retain(|_, value| *value != Graph::ZERO);
+        Self(terms)
+    }
+
+    pub(crate) fn scaled(&self, factor: &Rational, graph: &mut Graph) -> Self {
+        Self(
+            self.0
+                .iter()
+                .map(|(m, v)| (m.clone(), graph.scale(*v, factor)))
+                .collect(),
+        )
+    }
+
+    /// The product; an error where it would have thousands of terms.
+    pub(crate) fn times(&self, other: &Self, graph: &mut Graph) -> Result<Self, DeriveError> {
+        let mut terms: BTreeMap<Monomial, Vec<(ExprId, Rational)>> = BTreeMap::new();
+        for (m, a) in &self.0 {
+            for (n, b) in &other.0 {
+                let value = graph.mul(*a, *b);
+                terms
+                    .entry(m.times(n))
+                    .or_default()
+                    .push((value, Rational::ONE));
+                if terms.len() > MOST_TERMS {
+                    return Err(DeriveError::TooManyTerms { limit: MOST_TERMS });
+                }
+            }
+        }
+        let mut product: BTreeMap<Monomial, ExprId> = terms
+            .into_iter()
+            .map(|(m, values)| (m, graph.sum(&values)))
+            .collect();
+        product.retain(|_, value| *value != Graph::ZERO);
+        Ok(Self(product))
+    }
+}
+
+/// A multiple of pi/12 and a sum of atoms.
+pub(crate) fn angle_sum(angle: &Angle) -> (AngleSum, i32) {
+    let twelfths = Rational::from(angle.pi.clone());
+    let twelfths = &twelfths * &Rational::integer(12);
+    assert!(
+        twelfths.is_integer(),
+        "a validated angle's fixed part is a multiple of pi/12, not pi * {}",
+        angle.pi
+    );
+    let pi12 = twelfths.to_big().to_integer() % num_bigint::BigInt::from(24);
+    let terms = angle.terms.iter().map(|(symbol, n)| (atom(*symbol), *n));
+    (
+        AngleSum::new(terms),
+        pi12.to_i32().expect("a remainder modulo 24 fits"),
+    )
+}
+
+fn atom(symbol: Symbol) -> Atom {
+    match symbol {
+        Symbol::Constant(i) => Atom::Constant(i.0),
+        Symbol::Parameter(i) => Atom::Parameter(i.0),
+        Symbol::Coordinate(i) => Atom::Coordinate(i.0),
+        Symbol::Place(_) => unreachable!("quantities of a place are put in before"),
+    }
+}
+
+/// The offset and the coordinates of a length as one expression.
+pub(crate) fn length(graph: &mut Graph, length: &Length) -> Result<ExprId, DeriveError> {
+    let mut terms = vec![(expression(graph, &length.offset)?, Rational::ONE)];
+    for (coordinate, factor) in &length.coordinates {
+        terms.push((
+            graph.atom(Atom::Coordinate(coordinate.0)),
+            Rational::from(factor.clone()),
+        ));
+    }
+    Ok(graph.sum(&terms))
+}
+
+/// An expression without dynamic parameters or quantities of a place.
+pub(crate) fn expression(graph: &mut Graph, exact: &Exact) -> Result<ExprId, DeriveError> {
+    expression_at(graph, exact, &|_| None)
+}
+
+/// An expression over constants and the quantities of a place.
+pub(crate) fn expression_at(
+    graph: &mut Graph,
+    exact: &Exact,
+    place: &dyn Fn(PlaceQuantity) -> Option<ExprId>,
+) -> Result<ExprId, DeriveError> {
+    let polynomial = polynomial_at(graph, exact, place)?;
+    match polynomial.0.len() {
+        0 => Ok(Graph::ZERO),
+        1 if polynomial.0.contains_key(&Monomial::default()) => {
+            Ok(polynomial.0[&Monomial::default()])
+        }
+        _ => Err(DeriveError::unsupported(
+            "a dynamic parameter stands where only constants may",
+            exact,
+        )),
+    }
+}
+
+/// An expression as a polynomial in the dynamic parameters.
+pub(crate) fn polynomial(graph: &mut Graph, exact: &Exact) -> Result<Polynomial, DeriveError> {
+    polynomial_at(graph, exact, &|_| None)
+}
+
+fn polynomial_at(
+    graph: &mut Graph,
+    exact: &Exact,
+    place: &dyn Fn(PlaceQuantity) -> Option<ExprId>,
+) -> Result<Polynomial, DeriveError> {
+    Ok(match exact {
+        Exact::Rational(value) => {
+            Polynomial::constant(graph.rational(Rational::from(value.clone())))
+        }
+        Exact::Pi => Polynomial::constant(graph.atom(Atom::Pi)),
+        Exact::Symbol(Symbol::Parameter(i)) => {
+            Polynomial(BTreeMap::from([(Monomial(vec![(i.0, 1)]), Graph::ONE)]))
+        }
+        Exact::Symbol(Symbol::Place(quantity)) => match place(*quantity) {
+            Some(value) => Polynomial::constant(value),
+            None => {
+                return Err(DeriveError::unsupported(
+                    "a quantity of a place stands outside an effect",
+                    exact,
+                ));
+            }
+        },
+        Exact::Symbol(symbol) => Polynomial::constant(graph.atom(atom(*symbol))),
+        Exact::Sum(operands) => {
+            let mut total = Polynomial::default();
+            for operand in operands {
+                let operand = polynomial_at(graph, operand, place)?;
+                total = total.plus(&operand, graph);
+            }
+            total
+        }
+        Exact::Product(operands) => {
+            let mut total = Polynomial::constant(Graph::ONE);
+            for operand in operands {
+                let operand = polynomial_at(graph, operand, place)?;
+                total = total.times(&operand, graph)?;
+            }
+            total
+        }
+        Exact::Quotient(a, b) => {
+            let divisor = expression_at(graph, b, place)?;
+            if divisor == Graph::ZERO {
+                return Err(DeriveError::unsupported("division by zero", exact));
+            }
+            let inverse = Polynomial::constant(graph.pow(divisor, -1));
+            polynomial_at(graph, a, place)?.times(&inverse, graph)?
+        }
+        Exact::Negative(a) => polynomial_at(graph, a, place)?.scaled(&Rational::MINUS_ONE, graph),
+        Exact::Power(a, n) if *n < 0 => {
+            let base = expression_at(graph, a, place)?;
+            if base == Graph::ZERO {
+                return Err(DeriveError::unsupported("division by zero", exact));
+            }
+            Polynomial::constant(graph.pow(base, *n))
+        }
+        Exact::Power(a, n) => {
+            let base = polynomial_at(graph, a, place)?;
+            let mut power = Polynomial::constant(Graph::ONE);
+            for _ in 0..*n {
+                power = power.times(&base, graph)?;
+            }
+            power
+        }
+        Exact::Apply(function, a) => {
+            if let (Function::Sin | Function::Cos, Some((sum, pi12))) =
+                (function, AngleParts::of(a))
+            {
+                let (c, s) = graph.cos_sin(&sum, pi12);
+                return Ok(Polynomial::constant(if *function == Function::Sin {
+                    s
+                } else {
+                    c
+                }));
+            }
+            let argument = expression_at(graph, a, place)?;
+            Polynomial::constant(graph.unary(unary(*function), argument))
+        }
+    })
+}
+
+/// The expression with a place's coordinate, or that of the other place, named.
+pub(crate) fn with_coordinate(
+    exact: &Exact,
+    quantity: PlaceQuantity,
+    coordinate: CoordinateIdx,
+) -> Exact {
+    let inner = |a: &Exact| Box::new(with_coordinate(a, quantity, coordinate));
+    let all = |operands: &[Exact]| {
+        operands
+            .iter()
+            .map(|a| with_coordinate(a, quantity, coordinate))
+            .collect()
+    };
+    match exact {
+        Exact::Symbol(Symbol::Place(found)) if *found == quantity => {
+            Exact::Symbol(Symbol::Coordinate(coordinate))
+        }
+        Exact::Rational(_) | Exact::Pi | Exact::Symbol(_) => exact.clone(),
+        Exact::Sum(operands) => Exact::Sum(all(operands)),
+        Exact::Product(operands) => Exact::Product(all(operands)),
+        Exact::Quotient(a, b) => Exact::Quotient(inner(a), inner(b)),
+        Exact::Negative(a) => Exact::Negative(inner(a)),
+        Exact::Power(a, n) => Exact::Power(inner(a), *n),
+        Exact::Apply(function, a) => Exact::Apply(*function, inner(a)),
+    }
+}
+
+fn unary(function: Function) -> Unary {
+    match function {
+        Function::Sin => Unary::Sin,
+        Function::Cos => Unary::Cos,
+        Function::Sqrt => Unary::Sqrt,
+        Function::Abs => Unary::Abs,
+        Function::Sign => Unary::Sign,
+        Function::Tanh => Unary::Tanh,
+        Function::Exp => Unary::Exp,
+    }
+}
+
+/// An angle in the making: multiples of pi and of atoms.
+#[derive(Default)]
+struct AngleParts {
+    pi: Rational,
+    atoms: Vec<(Atom, Rational)>,
+}
+
+impl AngleParts {
+    /// An expression as an exact angle; `None` if it is no sum of integer multiples of angles and of pi/12.
+    fn of(exact: &Exact) -> Option<(AngleSum, i32)> {
+        /// Sines of larger multiples are no polynomials that anyone wants to see.
+        const MOST: u32 = 100;
+        let mut parts = Self::default();
+        parts.collect(exact, &Rational::ONE)?;
+        let integer = |value: &Rational| {
+            let (n, _) = value.as_small().filter(|(_, d)| *d == 1)?;
+            i32::try_from(n).ok().filter(|n| n.unsigned_abs() <= MOST)
+        };
+        let twelfths = &parts.pi * &Rational::integer(12);
+        let (n, _) = twelfths.as_small().filter(|(_, d)| *d == 1)?;
+        let pi12 = i32::try_from(n.rem_euclid(24)).ok()?;
+        let atoms: Option<Vec<_>> = parts
+            .atoms
+            .iter()
+            .map(|(a, k)| Some((*a, integer(k)?)))
+            .collect();
+        Some((AngleSum::new(atoms?), pi12))
+    }
+
+    fn collect(&mut self, exact: &Exact, factor: &Rational) -> Option<()> {
+        match exact {
+            Exact::Rational(value) if Rational::from(value.clone()).is_zero() => {}
+            Exact::Pi => self.pi = &self.pi + factor,
+            Exact::Symbol(symbol @ (Symbol::Constant(_) | Symbol::Coordinate(_))) => {
+                self.atoms.push((atom(*symbol), factor.clone()));
+            }
+            Exact::Sum(operands) => {
+                for operand in operands {
+                    self.collect(operand, factor)?;
+                }
+            }
+            Exact::Negative(a) => self.collect(a, &-factor)?,
+            Exact::Quotient(a, b) => match b.as_ref() {
+                Exact::Rational(value) if !Rational::from(value.clone()).is_zero() => {
+                    self.collect(a, &(factor * &Rational::from(value.clone()).recip()))?;
+                }
+                _ => return None,
+            },
+            Exact::Product(operands) => {
+                let mut factor = factor.clone();
+                let mut rest = None;
+                for operand in operands {
+                    match operand {
+                        Exact::Rational(value) => factor = &factor * &Rational::from(value.clone()),
+                        _ if rest.is_none() => rest = Some(operand),
+                        _ => return None,
+                    }
+                }
+                self.collect(rest?, &factor)?;
+            }
+            _ => return None,
+        }
+        Some(())
+    }
+}

@@ -1,0 +1,348 @@
+//! The tree of links: every frame of the model file as one or more links whose joint turns about or slides along
+//! their own z axis, as in the modified Denavit-Hartenberg convention (Khalil and Kleinfinger 1986).
+//!
+//! Loops are cut here; they come back in `closure`.
+
+pub(crate) mod expressions;
+
+use modelmill_spec::{Axis, FrameIdx, Mechanism, Step};
+
+use crate::DeriveError;
+use crate::expr::vector::{self, Turn, Vector, push_turn};
+use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational};
+
+/// A rigid frame that moves relative to its parent about or along its own z axis, or not at all.
+#[derive(Clone, Debug)]
+pub(crate) struct Link {
+    /// The link it hangs on; `None` for the base.
+    pub(crate) parent: Option<usize>,
+    /// The fixed rotation from the parent, before the joint.
+    pub(crate) pre: Vec<Turn>,
+    /// The joint's rotation about z, with any fixed offset.
+    pub(crate) joint: Turn,
+    /// The axis of the model file about or along which the joint moves; the link's own z lies along it.
+    pub(crate) named: Axis,
+    /// Position of the origin in the parent's frame.
+    pub(crate) position: Vector,
+    /// Coordinates that turn it, with their integer factors.
+    pub(crate) turns: Vec<(usize, i32)>,
+    /// Coordinates that slide it along z, with their factors.
+    pub(crate) slides: Vec<(usize, Rational)>,
+    /// The first of the links above it whose z axes are all parallel to its own; itself if its parent's axis is not.
+    pub(crate) first_parallel: usize,
+    /// Its rotation about z relative to the fixed side of that first link's joint.
+    pub(crate) absolute: Turn,
+    /// Which axis of its parent's frame its joint is parallel to, and whether it points the same way.
+    pub(crate) axis: Option<(usize, bool)>,
+    /// The position but for what lies along such an axis, and that.
+    pub(crate) across: Vector,
+    pub(crate) along: ExprId,
+}
+
+impl Link {
+    /// Whether it moves relative to its parent.
+    pub(crate) fn is_moving(&self) -> bool {
+        !self.turns.is_empty() || !self.slides.is_empty()
+    }
+
+    /// Components in the axes that the model file reaches behind the joint, of a vector given in the link's own.
+    pub(crate) fn to_named_axes(&self, graph: &mut Graph, v: &Vector) -> Vector {
+        match to_z(self.named) {
+            Some((axis, pi12)) => graph.turn_out(&fixed_turn(axis, pi12), v),
+            None => *v,
+        }
+    }
+
+    /// Finds the axis of the joint in the parent's frame, and splits the position by it.
+    fn find_axis(&mut self, graph: &mut Graph) {
+        let z = [Graph::ZERO, Graph::ZERO, Graph::ONE];
+        let z = self
+            .pre
+            .iter()
+            .rev()
+            .fold(z, |v, turn| graph.turn_out(turn, &v));
+        let minus = graph.neg(Graph::ONE);
+        (self.across, self.along, self.axis) = (self.position, Graph::ZERO, None);
+        let mut nonzero = (0..3).filter(|i| z[*i] != Graph::ZERO);
+        if let (Some(axis), None) = (nonzero.next(), nonzero.next())
+            && (z[axis] == Graph::ONE || z[axis] == minus)
+        {
+            let positive = z[axis] == Graph::ONE;
+            let along = std::mem::replace(&mut self.across[axis], Graph::ZERO);
+            self.along = if positive { along } else { graph.neg(along) };
+            self.axis = Some((axis, positive));
+        }
+    }
+}
+
+/// All links; parents come before their children.
+#[derive(Clone, Debug)]
+pub(crate) struct Tree {
+    pub(crate) links: Vec<Link>,
+    /// The link that carries each frame of the file; `None` for the base.
+    pub(crate) of_frame: Vec<Option<usize>>,
+}
+
+impl Tree {
+    pub(crate) fn new(graph: &mut Graph, mechanism: &Mechanism) -> Result<Self, DeriveError> {
+        let mut tree = Self {
+            links: Vec::new(),
+            of_frame: vec![None],
+        };
+        for frame in &mechanism.frames[1..] {
+            let mut builder = Builder::new(tree.of_frame[frame.parent.0]);
+            for step in &frame.steps {
+                builder.step(graph, &mut tree.links, step)?;
+            }
+            let link = builder.finish(&mut tree.links);
+            tree.of_frame.push(Some(link));
+        }
+        for link in &mut tree.links {
+            link.find_axis(graph);
+        }
+        Ok(tree)
+    }
+
+    /// The same tree with every link's quantities in the axes of the fixed side of the first of its parallel joints, so
+    /// that nothing turns between parallel links; and the turn that takes each link's own axes there.
+    pub(crate) fn in_fixed_axes(&self, graph: &mut Graph) -> (Self, Vec<Turn>) {
+        let mut fixed = self.clone();
+        for (i, link) in fixed.links.iter_mut().enumerate() {
+            let own = &self.links[i];
+            link.joint = NO_TURN;
+            link.absolute = NO_TURN;
+            link.first_parallel = i;
+            let Some(parent) = own.parent else { continue };
+            let turned = &self.links[parent].absolute;
+            link.position = graph.turn_out(turned, &own.position);
+            if own.first_parallel == i {
+                link.pre.clear();
+                for turn in std::iter::once(turned).chain(&own.pre) {
+                    push_turn(&mut link.pre, turn);
+                }
+            } else {
+                link.pre.clear();
+            }
+        }
+        for link in &mut fixed.links {
+            link.find_axis(graph);
+        }
+        let turns = self.links.iter().map(|link| link.absolute.clone());
+        (fixed, turns.collect())
+    }
+
+    pub(crate) fn link_of(&self, frame: FrameIdx) -> Option<usize> {
+        self.of_frame[frame.0]
+    }
+
+    /// The links from just below the base down to `link`.
+    pub(crate) fn path(&self, link: Option<usize>) -> Vec<usize> {
+        let mut path = Vec::new();
+        let mut next = link;
+        while let Some(i) = next {
+            path.push(i);
+            next = self.links[i].parent;
+        }
+        path.reverse();
+        path
+    }
+
+    /// Components in the link's frame of a vector given in the parent's frame.
+    pub(crate) fn to_link(&self, graph: &mut Graph, link: usize, v: &Vector) -> Vector {
+        let link = &self.links[link];
+        let mut v = *v;
+        for turn in &link.pre {
+            v = graph.turn_in(turn, &v);
+        }
+        graph.turn_in(&link.joint, &v)
+    }
+}
+
+/// The fixed turn, by its axis and twelfths of pi, that takes z to an axis of the model file.
+fn to_z(axis: Axis) -> Option<(Axis, i32)> {
+    match axis {
+        Axis::X => Some((Axis::Y, 6)),
+        Axis::Y => Some((Axis::X, -6)),
+        Axis::Z => None,
+    }
+}
+
+fn fixed_turn(axis: Axis, pi12: i32) -> Turn {
+    Turn {
+        axis,
+        sum: AngleSum::NONE,
+        pi12,
+    }
+}
+
+/// Collects elementary steps into links: a link ends where a step would no longer commute with its joint.
+struct Builder {
+    parent: Option<usize>,
+    pre: Vec<Turn>,
+    named: Axis,
+    position: Vector,
+    joint: Turn,
+    turns: Vec<(usize, i32)>,
+    slides: Vec<(usize, Rational)>,
+}
+
+const NO_TURN: Turn = Turn {
+    axis: Axis::Z,
+    sum: AngleSum::NONE,
+    pi12: 0,
+};
+
+impl Builder {
+    fn new(parent: Option<usize>) -> Self {
+        Self {
+            parent,
+            pre: Vec::new(),
+            named: Axis::Z,
+            position: vector::ZERO,
+            joint: NO_TURN,
+            turns: Vec::new(),
+            slides: Vec::new(),
+        }
+    }
+
+    fn has_joint(&self) -> bool {
+        !self.turns.is_empty() || !self.slides.is_empty()
+    }
+
+    fn step(
+        &mut self,
+        graph: &mut Graph,
+        links: &mut Vec<Link>,
+        step: &Step,
+    ) -> Result<(), DeriveError> {
+        match step {
+            Step::Rotate(axis, angle) => {
+                let (sum, pi12) = expressions::angle_sum(angle);
+                let turns: Vec<(usize, i32)> = sum
+                    .terms()
+                    .iter()
+                    .filter_map(|(atom, n)| {
+                        if let Atom::Coordinate(i) = atom {
+                            Some((*i, *n))
+                        } else {
+                            None
+                        }
+                    })
+                    .collect();
+                let turn = Turn {
+                    axis: *axis,
+                    sum,
+                    pi12,
+                };
+                self.about_z(
+                    graph,
+                    links,
+                    *axis,
+                    !turns.is_empty(),
+                    |builder, _, axis| {
+                        if turns.is_empty() && !builder.has_joint() {
+                            push_turn(
+                                &mut builder.pre,
+                                &Turn {
+                                    axis,
+                                    ..turn.clone()
+                                },
+                            );
+                        } else {
+                            builder.joint.sum = builder.joint.sum.plus(&turn.sum, 1);
+                            builder.joint.pi12 = (builder.joint.pi12 + turn.pi12).rem_euclid(24);
+                            builder.turns.extend(&turns);
+                        }
+                    },
+                );
+            }
+            Step::Translate(axis, length) => {
+                let value = expressions::length(graph, length)?;
+                let slides: Vec<(usize, Rational)> = length
+                    .coordinates
+                    .iter()
+                    .map(|(c, k)| (c.0, Rational::from(k.clone())))
+                    .collect();
+                self.about_z(
+                    graph,
+                    links,
+                    *axis,
+                    !slides.is_empty(),
+                    |builder, graph, axis| {
+                        let mut along = vector::ZERO;
+                        along[axis as usize] = value;
+                        for turn in builder.pre.iter().rev() {
+                            along = graph.turn_out(turn, &along);
+                        }
+                        builder.position = graph.add_vectors(&[builder.position, along]);
+                        builder.slides.extend(slides.iter().cloned());
+                    },
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// Applies a step with its axis brought to z if it moves, on a new link if it cannot join the present one.
+    fn about_z(
+        &mut self,
+        graph: &mut Graph,
+        links: &mut Vec<Link>,
+        axis: Axis,
+        moves: bool,
+        apply: impl Fn(&mut Self, &mut Graph, Axis),
+    ) {
+        if self.has_joint() && axis != Axis::Z {
+            self.close(links);
+        }
+        let Some((about, pi12)) = to_z(axis).filter(|_| moves) else {
+            apply(self, graph, axis);
+            return;
+        };
+        // A = Ry(pi/2) takes z to x, A = Rx(-pi/2) takes z to y; motion about x is A (motion about z) A^-1.
+        push_turn(&mut self.pre, &fixed_turn(about, pi12));
+        self.named = axis;
+        apply(self, graph, Axis::Z);
+        self.close(links);
+        push_turn(&mut self.pre, &fixed_turn(about, -pi12));
+    }
+
+    fn close(&mut self, links: &mut Vec<Link>) {
+        let fresh = Self::new(Some(links.len()));
+        let done = std::mem::replace(self, fresh);
+        let parallel = done
+            .parent
+            .filter(|_| done.pre.iter().all(|turn| turn.axis == Axis::Z));
+        let mut absolute = NO_TURN;
+        let mut first_parallel = links.len();
+        if let Some(parent) = parallel {
+            first_parallel = links[parent].first_parallel;
+            absolute = links[parent].absolute.clone();
+            for turn in &done.pre {
+                absolute.sum = absolute.sum.plus(&turn.sum, 1);
+                absolute.pi12 += turn.pi12;
+            }
+        }
+        absolute.sum = absolute.sum.plus(&done.joint.sum, 1);
+        absolute.pi12 = (absolute.pi12 + done.joint.pi12).rem_euclid(24);
+        links.push(Link {
+            parent: done.parent,
+            pre: done.pre,
+            named: done.named,
+            joint: done.joint,
+            position: done.position,
+            turns: done.turns,
+            slides: done.slides,
+            first_parallel,
+            absolute,
+            axis: None,
+            across: done.position,
+            along: Graph::ZERO,
+        });
+    }
+
+    fn finish(mut self, links: &mut Vec<Link>) -> usize {
+        self.close(links);
+        links.len() - 1
+    }
+}
