@@ -1,9 +1,9 @@
 //! A model along a recording: its forces, beside the measured ones, and where they differ.
 
 use modelmill_codegen::{Evaluator, Reactions, States};
-use modelmill_identify::decimation::decimate_columns;
-use modelmill_identify::locate::{LocateOptions, TIME, locate};
-use modelmill_identify::{Comparison, Figures, Region};
+use modelmill_identify::{
+    Comparison, Figures, LocateOptions, Region, TIME_COLUMN, decimate_columns, locate,
+};
 use modelmill_spec::DriveKind;
 
 use crate::data::Data;
@@ -103,13 +103,13 @@ pub(crate) fn places(
         let mut variables = variables(model, one)?;
         let time = one.time();
         if data.len() == 1 {
-            variables.push((TIME.to_owned(), time));
+            variables.push((TIME_COLUMN.to_owned(), time));
         } else {
             for (d, drive) in &drives {
                 let error = errors_of(k, *d);
                 let mut found = locate(
                     &[(drive, &error)],
-                    &[(TIME, &time)],
+                    &[(TIME_COLUMN, &time)],
                     &LocateOptions::default(),
                 );
                 for region in &mut found {

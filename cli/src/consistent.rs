@@ -1,7 +1,10 @@
 //! Physical consistency of a model file's bodies: what must be positive definite, and base parameters as functions of the
 //! physical ones.
 
-use modelmill_identify::physical::{BaseMap, Body, Physical, physical, planar, pseudo_inertia};
+use modelmill_identify::estimate::{
+    BaseMap, BodyMatrix, PhysicalParameters, physical_parameters, planar_pseudo_inertia,
+    pseudo_inertia,
+};
 use modelmill_identify::{Deviations, Solution, Triangle};
 use modelmill_spec::{Exact, Inertial, Mechanism, Sign, Symbol};
 use nalgebra::{DMatrix, DVector};
@@ -16,14 +19,14 @@ pub(crate) fn find(
     solution: &Solution,
     deviations: &Deviations,
     unknown: &[usize],
-) -> Outcome<(Physical, Vec<String>)> {
+) -> Outcome<(PhysicalParameters, Vec<String>)> {
     let mechanism = &model.derivation.mechanism;
     let start = start(model, solution, deviations, unknown);
     let mut bodies = bodies(mechanism);
     for p in model.positive_effects() {
         // One whose nominal value is not given and whose column repeats another's stays free.
         if start[p] > 0.0 {
-            bodies.push(Body {
+            bodies.push(BodyMatrix {
                 name: mechanism.parameters[p].name.clone(),
                 matrix: Box::new(move |x: &[f64]| number(x[p])),
                 copies: 1.0,
@@ -32,7 +35,7 @@ pub(crate) fn find(
     }
     let base = |x: &[f64]| base_map(model, unknown, x);
     let base: &BaseMap<'_> = &base;
-    let found = physical(triangle, solution, deviations, &start, base, &bodies)
+    let found = physical_parameters(triangle, solution, deviations, &start, base, &bodies)
         .map_err(|error| Failure::Input(format!("{}: {error}", model.path)))?;
     Ok((found, bodies.into_iter().map(|body| body.name).collect()))
 }
@@ -94,14 +97,14 @@ fn number(value: f64) -> DMatrix<f64> {
 
 /// What must be positive definite: the pseudo-inertia of a part that has all three moments, mass and inertia about the
 /// centre of one that is only seen turning about one axis, and masses of points.
-fn bodies(mechanism: &Mechanism) -> Vec<Body<'_>> {
+fn bodies(mechanism: &Mechanism) -> Vec<BodyMatrix<'_>> {
     let mut bodies = Vec::new();
     for part in &mechanism.parts {
         add_part(mechanism, &part.name, &part.inertial, &mut bodies);
     }
     for (k, lump) in mechanism.lumped_masses.iter().enumerate() {
         if has_parameter(&lump.mass) {
-            bodies.push(Body {
+            bodies.push(BodyMatrix {
                 name: format!(
                     "lumped mass {} on {}",
                     k + 1,
@@ -119,7 +122,7 @@ fn add_part<'a>(
     mechanism: &'a Mechanism,
     name: &str,
     inertial: &'a Inertial,
-    bodies: &mut Vec<Body<'a>>,
+    bodies: &mut Vec<BodyMatrix<'a>>,
 ) {
     let (Inertial::AboutCentre {
         mass,
@@ -147,23 +150,27 @@ fn add_part<'a>(
         .filter(|axis| !inertia[diagonal[*axis]].is_zero())
         .collect();
     match moments.as_slice() {
-        [] if has_mass => bodies.push(Body {
+        [] if has_mass => bodies.push(BodyMatrix {
             name,
             matrix: Box::new(move |x: &[f64]| number(value(mechanism, mass, x))),
             copies: 1.0,
         }),
         [axis] if has_mass => {
             let axis = *axis;
-            bodies.push(Body {
+            bodies.push(BodyMatrix {
                 name,
                 matrix: Box::new(move |x: &[f64]| {
                     let (m, h, i) = about_origin(mechanism, inertial, x);
-                    planar(m, [h[(axis + 1) % 3], h[(axis + 2) % 3]], i[diagonal[axis]])
+                    planar_pseudo_inertia(
+                        m,
+                        [h[(axis + 1) % 3], h[(axis + 2) % 3]],
+                        i[diagonal[axis]],
+                    )
                 }),
                 copies: 2.0,
             });
         }
-        [_, _, _] if has_mass => bodies.push(Body {
+        [_, _, _] if has_mass => bodies.push(BodyMatrix {
             name,
             matrix: Box::new(move |x: &[f64]| {
                 let (m, h, i) = about_origin(mechanism, inertial, x);
@@ -174,14 +181,14 @@ fn add_part<'a>(
         axes => {
             for axis in axes {
                 let moment = &inertia[diagonal[*axis]];
-                bodies.push(Body {
+                bodies.push(BodyMatrix {
                     name: about(["inertia about x", "inertia about y", "inertia about z"][*axis]),
                     matrix: Box::new(move |x: &[f64]| number(value(mechanism, moment, x))),
                     copies: 1.0,
                 });
             }
             if has_mass {
-                bodies.push(Body {
+                bodies.push(BodyMatrix {
                     name: about("mass"),
                     matrix: Box::new(move |x: &[f64]| number(value(mechanism, mass, x))),
                     copies: 1.0,

@@ -4,8 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use modelmill_codegen::{PoseFault, PoseReason, States};
-use modelmill_identify::decimation::decimate_time;
-use modelmill_identify::{Note, Recording, Run, Severity, name_of_bytes, place_word};
+use modelmill_identify::{
+    Note, Recording, Run, Severity, decimate_time, name_of_bytes, place_word,
+};
 
 use crate::columns::read_options;
 use crate::failure::{Failure, Outcome};

@@ -2,7 +2,7 @@
 //! people.
 
 use modelmill_identify::ParameterInfo;
-use modelmill_identify::physical::Physical;
+use modelmill_identify::estimate::PhysicalParameters;
 use serde_json::{Value, json};
 
 use crate::estimators::EstimatorArgs;
@@ -223,7 +223,7 @@ const NOT_ALONE: &str = "not alone";
 const NEXT_TO_NOTHING: f64 = 0.01;
 
 /// How much of a physical parameter the recordings say by themselves.
-fn from_recording(physical: &Physical, i: usize) -> String {
+fn from_recording(physical: &PhysicalParameters, i: usize) -> String {
     let share = physical.from_recording[i];
     if physical.alone[i] || share < NEXT_TO_NOTHING {
         percent(Some(share))
@@ -234,7 +234,7 @@ fn from_recording(physical: &Physical, i: usize) -> String {
 
 fn physical_text(
     model: &Model,
-    physical: &Physical,
+    physical: &PhysicalParameters,
     bodies: &[String],
     before: f64,
 ) -> Vec<String> {

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use modelmill_codegen::review::base_expression;
 use modelmill_codegen::{BaseParameter, Derivation, Monomial};
-use modelmill_identify::prior::Belief;
+use modelmill_identify::estimate::Belief;
 use modelmill_identify::{FitFile, ParameterInfo};
 use modelmill_spec::{
     EffectKind, Exact, Inertial, Loaded, Mechanism, Motion, ParameterIdx, PlaceQuantity, Sign,

@@ -1,9 +1,7 @@
 //! Options that say how recordings are read and prepared, shared by all commands that read them.
 
 use clap::{Args, ValueEnum};
-use modelmill_identify::derivatives::Source;
-use modelmill_identify::filters::MAX_ORDER;
-use modelmill_identify::{Preparation, Smoothing};
+use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER, Preparation, Smoothing};
 
 /// Order of the low-pass where none is asked for.
 const USUAL_ORDER: usize = 4;
@@ -96,8 +94,8 @@ impl PreparationArgs {
             trim: self.trim,
             decimate: self.decimate,
             source: match self.derivatives {
-                DerivativesArg::Recorded => Source::RecordedFirst,
-                DerivativesArg::Positions => Source::Positions,
+                DerivativesArg::Recorded => DerivativeSource::RecordedFirst,
+                DerivativesArg::Positions => DerivativeSource::Positions,
             },
             smoothing: match self.smoothing {
                 SmoothingArg::Auto => match self.period {
@@ -139,9 +137,9 @@ fn parse_period(text: &str) -> Result<f64, String> {
 
 fn parse_order(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
-        Ok(order) if (1..=MAX_ORDER).contains(&order) => Ok(order),
+        Ok(order) if (1..=MAX_FILTER_ORDER).contains(&order) => Ok(order),
         _ => Err(format!(
-            "expected an order from 1 to {MAX_ORDER}; 4 is usual"
+            "expected an order from 1 to {MAX_FILTER_ORDER}; 4 is usual"
         )),
     }
 }

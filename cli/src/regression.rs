@@ -2,14 +2,11 @@
 //! they fit a modest memory; else they are made again for every pass.
 
 use modelmill_codegen::{Evaluator, PoseFault, States};
-use modelmill_identify::decimation::decimate_table;
-use modelmill_identify::deviations::Visit;
-use modelmill_identify::essential::{Dropped, EssentialOptions, essential};
-use modelmill_identify::estimate::{Estimate, EstimateOptions, Weighting, estimate};
-use modelmill_identify::instruments::instrumental;
-use modelmill_identify::physical::Physical;
-use modelmill_identify::prior::with_prior;
-use modelmill_identify::{Deviations, LeastSquaresError, Solution};
+use modelmill_identify::estimate::{
+    Dropped, EssentialOptions, Estimate, EstimateOptions, PhysicalParameters, Visit, Weighting,
+    essential, estimate, instrumental, with_prior,
+};
+use modelmill_identify::{Deviations, LeastSquaresError, Solution, decimate_table};
 
 use crate::along::{interleaved, measured};
 use crate::consistent;
@@ -47,7 +44,7 @@ pub(crate) enum More {
     /// Nominal values counted as measurements.
     Prior(usize),
     /// Physical parameters that bodies can have, beside the residual norm of the solution without that demand.
-    Physical(Box<Physical>, Vec<String>, f64),
+    Physical(Box<PhysicalParameters>, Vec<String>, f64),
     /// Instrumental variables: how strong they are, and what least squares finds.
     Instruments(f64, Vec<f64>),
 }

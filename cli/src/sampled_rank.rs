@@ -6,7 +6,7 @@ use std::cmp::Ordering;
 
 use modelmill_codegen::review::NumericRank;
 use modelmill_codegen::{Evaluator, PoseFault, PoseReason, States};
-use modelmill_identify::numeric_rank::numeric_rank;
+use modelmill_identify::estimate::numeric_rank;
 use modelmill_spec::Motion;
 use nalgebra::DMatrix;
 

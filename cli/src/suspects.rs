@@ -2,9 +2,7 @@
 //! exchanged or turned round, angles in degrees. Everything goes into the notes.
 
 use modelmill_codegen::{Evaluator, States};
-use modelmill_identify::Note;
-use modelmill_identify::derivatives::differentiate;
-use modelmill_identify::suspects::{Explained, Suspect};
+use modelmill_identify::{ForceAudit, Note, Suspect, differentiate};
 use nalgebra::{DMatrix, DVector};
 
 use crate::data::Data;
@@ -42,7 +40,7 @@ fn findings(model: &Model, data: &Data) -> Vec<Note> {
     let n_drives = forces.len();
     let explained = |change: &Change<'_>| {
         let regressor = regressor(model, data, &samples, change)?;
-        Explained::new(regressor, n_drives)
+        ForceAudit::new(regressor, n_drives)
     };
     // Poses without answer are reported with their place when the whole recording is evaluated.
     let Some(as_it_is) = explained(&|_| {}) else {
@@ -151,7 +149,7 @@ fn beside_nominal(model: &Model, data: &Data, samples: &[usize]) -> Vec<Note> {
 
 /// The regressor with friction, inertia and an offset at every drive besides: where a model lacks these, their force
 /// would pass for a delay.
-fn with_friction(model: &Model, data: &Data, samples: &[usize]) -> Option<Explained> {
+fn with_friction(model: &Model, data: &Data, samples: &[usize]) -> Option<ForceAudit> {
     let regressor = regressor(model, data, samples, &|_| {})?;
     let rates = drive_rates(model, data).ok()?;
     let n = rates.len();
@@ -171,7 +169,7 @@ fn with_friction(model: &Model, data: &Data, samples: &[usize]) -> Option<Explai
             }
         }
     }
-    Explained::new(more, n)
+    ForceAudit::new(more, n)
 }
 
 /// Positions, rates and accelerations, `[order][coordinate][sample]`.
@@ -179,7 +177,7 @@ type Motion = [Vec<Vec<f64>>; 3];
 /// What could be done to a recording's motion to make sense of it.
 type Change<'a> = dyn Fn(&mut Motion) + 'a;
 /// How well the model explains the forces once the motion is changed.
-type Explain<'a> = dyn Fn(&Change<'_>) -> Option<Explained> + 'a;
+type Explain<'a> = dyn Fn(&Change<'_>) -> Option<ForceAudit> + 'a;
 
 /// Coordinates that are exchanged, or angles in degrees; `now` is the error as the columns are, if there is one.
 fn suspects_of_motion(

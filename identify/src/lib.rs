@@ -4,52 +4,58 @@
 //! The crate takes numbers and knows nothing of how a regressor is made. The pipeline:
 //!
 //! 1. [`Recording::read`] - CSV, Parquet or MATLAB's format 5 into named columns; every fault has its line and its remedy.
-//! 2. [`Recording::suspicions`] - what looks wrong with them; [`Recording::runs_with`] - coordinates with derivatives ([`derivatives`], [`filters`]) and
-//!    forces, as a [`Run`] for each stretch between gaps in time; the caller evaluates its regressor along it, rows interleaved per
-//!    sample (`row = sample * n_channels + channel`), and applies [`decimation::decimate_table`] to
-//!    regressor and force where the run asks for it.
-//! 3. [`LeastSquares`] - eq. (12) from a stream of rows; [`deviations::autocorrelated`] - what
-//!    the result is worth.
-//!    [`estimate`] weighs and reweighs rows (channels, outliers); [`instruments`] are for states that are noisy themselves.
-//!    On the reduced rows work [`prior`] (nominal values as soft constraints), [`essential`] (what the recording supports)
-//!    and [`physical`] (parameters that a body can have).
-//! 4. [`figures`] and [`locate`] - how far the model is off, and where.
-//! 5. [`FitFile`] - the result on disk and back.
+//! 2. [`Recording::runs_with`] - coordinates with derivatives and forces, as a [`Run`] for each stretch between gaps in time;
+//!    the caller evaluates its regressor along it, rows interleaved per sample (`row = sample * n_channels + channel`), and
+//!    applies [`decimate_table`] to regressor and force where the run asks for it.
+//! 3. [`Recording::suspicions`] and [`ForceAudit`] - what looks wrong with them.
+//! 4. [`estimate`] - eq. (12) from a stream of rows ([`LeastSquares`]), weighted, robust, with instruments or nominal values,
+//!    and what the result is worth.
+//! 5. [`Comparison`] and [`locate`] - how far the model is off, and where; [`FitFile`] - the result on disk and back.
 //!
-//! Beside it, [`interpret`]: physical parameters from identified base parameters, all real solutions;
-//! [`excite`]: the motion that tells base parameters apart best, within limits;
-//! and [`numeric_rank`]: eq. (9) on given values, and the numeric fallback reduction.
+//! Beside it, [`diagnose`]: which effects the recording needs; [`excite`]: the motion that tells base parameters apart best,
+//! within limits; and [`interpret`]: physical parameters from identified base parameters, all real solutions.
+//!
+//! Folders, each of which uses only those above it:
+//!
+//! - `words`: words of messages
+//! - `signal`: filters, spectra, statistics of plain numbers
+//! - `recording`: files to named columns
+//! - `motion`: columns to states
+//! - `audit`: what looks wrong
+//! - `estimate`: rows to parameters
+//! - `figures`: how far off, and where; the file of a fit
+//! - `diagnose`: which effects are missing
+//! - `excite`: motion for a recording
+//! - `interpret`: physical parameters
 
 mod audit;
 pub mod diagnose;
 pub mod estimate;
 pub mod excite;
-pub mod figures;
+mod figures;
 pub mod interpret;
 mod motion;
 mod recording;
+mod signal;
 #[cfg(test)]
 mod test_noise;
+mod words;
 
-pub use audit::suspects;
-pub use estimate::deviations::Deviations;
-pub use estimate::least_squares::{LeastSquares, LeastSquaresError};
-pub use estimate::solution::{RANK_TOLERANCE, Solution};
-pub use estimate::triangle::Triangle;
-pub use estimate::undetermined::Direction;
+pub use audit::{ForceAudit, ForceDelay, Suspect};
 pub use estimate::{
-    deviations, essential, instruments, least_squares, numeric_rank, physical, prior,
+    Deviations, Direction, LeastSquares, LeastSquaresError, RANK_TOLERANCE, Solution, Triangle,
 };
-pub use figures::fit_file::{
-    FitFile, FitFileError, FitParameter, ParameterInfo, Status, fit_parameters,
+pub use figures::{
+    ChannelFigures, Comparison, Figures, FiguresError, FitFault, FitFile, FitFileError,
+    FitParameter, LocateOptions, ParameterInfo, Region, Status, TIME_COLUMN, compare,
+    fit_parameters, locate,
 };
-pub use figures::locate::{LocateOptions, Region};
-pub use figures::{ChannelFigures, Comparison, Figures, FiguresError, locate};
-pub use motion::derivatives::{Preparation, Smoothing};
-pub use motion::filters::FilterError;
-pub use motion::periods::Repeats;
-pub use motion::run::{PreparedAs, Run};
-pub use motion::{cutoff, decimation, derivatives, filters, local_polynomials, periods, series};
-pub use recording::error::{Fault, RecordingError, name_of_bytes, place_word};
-pub use recording::notes::{Note, Severity};
-pub use recording::{Computed, NotFinite, ReadOptions, Recording};
+pub use motion::{
+    DerivativeSource, Preparation, PreparedAs, Repeats, Run, Smoothed, Smoothing, decimate,
+    decimate_columns, decimate_table, decimate_time, differentiate, filter_and_differentiate,
+};
+pub use recording::{
+    Computed, Fault, NotFinite, Note, ReadOptions, Recording, RecordingError, Severity,
+    name_of_bytes, place_word,
+};
+pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER};

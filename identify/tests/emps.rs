@@ -6,10 +6,11 @@
 
 use std::path::PathBuf;
 
-use modelmill_identify::decimation::{decimate_table, decimate_time};
-use modelmill_identify::deviations::autocorrelated;
-use modelmill_identify::locate::{LocateOptions, locate};
-use modelmill_identify::{LeastSquares, LeastSquaresError, Preparation, Recording, Run, figures};
+use modelmill_identify::estimate::autocorrelated_deviations;
+use modelmill_identify::{
+    LeastSquares, LeastSquaresError, LocateOptions, Preparation, Recording, Run, compare,
+    decimate_table, decimate_time, locate,
+};
 
 fn data() -> Option<PathBuf> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/emps");
@@ -74,7 +75,7 @@ fn model(data: &Regression, values: &[f64]) -> Vec<f64> {
 }
 
 fn relative_error(data: &Regression, values: &[f64]) -> f64 {
-    let figures = figures::compare(
+    let figures = compare(
         &["axis".to_owned()],
         std::slice::from_ref(&data.force),
         std::slice::from_ref(&model(data, values)),
@@ -97,7 +98,7 @@ fn the_published_parameters_come_out() {
     fit.add_rows(&train.regressor, &train.force)
         .expect("finite rows");
     let solution = fit.solve().expect("a solution");
-    let deviations = autocorrelated(&solution, 1, |visit| {
+    let deviations = autocorrelated_deviations(&solution, 1, |visit| {
         visit(&train.regressor, &train.force)?;
         Ok::<(), LeastSquaresError>(())
     })

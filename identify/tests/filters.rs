@@ -1,8 +1,6 @@
 //! Filters and differences against numbers from scipy and numpy.
 
-use modelmill_identify::decimation::{decimate, decimate_columns, decimate_table};
-use modelmill_identify::derivatives::differentiate;
-use modelmill_identify::filters::LowPass;
+use modelmill_identify::{LowPass, decimate, decimate_columns, decimate_table, differentiate};
 
 #[allow(clippy::unreadable_literal, reason = "numbers as numpy prints them")]
 #[path = "reference/filter_tables.rs"]

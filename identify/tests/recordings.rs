@@ -3,9 +3,9 @@
 
 use std::fmt::Write as _;
 
-use modelmill_identify::derivatives::Source;
 use modelmill_identify::{
-    Fault, NotFinite, Preparation, ReadOptions, Recording, RecordingError, Severity,
+    DerivativeSource, Fault, NotFinite, Preparation, ReadOptions, Recording, RecordingError,
+    Severity,
 };
 
 fn read(text: &str) -> Result<Recording, RecordingError> {
@@ -370,7 +370,7 @@ fn a_preparation_of_ones_own_is_kept_to() {
         cutoff_hz: Some(30.0),
         trim: Some((7, 3)),
         decimate: 5,
-        source: Source::Positions,
+        source: DerivativeSource::Positions,
         ..Preparation::default()
     };
     let run = sine(&["q", "q_d", "q_dd"])

@@ -7,11 +7,10 @@
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-use modelmill_identify::deviations::autocorrelated;
-use modelmill_identify::fit_parameters;
+use modelmill_identify::estimate::autocorrelated_deviations;
 use modelmill_identify::{
     Comparison, FitFile, LeastSquares, LeastSquaresError, ParameterInfo, Preparation, ReadOptions,
-    Recording, Run,
+    Recording, Run, fit_parameters,
 };
 
 const GRAVITY: f64 = 9.81;
@@ -140,7 +139,7 @@ fn positions_alone_give_the_parameters_within_a_fifth_of_a_percent() {
         regression.add_rows(w, y).expect("finite rows");
     }
     let solution = regression.solve().expect("a solution");
-    let deviations = autocorrelated(&solution, 2, |visit| {
+    let deviations = autocorrelated_deviations(&solution, 2, |visit| {
         for (w, y) in w.chunks(300 * 10).zip(y.chunks(300 * 2)) {
             visit(w, y)?;
         }
@@ -214,7 +213,8 @@ fn a_missing_effect_widens_the_deviations() {
     let mut regression = LeastSquares::new(5);
     regression.add_rows(&w, &y).expect("finite rows");
     let solution = regression.solve().expect("a solution");
-    let deviations = autocorrelated(&solution, 2, |visit| visit(&w, &y)).expect("deviations");
+    let deviations =
+        autocorrelated_deviations(&solution, 2, |visit| visit(&w, &y)).expect("deviations");
     println!(
         "lag 1: {:?}, effective samples {:?}",
         deviations.residual_lag1, deviations.effective_samples

@@ -1,7 +1,7 @@
 //! Rank of eq. (9) on a sample, safe against columns that are nothing but rounding.
 
 use modelmill_codegen::{Evaluator, PoseFault};
-use modelmill_identify::numeric_rank::{NumericRank, numeric_rank};
+use modelmill_identify::estimate::{RegressorRank, numeric_rank};
 use nalgebra::DMatrix;
 
 use crate::sample::Sample;
@@ -12,7 +12,7 @@ const ROUNDING: f64 = 1e-12;
 /// The numeric rank of a regressor whose columns at the level of rounding count as zero.
 ///
 /// Scaled to norm 1 they would count as columns of noise, and each would add one to the rank.
-pub fn rank(mut w: DMatrix<f64>) -> NumericRank {
+pub fn rank(mut w: DMatrix<f64>) -> RegressorRank {
     let largest = w.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
     for mut column in w.column_iter_mut() {
         if column.norm() < ROUNDING * largest {
@@ -26,6 +26,6 @@ pub fn rank(mut w: DMatrix<f64>) -> NumericRank {
 pub fn rank_of_products(
     evaluator: &Evaluator<'_>,
     sample: &Sample,
-) -> Result<NumericRank, PoseFault> {
+) -> Result<RegressorRank, PoseFault> {
     evaluator.full_regressor(&sample.states()).map(rank)
 }

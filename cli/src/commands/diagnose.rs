@@ -345,7 +345,7 @@ fn everywhere(study: &Study, channel: usize) -> Region {
             "what is left of {name} is spread over all of the time, and {again:.0} % of its square comes again with the state"
         ),
         channel: name,
-        variable: modelmill_identify::locate::TIME.to_owned(),
+        variable: modelmill_identify::TIME_COLUMN.to_owned(),
         range,
         share: 1.0,
         samples: 1.0,

@@ -2,10 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill_identify::deviations::FEWEST_ROWS;
-use modelmill_identify::fit_parameters;
+use modelmill_identify::estimate::FEWEST_ROWS;
 use modelmill_identify::{
-    Figures, FitFile, FitParameter, Note, ParameterInfo, Repeats, Severity, Status,
+    Figures, FitFile, FitParameter, Note, ParameterInfo, Repeats, Severity, Status, fit_parameters,
 };
 use modelmill_spec::Sign;
 use serde_json::json;

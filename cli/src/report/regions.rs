@@ -3,8 +3,7 @@
 use std::cmp::Ordering;
 use std::fmt::Write as _;
 
-use modelmill_identify::Region;
-use modelmill_identify::locate::TIME;
+use modelmill_identify::{Region, TIME_COLUMN};
 
 use super::draw::{Axis, Picture, range, with_room};
 use super::maps::Variable;
@@ -43,7 +42,7 @@ pub(super) fn figures(
 pub(super) fn sentence(region: &Region, model: &Model) -> String {
     let unit = variable_unit(model, &region.variable);
     let [low, high] = region.range;
-    let name = if region.variable == TIME {
+    let name = if region.variable == TIME_COLUMN {
         "the time"
     } else {
         &region.variable
@@ -60,7 +59,7 @@ pub(super) fn sentence(region: &Region, model: &Model) -> String {
     };
     let file = region.says.split_once(": ").map(|(file, _)| file);
     let of = match file {
-        Some(file) if region.variable == TIME => format!(" in {file}"),
+        Some(file) if region.variable == TIME_COLUMN => format!(" in {file}"),
         _ => String::new(),
     };
     format!(
@@ -82,7 +81,7 @@ fn picture(
     let d = model.drives().iter().position(|d| *d == region.channel)?;
     let judged = before.judged();
     // A stretch of time lies in one recording, which its sentence names if there are several.
-    let runs: Vec<usize> = if region.variable == TIME {
+    let runs: Vec<usize> = if region.variable == TIME_COLUMN {
         let named = |k: &usize| {
             region
                 .says
@@ -98,7 +97,7 @@ fn picture(
     } else {
         judged
     };
-    let over: Vec<f64> = if region.variable == TIME {
+    let over: Vec<f64> = if region.variable == TIME_COLUMN {
         before.runs[*runs.first()?].time.clone()
     } else {
         let (_, values) = variables
@@ -131,7 +130,7 @@ fn picture(
     let [low, high] = region.range.map(|v| x.at(v));
     picture.rect("region", [low, y.start], [high.max(low + 1.0), y.end]);
     let unit = variable_unit(model, &region.variable);
-    let name = if region.variable == TIME {
+    let name = if region.variable == TIME_COLUMN {
         "time"
     } else {
         &region.variable

@@ -16,7 +16,7 @@ pub(super) fn force_unit(model: &Model, drive: usize) -> &'static str {
 /// Unit of a variable by its name: a coordinate or the length of a drive, their rates and accelerations, a force, the time.
 pub(super) fn variable_unit(model: &Model, name: &str) -> String {
     let mechanism = &model.derivation.mechanism;
-    if name == modelmill_identify::locate::TIME {
+    if name == modelmill_identify::TIME_COLUMN {
         return "s".to_owned();
     }
     if let Some(d) = mechanism.drives.iter().position(|d| d.name == name) {

@@ -2,8 +2,7 @@
 
 use std::error::Error;
 
-use modelmill_identify::LeastSquares;
-use modelmill_identify::derivatives::prepare;
+use modelmill_identify::{LeastSquares, filter_and_differentiate};
 
 use crate::control::Recording;
 use crate::spidermill_with_friction as model;
@@ -17,12 +16,12 @@ const ENDS: usize = 150;
 pub(crate) fn identify(recording: &Recording) -> Result<[f64; model::N_BASE], Box<dyn Error>> {
     let mut states = Vec::new();
     for q in &recording.q {
-        states.push(prepare(&recording.t, q, CUTOFF, 4)?);
+        states.push(filter_and_differentiate(&recording.t, q, CUTOFF, 4)?);
     }
     // The same filter on the forces keeps both sides of the equations in step.
     let mut forces = Vec::new();
     for force in &recording.forces {
-        forces.push(prepare(&recording.t, force, CUTOFF, 4)?.q);
+        forces.push(filter_and_differentiate(&recording.t, force, CUTOFF, 4)?.q);
     }
     let n = recording.t.len();
     let inner = ENDS..n - ENDS;

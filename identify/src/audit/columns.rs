@@ -5,14 +5,11 @@
 
 use std::f64::consts::PI;
 
-use crate::motion::derivatives::Source;
-use crate::motion::run::Run;
-use crate::recording::Recording;
-use crate::recording::error::list;
-use crate::recording::notes::Note;
+use crate::motion::{DerivativeSource, Run};
+use crate::recording::{GAP, Note, Recording};
+use crate::signal::median;
+use crate::words::{list, with_digits};
 
-/// Steps of time above this many times the usual one are gaps, across which nothing is filtered.
-pub(crate) const GAP: f64 = 5.0;
 /// Ratios of a rate to the derivative of its position that pass as 1; drift and coarse sampling make a few per cent.
 const RATIO_TOLERANCE: f64 = 0.1;
 /// Part of a rate's integral that the position may leave unexplained.
@@ -21,15 +18,6 @@ const MISFIT: f64 = 0.3;
 const SLOWEST: f64 = 0.5;
 /// Nobody samples forces of a machine in shorter steps, s.
 const FASTEST: f64 = 2e-6;
-
-/// Middle of some numbers; zero for none.
-pub(crate) fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
-}
 
 impl Run {
     /// Warnings about measured forces of the given drives that are 0 throughout, which fit parameters of 0 exactly.
@@ -56,7 +44,11 @@ impl Run {
 impl Recording {
     /// Warnings about columns that can be read but hardly are what they should be. `coordinates` are
     /// `(name, whether it is an angle)`; columns that cannot be used are passed over.
-    pub fn suspicions(&self, coordinates: &[(String, bool)], source: Source) -> Vec<Note> {
+    pub fn suspicions(
+        &self,
+        coordinates: &[(String, bool)],
+        source: DerivativeSource,
+    ) -> Vec<Note> {
         let Ok(time) = self.column("t") else {
             return Vec::new();
         };
@@ -65,7 +57,7 @@ impl Recording {
             .filter(|(_, is_angle)| *is_angle)
             .filter_map(|(name, _)| self.wrapped(name, time))
             .collect();
-        let (rates, settled) = if source == Source::Positions {
+        let (rates, settled) = if source == DerivativeSource::Positions {
             (Vec::new(), false)
         } else {
             self.rates(coordinates, time)
@@ -75,14 +67,14 @@ impl Recording {
             notes.push(Note::warning(format!(
                 "The steps of `t` in {} are {} s, which is fast for a recording of forces; time must be in s.",
                 self.file(),
-                short(step)
+                with_digits(step, 3)
             )));
         }
         if step >= SLOWEST && rates.is_empty() && !settled {
             notes.push(Note::warning(format!(
                 "The steps of `t` in {} are {} s, which is slow for a recording of forces; time must be in s: is it in ms?",
                 self.file(),
-                short(step)
+                with_digits(step, 3)
             )));
         }
         notes.extend(rates);
@@ -189,7 +181,7 @@ impl Recording {
             let how = if why.is_empty() {
                 "nor a multiple of it: check which column is which (--map)".to_owned()
             } else {
-                format!("but about {} times as large: {why}", short(ratio))
+                format!("but about {} times as large: {why}", with_digits(ratio, 3))
             };
             Note::warning(format!(
                 "{} in {} {is} not {derivative} of {} with respect to `t`, {how}. Mend the columns, or take derivatives \
@@ -200,29 +192,6 @@ impl Recording {
             ))
         });
         (notes.collect(), settled)
-    }
-
-    /// The recording cut at its gaps in time, each stretch with its lines; the whole if there are none.
-    pub(crate) fn stretches(&self) -> Vec<Self> {
-        let Ok(time) = self.column("t") else {
-            return vec![self.clone()];
-        };
-        let usual = median(time.windows(2).map(|w| w[1] - w[0]).collect());
-        let mut edges = vec![0];
-        edges.extend(
-            (1..time.len()).filter(|i| time[*i] - time[*i - 1] > GAP * usual && usual > 0.0),
-        );
-        edges.push(time.len());
-        if edges.len() == 2 {
-            return vec![self.clone()];
-        }
-        edges
-            .windows(2)
-            .map(|edge| {
-                let name = format!("{} from t = {} s on", self.file(), time[edge[0]]);
-                self.stretch(name, edge[0], edge[1])
-            })
-            .collect()
     }
 }
 
@@ -306,14 +275,6 @@ fn explain(ratio: f64, is_angle: bool) -> String {
     why
 }
 
-/// Three significant digits without trailing zeros.
-fn short(value: f64) -> String {
-    let scientific = format!("{value:.2e}");
-    scientific
-        .parse::<f64>()
-        .map_or(scientific, |rounded| format!("{rounded}"))
-}
-
 #[cfg(test)]
 mod tests {
     use std::fmt::Write as _;
@@ -339,7 +300,7 @@ mod tests {
 
     fn says(recording: &Recording) -> String {
         recording
-            .suspicions(&[("q".to_owned(), true)], Source::RecordedFirst)
+            .suspicions(&[("q".to_owned(), true)], DerivativeSource::RecordedFirst)
             .iter()
             .map(|note| note.says.as_str())
             .collect::<Vec<_>>()
@@ -405,7 +366,7 @@ mod tests {
     #[test]
     fn time_in_milliseconds_is_seen_without_rates() {
         let slow = recording(500, |t| 1e3 * t, q, qd);
-        let notes = slow.suspicions(&[("q".to_owned(), true)], Source::Positions);
+        let notes = slow.suspicions(&[("q".to_owned(), true)], DerivativeSource::Positions);
         assert!(
             notes.len() == 1 && notes[0].says.contains("is it in ms?"),
             "{notes:?}"
@@ -416,7 +377,7 @@ mod tests {
     fn a_wrapped_angle_is_named_with_its_line() {
         let wrap = |t: f64| (0.8 * t + PI).rem_euclid(2.0 * PI) - PI;
         let wrapped = recording(4000, |t| t, wrap, |_| 0.8);
-        let notes = wrapped.suspicions(&[("q".to_owned(), true)], Source::Positions);
+        let notes = wrapped.suspicions(&[("q".to_owned(), true)], DerivativeSource::Positions);
         assert!(
             notes.len() == 1
                 && notes[0].says.contains("jumps by 2 pi")
@@ -426,7 +387,7 @@ mod tests {
         );
         // A length may jump as it likes.
         assert_eq!(
-            wrapped.suspicions(&[("q".to_owned(), false)], Source::Positions),
+            wrapped.suspicions(&[("q".to_owned(), false)], DerivativeSource::Positions),
             []
         );
     }
@@ -443,7 +404,7 @@ mod tests {
         let names = ["q".to_owned()];
         let drives = ["motor".to_owned()];
         let positions = Preparation {
-            source: Source::Positions,
+            source: DerivativeSource::Positions,
             ..Preparation::default()
         };
         let runs = broken.runs_with(&names, &drives, &positions).unwrap();

@@ -1,6 +1,8 @@
-//! What looks wrong with a recording: columns, signals and periods go in, suspicions and notes come out.
+//! What looks wrong with a recording although every number can be read: columns and signals by themselves, and forces
+//! against a model's regressor.
 
-pub(crate) mod columns;
-mod periods;
+mod columns;
 mod signals;
-pub mod suspects;
+mod suspects;
+
+pub use suspects::{ForceAudit, ForceDelay, Suspect};

@@ -3,9 +3,8 @@
 
 use std::f64::consts::PI;
 
-use crate::recording::Recording;
-use crate::recording::error::place_word;
-use crate::recording::notes::{Note, count_of, short};
+use crate::recording::{Note, Recording, place_word};
+use crate::words::{count_of, seven_digits};
 
 /// Angles beyond this many rad are likely in degrees: two turns to each side.
 const LARGE_ANGLE: f64 = 4.0 * PI;
@@ -65,7 +64,7 @@ impl Recording {
         let largest = q.iter().map(|v| v.abs()).fold(0.0, f64::max);
         let rounded = |value: f64| match value {
             value if value < 1e7 => format!("{value:.1}"),
-            value => short(value),
+            value => seven_digits(value),
         };
         (largest > LARGE_ANGLE).then(|| {
             Note::warning(format!(
@@ -138,7 +137,7 @@ fn plain(value: f64) -> String {
     if value.abs() < 1e12 {
         value.to_string()
     } else {
-        short(value)
+        seven_digits(value)
     }
 }
 

@@ -8,14 +8,14 @@ use nalgebra::{DMatrix, DVector};
 
 /// How well a regressor can explain forces.
 #[derive(Debug, Clone)]
-pub struct Explained {
+pub struct ForceAudit {
     q: DMatrix<f64>,
     n_channels: usize,
 }
 
 /// A delay of the forces behind the motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Delay {
+pub struct ForceDelay {
     /// In steps of the recording; negative where the forces come first.
     pub samples: f64,
     /// Relative error of the best fit without and with the delay taken out.
@@ -31,7 +31,7 @@ pub enum Suspect {
     Turned(usize),
 }
 
-impl Explained {
+impl ForceAudit {
     /// Factorises a regressor of rows interleaved per sample; `None` if it has fewer rows than twice its columns.
     pub fn new(mut regressor: DMatrix<f64>, n_channels: usize) -> Option<Self> {
         if n_channels == 0 || regressor.nrows() < 2 * regressor.ncols() {
@@ -60,7 +60,7 @@ impl Explained {
     /// `samples` are those of the rows in the recording, `forces[channel]` is the whole recording; all shifted samples
     /// must lie in it (asserted).
     /// `None` where the best shift is the largest one, or nothing is measured.
-    pub fn delay(&self, samples: &[usize], forces: &[Vec<f64>], most: usize) -> Option<Delay> {
+    pub fn delay(&self, samples: &[usize], forces: &[Vec<f64>], most: usize) -> Option<ForceDelay> {
         let shifted = |shift: usize| {
             let rows = samples.iter().flat_map(|sample| {
                 let at = sample + shift - most;
@@ -83,7 +83,7 @@ impl Explained {
         } else {
             0.0
         };
-        Some(Delay {
+        Some(ForceDelay {
             samples: best as f64 - most as f64 + fraction,
             error: [errors[most], errors[best]],
         })
@@ -149,7 +149,7 @@ mod tests {
     fn a_delay_is_found_to_a_fraction_of_a_sample() {
         for delay in [0.0, 3.0, 7.4, -2.6] {
             let (samples, forces) = forces(delay, 0.01);
-            let explained = Explained::new(rows(|k| k as f64 * 0.002, &samples), 2).unwrap();
+            let explained = ForceAudit::new(rows(|k| k as f64 * 0.002, &samples), 2).unwrap();
             let found = explained.delay(&samples, &forces, 20).unwrap();
             assert!(
                 (found.samples - delay).abs() < 0.1,
@@ -158,14 +158,14 @@ mod tests {
             assert!(found.error[1] <= found.error[0] && found.error[1] < 0.02);
         }
         let (samples, forces) = forces(25.0, 0.01);
-        let explained = Explained::new(rows(|k| k as f64 * 0.002, &samples), 2).unwrap();
+        let explained = ForceAudit::new(rows(|k| k as f64 * 0.002, &samples), 2).unwrap();
         assert_eq!(explained.delay(&samples, &forces, 20), None);
     }
 
     #[test]
     fn exchanged_and_turned_forces_are_found() {
         let (samples, forces) = forces(0.0, 0.01);
-        let explained = Explained::new(rows(|k| k as f64 * 0.002, &samples), 2).unwrap();
+        let explained = ForceAudit::new(rows(|k| k as f64 * 0.002, &samples), 2).unwrap();
         let interleaved = |channels: [&Vec<f64>; 2], sign: f64| {
             let rows = samples
                 .iter()

@@ -24,11 +24,11 @@
 //! `S_t S_t'/L`, `S_t` being the sum of the window: the same number, at a cost and a memory
 //! that do not grow with the lags times the parameters squared.
 
-use std::collections::VecDeque;
-
 use nalgebra::{DMatrix, DVector};
 
-use crate::estimate::least_squares::{LeastSquaresError, check_rows};
+use crate::estimate::error::LeastSquaresError;
+use crate::estimate::lags::{LagProducts, Windows, bandwidth, lags_for_bandwidth};
+use crate::estimate::rows::{Visit, check_rows};
 use crate::estimate::solution::Solution;
 
 /// Uncertainty of a solution. Lists are in the order of the regressor's columns.
@@ -56,11 +56,6 @@ pub struct Deviations {
 /// Equations for each parameter below which the influences of samples cancel too much to be summed over lags.
 pub const FEWEST_ROWS: usize = 20;
 
-/// One showing of a block of whole samples: regressor and measured values, as in
-/// [`LeastSquares::add_rows`](crate::LeastSquares::add_rows), rows interleaved per sample
-/// (`row = sample * channels + channel`).
-pub type Visit<'a> = dyn FnMut(&[f64], &[f64]) -> Result<(), LeastSquaresError> + 'a;
-
 /// Standard deviations of `solution`, whose rows `show` presents again, block by block and in
 /// order of time; it is called twice.
 ///
@@ -69,17 +64,17 @@ pub type Visit<'a> = dyn FnMut(&[f64], &[f64]) -> Result<(), LeastSquaresError> 
 /// Fails when `show` fails, or shows other rows than the solution was made from.
 ///
 /// ```
-/// use modelmill_identify::{LeastSquares, LeastSquaresError, deviations::autocorrelated};
+/// use modelmill_identify::{LeastSquares, LeastSquaresError, estimate::autocorrelated_deviations};
 /// let regressor: Vec<f64> = (0..400).flat_map(|i| [1.0, f64::from(i)]).collect();
 /// let measured: Vec<f64> = (0..400).map(|i| 3.0 + 2.0 * f64::from(i) + f64::from(i % 7)).collect();
 /// let mut regression = LeastSquares::new(2);
 /// regression.add_rows(&regressor, &measured)?;
 /// let solution = regression.solve()?;
-/// let deviations = autocorrelated(&solution, 1, |visit| visit(&regressor, &measured))?;
+/// let deviations = autocorrelated_deviations(&solution, 1, |visit| visit(&regressor, &measured))?;
 /// assert!(deviations.std[1] < 1e-2);
 /// # Ok::<(), LeastSquaresError>(())
 /// ```
-pub fn autocorrelated<E: From<LeastSquaresError>>(
+pub fn autocorrelated_deviations<E: From<LeastSquaresError>>(
     solution: &Solution,
     channels: usize,
     mut show: impl FnMut(&mut Visit<'_>) -> Result<(), E>,
@@ -197,46 +192,6 @@ fn raise_to_classical(covariance: &mut DMatrix<f64>, solution: &Solution) {
     }
 }
 
-/// Newey and West's number of lags that the bandwidth is estimated from (Bartlett's kernel).
-fn lags_for_bandwidth(samples: usize) -> usize {
-    whole(4.0 * (samples as f64 / 100.0).powf(2.0 / 9.0)).clamp(1, samples.max(2) - 1)
-}
-
-/// The whole part of a small positive number.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "bandwidths are far below 2^53"
-)]
-fn whole(value: f64) -> usize {
-    value.max(0.0) as usize
-}
-
-/// The automatic bandwidth from the lag products of the influences, prewhitened on paper.
-fn bandwidth(memory: &LagProducts, whitening: &[f64], lags: usize, samples: usize) -> usize {
-    let (mut curvature, mut power) = (0.0, 0.0);
-    for (j, a) in whitening.iter().enumerate() {
-        let gamma = |lag: usize| {
-            let before = memory.product(lag.abs_diff(1), j);
-            (1.0 + a * a) * memory.product(lag, j) - a * (before + memory.product(lag + 1, j))
-        };
-        let variance = gamma(0);
-        if variance <= 0.0 {
-            continue;
-        }
-        let s0 = 1.0 + 2.0 * (1..=lags).map(|lag| gamma(lag) / variance).sum::<f64>();
-        let s1 = 2.0
-            * (1..=lags)
-                .map(|lag| lag as f64 * gamma(lag) / variance)
-                .sum::<f64>();
-        curvature += s1 * s1;
-        power += s0 * s0;
-    }
-    let alpha = if power > 0.0 { curvature / power } else { 0.0 };
-    let automatic = whole(1.1447 * (alpha * samples as f64).cbrt());
-    automatic.max(lags + 1).min((samples / 10).max(1))
-}
-
 /// Shows each sample's influence on the parameters and its residuals.
 struct Scores<'a> {
     solution: &'a Solution,
@@ -302,118 +257,6 @@ impl<'a> Scores<'a> {
     }
 }
 
-/// Sums of products of several series with themselves some samples later.
-struct LagProducts {
-    width: usize,
-    lags: usize,
-    recent: VecDeque<Vec<f64>>,
-    /// `products[lag * width + series]`.
-    products: Vec<f64>,
-}
-
-impl LagProducts {
-    fn new(width: usize, lags: usize) -> Self {
-        Self {
-            width,
-            lags,
-            recent: VecDeque::with_capacity(lags + 1),
-            products: vec![0.0; (lags + 1) * width],
-        }
-    }
-
-    fn push(&mut self, values: &[f64]) {
-        let mut slot = if self.recent.len() > self.lags {
-            self.recent.pop_back()
-        } else {
-            None
-        }
-        .unwrap_or_default();
-        slot.clear();
-        slot.extend_from_slice(values);
-        self.recent.push_front(slot);
-        for (earlier, products) in self
-            .recent
-            .iter()
-            .zip(self.products.chunks_exact_mut(self.width))
-        {
-            for ((product, now), before) in products.iter_mut().zip(values).zip(earlier) {
-                *product += now * before;
-            }
-        }
-    }
-
-    fn product(&self, lag: usize, series: usize) -> f64 {
-        self.products[lag * self.width + series]
-    }
-
-    /// Correlation at a lag; 0 for a series that is 0 throughout.
-    fn correlation(&self, lag: usize, series: usize) -> f64 {
-        let variance = self.product(0, series);
-        if variance > 0.0 {
-            self.product(lag, series) / variance
-        } else {
-            0.0
-        }
-    }
-}
-
-/// Bartlett's weighted sum of autocovariances, from sums over sliding windows.
-struct Windows {
-    length: usize,
-    recent: VecDeque<Vec<f64>>,
-    sum: DVector<f64>,
-    outer: DMatrix<f64>,
-}
-
-impl Windows {
-    fn new(width: usize, length: usize) -> Self {
-        Self {
-            length,
-            recent: VecDeque::with_capacity(length),
-            sum: DVector::zeros(width),
-            outer: DMatrix::zeros(width, width),
-        }
-    }
-
-    fn push(&mut self, values: &[f64]) {
-        let mut slot = if self.recent.len() == self.length {
-            self.drop_oldest()
-        } else {
-            Vec::new()
-        };
-        for (sum, value) in self.sum.iter_mut().zip(values) {
-            *sum += value;
-        }
-        slot.clear();
-        slot.extend_from_slice(values);
-        self.recent.push_back(slot);
-        self.add_outer();
-    }
-
-    fn drop_oldest(&mut self) -> Vec<f64> {
-        let oldest = self.recent.pop_front().unwrap_or_default();
-        for (sum, value) in self.sum.iter_mut().zip(&oldest) {
-            *sum -= value;
-        }
-        oldest
-    }
-
-    fn add_outer(&mut self) {
-        self.outer
-            .syger(1.0 / self.length as f64, &self.sum, &self.sum, 1.0);
-    }
-
-    /// The windows that reach beyond the last sample count as well.
-    fn finish(mut self) -> DMatrix<f64> {
-        while self.recent.len() > 1 {
-            self.drop_oldest();
-            self.add_outer();
-        }
-        self.outer.fill_upper_triangle_with_lower_triangle();
-        self.outer
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -428,7 +271,7 @@ mod tests {
         regression.add_rows(&w, &y).unwrap();
         let solution = regression.solve().unwrap();
         let found: Result<Deviations, LeastSquaresError> =
-            autocorrelated(&solution, 1, |visit| visit(&w, &y));
+            autocorrelated_deviations(&solution, 1, |visit| visit(&w, &y));
         assert!(found.unwrap().std.iter().all(|std| std.is_nan()));
     }
 
@@ -449,7 +292,7 @@ mod tests {
                 regression.add_rows(&w, &y).unwrap();
                 let solution = regression.solve().unwrap();
                 let found: Result<Deviations, LeastSquaresError> =
-                    autocorrelated(&solution, 1, |visit| visit(&w, &y));
+                    autocorrelated_deviations(&solution, 1, |visit| visit(&w, &y));
                 let found = found.unwrap();
                 assert!(found.few_samples);
                 for j in 0..2 {
@@ -513,7 +356,8 @@ mod tests {
             let mut regression = LeastSquares::new(3);
             regression.add_rows(&w, &y).unwrap();
             let solution = regression.solve().unwrap();
-            let honest = autocorrelated(&solution, channels, |visit| visit(&w, &y)).unwrap();
+            let honest =
+                autocorrelated_deviations(&solution, channels, |visit| visit(&w, &y)).unwrap();
             for j in 0..3 {
                 let error = (solution.values[j] - truth[j]).abs();
                 hits.0[j] += f64::from(u8::from(error <= 2.0 * honest.std[j])) / f64::from(trials);
@@ -555,10 +399,11 @@ mod tests {
         let mut regression = LeastSquares::new(3);
         regression.add_rows(&w, &y).unwrap();
         let solution = regression.solve().unwrap();
-        let deviations = autocorrelated(&solution, 1, |visit| visit(&w, &y)).unwrap();
+        let deviations = autocorrelated_deviations(&solution, 1, |visit| visit(&w, &y)).unwrap();
         assert!(deviations.std[0].is_finite() && deviations.std[1].is_finite());
         assert!(deviations.std[2].is_infinite());
-        let other = autocorrelated(&solution, 1, |visit| visit(&w[..30], &y[..10])).unwrap_err();
+        let other =
+            autocorrelated_deviations(&solution, 1, |visit| visit(&w[..30], &y[..10])).unwrap_err();
         assert_eq!(
             other,
             LeastSquaresError::PassesDiffer {

@@ -12,7 +12,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::deviations::Deviations;
-use crate::estimate::least_squares::LeastSquaresError;
+use crate::estimate::error::LeastSquaresError;
 use crate::estimate::solution::Solution;
 use crate::estimate::triangle::Triangle;
 
@@ -266,7 +266,7 @@ fn log_gamma(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::deviations::autocorrelated;
+    use crate::estimate::deviations::autocorrelated_deviations;
     use crate::test_noise::Noise;
     use crate::{LeastSquares, LeastSquaresError};
 
@@ -316,7 +316,7 @@ mod tests {
             regression.add_rows(&w, &y).unwrap();
             let solution = regression.solve().unwrap();
             let deviations: Result<_, LeastSquaresError> =
-                autocorrelated(&solution, 1, |visit| visit(&w, &y));
+                autocorrelated_deviations(&solution, 1, |visit| visit(&w, &y));
             let triangle = Triangle::of(&regression);
             let found = essential(
                 &triangle,

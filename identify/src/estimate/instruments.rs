@@ -10,13 +10,15 @@
 //! CST 22 (2014), who make `Z` by simulating the closed loop, which needs its controller; P. C.
 //! Young, "Recursive Estimation and Time-Series Analysis" (2011), chapter 6.
 //!
-//! The stacked rows `[Z W y]` are reduced by reflections as in [`crate::estimate::least_squares`]; with
+//! The stacked rows `[Z W y]` are reduced by reflections as in [`LeastSquares`](crate::LeastSquares); with
 //! `Q'Z = R`, `Q'W = B` and `Q'y = b` the solution is `B^-1 b`, and no products of rows are formed.
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::estimate::deviations::{Deviations, Visit, from_influences};
-use crate::estimate::least_squares::{LeastSquares, LeastSquaresError, check_rows};
+use crate::estimate::deviations::{Deviations, from_influences};
+use crate::estimate::error::LeastSquaresError;
+use crate::estimate::least_squares::LeastSquares;
+use crate::estimate::rows::{Visit, check_rows};
 use crate::estimate::solution::Solution;
 
 /// Canonical correlations below this say nothing.

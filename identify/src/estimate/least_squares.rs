@@ -10,106 +10,12 @@
 //! factorizations", SIAM J. Sci. Comput. 34 (2012) for the sequential tall-skinny form;
 //! A. van der Sluis (1969) for scaling columns to equal norm.
 
-use std::fmt;
-
 use nalgebra::DMatrix;
 
+use crate::estimate::error::LeastSquaresError;
 use crate::estimate::reflections::{Block, LANES, fold};
+use crate::estimate::rows::{all_finite, check_rows, is_left_out};
 use crate::estimate::solution::{RowCount, Solution, solve_triangle};
-
-/// Why a regression cannot be set up or solved.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub enum LeastSquaresError {
-    /// The regressor has no columns.
-    NoParameters,
-    /// Rows and measured values do not fit together.
-    Shape {
-        /// Numbers of the regressor given.
-        regressor: usize,
-        /// Measured values given.
-        measured: usize,
-        /// Columns of the regressor.
-        columns: usize,
-    },
-    /// A block does not hold whole samples of all channels.
-    Channels {
-        /// Rows of the block.
-        rows: usize,
-        /// Rows per sample.
-        channels: usize,
-    },
-    /// A number of the regressor or of the measured values is NaN or infinite.
-    NotFinite {
-        /// Row among all that were given, from 0.
-        row: usize,
-        /// Column of the regressor; `None` for the measured value.
-        column: Option<usize>,
-    },
-    /// No rows were given.
-    NoRows,
-    /// The list of nominal values has another length than the parameters.
-    NominalLength {
-        /// Values given.
-        have: usize,
-        /// Parameters.
-        expected: usize,
-    },
-    /// The singular value iteration did not converge; only extreme numbers can cause it.
-    NoConvergence,
-    /// The instruments say too little about the regressor.
-    WeakInstruments {
-        /// The smallest canonical correlation between both.
-        correlation: f64,
-    },
-    /// The second pass over the rows did not show the rows of the first.
-    PassesDiffer {
-        /// Rows of the first pass.
-        first: usize,
-        /// Rows of this pass.
-        now: usize,
-    },
-}
-
-impl fmt::Display for LeastSquaresError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NoParameters => f.write_str("there is no parameter to identify; the regressor has no columns"),
-            Self::Shape { regressor, measured, columns } => write!(
-                f,
-                "{regressor} numbers of the regressor do not make {measured} rows of {columns} columns"
-            ),
-            Self::Channels { rows, channels } => {
-                write!(f, "{rows} rows are not whole samples of {channels} channels; give whole samples in each block")
-            }
-            Self::NotFinite { row, column: Some(column) } => write!(
-                f,
-                "column {column} of the regressor is not finite in row {row}; \
-                 is the mechanism out of reach or singular there?"
-            ),
-            Self::NotFinite { row, column: None } => write!(f, "the measured value of row {row} is not finite"),
-            Self::NoRows => f.write_str("there are no samples to identify from"),
-            Self::NominalLength { have, expected } => {
-                write!(f, "{have} nominal values were given for {expected} parameters")
-            }
-            Self::NoConvergence => f.write_str(
-                "the singular values do not converge; the numbers of the regressor differ too much in size",
-            ),
-            Self::WeakInstruments { correlation } => write!(
-                f,
-                "the instruments do not determine the parameters: the smallest canonical correlation between them and the \
-                 regressor is {correlation:.1e}; are they of the same motion, and in step with the recording? Does the \
-                 recording itself determine all parameters? Identify without instruments to see"
-            ),
-            Self::PassesDiffer { first, now } => write!(
-                f,
-                "the second pass showed {now} rows where the first showed {first}; show the same rows in all passes"
-            ),
-        }
-    }
-}
-
-impl std::error::Error for LeastSquaresError {}
 
 /// Numbers that are reduced together at most, so that they stay in the fastest caches.
 const BLOCK_NUMBERS: usize = 4096;
@@ -372,60 +278,6 @@ impl LeastSquares {
         }
         solve_triangle(&self.reduced(), self.row_count(), nominal)
     }
-}
-
-/// Whether a row was given the weight 0, or says nothing for another reason: its residual is no sample of any noise.
-pub(crate) fn is_left_out(row: &[f64], measured: f64) -> bool {
-    measured == 0.0 && row.iter().all(|w| *w == 0.0)
-}
-
-/// Checks one block of rows; `before` rows came earlier.
-pub(crate) fn check_rows(
-    regressor: &[f64],
-    measured: &[f64],
-    columns: usize,
-    before: usize,
-) -> Result<(), LeastSquaresError> {
-    if columns == 0 {
-        return Err(LeastSquaresError::NoParameters);
-    }
-    if regressor.len() != measured.len() * columns {
-        return Err(LeastSquaresError::Shape {
-            regressor: regressor.len(),
-            measured: measured.len(),
-            columns,
-        });
-    }
-    if !all_finite(regressor)
-        && let Some(i) = regressor.iter().position(|value| !value.is_finite())
-    {
-        return Err(LeastSquaresError::NotFinite {
-            row: before + i / columns,
-            column: Some(i % columns),
-        });
-    }
-    if !all_finite(measured)
-        && let Some(i) = measured.iter().position(|value| !value.is_finite())
-    {
-        return Err(LeastSquaresError::NotFinite {
-            row: before + i,
-            column: None,
-        });
-    }
-    Ok(())
-}
-
-/// Whether all numbers are finite; a sum is not when a summand is not. Independent sums go at the speed of memory.
-fn all_finite(values: &[f64]) -> bool {
-    let mut sums = [0.0; 8];
-    let eights = values.chunks_exact(8);
-    let rest: f64 = eights.remainder().iter().sum();
-    for eight in eights {
-        for lane in 0..8 {
-            sums[lane] += 0.0 * eight[lane];
-        }
-    }
-    (sums.iter().sum::<f64>() + 0.0 * rest).is_finite()
 }
 
 #[cfg(test)]

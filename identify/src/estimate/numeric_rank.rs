@@ -8,11 +8,11 @@
 use nalgebra::{ColPivQR, DMatrix};
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::least_squares::LeastSquaresError;
+use crate::estimate::error::LeastSquaresError;
 
 /// Rank of a regressor by its singular values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct NumericRank {
+pub struct RegressorRank {
     /// Singular values of the regressor with all columns scaled to norm 1, largest first;
     /// columns that are zero throughout add zeros.
     pub singular_values: Vec<f64>,
@@ -54,12 +54,12 @@ pub struct Dependency {
 /// The rank is where the singular values of the scaled columns fall by the largest ratio; values
 /// below the level of rounding, `max(rows, columns) * epsilon * largest`, are taken as being at it.
 /// Fails when an entry is not finite or there are no columns.
-pub fn numeric_rank(w: &DMatrix<f64>) -> Result<NumericRank, LeastSquaresError> {
+pub fn numeric_rank(w: &DMatrix<f64>) -> Result<RegressorRank, LeastSquaresError> {
     let (scaled, _) = scale(w)?;
     let singular_values = singular_values(&scaled)?;
     let largest = singular_values[0];
     if largest == 0.0 {
-        return Ok(NumericRank {
+        return Ok(RegressorRank {
             singular_values,
             rank: 0,
             gap: f64::INFINITY,
@@ -78,7 +78,7 @@ pub fn numeric_rank(w: &DMatrix<f64>) -> Result<NumericRank, LeastSquaresError> 
     }
     let (rank, gap) = best;
     let plain = self::singular_values(w)?;
-    Ok(NumericRank {
+    Ok(RegressorRank {
         scaled_condition_number: largest / singular_values[rank - 1],
         condition_number: plain[0] / plain[rank - 1],
         singular_values,

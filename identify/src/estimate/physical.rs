@@ -19,73 +19,25 @@
 //! what the recording does not. The minimum is found by Gauss's and Newton's steps, damped after
 //! Levenberg and Marquardt and shortened to stay inside, with `g` falling from where both terms weigh alike.
 
-use std::fmt;
-
 use nalgebra::{DMatrix, DVector};
 
+use crate::estimate::body_matrices::{BodyMatrix, Reference};
 use crate::estimate::deviations::Deviations;
+use crate::estimate::divergence::{BaseMap, Misfit, step_scales};
+use crate::estimate::error::PhysicalError;
 use crate::estimate::prior::inflation;
 use crate::estimate::solution::Solution;
 use crate::estimate::triangle::Triangle;
 
-/// A matrix as a function of the physical parameters.
-pub type MatrixMap<'a> = Box<dyn Fn(&[f64]) -> DMatrix<f64> + 'a>;
-
-/// What must be positive definite for a body to be possible, as a function of the physical parameters.
-pub struct Body<'a> {
-    /// Its name for people.
-    pub name: String,
-    /// A symmetric matrix of fixed size; a mass or an inertia alone is one number.
-    pub matrix: MatrixMap<'a>,
-    /// How often the matrix holds each of its numbers: 2 for [`planar`], else 1.
-    pub copies: f64,
-}
-
-/// The base parameters for given physical parameters with their derivatives (rows: base parameters), in the order of the
-/// regressor's columns.
-pub type BaseMap<'a> = dyn Fn(&[f64]) -> (DVector<f64>, DMatrix<f64>) + 'a;
-
 /// Weight of the nominal values in the end; see the module.
 pub const NOMINAL_WEIGHT: f64 = 0.01;
-
-/// Why no possible parameters were found.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub enum PhysicalError {
-    /// A body is not possible with its nominal values, so that nothing can be near to them.
-    NominalImpossible {
-        /// The body.
-        body: String,
-        /// What is wrong with it.
-        why: String,
-    },
-    /// The iteration did not settle; only extreme numbers can cause it.
-    NoConvergence,
-}
-
-impl fmt::Display for PhysicalError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NominalImpossible { body, why } => write!(
-                f,
-                "the nominal values of {body} are those of no body: {why}; give nominal values that a body can have, as a \
-                 CAD system prints them"
-            ),
-            Self::NoConvergence => {
-                f.write_str("the search for physical parameters did not settle; are the nominal values of the right size?")
-            }
-        }
-    }
-}
-
-impl std::error::Error for PhysicalError {}
 
 /// Directions below this share of the largest singular value are told by rounding only.
 const WITHIN_SPAN: f64 = 1e-10;
 
 /// Physical parameters that are possible.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Physical {
+pub struct PhysicalParameters {
     /// All physical parameters.
     pub parameters: Vec<f64>,
     /// Their standard deviations if nominal values may be off by their own size (`g = 1`).
@@ -108,59 +60,16 @@ pub struct Physical {
     pub iterations: usize,
 }
 
-/// The pseudo-inertia of a body in space from mass, first moment (kg m) and inertia about the origin (xx, xy, xz, yy, yz,
-/// zz).
-pub fn pseudo_inertia(mass: f64, moment: [f64; 3], inertia: [f64; 6]) -> DMatrix<f64> {
-    let [xx, xy, xz, yy, yz, zz] = inertia;
-    let half = 0.5 * (xx + yy + zz);
-    let [x, y, z] = moment;
-    DMatrix::from_row_slice(
-        4,
-        4,
-        &[
-            half - xx,
-            -xy,
-            -xz,
-            x,
-            -xy,
-            half - yy,
-            -yz,
-            y,
-            -xz,
-            -yz,
-            half - zz,
-            z,
-            x,
-            y,
-            z,
-            mass,
-        ],
-    )
-}
-
-/// The same for a body that is only seen turning about one axis: positive definite exactly if the mass is positive and so
-/// is the inertia about the axis through the centre. Every number stands in it twice.
-pub fn planar(mass: f64, moment: [f64; 2], inertia: f64) -> DMatrix<f64> {
-    let [x, y] = moment;
-    DMatrix::from_row_slice(
-        4,
-        4,
-        &[
-            inertia, 0.0, x, y, 0.0, inertia, -y, x, x, -y, mass, 0.0, y, x, 0.0, mass,
-        ],
-    )
-}
-
 /// Possible physical parameters that fit the rows of `triangle`, whose solution and deviations are given, nearest to
 /// `nominal`, at which every body must be possible.
-pub fn physical(
+pub fn physical_parameters(
     triangle: &Triangle,
     solution: &Solution,
     deviations: &Deviations,
     nominal: &[f64],
     base: &BaseMap<'_>,
-    bodies: &[Body<'_>],
-) -> Result<Physical, PhysicalError> {
+    bodies: &[BodyMatrix<'_>],
+) -> Result<PhysicalParameters, PhysicalError> {
     let noise = (solution.residual_variance() * inflation(solution, deviations)).sqrt();
     let least = 1e-7 * solution.measured_norm / (solution.rows.max(1) as f64).sqrt();
     let noise = if noise > least {
@@ -170,9 +79,9 @@ pub fn physical(
     };
     let references = bodies
         .iter()
-        .map(|body| Reference::of(body, nominal))
+        .map(|body| Reference::new(body, nominal))
         .collect::<Result<Vec<_>, _>>()?;
-    let problem = Problem {
+    let problem = Misfit {
         r: triangle.r() / noise,
         right: triangle.right() / noise,
         base,
@@ -196,7 +105,7 @@ pub fn physical(
     let spread = &slopes * &inverse * slopes.transpose();
     let misfit = triangle.right() - triangle.r() * &p;
     let n = nominal.len();
-    Ok(Physical {
+    Ok(PhysicalParameters {
         std: (0..n).map(|i| inverse[(i, i)].max(0.0).sqrt()).collect(),
         from_recording: (0..n)
             .map(|i| {
@@ -251,221 +160,6 @@ fn told_alone(rows: &DMatrix<f64>) -> Vec<bool> {
     within.iter().map(|share| *share > 1.0 - 1e-6).collect()
 }
 
-/// The nominal matrix of a body, by its inverse root.
-struct Reference {
-    /// `L^-1` of `P0 = L L'`.
-    root_inverse: DMatrix<f64>,
-    copies: f64,
-}
-
-impl Reference {
-    fn of(body: &Body<'_>, nominal: &[f64]) -> Result<Self, PhysicalError> {
-        let matrix = (body.matrix)(nominal);
-        let n = matrix.nrows();
-        let impossible = || PhysicalError::NominalImpossible {
-            body: body.name.clone(),
-            why: why_impossible(&matrix),
-        };
-        let cholesky = matrix.clone().cholesky().ok_or_else(impossible)?;
-        let root_inverse = cholesky
-            .l()
-            .solve_lower_triangular(&DMatrix::identity(n, n))
-            .filter(|inverse| inverse.iter().all(|x| x.is_finite()))
-            .ok_or_else(impossible)?;
-        let copies = body.copies;
-        Ok(Self {
-            root_inverse,
-            copies,
-        })
-    }
-
-    /// `L^-1 P L'^-1`, the identity at the nominal values.
-    fn relative(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
-        let relative = &self.root_inverse * matrix * self.root_inverse.transpose();
-        0.5 * (&relative + relative.transpose())
-    }
-
-    fn margin(&self, matrix: &DMatrix<f64>) -> f64 {
-        self.relative(matrix).symmetric_eigenvalues().min()
-    }
-}
-
-fn why_impossible(matrix: &DMatrix<f64>) -> String {
-    let n = matrix.nrows();
-    if n == 1 {
-        return format!("{} is not positive", matrix[(0, 0)]);
-    }
-    let mass = matrix[(n - 1, n - 1)];
-    if mass.is_nan() || mass <= 0.0 {
-        return format!("its mass {mass} kg is not positive");
-    }
-    "its inertia about the centre of mass is not that of any distribution of mass (principal moments must be positive, and \
-     each at most the sum of the other two)"
-        .to_owned()
-}
-
-/// Steps for differences: matrices are polynomials of low degree, so that central differences are nearly exact.
-fn step_scales(nominal: &[f64]) -> Vec<f64> {
-    nominal
-        .iter()
-        .map(|x| 1e-4 * if *x == 0.0 { 1.0 } else { x.abs() })
-        .collect()
-}
-
-struct Problem<'a> {
-    /// In units of the noise.
-    r: DMatrix<f64>,
-    right: DVector<f64>,
-    base: &'a BaseMap<'a>,
-    bodies: &'a [Body<'a>],
-    references: Vec<Reference>,
-    scales: Vec<f64>,
-}
-
-/// Value and derivatives at a point.
-struct Point {
-    value: f64,
-    gradient: DVector<f64>,
-    /// Second derivatives by the recording (Gauss and Newton) and by the divergence.
-    data: DMatrix<f64>,
-    prior: DMatrix<f64>,
-}
-
-impl Problem<'_> {
-    /// The value; none outside.
-    fn value(&self, x: &DVector<f64>, weight: f64) -> Option<f64> {
-        let (p, _) = (self.base)(x.as_slice());
-        let mut value = 0.5 * (&self.r * p - &self.right).norm_squared();
-        for (body, reference) in self.bodies.iter().zip(&self.references) {
-            let relative = reference.relative(&(body.matrix)(x.as_slice()));
-            let trace = relative.trace();
-            let n = relative.nrows() as f64;
-            let cholesky = relative.cholesky()?;
-            let log_det: f64 = cholesky
-                .l_dirty()
-                .diagonal()
-                .iter()
-                .map(|d| 2.0 * d.ln())
-                .sum();
-            value += weight * (trace - log_det - n) / reference.copies;
-        }
-        value.is_finite().then_some(value)
-    }
-
-    fn at(&self, x: &DVector<f64>, weight: f64) -> Option<Point> {
-        let n = x.len();
-        let (p, jacobian) = (self.base)(x.as_slice());
-        let residual = &self.r * p - &self.right;
-        let slope = &self.r * jacobian;
-        let mut gradient = slope.transpose() * &residual;
-        let data = slope.transpose() * slope;
-        let mut prior = DMatrix::zeros(n, n);
-        for (body, reference) in self.bodies.iter().zip(&self.references) {
-            let relative = reference.relative(&(body.matrix)(x.as_slice()));
-            let inverse = relative.cholesky()?.inverse();
-            let mut moved = x.clone();
-            // Derivatives of the relative matrix, only by what it depends on.
-            let mut slopes: Vec<(usize, DMatrix<f64>)> = Vec::new();
-            for i in 0..n {
-                let h = self.scales[i];
-                moved[i] = x[i] + h;
-                let up = (body.matrix)(moved.as_slice());
-                moved[i] = x[i] - h;
-                let down = (body.matrix)(moved.as_slice());
-                moved[i] = x[i];
-                let slope = (up - down) / (2.0 * h);
-                if slope.iter().any(|x| *x != 0.0) {
-                    slopes.push((i, reference.relative(&slope)));
-                }
-            }
-            let factor = weight / reference.copies;
-            let turned: Vec<DMatrix<f64>> =
-                slopes.iter().map(|(_, slope)| &inverse * slope).collect();
-            for (k, (i, slope)) in slopes.iter().enumerate() {
-                gradient[*i] += factor * (slope.trace() - turned[k].trace());
-                for (l, (j, _)) in slopes.iter().enumerate().take(k + 1) {
-                    let second = factor * turned[k].dot(&turned[l].transpose());
-                    prior[(*i, *j)] += second;
-                    if i != j {
-                        prior[(*j, *i)] += second;
-                    }
-                }
-            }
-        }
-        Some(Point {
-            value: self.value(x, weight)?,
-            gradient,
-            data,
-            prior,
-        })
-    }
-
-    /// Levenberg and Marquardt, with steps that stay where all bodies are possible.
-    fn minimise(&self, x: &mut DVector<f64>, weight: f64) -> Result<usize, PhysicalError> {
-        let mut damping = 1e-9;
-        for iteration in 0..500 {
-            let point = self.at(x, weight).ok_or(PhysicalError::NoConvergence)?;
-            let second = &point.data + &point.prior;
-            let mut moved = false;
-            while !moved && damping < 1e9 {
-                let mut damped = second.clone();
-                for i in 0..x.len() {
-                    // What nothing depends on stays where it is.
-                    damped[(i, i)] += damping * second[(i, i)];
-                    if damped[(i, i)] == 0.0 {
-                        damped[(i, i)] = 1.0;
-                    }
-                }
-                let step = solve_scaled(&damped, &point.gradient).map(|step| -step);
-                let Some(step) = step else {
-                    damping *= 100.0;
-                    continue;
-                };
-                let slope = point.gradient.dot(&step);
-                // Far below what shows: a unit is half a squared standard deviation.
-                if -slope <= 1e-8 * (1.0 + point.value.abs().min(1e4)) {
-                    return Ok(iteration);
-                }
-                let mut length = 1.0;
-                while length > 1e-6 {
-                    let next = &*x + length * &step;
-                    if self
-                        .value(&next, weight)
-                        .is_some_and(|v| v <= point.value + 1e-4 * length * slope)
-                    {
-                        *x = next;
-                        moved = true;
-                        break;
-                    }
-                    length *= 0.5;
-                }
-                damping = if length < 0.1 {
-                    damping * 100.0
-                } else {
-                    (damping * 0.01).max(1e-9)
-                };
-            }
-            // Rounding hides what is left of the slope.
-            if !moved {
-                return Ok(iteration);
-            }
-        }
-        Err(PhysicalError::NoConvergence)
-    }
-}
-
-/// Solves a positive definite system after scaling its diagonal to 1, since parameters differ in units.
-fn solve_scaled(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let scale = matrix
-        .diagonal()
-        .map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 });
-    let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
-        scale[i] * matrix[(i, j)] * scale[j]
-    });
-    let solved = scaled.cholesky()?.solve(&right.component_mul(&scale));
-    Some(solved.component_mul(&scale))
-}
-
 /// Inverse of a symmetric matrix where it has one; nothing is known along the rest, which is left away.
 fn invert(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let n = matrix.nrows();
@@ -487,7 +181,8 @@ fn invert(matrix: &DMatrix<f64>) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::deviations::autocorrelated;
+    use crate::estimate::deviations::autocorrelated_deviations;
+    use crate::estimate::{planar_pseudo_inertia, pseudo_inertia};
     use crate::test_noise::Noise;
     use crate::{LeastSquares, LeastSquaresError};
 
@@ -564,9 +259,9 @@ mod tests {
         }
     }
 
-    fn bodies() -> Vec<Body<'static>> {
+    fn bodies() -> Vec<BodyMatrix<'static>> {
         (0..2)
-            .map(|k| Body {
+            .map(|k| BodyMatrix {
                 name: format!("body {k}"),
                 matrix: Box::new(move |x: &[f64]| matrix_of(&x[10 * k..10 * k + 10])),
                 copies: 1.0,
@@ -577,7 +272,7 @@ mod tests {
     fn solved(case: &Case) -> (Triangle, Solution, Deviations) {
         let solution = case.regression.solve().unwrap();
         let deviations: Result<Deviations, LeastSquaresError> =
-            autocorrelated(&solution, 1, |visit| visit(&case.w, &case.y));
+            autocorrelated_deviations(&solution, 1, |visit| visit(&case.w, &case.y));
         (
             Triangle::of(&case.regression),
             solution,
@@ -585,10 +280,10 @@ mod tests {
         )
     }
 
-    fn find(case: &Case) -> Physical {
+    fn find(case: &Case) -> PhysicalParameters {
         let (triangle, solution, deviations) = solved(case);
         let base = |x: &[f64]| (&case.map * DVector::from_column_slice(x), case.map.clone());
-        physical(
+        physical_parameters(
             &triangle,
             &solution,
             &deviations,
@@ -631,7 +326,7 @@ mod tests {
         let noise = (solution.residual_variance() * inflation(&solution, &deviations)).sqrt();
         let references: Vec<Reference> = bodies()
             .iter()
-            .map(|body| Reference::of(body, &case.nominal).unwrap())
+            .map(|body| Reference::new(body, &case.nominal).unwrap())
             .collect();
         let objective = |x: &[f64]| -> f64 {
             let misfit = (triangle.r() * (&case.map * DVector::from_column_slice(x))
@@ -712,19 +407,27 @@ mod tests {
 
     #[test]
     fn planar_bodies_need_inertia_about_their_centre() {
-        assert!(planar(2.0, [0.6, 0.8], 0.51).cholesky().is_some());
-        assert!(planar(2.0, [0.6, 0.8], 0.49).cholesky().is_none());
-        let body = Body {
+        assert!(
+            planar_pseudo_inertia(2.0, [0.6, 0.8], 0.51)
+                .cholesky()
+                .is_some()
+        );
+        assert!(
+            planar_pseudo_inertia(2.0, [0.6, 0.8], 0.49)
+                .cholesky()
+                .is_none()
+        );
+        let body = BodyMatrix {
             name: "link".to_owned(),
-            matrix: Box::new(|x: &[f64]| planar(x[0], [x[1], 0.0], x[2])),
+            matrix: Box::new(|x: &[f64]| planar_pseudo_inertia(x[0], [x[1], 0.0], x[2])),
             copies: 2.0,
         };
-        let error = Reference::of(&body, &[2.0, 1.0, 0.4]).err().unwrap();
+        let error = Reference::new(&body, &[2.0, 1.0, 0.4]).err().unwrap();
         assert!(
             error.to_string().contains("link") && error.to_string().contains("inertia"),
             "{error}"
         );
-        let error = Reference::of(&body, &[0.0, 0.0, 0.4]).err().unwrap();
+        let error = Reference::new(&body, &[0.0, 0.0, 0.4]).err().unwrap();
         assert!(error.to_string().contains("mass"), "{error}");
     }
 }

@@ -10,7 +10,7 @@
 use nalgebra::DMatrix;
 
 use crate::estimate::deviations::Deviations;
-use crate::estimate::least_squares::LeastSquaresError;
+use crate::estimate::error::LeastSquaresError;
 use crate::estimate::solution::Solution;
 use crate::estimate::triangle::Triangle;
 

@@ -1,5 +1,5 @@
 //! Householder reflections of a block of rows into an upper triangle, in the widest vectors of the processor that runs
-//! it: the inner loop of [`crate::estimate::least_squares`].
+//! it: the inner loop of [`LeastSquares`](crate::LeastSquares).
 
 use pulp::{Arch, Simd, WithSimd};
 

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::estimate::least_squares::{LeastSquares, LeastSquaresError};
+use crate::estimate::error::LeastSquaresError;
+use crate::estimate::least_squares::LeastSquares;
 use crate::estimate::solution::{RowCount, Solution, solve_triangle};
 
 /// The upper triangle `[R, Q'y; 0, +-|residual|]` of some rows: all that they say about the parameters.

@@ -2,6 +2,8 @@
 
 use nalgebra::DMatrix;
 
+use crate::words::with_digits;
+
 /// A change of the parameters that changes no row of the regressor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Direction {
@@ -23,7 +25,7 @@ impl Direction {
                     .iter()
                     .map(|(i, change)| {
                         let sign = if *change < 0.0 { '-' } else { '+' };
-                        format!("{} {sign} {}", name(*i), short(change.abs()))
+                        format!("{} {sign} {}", name(*i), with_digits(change.abs(), 4))
                     })
                     .collect();
                 format!(
@@ -34,14 +36,6 @@ impl Direction {
             }
         }
     }
-}
-
-/// Four significant digits without trailing zeros.
-fn short(value: f64) -> String {
-    let scientific = format!("{value:.3e}");
-    scientific
-        .parse::<f64>()
-        .map_or(scientific, |rounded| format!("{rounded}"))
 }
 
 /// Entries of unit null vectors below this are rounding.

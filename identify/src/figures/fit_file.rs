@@ -8,11 +8,10 @@ use indexmap::IndexMap;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::deviations::Deviations;
-use crate::estimate::solution::Solution;
+use crate::estimate::{Deviations, Solution};
 use crate::figures::Figures;
-use crate::recording::error::list;
-use crate::recording::notes::{Note, nearest};
+use crate::recording::Note;
+use crate::words::{list, nearest};
 
 /// A base parameter as the model describes it.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,6 +9,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::words::with_digits;
+
 /// A region that holds more of a channel's squared error than its share of the samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Region {
@@ -55,15 +57,15 @@ impl Default for LocateOptions {
 const PARTS: usize = 4;
 
 /// Name of the variable that is time; recurrence cannot be asked of it.
-pub const TIME: &str = "t";
+pub const TIME_COLUMN: &str = "t";
 
 /// Regions of concentrated error. `errors` are `(channel, measured - model per sample)` in order
-/// of time, `variables` are `(name, value per sample)`; time is called [`TIME`].
+/// of time, `variables` are `(name, value per sample)`; time is called [`TIME_COLUMN`].
 /// Columns of another length than the channel's are passed over, as are samples that are not
 /// finite.
 ///
 /// ```
-/// use modelmill_identify::locate::{locate, LocateOptions};
+/// use modelmill_identify::{locate, LocateOptions};
 /// let rate: Vec<f64> = (0..1000).map(|i| (f64::from(i) * 0.1).sin()).collect();
 /// let error: Vec<f64> = rate.iter().map(|v| if *v > 0.9 { 1.0 } else { 0.1 }).collect();
 /// let regions = locate(&[("left", &error)], &[("left_d", &rate)], &LocateOptions::default());
@@ -143,7 +145,7 @@ fn densest(
         }
     }
     let counts = share - samples >= options.excess && share >= options.density * samples;
-    if !counts || (name != TIME && !recurs(squares, values, range, options.density)) {
+    if !counts || (name != TIME_COLUMN && !recurs(squares, values, range, options.density)) {
         return None;
     }
     let around = if range[0] < 0.0 && range[0].to_bits() == (-range[1]).to_bits() {
@@ -155,8 +157,8 @@ fn densest(
         "{:.0} % of the squared error of {channel} lies where {name} is between {} and {}{around}, \
          in {:.0} % of the samples",
         100.0 * share,
-        short(range[0]),
-        short(range[1]),
+        with_digits(range[0], 3),
+        with_digits(range[1], 3),
         100.0 * samples,
     );
     Some(Region {
@@ -234,13 +236,6 @@ fn recurs(squares: &[f64], values: &[f64], range: [f64; 2], density: f64) -> boo
     visited >= 2 && 4 * dense >= 3 * visited
 }
 
-/// Three significant digits.
-fn short(value: f64) -> String {
-    format!("{value:.2e}")
-        .parse::<f64>()
-        .map_or_else(|_| value.to_string(), |rounded| rounded.to_string())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -276,7 +271,7 @@ mod tests {
             .collect();
         let regions = locate(
             &[("left", &error)],
-            &[(TIME, &time), ("q", &angle), ("q_d", &rate)],
+            &[(TIME_COLUMN, &time), ("q", &angle), ("q_d", &rate)],
             &LocateOptions::default(),
         );
         let first = &regions[0];
@@ -302,11 +297,11 @@ mod tests {
             .collect();
         let regions = locate(
             &[("left", &error)],
-            &[(TIME, &time), ("q", &angle), ("q_d", &rate)],
+            &[(TIME_COLUMN, &time), ("q", &angle), ("q_d", &rate)],
             &LocateOptions::default(),
         );
         assert_eq!(regions.len(), 1, "{regions:?}");
-        assert_eq!(regions[0].variable, TIME);
+        assert_eq!(regions[0].variable, TIME_COLUMN);
         assert!(regions[0].range[0] > 4.7 && regions[0].range[1] < 5.9);
     }
 
@@ -318,7 +313,7 @@ mod tests {
             let error: Vec<f64> = time.iter().map(|_| noise.normal()).collect();
             let regions = locate(
                 &[("left", &error)],
-                &[(TIME, &time), ("q", &angle), ("q_d", &rate)],
+                &[(TIME_COLUMN, &time), ("q", &angle), ("q_d", &rate)],
                 &LocateOptions::default(),
             );
             assert!(regions.is_empty(), "{regions:?}");

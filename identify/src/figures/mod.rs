@@ -6,13 +6,18 @@
 //! peaks where the measured force passes through zero are the reason to read `nrms` beside it.
 //! `abs_ratio` is `sum |error| / sum |measured|`, as Volkmann et al. (IEEE ICMA 2020) give it.
 
-pub mod fit_file;
-pub mod locate;
+mod fit_file;
+mod locate;
 
 use std::fmt;
 
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
+
+pub use fit_file::{
+    FitFault, FitFile, FitFileError, FitParameter, ParameterInfo, Status, fit_parameters,
+};
+pub use locate::{LocateOptions, Region, TIME_COLUMN, locate};
 
 /// Error figures of a comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -96,7 +101,7 @@ impl std::error::Error for FiguresError {}
 /// Takes samples block by block; its memory does not depend on their number.
 ///
 /// ```
-/// use modelmill_identify::figures::Comparison;
+/// use modelmill_identify::Comparison;
 /// let mut comparison = Comparison::new(["left".to_owned(), "right".to_owned()]);
 /// comparison.add(&[3.0, 4.0], &[3.0, 5.0])?;
 /// let figures = comparison.finish()?;

@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector};
 use num_rational::BigRational;
 use num_traits::Zero;
 
-use crate::estimate::undetermined::{Direction, null_directions};
+use crate::estimate::{Direction, null_directions};
 
 pub use modelmill_algebra::polynomial::{Polynomial, exact};
 

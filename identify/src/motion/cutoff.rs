@@ -7,8 +7,7 @@
 
 use std::f64::consts::{LN_10, PI, TAU};
 
-use crate::audit::columns::median;
-use crate::motion::spectrum::hann_power;
+use crate::signal::{count, hann_power, median};
 
 /// A band of the spectrum holds motion where its power is above so many times the noise.
 /// Within the narrowest bands chance reaches that about once in a thousand.
@@ -24,11 +23,11 @@ const STEPS: u32 = 128;
 
 /// A signal that is differentiated to accelerations.
 #[derive(Debug, Clone, Copy)]
-pub struct Signal<'a> {
+pub(crate) struct Signal<'a> {
     /// Its samples, evenly spaced.
-    pub values: &'a [f64],
+    pub(crate) values: &'a [f64],
     /// How often: twice for positions, once for rates.
-    pub times: u8,
+    pub(crate) times: u8,
 }
 
 /// The cut-off, Hz, that promises nearly the smallest error of the accelerations of all signals together, each relative
@@ -44,7 +43,7 @@ pub struct Signal<'a> {
 /// A low cut-off loses more samples at the ends, so the highest one is returned whose expected error is within a quarter
 /// of the smallest, or below 0.03 % of the acceleration; never above a fifth of the sampling rate, where central
 /// differences take more than the filter leaves.
-pub fn choose_cutoff(signals: &[Signal<'_>], rate_hz: f64, order: usize) -> Option<f64> {
+pub(crate) fn choose_cutoff(signals: &[Signal<'_>], rate_hz: f64, order: usize) -> Option<f64> {
     let samples = signals.first()?.values.len();
     if samples < 32 || !(rate_hz > 0.0 && rate_hz.is_finite()) {
         return None;
@@ -130,7 +129,7 @@ impl Spectrum {
         let narrowest = (8 * bins).div_ceil(differences.len());
         let mut start = 1;
         while start < bins {
-            let width = crate::motion::periods::count(BAND * start as f64).max(narrowest);
+            let width = count(BAND * start as f64).max(narrowest);
             let end = (start + width).min(bins);
             let band: f64 = (start..end).map(|k| power[k] / shape(k)).sum();
             if band > ABOVE_NOISE * noise * (end - start) as f64 {
@@ -176,7 +175,7 @@ impl Spectrum {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::derivatives::prepare;
+    use crate::motion::derivatives::filter_and_differentiate;
     use crate::test_noise::Noise;
 
     fn twice(values: &[f64]) -> Signal<'_> {
@@ -216,7 +215,9 @@ mod tests {
                 })
                 .collect();
             let error = |cutoff: f64| {
-                let qdd = prepare(&time, &positions, cutoff, 4).unwrap().qdd;
+                let qdd = filter_and_differentiate(&time, &positions, cutoff, 4)
+                    .unwrap()
+                    .qdd;
                 let inner = 400..3245;
                 (inner
                     .clone()

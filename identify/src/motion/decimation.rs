@@ -1,6 +1,6 @@
 //! Fewer samples of the same motion: the parallel filter of identification, on regressors and forces alike.
 
-use crate::motion::filters::{FilterError, LowPass};
+use crate::signal::{FilterError, LowPass};
 
 /// Columns that are filtered side by side.
 const LANES: usize = 8;
@@ -18,7 +18,7 @@ fn anti_alias(factor: usize) -> Result<LowPass, FilterError> {
 ///
 /// ```
 /// let ramp: Vec<f64> = (0..200).map(f64::from).collect();
-/// let short = modelmill_identify::decimation::decimate(&ramp, 10)?;
+/// let short = modelmill_identify::decimate(&ramp, 10)?;
 /// assert_eq!(short.len(), 20);
 /// # Ok::<(), modelmill_identify::FilterError>(())
 /// ```

@@ -63,7 +63,7 @@ fn stencil(time: &[f64], at: f64) -> (usize, [f64; 4]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::run::PreparedAs;
+    use crate::motion::prepared_as::PreparedAs;
 
     /// Uneven samples of cubics, with the time itself as the force.
     fn run(n: u32) -> Run {

@@ -6,28 +6,28 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::motion::derivatives::Prepared;
-use crate::motion::periods::count;
+use crate::motion::derivatives::Smoothed;
+use crate::signal::count;
 
 /// Degree of the polynomials: the lowest whose second derivative is smooth to second order.
-pub const DEGREE: usize = 4;
+pub(crate) const DEGREE: usize = 4;
 const TERMS: usize = DEGREE + 1;
 
 /// Samples to either side of the window whose cut-off is `cutoff_hz`, at `rate_hz` samples per second;
 /// Schafer's eq. (12), never less than a fit needs.
-pub fn half_width(cutoff_hz: f64, rate_hz: f64) -> usize {
+pub(crate) fn half_width(cutoff_hz: f64, rate_hz: f64) -> usize {
     let width = (TERMS as f64 * 0.5 * rate_hz / cutoff_hz + 4.6) / 3.2;
     count(width.round()).max(DEGREE)
 }
 
 /// Smoothed positions with both derivatives from windows of `2 half_width + 1` samples; `None` if there are fewer.
-pub fn smooth(time: &[f64], positions: &[f64], half_width: usize) -> Option<Prepared> {
+pub(crate) fn smooth(time: &[f64], positions: &[f64], half_width: usize) -> Option<Smoothed> {
     let n = time.len();
     let width = 2 * half_width + 1;
     if n < width || width <= TERMS {
         return None;
     }
-    let mut prepared = Prepared {
+    let mut prepared = Smoothed {
         q: Vec::with_capacity(n),
         qd: Vec::with_capacity(n),
         qdd: Vec::with_capacity(n),

@@ -1,15 +1,23 @@
-//! From recorded columns to states: positions go in; smooth positions, rates and accelerations come out, as a
-//! [`Run`](run::Run) with its forces.
+//! From recorded columns to states: positions go in; smooth positions, rates and accelerations come out, as a [`Run`] with
+//! its forces.
 
-pub mod cutoff;
-pub mod decimation;
+mod cutoff;
+mod decimation;
 mod delay;
-pub mod derivatives;
-pub mod filters;
-pub mod local_polynomials;
-pub mod periods;
-pub(crate) mod prepare;
-pub(crate) mod run;
-pub mod series;
-pub(crate) mod smoothing;
-mod spectrum;
+mod derivatives;
+mod local_polynomials;
+mod options;
+mod periods;
+mod prepare;
+mod prepared_as;
+mod remarks;
+mod run;
+mod series;
+mod smooth;
+
+pub use decimation::{decimate, decimate_columns, decimate_table, decimate_time};
+pub use derivatives::{Smoothed, differentiate, filter_and_differentiate};
+pub use options::{DerivativeSource, Preparation, Smoothing};
+pub use periods::Repeats;
+pub use prepared_as::PreparedAs;
+pub use run::Run;

@@ -7,7 +7,7 @@
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use crate::audit::columns::median;
+use crate::signal::{count, median};
 
 /// Points of the coarse search for a period.
 const GRID: usize = 2048;
@@ -33,7 +33,7 @@ pub struct Repeats {
 
 /// The shortest period after which all positions are where they were, s; `None` if there is none of which the run holds
 /// two, the last of which ends a step after the last sample. Positions that do not move say nothing.
-pub fn find_period(time: &[f64], positions: &[&[f64]]) -> Option<f64> {
+pub(crate) fn find_period(time: &[f64], positions: &[&[f64]]) -> Option<f64> {
     let moving: Vec<(&[f64], f64)> = positions
         .iter()
         .map(|q| (*q, variance(q)))
@@ -125,7 +125,7 @@ fn refine(time: &[f64], moving: &[(&[f64], f64)], period: f64, step: f64) -> (f6
 }
 
 /// The spread of forces over the periods of a run; `None` where it holds fewer than two, or no force.
-pub fn repeats(
+pub(crate) fn repeats(
     time: &[f64],
     period: f64,
     names: &[String],
@@ -188,16 +188,6 @@ pub fn repeats(
             .filter_map(|(name, sums)| Some((name, ratio(sums)?)))
             .collect(),
     })
-}
-
-/// A count that was computed as a float, rounded down; what is negative counts as none.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a float becomes the nearest count there is"
-)]
-pub(crate) fn count(value: f64) -> usize {
-    value as usize
 }
 
 fn variance(values: &[f64]) -> f64 {

@@ -1,16 +1,15 @@
 //! Which way of smoothing suits a recording, and states by it: columns go in, positions with both derivatives come out.
 
 use crate::motion::cutoff::{LONGEST_TRIM, Signal, TRIMMED_PERIODS, choose_cutoff};
-use crate::motion::derivatives::{Preparation, Smoothing, mean_rate};
-use crate::motion::filters::LowPass;
-use crate::motion::local_polynomials;
-use crate::motion::periods;
-use crate::motion::run::PreparedAs;
+use crate::motion::derivatives::mean_rate;
+use crate::motion::options::{Preparation, Smoothing};
+use crate::motion::prepared_as::PreparedAs;
 use crate::motion::series::{self, Periodic};
-use crate::motion::smoothing::{Recorded, Way};
-use crate::recording::Recording;
-use crate::recording::error::{Fault, RecordingError, list};
-use crate::recording::notes::Note;
+use crate::motion::smooth::{Recorded, Way};
+use crate::motion::{local_polynomials, periods};
+use crate::recording::{Fault, Note, Recording, RecordingError};
+use crate::signal::{LowPass, count};
+use crate::words::list;
 
 impl Recording {
     /// States of all coordinates by the way of smoothing that the preparation asks for, or that suits them; what was
@@ -95,7 +94,7 @@ impl Recording {
                         longest,
                     }));
                 }
-                let harmonics = periods::count(cutoff * period).max(1);
+                let harmonics = count(cutoff * period).max(1);
                 Way::Series { period, harmonics }
             }
         };
@@ -162,7 +161,7 @@ impl Recording {
         preparation: &Preparation,
         notes: &mut Vec<Note>,
     ) -> (usize, usize) {
-        let most = periods::count(samples as f64 / LONGEST_TRIM);
+        let most = count(samples as f64 / LONGEST_TRIM);
         let spoilt = (1..most).find(|count| *count as f64 >= TRIMMED_PERIODS * period);
         if spoilt.is_none() && preparation.trim.is_none() {
             notes.push(Note::warning(format!(

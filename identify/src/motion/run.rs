@@ -5,16 +5,14 @@
 
 use std::fmt::Write as _;
 
-use serde::{Deserialize, Serialize};
-
-use crate::audit::columns::{GAP, median};
-use crate::motion::derivatives::{Preparation, Smoothing, Source};
+use crate::motion::options::{DerivativeSource, Preparation, Smoothing};
 use crate::motion::periods::Repeats;
 use crate::motion::prepare::series_of;
-use crate::motion::smoothing::Recorded;
-use crate::recording::Recording;
-use crate::recording::error::{Fault, RecordingError, list};
-use crate::recording::notes::{Note, Severity, count_of};
+use crate::motion::prepared_as::PreparedAs;
+use crate::motion::smooth::Recorded;
+use crate::recording::{Fault, GAP, Note, Recording, RecordingError, Severity};
+use crate::signal::median;
+use crate::words::{count_of, list};
 
 /// States along a run, ready for the regressor. All columns have the length of `time`.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,28 +40,6 @@ pub struct Run {
     pub prepared: PreparedAs,
     /// What the user should know, the recording's own notes included.
     pub notes: Vec<Note>,
-}
-
-/// What was done on the way from the recording to the states.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct PreparedAs {
-    /// Cut-off of the low-pass, Hz, when anything was filtered.
-    pub cutoff_hz: Option<f64>,
-    /// Whether the cut-off was chosen from the signal rather than given.
-    pub cutoff_chosen: bool,
-    /// Period of the Fourier series that the motion was taken for, s, if it was.
-    #[serde(default)]
-    pub period: Option<f64>,
-    /// Coordinates whose rates or accelerations were prepared.
-    pub coordinates: Vec<String>,
-    /// Samples dropped at the start and at the end.
-    pub trimmed: (usize, usize),
-    /// Whether the caller asked for those, rather than the filter.
-    #[serde(default)]
-    pub trim_asked_for: bool,
-    /// The parallel decimation that the regression is to apply to the columns of the regressor
-    /// and to the forces ([`crate::motion::decimation::decimate_table`]); the columns here are not decimated.
-    pub decimate: usize,
 }
 
 impl Recording {
@@ -250,12 +226,12 @@ impl Recording {
     fn recorded(
         &self,
         name: &str,
-        source: Source,
+        source: DerivativeSource,
         wanted: &[String],
     ) -> Result<Recorded<'_>, RecordingError> {
         let optional = |suffix: &str| {
             let derivative = format!("{name}{suffix}");
-            let wanted = source == Source::RecordedFirst && self.has(&derivative);
+            let wanted = source == DerivativeSource::RecordedFirst && self.has(&derivative);
             wanted.then(|| self.column(&derivative)).transpose()
         };
         Ok(Recorded {

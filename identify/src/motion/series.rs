@@ -10,9 +10,9 @@ use std::f64::consts::{LN_2, TAU};
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::motion::derivatives::Prepared;
-use crate::motion::periods::{count, find_period};
-use crate::motion::spectrum::hann_power;
+use crate::motion::derivatives::Smoothed;
+use crate::motion::periods::find_period;
+use crate::signal::{count, hann_power};
 
 /// Harmonics that a motion is searched for at most.
 const MOST_HARMONICS: usize = 100;
@@ -25,13 +25,13 @@ const STANDS_OUT: f64 = 15.0;
 
 /// A motion that repeats itself, and what else is in its samples.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Periodic {
+pub(crate) struct Periodic {
     /// The period, s.
-    pub period: f64,
+    pub(crate) period: f64,
     /// Harmonics that stand above the noise.
-    pub harmonics: usize,
+    pub(crate) harmonics: usize,
     /// Standard deviation of what the series leaves of each signal, in its unit.
-    pub noise: Vec<f64>,
+    pub(crate) noise: Vec<f64>,
 }
 
 /// The least squares projection of signals on a Fourier series of one period: what depends on the times alone.
@@ -168,10 +168,15 @@ fn for_each_harmonic(angle: f64, harmonics: usize, mut visit: impl FnMut(usize, 
 
 /// The least squares projection of positions on a Fourier series of `harmonics` of the period, and its exact
 /// derivatives; `None` if there are too few samples for so many harmonics, or the run is far shorter than the period.
-pub fn project(time: &[f64], positions: &[f64], period: f64, harmonics: usize) -> Option<Prepared> {
+pub(crate) fn project(
+    time: &[f64],
+    positions: &[f64],
+    period: f64,
+    harmonics: usize,
+) -> Option<Smoothed> {
     let basis = Basis::new(time, period, harmonics)?;
     let series = basis.series(positions);
-    let mut prepared = Prepared {
+    let mut prepared = Smoothed {
         q: Vec::with_capacity(time.len()),
         qd: Vec::with_capacity(time.len()),
         qdd: Vec::with_capacity(time.len()),
@@ -191,7 +196,7 @@ pub fn project(time: &[f64], positions: &[f64], period: f64, harmonics: usize) -
 /// the run, with or without the first sample repeated at its end; then it is what leaves least.
 /// Harmonics count up to the last that stands above the noise. What is left is noise if its spectrum is flat: where
 /// the harmonics are no line may stand out, and the mean must be that of the upper half of the band.
-pub fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<Periodic> {
+pub(crate) fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<Periodic> {
     let moving: Vec<&[f64]> = signals
         .iter()
         .copied()

@@ -2,8 +2,9 @@
 
 use std::fmt;
 
-use crate::motion::filters::FilterError;
-use crate::recording::notes::count_of;
+use crate::recording::read::place_word;
+use crate::signal::FilterError;
+use crate::words::{count_of, list};
 
 /// A fault of a recording. Its `Display` names the file, the line and the column where they are
 /// known, and ends with what to do.
@@ -194,34 +195,6 @@ impl fmt::Display for RecordingError {
 }
 
 impl std::error::Error for RecordingError {}
-
-/// What messages call a recording whose bytes came without a file: its name, and what they are unless they are text.
-pub fn name_of_bytes(name: &str, bytes: &[u8]) -> String {
-    let kind = match bytes {
-        [b'P', b'A', b'R', b'1', ..] => PARQUET,
-        _ if bytes.starts_with(b"MATLAB 5") => MATLAB,
-        _ => "",
-    };
-    format!("{name}{kind}")
-}
-
-const PARQUET: &str = " (Parquet)";
-const MATLAB: &str = " (MATLAB)";
-
-/// What a sample of a file, or of bytes that [`name_of_bytes`] names, stands in: text has lines, tables have rows.
-pub fn place_word(file: &str) -> &'static str {
-    let ends = |end: &str| {
-        std::path::Path::new(file)
-            .extension()
-            .is_some_and(|extension| extension.eq_ignore_ascii_case(end))
-    };
-    let is_table = file.ends_with(PARQUET) || file.ends_with(MATLAB);
-    if is_table || ends("parquet") || ends("pq") || ends("mat") {
-        "row"
-    } else {
-        "line"
-    }
-}
 
 impl Fault {
     /// The line concerned, where there is one.
@@ -466,19 +439,4 @@ fn others(f: &mut fmt::Formatter<'_>, count: usize, what: &str) -> fmt::Result {
 
 fn looks_like_decimal_comma(text: &str) -> bool {
     text.matches(',').count() == 1 && text.replace(',', ".").parse::<f64>().is_ok()
-}
-
-/// Names in backquotes; a long list is cut short with its length said.
-pub(crate) fn list(names: &[String]) -> String {
-    const SHOWN: usize = 40;
-    let shown: Vec<String> = names
-        .iter()
-        .take(SHOWN)
-        .map(|name| format!("`{name}`"))
-        .collect();
-    if names.len() > SHOWN {
-        format!("{} and {} more", shown.join(", "), names.len() - SHOWN)
-    } else {
-        shown.join(", ")
-    }
 }

@@ -3,31 +3,12 @@
 
 use indexmap::IndexMap;
 
+use crate::recording::Recording;
+use crate::recording::column::{Column, Defect, Field, missing};
 use crate::recording::error::Fault;
-use crate::recording::notes::{Note, count_of};
-use crate::recording::{Column, Computed, Defect, NotFinite, ReadOptions, Recording, missing};
-
-/// No quantity that is measured in SI units comes near this, and squares of smaller numbers do not overflow.
-pub(crate) const LARGEST: f64 = 1e100;
-
-/// One field of a sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Field {
-    Number(f64),
-    NotFinite,
-    Text,
-}
-
-impl Field {
-    /// A number, unless it is none that can be computed with.
-    pub(crate) fn of(value: f64) -> Self {
-        if value.abs() <= LARGEST {
-            Self::Number(value)
-        } else {
-            Self::NotFinite
-        }
-    }
-}
+use crate::recording::notes::Note;
+use crate::recording::options::{Computed, NotFinite, ReadOptions};
+use crate::words::count_of;
 
 /// Whether more samples are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -290,27 +271,6 @@ fn compute(computed: &Computed, theirs: &[String], columns: &[Column]) -> Column
         sum.not_finite = sum.not_finite.or_else(|| column.not_finite.clone());
     }
     sum
-}
-
-impl Column {
-    fn push(&mut self, field: Field, line: u64, text: &dyn Fn() -> String) {
-        let defect = match field {
-            Field::Number(number) => {
-                self.values.push(number);
-                return;
-            }
-            Field::NotFinite => &mut self.not_finite,
-            Field::Text => &mut self.text,
-        };
-        self.values.push(f64::NAN);
-        defect
-            .get_or_insert_with(|| Defect {
-                line,
-                text: text(),
-                count: 0,
-            })
-            .count += 1;
-    }
 }
 
 fn check_names(names: &[String]) -> Result<(), Fault> {

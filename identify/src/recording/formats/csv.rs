@@ -4,20 +4,44 @@
 
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 
+use crate::recording::column::Field;
 use crate::recording::error::Fault;
-use crate::recording::intake::{Field, Flow, Intake};
+use crate::recording::formats::{Format, Input};
+use crate::recording::intake::{Flow, Intake};
 use crate::recording::notes::Note;
 use crate::recording::{ReadOptions, Recording};
 
 /// The longest header line that is looked at; beyond it the file is no recording.
 const LONGEST_HEADER: u64 = 1 << 20;
 
-/// Reads CSV text; `file` is what messages call it.
-pub(crate) fn read(
-    stream: impl Read,
-    file: &str,
-    options: &ReadOptions,
-) -> Result<Recording, Fault> {
+/// CSV text, which everything is that no other format knows as its own.
+pub(crate) struct Csv;
+
+impl Format for Csv {
+    fn is_table(&self) -> bool {
+        false
+    }
+
+    fn begins(&self, _first: &[u8]) -> bool {
+        true
+    }
+
+    fn read(
+        &self,
+        input: Input<'_>,
+        file: &str,
+        options: &ReadOptions,
+    ) -> Result<Recording, Fault> {
+        read(input.stream(), file, options)
+    }
+
+    fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault> {
+        let (mut reader, _, header_line) = open(input.stream())?;
+        names(&mut reader, header_line)
+    }
+}
+
+fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<Recording, Fault> {
     let (mut reader, separator, header_line) = open(stream)?;
     let theirs = names(&mut reader, header_line)?;
     let mut intake = Intake::new(theirs, options)?;
@@ -64,12 +88,6 @@ pub(crate) fn read(
         }
     }
     intake.finish(file)
-}
-
-/// Names of the columns of CSV text.
-pub(crate) fn names_of(stream: impl Read) -> Result<Vec<String>, Fault> {
-    let (mut reader, _, header_line) = open(stream)?;
-    names(&mut reader, header_line)
 }
 
 /// A reader that stands before the header, what separates the columns, and the line of the header.

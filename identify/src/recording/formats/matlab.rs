@@ -7,13 +7,71 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
 use matfile::{Array, MatFile, NumericData};
 
-use crate::recording::error::{Fault, list};
-use crate::recording::intake::{Field, Flow, Intake};
+use crate::recording::column::Field;
+use crate::recording::error::Fault;
+use crate::recording::formats::{Format, Input};
+use crate::recording::intake::{Flow, Intake};
 use crate::recording::notes::Note;
 use crate::recording::{ReadOptions, Recording};
+use crate::words::list;
 
-/// Reads a MATLAB file; `file` is what messages call it.
-pub(crate) fn read(
+/// What `save -v7` and `-v6` write.
+pub(crate) struct Matlab5;
+
+impl Format for Matlab5 {
+    fn suffix(&self) -> &'static str {
+        " (MATLAB)"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["mat"]
+    }
+
+    fn begins(&self, first: &[u8]) -> bool {
+        first.starts_with(b"MATLAB 5.0 MAT-file")
+    }
+
+    fn read(
+        &self,
+        input: Input<'_>,
+        file: &str,
+        options: &ReadOptions,
+    ) -> Result<Recording, Fault> {
+        read(input.seekable()?, file, options)
+    }
+
+    fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault> {
+        let columns = columns(input.seekable()?)?;
+        Ok(columns.sound.into_iter().map(|(name, _)| name).collect())
+    }
+}
+
+/// What `save -v7.3` writes, which is HDF5: known, so that it can be said what to do, and not read.
+pub(crate) struct Matlab73;
+
+impl Format for Matlab73 {
+    fn begins(&self, first: &[u8]) -> bool {
+        first.starts_with(b"MATLAB 7.3 MAT-file") || first.starts_with(b"\x89HDF")
+    }
+
+    fn read(&self, _: Input<'_>, _: &str, _: &ReadOptions) -> Result<Recording, Fault> {
+        Err(not_read())
+    }
+
+    fn names(&self, _: Input<'_>) -> Result<Vec<String>, Fault> {
+        Err(not_read())
+    }
+}
+
+fn not_read() -> Fault {
+    Fault::Format {
+        format: "a MATLAB 7.3 or HDF5 file",
+        says: "only MATLAB's format 5 is read; save it again with `save(name, ..., '-v7')`, or as CSV or Parquet"
+            .to_owned(),
+    }
+}
+
+fn read(
     mut stream: impl Read + Seek,
     file: &str,
     options: &ReadOptions,
@@ -53,12 +111,6 @@ pub(crate) fn read(
         }
     }
     intake.finish(file)
-}
-
-/// Names of the columns.
-pub(crate) fn names_of(stream: impl Read + Seek) -> Result<Vec<String>, Fault> {
-    let columns = columns(stream)?;
-    Ok(columns.sound.into_iter().map(|(name, _)| name).collect())
 }
 
 /// The columns of a file, all of one length, and the names of what is none.

@@ -2,6 +2,7 @@
 //!
 //! Time stamps and times of day become seconds from the first one on, exactly, before they are rounded to a float.
 
+use bytes::Bytes;
 use parquet::basic::{ConvertedType, LogicalType, TimeUnit};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::DataType;
@@ -9,16 +10,55 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
+use crate::recording::column::Field;
 use crate::recording::error::Fault;
-use crate::recording::intake::{Field, Flow, Intake};
+use crate::recording::formats::{Format, Input, all_of};
+use crate::recording::intake::{Flow, Intake};
 use crate::recording::notes::Note;
 use crate::recording::{ReadOptions, Recording};
 
 /// Samples that are read at once.
 const BATCH: usize = 8192;
 
-/// Reads a Parquet file; `file` is what messages call it.
-pub(crate) fn read(
+/// Apache Parquet.
+pub(crate) struct Parquet;
+
+impl Format for Parquet {
+    fn suffix(&self) -> &'static str {
+        " (Parquet)"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["parquet", "pq"]
+    }
+
+    fn begins(&self, first: &[u8]) -> bool {
+        first.starts_with(b"PAR1")
+    }
+
+    fn read(
+        &self,
+        input: Input<'_>,
+        file: &str,
+        options: &ReadOptions,
+    ) -> Result<Recording, Fault> {
+        match input {
+            Input::File(stream) => read(stream, file, options),
+            Input::Bytes(bytes) => read(Bytes::copy_from_slice(bytes), file, options),
+            Input::Stream(stream) => read(Bytes::from(all_of(stream)?), file, options),
+        }
+    }
+
+    fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault> {
+        match input {
+            Input::File(stream) => names_of(stream),
+            Input::Bytes(bytes) => names_of(Bytes::copy_from_slice(bytes)),
+            Input::Stream(stream) => names_of(Bytes::from(all_of(stream)?)),
+        }
+    }
+}
+
+fn read(
     stream: impl ChunkReader + 'static,
     file: &str,
     options: &ReadOptions,
@@ -85,7 +125,7 @@ pub(crate) fn read(
 }
 
 /// Names of the columns; those of nested ones hold points.
-pub(crate) fn names_of(stream: impl ChunkReader + 'static) -> Result<Vec<String>, Fault> {
+fn names_of(stream: impl ChunkReader + 'static) -> Result<Vec<String>, Fault> {
     Ok(names(&SerializedFileReader::new(stream).map_err(fault)?))
 }
 

@@ -63,7 +63,7 @@ impl fmt::Display for FilterError {
             Self::OrderOutOfRange { order } => {
                 write!(
                     f,
-                    "a filter of order {order} was asked for; choose an order from 1 to {MAX_ORDER} (4 is usual)"
+                    "a filter of order {order} was asked for; choose an order from 1 to {MAX_FILTER_ORDER} (4 is usual)"
                 )
             }
             Self::FactorOutOfRange { factor } => write!(
@@ -92,7 +92,7 @@ impl fmt::Display for FilterError {
 impl std::error::Error for FilterError {}
 
 /// Orders beyond this one ring for so long that no recording is long enough.
-pub const MAX_ORDER: usize = 20;
+pub const MAX_FILTER_ORDER: usize = 20;
 
 /// A low-pass filter in second-order sections `(b0 + b1/z + b2/z^2) / (1 + a1/z + a2/z^2)`.
 #[derive(Debug, Clone, PartialEq)]
@@ -304,7 +304,7 @@ impl<const N: usize> WithSimd for FromSteadyState<'_, N> {
 }
 
 fn check_order(order: usize) -> Result<(), FilterError> {
-    if (1..=MAX_ORDER).contains(&order) {
+    if (1..=MAX_FILTER_ORDER).contains(&order) {
         Ok(())
     } else {
         Err(FilterError::OrderOutOfRange { order })

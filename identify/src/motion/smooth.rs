@@ -1,11 +1,10 @@
 //! From what a file holds of a coordinate to its position, rate and acceleration, by one of the ways of smoothing.
 
 use crate::motion::cutoff::Signal;
-use crate::motion::derivatives::{differentiate, mean_rate, prepare};
-use crate::motion::filters::LowPass;
-use crate::motion::local_polynomials;
-use crate::motion::series;
-use crate::recording::notes::{count_of, short};
+use crate::motion::derivatives::{differentiate, filter_and_differentiate, mean_rate};
+use crate::motion::{local_polynomials, series};
+use crate::signal::LowPass;
+use crate::words::{count_of, seven_digits};
 
 /// What the file holds of a coordinate.
 pub(crate) struct Recorded<'a> {
@@ -58,7 +57,9 @@ impl Recorded<'_> {
             ]));
         }
         let smooth = |values: &[f64]| match way {
-            Way::Butterworth { order } => prepare(time, values, cutoff, order).map(Some),
+            Way::Butterworth { order } => {
+                filter_and_differentiate(time, values, cutoff, order).map(Some)
+            }
             Way::Polynomials { half_width } => {
                 Ok(local_polynomials::smooth(time, values, half_width))
             }
@@ -112,7 +113,7 @@ impl Way {
             ),
             Self::Series { period, harmonics } => format!(
                 "a Fourier series of period {} s with {}, up to {cutoff:.4} Hz{chosen}",
-                short(period),
+                seven_digits(period),
                 count_of(harmonics, "harmonic", "harmonics")
             ),
         }

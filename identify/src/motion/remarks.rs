@@ -3,10 +3,9 @@
 use crate::motion::periods;
 use crate::motion::run::Run;
 use crate::motion::series::Periodic;
-use crate::motion::smoothing::Recorded;
-use crate::recording::Recording;
-use crate::recording::error::list;
-use crate::recording::notes::{Note, count_of, short};
+use crate::motion::smooth::Recorded;
+use crate::recording::{Note, Recording};
+use crate::words::{count_of, list, seven_digits};
 
 /// A series that leaves more of a motion than this part is not its series.
 const LEFT_OVER: f64 = 1e-2;
@@ -25,7 +24,7 @@ impl Recording {
                 "The motion in {} repeats itself every {} s, {} times in all; over these periods the forces spread \
                  by {:.3} % of their size, the noise floor.",
                 self.file(),
-                short(period),
+                seven_digits(period),
                 repeats.periods,
                 100.0 * repeats.noise_floor
             )));
@@ -44,7 +43,7 @@ impl Recording {
              white noise: {} (RMS). `--smoothing butterworth` filters instead.",
             list(&names),
             self.file(),
-            short(found.period),
+            seven_digits(found.period),
             count_of(found.harmonics, "harmonic", "harmonics"),
             left.collect::<Vec<_>>().join(", ")
         )

@@ -1,0 +1,177 @@
+//! The minimum of misfit and divergence over physical parameters; the function is in [`physical`](super::physical).
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::estimate::body_matrices::{BodyMatrix, Reference};
+use crate::estimate::error::PhysicalError;
+
+/// The base parameters for given physical parameters with their derivatives (rows: base parameters), in the order of the
+/// regressor's columns.
+pub type BaseMap<'a> = dyn Fn(&[f64]) -> (DVector<f64>, DMatrix<f64>) + 'a;
+
+/// Steps for differences: matrices are polynomials of low degree, so that central differences are nearly exact.
+pub(crate) fn step_scales(nominal: &[f64]) -> Vec<f64> {
+    nominal
+        .iter()
+        .map(|x| 1e-4 * if *x == 0.0 { 1.0 } else { x.abs() })
+        .collect()
+}
+
+/// Misfit and divergence as a function of the physical parameters.
+pub(crate) struct Misfit<'a> {
+    /// In units of the noise.
+    pub(crate) r: DMatrix<f64>,
+    pub(crate) right: DVector<f64>,
+    pub(crate) base: &'a BaseMap<'a>,
+    pub(crate) bodies: &'a [BodyMatrix<'a>],
+    pub(crate) references: Vec<Reference>,
+    pub(crate) scales: Vec<f64>,
+}
+
+/// Value and derivatives at a point.
+pub(crate) struct Point {
+    pub(crate) value: f64,
+    pub(crate) gradient: DVector<f64>,
+    /// Second derivatives by the recording (Gauss and Newton) and by the divergence.
+    pub(crate) data: DMatrix<f64>,
+    pub(crate) prior: DMatrix<f64>,
+}
+
+impl Misfit<'_> {
+    /// The value; none outside.
+    pub(crate) fn value(&self, x: &DVector<f64>, weight: f64) -> Option<f64> {
+        let (p, _) = (self.base)(x.as_slice());
+        let mut value = 0.5 * (&self.r * p - &self.right).norm_squared();
+        for (body, reference) in self.bodies.iter().zip(&self.references) {
+            let relative = reference.relative(&(body.matrix)(x.as_slice()));
+            let trace = relative.trace();
+            let n = relative.nrows() as f64;
+            let cholesky = relative.cholesky()?;
+            let log_det: f64 = cholesky
+                .l_dirty()
+                .diagonal()
+                .iter()
+                .map(|d| 2.0 * d.ln())
+                .sum();
+            value += weight * (trace - log_det - n) / reference.copies;
+        }
+        value.is_finite().then_some(value)
+    }
+
+    pub(crate) fn at(&self, x: &DVector<f64>, weight: f64) -> Option<Point> {
+        let n = x.len();
+        let (p, jacobian) = (self.base)(x.as_slice());
+        let residual = &self.r * p - &self.right;
+        let slope = &self.r * jacobian;
+        let mut gradient = slope.transpose() * &residual;
+        let data = slope.transpose() * slope;
+        let mut prior = DMatrix::zeros(n, n);
+        for (body, reference) in self.bodies.iter().zip(&self.references) {
+            let relative = reference.relative(&(body.matrix)(x.as_slice()));
+            let inverse = relative.cholesky()?.inverse();
+            let mut moved = x.clone();
+            // Derivatives of the relative matrix, only by what it depends on.
+            let mut slopes: Vec<(usize, DMatrix<f64>)> = Vec::new();
+            for i in 0..n {
+                let h = self.scales[i];
+                moved[i] = x[i] + h;
+                let up = (body.matrix)(moved.as_slice());
+                moved[i] = x[i] - h;
+                let down = (body.matrix)(moved.as_slice());
+                moved[i] = x[i];
+                let slope = (up - down) / (2.0 * h);
+                if slope.iter().any(|x| *x != 0.0) {
+                    slopes.push((i, reference.relative(&slope)));
+                }
+            }
+            let factor = weight / reference.copies;
+            let turned: Vec<DMatrix<f64>> =
+                slopes.iter().map(|(_, slope)| &inverse * slope).collect();
+            for (k, (i, slope)) in slopes.iter().enumerate() {
+                gradient[*i] += factor * (slope.trace() - turned[k].trace());
+                for (l, (j, _)) in slopes.iter().enumerate().take(k + 1) {
+                    let second = factor * turned[k].dot(&turned[l].transpose());
+                    prior[(*i, *j)] += second;
+                    if i != j {
+                        prior[(*j, *i)] += second;
+                    }
+                }
+            }
+        }
+        Some(Point {
+            value: self.value(x, weight)?,
+            gradient,
+            data,
+            prior,
+        })
+    }
+
+    /// Levenberg and Marquardt, with steps that stay where all bodies are possible.
+    pub(crate) fn minimise(
+        &self,
+        x: &mut DVector<f64>,
+        weight: f64,
+    ) -> Result<usize, PhysicalError> {
+        let mut damping = 1e-9;
+        for iteration in 0..500 {
+            let point = self.at(x, weight).ok_or(PhysicalError::NoConvergence)?;
+            let second = &point.data + &point.prior;
+            let mut moved = false;
+            while !moved && damping < 1e9 {
+                let mut damped = second.clone();
+                for i in 0..x.len() {
+                    // What nothing depends on stays where it is.
+                    damped[(i, i)] += damping * second[(i, i)];
+                    if damped[(i, i)] == 0.0 {
+                        damped[(i, i)] = 1.0;
+                    }
+                }
+                let step = solve_scaled(&damped, &point.gradient).map(|step| -step);
+                let Some(step) = step else {
+                    damping *= 100.0;
+                    continue;
+                };
+                let slope = point.gradient.dot(&step);
+                // Far below what shows: a unit is half a squared standard deviation.
+                if -slope <= 1e-8 * (1.0 + point.value.abs().min(1e4)) {
+                    return Ok(iteration);
+                }
+                let mut length = 1.0;
+                while length > 1e-6 {
+                    let next = &*x + length * &step;
+                    if self
+                        .value(&next, weight)
+                        .is_some_and(|v| v <= point.value + 1e-4 * length * slope)
+                    {
+                        *x = next;
+                        moved = true;
+                        break;
+                    }
+                    length *= 0.5;
+                }
+                damping = if length < 0.1 {
+                    damping * 100.0
+                } else {
+                    (damping * 0.01).max(1e-9)
+                };
+            }
+            // Rounding hides what is left of the slope.
+            if !moved {
+                return Ok(iteration);
+            }
+        }
+        Err(PhysicalError::NoConvergence)
+    }
+}
+
+/// Solves a positive definite system after scaling its diagonal to 1, since parameters differ in units.
+fn solve_scaled(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    let scale = matrix
+        .diagonal()
+        .map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 });
+    let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
+        scale[i] * matrix[(i, j)] * scale[j]
+    });
+    let solved = scaled.cholesky()?.solve(&right.component_mul(&scale));
+    Some(solved.component_mul(&scale))
+}

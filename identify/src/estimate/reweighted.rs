@@ -1,0 +1,583 @@
+//! Weighted and robust least squares by reweighting: showings of the rows go in, a solution with
+//! deviations and the weights that it was made with come out. Memory does not grow with the rows.
+//!
+//! Weights of channels are the inverse standard deviations of their residuals, iterated from the
+//! unweighted solution: M. Gautier and P. Poignet, Control Engineering Practice 9 (2001), section
+//! 3.2. Robust estimates minimise Huber's function of the scaled residual, P. J. Huber, Ann. Math.
+//! Statist. 35 (1964), by iteratively reweighted rows; the scale of each channel is 1.4826 times
+//! the median of the residuals' magnitudes, which outliers do not move. Deviations of robust
+//! estimates follow from `psi' w w'` in place of `w w'` in the inverse: P. J. Huber, "Robust
+//! Statistics" (1981), section 7.6.
+
+use crate::estimate::deviations::{Deviations, autocorrelated_deviations};
+use crate::estimate::error::LeastSquaresError;
+use crate::estimate::least_squares::LeastSquares;
+use crate::estimate::magnitudes::Magnitudes;
+use crate::estimate::rows::{Visit, is_left_out};
+use crate::estimate::solution::Solution;
+use crate::estimate::triangle::Triangle;
+
+/// Huber's bound for 95 % efficiency under normal residuals, in standard deviations.
+pub const HUBER_BOUND: f64 = 1.345;
+
+/// Solutions that move by less than this part of a standard deviation have settled.
+const SETTLED: f64 = 1e-3;
+
+/// What is estimated, and how.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EstimateOptions {
+    /// Divide each channel by the standard deviation of its residuals.
+    pub by_channel: bool,
+    /// Huber's bound in standard deviations; none for ordinary least squares.
+    pub huber: Option<f64>,
+    /// Solutions at most.
+    pub iterations: usize,
+}
+
+impl Default for EstimateOptions {
+    fn default() -> Self {
+        Self {
+            by_channel: false,
+            huber: None,
+            iterations: 50,
+        }
+    }
+}
+
+/// What each row was multiplied by in the end.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Weighting {
+    /// For each channel the scale of its residuals, in the units of the measured value (as shown).
+    pub scales: Vec<f64>,
+    /// Whether rows were divided by it.
+    pub by_channel: bool,
+    /// Huber's bound in scales.
+    pub huber: Option<f64>,
+    /// Share of the rows whose residual was beyond the bound.
+    pub outliers: f64,
+    /// Solutions that were made.
+    pub iterations: usize,
+    /// Whether the last two agreed.
+    pub settled: bool,
+}
+
+/// A solution, what it is worth, and how it came about.
+#[derive(Debug, Clone)]
+pub struct Estimate {
+    /// The solution; its norms are those of the weighted rows.
+    pub solution: Solution,
+    /// Its deviations.
+    pub deviations: Deviations,
+    /// The weights.
+    pub weighting: Weighting,
+    /// The reduced rows that it was made from, weighted.
+    pub triangle: Triangle,
+}
+
+/// Estimates `nominal.len()` parameters from the rows that `show` presents, interleaved per sample, in order of time,
+/// the same in every showing; undetermined directions stay at `nominal`.
+///
+/// Ordinary least squares shows the rows three times, each reweighting twice more.
+/// Fails when `show` fails, when there are no rows, or when a number is not finite.
+///
+/// ```
+/// use modelmill_identify::estimate::{EstimateOptions, HUBER_BOUND, estimate};
+/// use modelmill_identify::LeastSquaresError;
+/// let regressor: Vec<f64> = (0..400).flat_map(|i| [1.0, f64::from(i)]).collect();
+/// let mut measured: Vec<f64> = (0..400).map(|i| 3.0 + 2.0 * f64::from(i) + 0.1 * f64::from(i % 7)).collect();
+/// measured[17] = 1e6;
+/// let options = EstimateOptions { huber: Some(HUBER_BOUND), ..EstimateOptions::default() };
+/// let found = estimate(&[0.0, 0.0], 1, &options, |visit| visit(&regressor, &measured))?;
+/// assert!((found.solution.values[1] - 2.0).abs() < 1e-3);
+/// # Ok::<(), LeastSquaresError>(())
+/// ```
+pub fn estimate<E: From<LeastSquaresError>>(
+    nominal: &[f64],
+    channels: usize,
+    options: &EstimateOptions,
+    mut show: impl FnMut(&mut Visit<'_>) -> Result<(), E>,
+) -> Result<Estimate, E> {
+    let n = nominal.len();
+    let channels = channels.max(1);
+    let mut regression = LeastSquares::with_channels(n, channels);
+    show(&mut |w, y| regression.add_rows(w, y))?;
+    let mut solution = regression.solve_near(nominal)?;
+    let mut weighting = Weighting {
+        scales: vec![1.0; channels],
+        by_channel: options.by_channel,
+        huber: options.huber,
+        outliers: 0.0,
+        iterations: 1,
+        settled: true,
+    };
+    if options.by_channel || options.huber.is_some() {
+        weighting.settled = false;
+        while !weighting.settled && weighting.iterations < options.iterations.max(2) {
+            weighting.scales = scales(&solution, &weighting, &mut show)?;
+            let before = solution;
+            regression = reweighted(
+                &before.values,
+                channels,
+                &weighting,
+                Rows::Weighted,
+                &mut show,
+            )?;
+            solution = regression.solve_near(nominal)?;
+            weighting.iterations += 1;
+            weighting.settled = (0..n).all(|j| {
+                let moved = (solution.values[j] - before.values[j]).abs();
+                !solution.determined[j]
+                    || moved <= SETTLED * solution.classical_std[j]
+                    || moved <= 1e-13 * solution.values[j].abs()
+            });
+        }
+    }
+    let triangle = Triangle::of(&regression);
+    if weighting.huber.is_some() {
+        let curvature = reweighted(
+            &solution.values,
+            channels,
+            &weighting,
+            Rows::Curvature,
+            &mut show,
+        )?;
+        solution.take_inverse_of(curvature.solve_near(nominal)?);
+        weighting.outliers = outliers(&solution.values, channels, &weighting, &mut show)?;
+    }
+    let values = solution.values.clone();
+    let deviations = autocorrelated_deviations(&solution, channels, |visit| {
+        show_weighted(
+            &values,
+            channels,
+            &weighting,
+            Rows::Weighted,
+            &mut show,
+            visit,
+        )
+    })?;
+    Ok(Estimate {
+        solution,
+        deviations,
+        weighting,
+        triangle,
+    })
+}
+
+/// Which rows a reweighting makes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Rows {
+    /// Regressor and measured value times the root of the weight: their gradient is that of Huber's function.
+    Weighted,
+    /// Rows within the bound only, with the residual that Huber's function sees: the second derivatives.
+    Curvature,
+}
+
+/// The scale of each channel's residuals: standard deviation, or median magnitude for robust estimates.
+fn scales<E: From<LeastSquaresError>>(
+    solution: &Solution,
+    weighting: &Weighting,
+    show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
+) -> Result<Vec<f64>, E> {
+    let channels = weighting.scales.len();
+    let n = solution.values.len();
+    let mut squares = vec![0.0; channels];
+    let mut medians: Vec<Magnitudes> = match weighting.huber {
+        Some(_) => vec![Magnitudes::new(); channels],
+        None => Vec::new(),
+    };
+    let mut size = vec![0.0; channels];
+    let mut counts = vec![0_usize; channels];
+    let mut rows = 0_usize;
+    show(&mut |regressor, measured| {
+        for (row, y) in regressor.chunks_exact(n).zip(measured) {
+            let channel = rows % channels;
+            rows += 1;
+            if is_left_out(row, *y) {
+                continue;
+            }
+            counts[channel] += 1;
+            let error = y - dot(row, &solution.values);
+            squares[channel] += error * error;
+            size[channel] += y * y;
+            if let Some(median) = medians.get_mut(channel) {
+                median.add(error.abs());
+            }
+        }
+        Ok(())
+    })?;
+    Ok((0..channels)
+        .map(|channel| {
+            let samples = counts[channel].max(1) as f64;
+            let freedom = (samples - solution.rank as f64 / channels as f64).max(1.0);
+            let spread = (squares[channel] / freedom).sqrt();
+            let scale = medians.get(channel).map_or(spread, |m| 1.4826 * m.median());
+            // A channel without any residual must not get all the weight there is.
+            let least = 1e-12 * (size[channel] / samples).sqrt();
+            if scale > least {
+                scale
+            } else {
+                spread.max(least).max(f64::MIN_POSITIVE.sqrt())
+            }
+        })
+        .collect())
+}
+
+/// The regression of reweighted rows.
+fn reweighted<E: From<LeastSquaresError>>(
+    values: &[f64],
+    channels: usize,
+    weighting: &Weighting,
+    rows: Rows,
+    show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
+) -> Result<LeastSquares, E> {
+    let mut regression = LeastSquares::with_channels(values.len(), channels);
+    show_weighted(values, channels, weighting, rows, show, &mut |w, y| {
+        regression.add_rows(w, y)
+    })?;
+    Ok(regression)
+}
+
+/// The share of rows beyond Huber's bound.
+fn outliers<E: From<LeastSquaresError>>(
+    values: &[f64],
+    channels: usize,
+    weighting: &Weighting,
+    show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
+) -> Result<f64, E> {
+    let bound = weighting.huber.unwrap_or(f64::INFINITY);
+    let (mut beyond, mut rows, mut counted) = (0_usize, 0_usize, 0_usize);
+    show(&mut |w, y| {
+        for (row, y) in w.chunks_exact(values.len()).zip(y) {
+            let scale = weighting.scales[rows % channels];
+            rows += 1;
+            counted += usize::from(!is_left_out(row, *y));
+            beyond += usize::from((y - dot(row, values)).abs() > bound * scale);
+        }
+        Ok(())
+    })?;
+    Ok(beyond as f64 / counted.max(1) as f64)
+}
+
+/// Shows weighted rows for residuals at `values`.
+fn show_weighted<E: From<LeastSquaresError>>(
+    values: &[f64],
+    channels: usize,
+    weighting: &Weighting,
+    rows: Rows,
+    show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
+    visit: &mut Visit<'_>,
+) -> Result<(), E> {
+    if !weighting.by_channel && weighting.huber.is_none() {
+        return show(visit);
+    }
+    let n = values.len();
+    let (mut scaled, mut right) = (Vec::new(), Vec::new());
+    let mut at = 0_usize;
+    show(&mut |regressor, measured| {
+        scaled.clear();
+        right.clear();
+        for (row, y) in regressor.chunks_exact(n).zip(measured) {
+            let scale = weighting.scales[at % channels];
+            at += 1;
+            let error = y - dot(row, values);
+            let inside = weighting
+                .huber
+                .is_none_or(|bound| error.abs() <= bound * scale);
+            let root = match (weighting.huber, rows) {
+                (Some(bound), Rows::Weighted) if !inside => (bound * scale / error.abs()).sqrt(),
+                (Some(_), Rows::Curvature) if !inside => 0.0,
+                _ => 1.0,
+            };
+            let factor = if weighting.by_channel {
+                root / scale
+            } else {
+                root
+            };
+            scaled.extend(row.iter().map(|w| factor * w));
+            right.push(match (weighting.huber, rows) {
+                // What Huber's function sees of the residual keeps the variance of its gradient.
+                (Some(bound), Rows::Curvature) => {
+                    let seen = error.clamp(-bound * scale, bound * scale);
+                    let unit = if weighting.by_channel {
+                        seen / scale
+                    } else {
+                        seen
+                    };
+                    factor * dot(row, values) + unit
+                }
+                _ => factor * y,
+            });
+        }
+        visit(&scaled, &right)
+    })
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+    use crate::estimate::prior::{Belief, with_prior};
+    use crate::test_noise::Noise;
+
+    const TRUTH: [f64; 3] = [4.0, -2.0, 1.0];
+
+    struct Rows {
+        w: Vec<f64>,
+        y: Vec<f64>,
+    }
+
+    /// Two channels with errors of different size, correlated in time by `memory`; a share of `spoilt` is far off.
+    fn rows(noise: &mut Noise, samples: i32, sizes: [f64; 2], memory: f64, spoilt: f64) -> Rows {
+        let (mut w, mut y, mut state) = (Vec::new(), Vec::new(), [0.0; 2]);
+        for i in 0..samples {
+            for channel in 0..2 {
+                let t = 0.01 * f64::from(i) + 3.1 * channel as f64;
+                let row = [1.0, t.sin(), (1.3 * t).cos().signum()];
+                state[channel] = memory * state[channel] + sizes[channel] * noise.normal();
+                let mut value =
+                    row.iter().zip(TRUTH).map(|(w, p)| w * p).sum::<f64>() + state[channel];
+                if noise.uniform() < spoilt {
+                    value += 30.0 + 20.0 * noise.uniform();
+                }
+                w.extend(row);
+                y.push(value);
+            }
+        }
+        Rows { w, y }
+    }
+
+    fn run(rows: &Rows, options: &EstimateOptions) -> Estimate {
+        estimate(
+            &[0.0; 3],
+            2,
+            options,
+            |visit| -> Result<(), LeastSquaresError> {
+                // Odd blocks, as they come.
+                for (w, y) in rows.w.chunks(3 * 2 * 37).zip(rows.y.chunks(2 * 37)) {
+                    visit(w, y)?;
+                }
+                Ok(())
+            },
+        )
+        .unwrap()
+    }
+
+    const WEIGHTED: EstimateOptions = EstimateOptions {
+        by_channel: true,
+        huber: None,
+        iterations: 50,
+    };
+    const ROBUST: EstimateOptions = EstimateOptions {
+        by_channel: false,
+        huber: Some(HUBER_BOUND),
+        iterations: 50,
+    };
+
+    /// The fixed point is a weighted least squares problem, which normal equations of the dense one solve.
+    #[test]
+    fn channel_weights_agree_with_a_dense_solution_and_beat_plain_ones() {
+        let mut noise = Noise::new(21);
+        let (mut plain, mut weighted) = (0.0, 0.0);
+        for _ in 0..40 {
+            let rows = rows(&mut noise, 800, [1.0, 0.05], 0.0, 0.0);
+            let found = run(&rows, &WEIGHTED);
+            assert!(found.weighting.settled);
+            let scales = &found.weighting.scales;
+            assert!(
+                (scales[0] - 1.0).abs() < 0.15 && (scales[1] - 0.05).abs() < 0.0075,
+                "{scales:?}"
+            );
+            let w = DMatrix::from_fn(1600, 3, |i, j| rows.w[3 * i + j] / scales[i % 2]);
+            let y = DVector::from_fn(1600, |i, _| rows.y[i] / scales[i % 2]);
+            let dense = w.clone().svd(true, true).solve(&y, 0.0).unwrap();
+            for j in 0..3 {
+                assert!((found.solution.values[j] - dense[j]).abs() < 1e-10);
+                weighted += (dense[j] - TRUTH[j]).powi(2);
+            }
+            let plain_values = run(&rows, &EstimateOptions::default()).solution.values;
+            plain += plain_values
+                .iter()
+                .zip(TRUTH)
+                .map(|(p, t)| (p - t).powi(2))
+                .sum::<f64>();
+        }
+        assert!(weighted < 0.05 * plain, "{weighted} and {plain}");
+    }
+
+    /// Rows of zeros among the others change neither the scales nor the values, in one channel or in both.
+    #[test]
+    fn rows_that_are_left_out_are_no_residuals() {
+        let all = rows(&mut Noise::new(8), 1200, [1.0, 0.2], 0.0, 0.05);
+        let mut with_zeros = Rows {
+            w: Vec::new(),
+            y: Vec::new(),
+        };
+        for (k, (w, y)) in all.w.chunks(6).zip(all.y.chunks(2)).enumerate() {
+            if k % 3 == 0 {
+                with_zeros.w.extend([0.0; 6]);
+                with_zeros.y.extend([0.0; 2]);
+            }
+            with_zeros.w.extend(w);
+            with_zeros.y.extend(y);
+        }
+        for options in [
+            WEIGHTED,
+            ROBUST,
+            EstimateOptions {
+                by_channel: true,
+                ..ROBUST
+            },
+        ] {
+            let (expected, found) = (run(&all, &options), run(&with_zeros, &options));
+            for (found, expected) in found
+                .weighting
+                .scales
+                .iter()
+                .zip(&expected.weighting.scales)
+            {
+                assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
+            }
+            assert!((found.weighting.outliers - expected.weighting.outliers).abs() < 1e-12);
+            assert_eq!(found.solution.rows, expected.solution.rows);
+            assert_eq!(found.solution.shown, 3200);
+            assert_eq!(found.deviations.samples, 1200);
+            for (found, expected) in found
+                .solution
+                .classical_std
+                .iter()
+                .zip(&expected.solution.classical_std)
+            {
+                assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
+            }
+            for j in 0..3 {
+                let moved = found.solution.values[j] - expected.solution.values[j];
+                assert!(moved.abs() < 1e-6, "{moved}");
+            }
+        }
+        // Half of one channel left out: its scale stays that of the noise.
+        let mut half = rows(&mut Noise::new(8), 1200, [1.0, 0.2], 0.0, 0.0);
+        for row in (1..1200).step_by(2) {
+            half.w[3 * row..3 * row + 3].fill(0.0);
+            half.y[row] = 0.0;
+        }
+        let scales = run(&half, &WEIGHTED).weighting.scales;
+        assert!((scales[1] - 0.2).abs() < 0.02, "{scales:?}");
+    }
+
+    #[test]
+    fn a_robust_estimate_is_not_moved_by_what_is_far_off() {
+        let rows = rows(&mut Noise::new(4), 2000, [0.5, 0.5], 0.0, 0.08);
+        let plain = run(&rows, &EstimateOptions::default());
+        let robust = run(&rows, &ROBUST);
+        let error = |e: &Estimate| (e.solution.values[0] - TRUTH[0]).abs();
+        assert!(
+            error(&plain) > 2.0 && error(&robust) < 0.12,
+            "{} and {}",
+            error(&plain),
+            error(&robust)
+        );
+        assert!(robust.weighting.settled && robust.weighting.outliers > 0.2);
+        // At the minimum of Huber's function its gradient vanishes.
+        let (values, scales) = (&robust.solution.values, &robust.weighting.scales);
+        let mut gradient = [0.0; 3];
+        for (i, (row, y)) in rows.w.chunks(3).zip(&rows.y).enumerate() {
+            let bound = HUBER_BOUND * scales[i % 2];
+            let seen = (y - dot(row, values)).clamp(-bound, bound);
+            for (g, w) in gradient.iter_mut().zip(row) {
+                *g += seen * w;
+            }
+        }
+        assert!(
+            gradient.iter().all(|g| g.abs() < 4000.0 * 1e-4),
+            "{gradient:?}"
+        );
+    }
+
+    /// How often the truth is within two deviations, of 200.
+    fn coverage(options: &EstimateOptions, memory: f64, spoilt: f64) -> f64 {
+        let mut noise = Noise::new(77);
+        let mut inside = 0;
+        for _ in 0..200 {
+            let rows = rows(&mut noise, 1200, [0.6, 0.2], memory, spoilt);
+            let found = run(&rows, options);
+            // A constant force is what one-sided spoilt values look like; the others are free of that bias.
+            inside += (1..3)
+                .filter(|j| {
+                    (found.solution.values[*j] - TRUTH[*j]).abs() <= 2.0 * found.deviations.std[*j]
+                })
+                .count();
+        }
+        f64::from(u32::try_from(inside).unwrap()) / 400.0
+    }
+
+    #[test]
+    fn two_deviations_cover_95_percent_for_weighted_and_robust_estimates() {
+        for (options, memory, spoilt) in [
+            (WEIGHTED, 0.0, 0.0),
+            (WEIGHTED, 0.9, 0.0),
+            (ROBUST, 0.0, 0.05),
+            (ROBUST, 0.9, 0.0),
+        ] {
+            let covered = coverage(&options, memory, spoilt);
+            println!("{options:?}, memory {memory}, spoilt {spoilt}: {covered}");
+            assert!(
+                (0.90..=0.985).contains(&covered),
+                "{options:?}, {memory}, {spoilt}: {covered}"
+            );
+        }
+    }
+
+    /// With independent errors of known size the most plausible values have a textbook formula.
+    #[test]
+    fn a_prior_balances_recording_and_nominal_values() {
+        let rows = rows(&mut Noise::new(8), 400, [0.5, 0.5], 0.0, 0.0);
+        let found = run(&rows, &EstimateOptions::default());
+        let beliefs: Vec<Belief> = (0..3)
+            .map(|j| Belief {
+                parameter: j,
+                value: 0.5,
+                std: [0.02, 0.5, 1e6][j],
+            })
+            .collect();
+        let (solution, deviations) = with_prior(
+            &found.triangle,
+            &found.solution,
+            &found.deviations,
+            &[0.0; 3],
+            &beliefs,
+        )
+        .unwrap();
+        let inflation = crate::estimate::prior::inflation(&found.solution, &found.deviations);
+        let variance = found.solution.residual_variance() * inflation;
+        let w = DMatrix::from_row_slice(800, 3, &rows.w);
+        let y = DVector::from_column_slice(&rows.y);
+        let precision =
+            DMatrix::from_diagonal(&DVector::from_fn(3, |j, _| beliefs[j].std.powi(-2)));
+        let information = w.transpose() * &w / variance + &precision;
+        let right = w.transpose() * y / variance + &precision * DVector::from_element(3, 0.5);
+        let expected = information.clone().lu().solve(&right).unwrap();
+        for j in 0..3 {
+            assert!((solution.values[j] - expected[j]).abs() < 1e-9 * expected[j].abs());
+            let std = information.clone().try_inverse().unwrap()[(j, j)].sqrt();
+            assert!(
+                (deviations.std[j] / std - 1.0).abs() < 0.25,
+                "{} and {std}",
+                deviations.std[j]
+            );
+            assert!(deviations.std[j] <= found.deviations.std[j] * (1.0 + 1e-9));
+        }
+        // What is believed firmly stays, what is not believed follows the recording.
+        assert!((solution.values[0] - 0.5).abs() < 3.0);
+        let apart = (solution.values[2] - found.solution.values[2]).abs();
+        assert!(
+            apart
+                < 3.0 * found.deviations.std[2]
+                    + (solution.values[0] - found.solution.values[0]).abs()
+        );
+    }
+}

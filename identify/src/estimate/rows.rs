@@ -1,0 +1,62 @@
+//! Rows of a regression as they are shown: what every one that takes them asks of them.
+
+use crate::estimate::error::LeastSquaresError;
+
+/// One showing of a block of whole samples: regressor and measured values, as in
+/// [`LeastSquares::add_rows`](crate::LeastSquares::add_rows), rows interleaved per sample
+/// (`row = sample * channels + channel`).
+pub type Visit<'a> = dyn FnMut(&[f64], &[f64]) -> Result<(), LeastSquaresError> + 'a;
+
+/// Checks one block of rows; `before` rows came earlier.
+pub(crate) fn check_rows(
+    regressor: &[f64],
+    measured: &[f64],
+    columns: usize,
+    before: usize,
+) -> Result<(), LeastSquaresError> {
+    if columns == 0 {
+        return Err(LeastSquaresError::NoParameters);
+    }
+    if regressor.len() != measured.len() * columns {
+        return Err(LeastSquaresError::Shape {
+            regressor: regressor.len(),
+            measured: measured.len(),
+            columns,
+        });
+    }
+    if !all_finite(regressor)
+        && let Some(i) = regressor.iter().position(|value| !value.is_finite())
+    {
+        return Err(LeastSquaresError::NotFinite {
+            row: before + i / columns,
+            column: Some(i % columns),
+        });
+    }
+    if !all_finite(measured)
+        && let Some(i) = measured.iter().position(|value| !value.is_finite())
+    {
+        return Err(LeastSquaresError::NotFinite {
+            row: before + i,
+            column: None,
+        });
+    }
+    Ok(())
+}
+
+/// Whether a row was given the weight 0, or says nothing for another reason: its residual is no sample of any noise.
+pub(crate) fn is_left_out(row: &[f64], measured: f64) -> bool {
+    measured == 0.0 && row.iter().all(|w| *w == 0.0)
+}
+
+/// Whether all numbers are finite; a sum is not when a summand is not. Independent sums go at the speed of memory.
+pub(crate) fn all_finite(values: &[f64]) -> bool {
+    let mut sums = [0.0; 8];
+    let eights = values.chunks_exact(8);
+    let rest: f64 = eights.remainder().iter().sum();
+    for eight in eights {
+        for lane in 0..8 {
+            sums[lane] += 0.0 * eight[lane];
+        }
+    }
+    (sums.iter().sum::<f64>() + 0.0 * rest).is_finite()
+}

@@ -1,0 +1,79 @@
+//! One column of a recording: its numbers, and what is wrong with the fields that are none.
+
+use crate::recording::error::Fault;
+use crate::words::nearest;
+
+/// No quantity that is measured in SI units comes near this, and squares of smaller numbers do not overflow.
+pub(crate) const LARGEST: f64 = 1e100;
+
+/// One field of a sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Field {
+    Number(f64),
+    NotFinite,
+    Text,
+}
+
+impl Field {
+    /// A number, unless it is none that can be computed with.
+    pub(crate) fn of(value: f64) -> Self {
+        if value.abs() <= LARGEST {
+            Self::Number(value)
+        } else {
+            Self::NotFinite
+        }
+    }
+}
+
+/// The numbers of a column, NaN where there are none, and what is wrong with it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Column {
+    pub(crate) values: Vec<f64>,
+    pub(crate) text: Option<Defect>,
+    pub(crate) not_finite: Option<Defect>,
+}
+
+/// Fields of a column that cannot be used: the first of them and how many there are.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Defect {
+    pub(crate) line: u64,
+    pub(crate) text: String,
+    pub(crate) count: usize,
+}
+
+impl Column {
+    /// Takes the next field; `text` gives it as it stands in the file.
+    pub(crate) fn push(&mut self, field: Field, line: u64, text: &dyn Fn() -> String) {
+        let defect = match field {
+            Field::Number(number) => {
+                self.values.push(number);
+                return;
+            }
+            Field::NotFinite => &mut self.not_finite,
+            Field::Text => &mut self.text,
+        };
+        self.values.push(f64::NAN);
+        defect
+            .get_or_insert_with(|| Defect {
+                line,
+                text: text(),
+                count: 0,
+            })
+            .count += 1;
+    }
+}
+
+/// The fault of a column that is not there.
+pub(crate) fn missing<'a>(
+    name: &str,
+    present: impl Iterator<Item = &'a str>,
+    by_renaming: bool,
+) -> Fault {
+    let present: Vec<String> = present.map(str::to_owned).collect();
+    Fault::MissingColumn {
+        name: name.to_owned(),
+        nearest: nearest(name, present.iter().map(String::as_str)).map(str::to_owned),
+        present,
+        by_renaming,
+    }
+}

@@ -1,0 +1,53 @@
+//! How a recording is read: names, computed columns, bad samples, the time that is looked at.
+
+/// What becomes of samples with NaN, infinite or empty fields.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum NotFinite {
+    /// A column that holds such fields is refused when it is asked for.
+    #[default]
+    Refuse,
+    /// Samples where any column holds such a field are left out, counted and said in the notes.
+    LeaveOut,
+}
+
+/// A column of ours that is an affine sum of the file's: `offset + sum of factor * column`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Computed {
+    /// Our name.
+    pub name: String,
+    /// The file's columns with their factors.
+    pub terms: Vec<(String, f64)>,
+    /// What is added.
+    pub offset: f64,
+}
+
+/// How a recording is read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadOptions {
+    /// `(ours, theirs)`: the column that the file calls `theirs` is known as `ours`.
+    pub renames: Vec<(String, String)>,
+    /// Columns that are computed from the file's; each replaces one of its name.
+    pub computed: Vec<Computed>,
+    /// What becomes of NaN, infinite and empty fields.
+    pub not_finite: NotFinite,
+    /// Our names of the columns that are needed; the others are neither looked at nor kept.
+    /// All are kept if there is no such list.
+    pub wanted: Option<Vec<String>>,
+    /// Only samples whose time `t` lies between these two, s; the others are passed over, counted and said.
+    pub between: Option<(f64, f64)>,
+    /// Most numbers that are kept; a recording that holds more is refused before memory runs out.
+    pub most_numbers: usize,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self {
+            renames: Vec::new(),
+            computed: Vec::new(),
+            not_finite: NotFinite::default(),
+            wanted: None,
+            between: None,
+            most_numbers: 1 << 26,
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! What is done with the numbers of one signal, whatever they mean: filters, spectra, statistics.
+
+mod filters;
+mod spectrum;
+mod statistics;
+
+pub use filters::{FilterError, LowPass, MAX_FILTER_ORDER};
+pub(crate) use spectrum::hann_power;
+pub(crate) use statistics::{count, median};
