@@ -5,11 +5,13 @@ use std::fmt;
 /// Why a command ended early.
 #[derive(Debug)]
 pub(crate) enum Failure {
+    /// The library has no answer: exit status 2 where options contradict each other, else 1.
+    Library(modelmill::Error),
     /// The input is at fault: exit status 1, and one message that says where, what was expected
     /// and what to do.
     Input(String),
-    /// As [`Failure::Input`], with a text that is rendered already.
-    Rendered(String),
+    /// A text that is printed already.
+    Said,
     /// The command line is at fault: exit status 2.
     Usage(String),
     /// The reader of standard output went away; nobody wants to hear more.
@@ -24,8 +26,8 @@ impl Failure {
     pub(crate) fn status(&self) -> u8 {
         match self {
             Self::BrokenPipe => 0,
-            Self::Input(_) | Self::Rendered(_) => 1,
-            Self::Usage(_) => 2,
+            Self::Usage(_) | Self::Library(modelmill::Error::Options(_)) => 2,
+            Self::Input(_) | Self::Said | Self::Library(_) => 1,
         }
     }
 
@@ -35,26 +37,8 @@ impl Failure {
     }
 }
 
-impl From<modelmill_identify::RecordingError> for Failure {
-    fn from(error: modelmill_identify::RecordingError) -> Self {
-        Self::input(error)
-    }
-}
-
-impl From<modelmill_identify::LeastSquaresError> for Failure {
-    fn from(error: modelmill_identify::LeastSquaresError) -> Self {
-        Self::input(error)
-    }
-}
-
-impl From<modelmill_identify::FiguresError> for Failure {
-    fn from(error: modelmill_identify::FiguresError) -> Self {
-        Self::input(error)
-    }
-}
-
-impl From<modelmill_identify::FilterError> for Failure {
-    fn from(error: modelmill_identify::FilterError) -> Self {
-        Self::input(error)
+impl From<modelmill::Error> for Failure {
+    fn from(error: modelmill::Error) -> Self {
+        Self::Library(error)
     }
 }

@@ -1,48 +1,22 @@
-//! The program: arguments go in, tables, figures and files come out; exit status 0 done, 1 the
+//! The program: arguments become options of the library, its answers become text, JSON and files. Exit status 0 done, 1 the
 //! input is at fault, 2 wrong usage.
 
-mod along;
 mod args;
-mod bundled;
-mod columns;
 mod commands;
-mod consistent;
-mod data;
-mod diagnosis;
-mod effect_args;
-mod entries;
-mod estimation;
-mod estimators;
 mod failure;
-mod instruments;
-mod limits;
-mod model;
-mod nominal_forces;
+mod flags;
 mod output;
-mod piped;
-mod plant;
-mod plot;
-mod preparation;
-mod progress;
-mod regression;
-mod report;
-mod sampled_rank;
-mod separate_args;
-mod separating;
-mod show;
-mod standstill;
-mod suspects;
-mod svg;
-mod table;
 mod terminal;
-mod variances;
 
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use clap::Parser;
+use modelmill::{Error, Host};
 
 use args::{Cli, Command};
 use failure::{Failure, Outcome};
+use terminal::progress::Terminal;
 
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
@@ -54,40 +28,45 @@ fn main() -> ExitCode {
             return ExitCode::from(status);
         }
     };
-    model::use_libraries(&cli.library);
-    match run(&cli.command) {
+    let host = Host::new()
+        .with_libraries(cli.library)
+        .with_progress(Arc::new(Terminal::new()));
+    match run(&host, &cli.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             match &failure {
+                Failure::Library(Error::Model(faults)) => {
+                    terminal::say(faults.render(terminal::errors_in_colour()).trim_end());
+                }
+                Failure::Library(error) => terminal::error(&error.to_string()),
                 Failure::Input(says) | Failure::Usage(says) => terminal::error(says),
-                Failure::Rendered(text) => terminal::say(text.trim_end()),
-                Failure::BrokenPipe => {}
+                Failure::Said | Failure::BrokenPipe => {}
             }
             ExitCode::from(failure.status())
         }
     }
 }
 
-fn run(command: &Command) -> Outcome {
+fn run(host: &Host, command: &Command) -> Outcome {
     match command {
-        Command::Check(args) => commands::check::run(args),
-        Command::Diff(args) => commands::diff::run(args),
-        Command::Effects(args) => commands::effects::run(args),
-        Command::Add(args) => commands::add::run(args),
-        Command::Equations(args) => commands::equations::run(args),
-        Command::Generate(args) => commands::generate::run(args),
-        Command::Evaluate(args) => commands::evaluate::run(args),
-        Command::Identify(args) => commands::identify::run(args),
-        Command::Compare(args) => commands::compare::run(args),
-        Command::Diagnose(args) => commands::diagnose::run(args),
-        Command::Report(args) => commands::report::run(args),
-        Command::Simulate(args) => commands::simulate::run(args),
-        Command::Reduce(args) => commands::reduce::run(args),
-        Command::Import(args) => commands::import::run(args),
-        Command::Interpret(args) => commands::interpret::run(args),
-        Command::Excite(args) => commands::excite::run(args),
-        Command::Experiment(args) => commands::experiment::run(args),
+        Command::Check(args) => commands::check::run(host, args),
+        Command::Diff(args) => commands::diff::run(host, args),
+        Command::Effects(args) => commands::effects::run(host, args),
+        Command::Add(args) => commands::add::run(host, args),
+        Command::Equations(args) => commands::equations::run(host, args),
+        Command::Generate(args) => commands::generate::run(host, args),
+        Command::Evaluate(args) => commands::evaluate::run(host, args),
+        Command::Identify(args) => commands::identify::run(host, args),
+        Command::Compare(args) => commands::compare::run(host, args),
+        Command::Diagnose(args) => commands::diagnose::run(host, args),
+        Command::Report(args) => commands::report::run(host, args),
+        Command::Simulate(args) => commands::simulate::run(host, args),
+        Command::Reduce(args) => commands::reduce::run(host, args),
+        Command::Import(args) => commands::import::run(host, args),
+        Command::Interpret(args) => commands::interpret::run(host, args),
+        Command::Excite(args) => commands::excite::run(host, args),
+        Command::Experiment(args) => commands::experiment::run(host, args),
         Command::Completions(args) => commands::completions::run(args),
-        Command::Tour(args) => commands::tour::run(args),
+        Command::Tour(args) => commands::tour::run(host, args),
     }
 }

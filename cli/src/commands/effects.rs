@@ -1,256 +1,33 @@
 //! `effects`: the library of effects, as a list or one kind in words.
 
-use std::path::Path;
+use modelmill::Host;
+use modelmill::print::effects;
 
-use modelmill_spec::{
-    ActsOn, Carries, EffectKind, KindConstant, KindParameter, Scale, Search, Sign, kinds_with,
-};
-use serde_json::{Value, json};
-
-use crate::effect_args::EffectsArgs;
-use crate::failure::{Failure, Outcome};
-use crate::model;
-use crate::table::{Align, table};
-use crate::terminal;
-
-/// Letters of a line of text.
-const WIDTH: usize = 96;
+use crate::args::effects::EffectsArgs;
+use crate::failure::Outcome;
+use crate::{commands, terminal};
 
 /// Prints the kinds, or one of them.
-pub(crate) fn run(args: &EffectsArgs) -> Outcome {
-    let kinds = match &args.model {
-        Some(path) => model::load(path)?.kinds,
-        None => kinds_with(model::libraries(), &mut |path: &Path| {
-            std::fs::read_to_string(path)
-        })
-        .map_err(|failure| Failure::Rendered(failure.render(terminal::errors_in_colour())))?,
+pub(crate) fn run(host: &Host, args: &EffectsArgs) -> Outcome {
+    let mut kinds = match &args.model {
+        Some(path) => commands::load(host, path)?.kinds,
+        None => host.kinds()?,
     };
-    let chosen: Vec<&EffectKind> = match &args.kind {
-        None => kinds.iter().collect(),
-        Some(name) => {
-            let found = kinds.iter().find(|kind| kind.name == *name);
-            vec![found.ok_or_else(|| unknown(name, &kinds))?]
+    if let Some(name) = &args.kind {
+        let kind = effects::kind(&kinds, name)?.clone();
+        if !args.json {
+            return terminal::print(&effects::explained(&kind, terminal::style()));
         }
-    };
+        kinds = vec![kind];
+    }
     if args.json {
-        let kinds: Vec<Value> = chosen.iter().map(|kind| described(kind)).collect();
-        return terminal::print_json(&json!({ "kinds": kinds }));
+        return terminal::print_json(&effects::json(&kinds));
     }
-    if args.kind.is_some() {
-        return terminal::print(&explained(chosen[0]));
-    }
-    let rows: Vec<Vec<String>> = chosen
-        .iter()
-        .map(|kind| vec![kind.name.clone(), places(kind), adds(kind)])
-        .collect();
-    let columns = [
-        ("effect", Align::Left),
-        ("acts on", Align::Left),
-        ("adds", Align::Left),
-    ];
-    let mut lines = table(0, &columns, &rows);
+    let mut lines = effects::listed(&kinds);
     lines.push(String::new());
     lines.push(
         "`modelmill effects KIND` explains one; `modelmill add MODEL KIND --at PLACE` adds it."
             .to_owned(),
     );
     terminal::print(&lines.join("\n"))
-}
-
-fn unknown(name: &str, kinds: &[EffectKind]) -> Failure {
-    let names: Vec<&str> = kinds.iter().map(|kind| kind.name.as_str()).collect();
-    Failure::Input(format!(
-        "there is no kind of effect `{name}`; known are {}",
-        names.join(", ")
-    ))
-}
-
-/// Where a kind acts, in words.
-fn places(kind: &EffectKind) -> String {
-    let all: Vec<&str> = kind.on.iter().map(|on| on.words()).collect();
-    let joined = all.join(" or ");
-    match kind.places {
-        Some(2) => format!("two of: {joined}"),
-        _ => joined,
-    }
-}
-
-fn adds(kind: &EffectKind) -> String {
-    match kind.mechanics {
-        Some(mechanics) => mechanics.words().to_owned(),
-        None => kind.expression.clone(),
-    }
-}
-
-/// One kind in words.
-fn explained(kind: &EffectKind) -> String {
-    let style = terminal::style();
-    let mut lines = vec![style.bold(&kind.name)];
-    lines.extend(wrapped(&kind.says, 0));
-    lines.push(String::new());
-    lines.push(format!("acts on  {}", places(kind)));
-    lines.push(format!("adds     {}", adds(kind)));
-    let mut symbols: Vec<Vec<String>> = Vec::new();
-    for one in &kind.parameters {
-        let sign = sign(one);
-        symbols.push(vec![
-            one.symbol.clone(),
-            units(&one.units),
-            format!(
-                "parameter{}",
-                sign.map_or_else(String::new, |s| format!(", {s}"))
-            ),
-            one.note.clone(),
-        ]);
-    }
-    for one in &kind.constants {
-        let value = one.value.as_ref();
-        let default = value.map_or_else(String::new, |v| format!(" ({v} if not given)"));
-        symbols.push(vec![
-            one.symbol.clone(),
-            units(&one.units),
-            format!("constant{default}"),
-            [one.note.clone(), sought(one)]
-                .into_iter()
-                .filter(|text| !text.is_empty())
-                .collect::<Vec<_>>()
-                .join("; "),
-        ]);
-    }
-    if !symbols.is_empty() {
-        lines.push(String::new());
-        let columns = [
-            ("symbol", Align::Left),
-            ("unit", Align::Left),
-            ("", Align::Left),
-            ("", Align::Left),
-        ];
-        lines.extend(table(0, &columns, &symbols));
-    }
-    for (head, text) in [
-        ("what it is", &kind.explains),
-        ("told from its doubles", &kind.doubles),
-    ] {
-        if !text.is_empty() {
-            lines.push(String::new());
-            lines.push(style.bold(head));
-            lines.extend(wrapped(text, 2));
-        }
-    }
-    lines.join("\n")
-}
-
-/// Text in lines of even width.
-fn wrapped(text: &str, indent: usize) -> Vec<String> {
-    let mut lines = vec![" ".repeat(indent)];
-    for word in text.split_whitespace() {
-        let line = lines.last_mut().expect("there is a line");
-        if line.chars().count() + 1 + word.chars().count() > WIDTH && line.trim() != "" {
-            lines.push(format!("{}{word}", " ".repeat(indent)));
-        } else {
-            if !line.trim().is_empty() {
-                line.push(' ');
-            }
-            line.push_str(word);
-        }
-    }
-    lines
-}
-
-fn units(units: &[(Carries, String)]) -> String {
-    let mut all: Vec<&str> = units.iter().map(|(_, unit)| unit.as_str()).collect();
-    all.dedup();
-    all.join(" or ")
-}
-
-fn sign(parameter: &KindParameter) -> Option<&'static str> {
-    match parameter.sign {
-        Sign::Positive => Some("not negative"),
-        Sign::Negative => Some("not positive"),
-        Sign::Any => None,
-    }
-}
-
-/// How a constant is found where it is not known.
-fn sought(constant: &KindConstant) -> String {
-    match constant.search {
-        None => String::new(),
-        Some(Search::Linear) => "found linearly".to_owned(),
-        Some(Search::Range { from, to, of }) => {
-            let of = match of {
-                Scale::Rate => " of the largest rate",
-                Scale::Travel => " of the travel",
-                Scale::One => "",
-            };
-            format!("sought from {from} to {to}{of}")
-        }
-    }
-}
-
-fn described(kind: &EffectKind) -> Value {
-    let by_place = |units: &[(Carries, String)]| -> Value {
-        let name = |carries: &Carries| match carries {
-            Carries::Force => "force",
-            Carries::Torque => "torque",
-            Carries::Mass => "point",
-            Carries::Elsewhere => "elsewhere",
-        };
-        let entries = units
-            .iter()
-            .map(|(carries, unit)| (name(carries).to_owned(), json!(unit)));
-        Value::Object(entries.collect())
-    };
-    let on = kind.on.iter().map(|on| match on {
-        ActsOn::Drive => "drive",
-        ActsOn::Coordinate => "coordinate",
-        ActsOn::Point => "point",
-        ActsOn::Part => "part",
-        ActsOn::Base => "base",
-        ActsOn::Force => "force",
-    });
-    let parameters = kind.parameters.iter().map(|one| {
-        json!({
-            "symbol": one.symbol,
-            "units": by_place(&one.units),
-            "sign": match one.sign {
-                Sign::Positive => "positive",
-                Sign::Negative => "negative",
-                Sign::Any => "any",
-            },
-            "note": one.note,
-        })
-    });
-    let constants = kind.constants.iter().map(|one| {
-        json!({
-            "symbol": one.symbol,
-            "units": by_place(&one.units),
-            "value": one.value,
-            "search": match one.search {
-                None => Value::Null,
-                Some(Search::Linear) => json!("linear"),
-                Some(Search::Range { from, to, of }) => json!({
-                    "from": from,
-                    "to": to,
-                    "of": match of {
-                        Scale::Rate => "rate",
-                        Scale::Travel => "travel",
-                        Scale::One => "one",
-                    },
-                }),
-            },
-            "note": one.note,
-        })
-    });
-    json!({
-        "name": kind.name,
-        "on": on.collect::<Vec<_>>(),
-        "places": kind.places,
-        "adds": adds(kind),
-        "parameters": parameters.collect::<Vec<_>>(),
-        "constants": constants.collect::<Vec<_>>(),
-        "says": kind.says,
-        "explains": kind.explains,
-        "doubles": kind.doubles,
-        "own": kind.is_own,
-    })
 }

@@ -1,95 +1,83 @@
 //! `generate`: the model as Rust source, or as a crate that brings it to C or Python.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use modelmill_codegen::{EmittedFile, emit, emit_c, emit_python, module_name};
+use modelmill::Host;
+use modelmill::generate::{Code, EmittedFile, Language};
+use modelmill::text::table::count;
 
-use crate::args::{GenerateArgs, Language};
+use crate::args::{GenerateArgs, LanguageArg};
 use crate::failure::{Failure, Outcome};
-use crate::model;
 use crate::output::{Target, refuse_dash, write};
-use crate::progress::watched;
-use crate::table::count;
-use crate::terminal;
+use crate::{commands, terminal};
 
 /// Writes the source that `cargo build` makes of the model, or the folder of a crate.
-pub(crate) fn run(args: &GenerateArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &GenerateArgs) -> Outcome {
     let more = [
         ("--dynamics", args.dynamics),
         ("--reactions", args.reactions),
         ("--self-test", args.self_test),
     ];
     if let Some((flag, _)) = more.iter().find(|(_, asked)| *asked)
-        && args.language != Language::Rust
+        && args.language != LanguageArg::Rust
     {
         return Err(Failure::Usage(format!(
             "{flag} goes with the Rust module only; leave it out, or leave --language out"
         )));
     }
-    let model = model::derive(&args.model)?;
-    let writing = format!("writing the code of {}", model.name);
-    let crate_files = match args.language {
-        Language::Rust => None,
-        Language::C => Some(watched(&writing, 0, |_| emit_c(&model.derivation))),
-        Language::Python => Some(watched(&writing, 0, |_| emit_python(&model.derivation))),
+    let model = commands::model(host, &args.model)?;
+    let target = match (&args.out, args.language) {
+        (Some(path), LanguageArg::Rust) => Some(Target::new(path, model.files())?),
+        _ => None,
     };
-    if let Some(files) = crate_files {
-        let Some(folder) = &args.out else {
-            return Err(Failure::Usage(
-                "--out names the folder of the crate".to_owned(),
-            ));
-        };
-        write_crate(folder, &files)?;
-        let what = match args.language {
-            Language::Python => {
-                "a Python module: build it there with `maturin build --release`, or `cargo build --release`"
-            }
-            _ => "a C library and its header: build it there with `cargo build --release`",
-        };
-        terminal::note(&format!("{}: a crate that makes {what}", folder.display()));
-        return Ok(());
-    }
-    let target = args
-        .out
-        .as_ref()
-        .map(|path| Target::new(path, model.files.iter().map(PathBuf::as_path)))
-        .transpose()?;
-    let derivation = &model.derivation;
-    let fault = |error| Failure::Input(format!("{}: {error}", model.path));
-    let source = watched(&writing, 0, |_| -> Outcome<String> {
-        let mut emitted = emit(derivation);
-        if args.dynamics {
-            let dynamics = derivation.dynamics().map_err(fault)?;
-            emitted = emitted.with_dynamics(derivation, &dynamics);
-        }
-        if args.reactions {
-            let reactions = derivation.reactions().map_err(fault)?;
-            emitted = emitted.with_reactions(derivation, &reactions);
-        }
-        if args.self_test {
-            emitted = emitted.with_self_test(derivation);
-        }
-        Ok(emitted.file())
+    let files = model.generate(&Code {
+        language: match args.language {
+            LanguageArg::Rust => Language::Rust,
+            LanguageArg::C => Language::C,
+            LanguageArg::Python => Language::Python,
+        },
+        dynamics: args.dynamics,
+        reactions: args.reactions,
+        self_test: args.self_test,
     })?;
-    match target {
-        Some(target) => {
-            target.write(&source)?;
-            terminal::note(&format!(
-                "{}: {}, the module `{}`",
-                target.path().display(),
-                count(source.lines().count(), "line", "lines"),
-                module_name(&model.derivation.mechanism.name)
-            ));
-            Ok(())
+    let what = match args.language {
+        LanguageArg::Rust => return module(target.as_ref(), &files),
+        LanguageArg::C => "a C library and its header: build it there with `cargo build --release`",
+        LanguageArg::Python => {
+            "a Python module: build it there with `maturin build --release`, or `cargo build --release`"
         }
-        None => terminal::print(&source),
+    };
+    let Some(folder) = &args.out else {
+        return Err(Failure::Usage(
+            "--out names the folder of the crate".to_owned(),
+        ));
+    };
+    write_crate(folder, &files)?;
+    terminal::note(&format!("{}: a crate that makes {what}", folder.display()));
+    Ok(())
+}
+
+/// Writes or prints the one module.
+fn module(target: Option<&Target>, files: &[EmittedFile]) -> Outcome {
+    for file in files {
+        let Some(target) = target else {
+            return terminal::print(&file.text);
+        };
+        target.write(&file.text)?;
+        terminal::note(&format!(
+            "{}: {}, the module `{}`",
+            target.path().display(),
+            count(file.text.lines().count(), "line", "lines"),
+            file.path.trim_end_matches(".rs")
+        ));
     }
+    Ok(())
 }
 
 /// The first line of a manifest that this program wrote.
 const OURS: &str = "# Written by modelmill.";
 
-/// Writes a crate with a copy of the runtime, so that the folder can go anywhere; only over a crate of the same kind.
+/// Writes a crate; only over a crate of the same kind.
 fn write_crate(folder: &Path, files: &[EmittedFile]) -> Outcome {
     refuse_dash(folder)?;
     let manifest = folder.join("Cargo.toml");
@@ -102,11 +90,8 @@ fn write_crate(folder: &Path, files: &[EmittedFile]) -> Outcome {
             folder.display()
         )));
     }
-    let runtime = modelmill_runtime::source::FILES;
-    let runtime = runtime.map(|(path, text)| (format!("modelmill-runtime/{path}"), text));
-    let own = files.iter().map(|f| (f.path.clone(), f.text.as_str()));
-    for (path, text) in own.chain(runtime) {
-        let path = folder.join(path);
+    for file in files {
+        let path = folder.join(&file.path);
         let parent = path.parent().unwrap_or(folder);
         std::fs::create_dir_all(parent).map_err(|error| {
             Failure::Input(format!(
@@ -114,7 +99,7 @@ fn write_crate(folder: &Path, files: &[EmittedFile]) -> Outcome {
                 parent.display()
             ))
         })?;
-        write(&path, text)?;
+        write(&path, &file.text)?;
     }
     Ok(())
 }

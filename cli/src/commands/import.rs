@@ -1,13 +1,15 @@
 //! `import`: a robot description of ROS as the start of a model file.
 
+use modelmill::Host;
+use modelmill::text::table::count;
+
 use crate::args::ImportArgs;
 use crate::failure::{Failure, Outcome};
 use crate::output::Target;
-use crate::table::count;
 use crate::terminal;
 
 /// Writes the model file and says what was left out or rounded.
-pub(crate) fn run(args: &ImportArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &ImportArgs) -> Outcome {
     let target = Target::new(&args.out, [args.urdf.as_path()])?;
     let bytes = std::fs::read(&args.urdf).map_err(|error| {
         Failure::Input(format!(
@@ -21,20 +23,12 @@ pub(crate) fn run(args: &ImportArgs) -> Outcome {
             args.urdf.display()
         ))
     })?;
-    let imported = modelmill_reduction::import_urdf(&text)
-        .map_err(|error| Failure::Input(format!("{}: {error}", args.urdf.display())))?;
-    for remark in &imported.remarks {
-        terminal::warn(remark);
-    }
+    let imported = host.import(&args.urdf.display().to_string(), &text)?;
     target.write(&imported.model)?;
     terminal::note(&format!(
         "{}: {}, with gravity along -z and the ten linear parameters of every body; read and mend it",
         target.path().display(),
-        count(
-            imported.model.matches("[[frame]]").count(),
-            "joint",
-            "joints"
-        ),
+        count(imported.joints, "joint", "joints"),
     ));
     Ok(())
 }

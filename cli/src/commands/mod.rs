@@ -1,4 +1,4 @@
-//! One file per command.
+//! One file per command; what they share: reading models and recordings, and asking for a diagnosis.
 
 pub(crate) mod add;
 pub(crate) mod check;
@@ -19,3 +19,137 @@ pub(crate) mod reduce;
 pub(crate) mod report;
 pub(crate) mod simulate;
 pub(crate) mod tour;
+
+use std::path::{Path, PathBuf};
+
+use modelmill::diagnose::{Findings, Held, Question};
+use modelmill::model::Loaded;
+use modelmill::recording::{Reading, Recording};
+use modelmill::{Host, Model};
+
+use crate::args::AskArgs;
+use crate::failure::{Failure, Outcome};
+use crate::terminal;
+
+/// Reads and derives a model file; warnings go to standard error.
+pub(crate) fn model(host: &Host, path: &Path) -> Outcome<Model> {
+    derived(host, &path.display().to_string(), load(host, path)?)
+}
+
+/// Derives a model that was read from `path`; warnings go to standard error.
+pub(crate) fn derived(host: &Host, path: &str, loaded: Loaded) -> Outcome<Model> {
+    let model = host.derive(path, loaded)?;
+    for note in &model.notes {
+        terminal::remark(note);
+    }
+    Ok(model)
+}
+
+/// Reads a model file; warnings go to standard error.
+pub(crate) fn load(host: &Host, path: &Path) -> Outcome<Loaded> {
+    let loaded = load_quietly(host, path)?;
+    if !loaded.warnings.is_empty() {
+        terminal::say(loaded.render(terminal::errors_in_colour()).trim_end());
+    }
+    Ok(loaded)
+}
+
+/// Reads a model file and keeps its warnings.
+pub(crate) fn load_quietly(host: &Host, path: &Path) -> Outcome<Loaded> {
+    if path.is_dir() {
+        return Err(Failure::Input(format!(
+            "{} is a folder; a model file is expected{}",
+            path.display(),
+            nearby(path)
+        )));
+    }
+    if !path.exists() {
+        return Err(Failure::Input(format!(
+            "there is no file {}; the path of a model file (TOML) is expected{}",
+            path.display(),
+            nearby(path)
+        )));
+    }
+    Ok(host.load(path)?)
+}
+
+/// Reads recordings; their remarks go to standard error as they come up.
+pub(crate) fn recordings(
+    model: &Model,
+    paths: &[PathBuf],
+    reading: &Reading,
+) -> Outcome<Vec<Recording>> {
+    let read = |path: &PathBuf| Ok(model.recording(path, reading)?);
+    paths.iter().map(read).collect()
+}
+
+/// Diagnoses what the command line names.
+pub(crate) fn diagnose(host: &Host, args: &AskArgs, question: &Question) -> Outcome<Findings> {
+    let model = self::model(host, &args.model)?;
+    let reading = args.preparation.reading();
+    let fit = recordings(&model, &args.data, &reading)?;
+    let check = recordings(&model, &args.check, &reading)?;
+    let [fit, check] = [&fit, &check].map(|all| all.iter().collect::<Vec<_>>());
+    Ok(model.diagnose(&fit, &check, question)?)
+}
+
+impl AskArgs {
+    /// Which parameters are held.
+    pub(crate) fn held(&self) -> Held {
+        if self.held { Held::All } else { Held::Known }
+    }
+}
+
+/// Model files around a path that led nowhere, as a sentence for the end of a message.
+fn nearby(path: &Path) -> String {
+    let own = if path.is_dir() {
+        path
+    } else {
+        path.parent().unwrap_or(Path::new(""))
+    };
+    let folders = [
+        own,
+        Path::new("models"),
+        Path::new("model-spec/models"),
+        Path::new(""),
+    ];
+    for folder in folders {
+        let here = if folder.as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            folder
+        };
+        let mut found: Vec<String> = std::fs::read_dir(here)
+            .into_iter()
+            .flatten()
+            .flatten()
+            .map(|entry| folder.join(entry.file_name()))
+            .filter(|file| is_model(file))
+            .map(|file| file.display().to_string())
+            .collect();
+        if found.is_empty() {
+            continue;
+        }
+        found.sort();
+        let more = found.len().saturating_sub(24);
+        found.truncate(24);
+        let more = if more > 0 {
+            format!("\n  and {more} more")
+        } else {
+            String::new()
+        };
+        return format!("; model files nearby:\n  {}{more}", found.join("\n  "));
+    }
+    "; `modelmill tour` shows what a model file gives".to_owned()
+}
+
+/// Whether a file looks like a model: TOML with a line that gives the version of the schema.
+fn is_model(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e == "toml")
+        && std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() < 1 << 20)
+        && std::fs::read_to_string(path).is_ok_and(|text| {
+            text.lines()
+                .filter_map(|line| line.split_once('='))
+                .any(|(key, _)| key.trim() == "schema")
+        })
+}

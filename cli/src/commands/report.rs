@@ -1,22 +1,30 @@
 //! `report`: what a model lacks, as one self-contained page.
 
+use modelmill::Host;
+use modelmill::diagnose::{Question, words};
+use modelmill::report::page;
+
 use crate::args::ReportArgs;
+use crate::commands;
 use crate::failure::Outcome;
+use crate::flags::Flags;
 use crate::output;
-use crate::report::{self, words};
 use crate::terminal;
 
 /// Name of the page in its folder.
 pub(crate) const PAGE: &str = "report.html";
 
 /// Diagnoses and writes the page.
-pub(crate) fn run(args: &ReportArgs) -> Outcome {
+pub(crate) fn run(host: &Host, args: &ReportArgs) -> Outcome {
     output::make_folder(&args.out)?;
-    let study = report::ask(&args.ask)?;
-    let drives = study.before.model.drives();
+    let question = Question {
+        held: args.ask.held(),
+        again_with_nominal: false,
+    };
+    let findings = commands::diagnose(host, &args.ask, &question)?;
     let path = args.out.join(PAGE);
-    output::write(&path, &report::render(&study))?;
-    let says = words::verdict(&study.answer.diagnosis, &drives, study.judged);
+    output::write(&path, &page(&findings, &Flags::of(&args.ask))?)?;
+    let says = words::verdict(&findings.diagnosis, findings.channels(), findings.judged);
     terminal::print(&format!(
         "{}\n\nThe page is {}.",
         words::lines(&says, 100).join("\n"),

@@ -1,14 +1,13 @@
 //! The words of the tour: paragraphs, tables and figures in the order in which they are told.
 
-use modelmill_identify::diagnose::Rung;
+use modelmill::Model;
+use modelmill::diagnose::{Findings, Rung, words};
+use modelmill::print::tables;
+use modelmill::text::Style;
+use modelmill::text::table::{Align, count, percent, table};
 
 use super::{EDITED, PAPER_PAGE, PLAIN, Place, RODS_PAGE, Seen, WITH_RODS, verdict};
-use crate::model::Model;
-use crate::plot::{Curve, bar, time_axis};
-use crate::report::{Study, words};
-use crate::show;
-use crate::table::{Align, count, percent, table};
-use crate::terminal::Style;
+use crate::terminal::plot::{Curve, bar, time_axis};
 
 /// Width of a paragraph.
 const WIDTH: usize = 76;
@@ -79,7 +78,7 @@ impl Story {
             count(reduction.products.len(), "product", "products"),
             model.base.len(),
         ));
-        self.lines(&show::expressions(2, model));
+        self.lines(&tables::expressions(2, model));
         self.line("");
         self.command(&format!("equations {name}"));
     }
@@ -91,7 +90,7 @@ impl Story {
             "Another house's multibody code simulated the whole robot, eleven groups of bodies, and something besides that the \
              model file does not know of. Held against that recording, with the masses of the drawings, the model misses the \
              forces by {}. First the force of one screw, then what the model misses:",
-            percent(seen.figures.nrms)
+            percent(seen.compared.figures.nrms)
         ));
         let drive = model.drives().first().cloned().unwrap_or_default();
         if let (Some(measured), Some(error)) = (seen.measured.first(), seen.errors.first()) {
@@ -112,7 +111,7 @@ impl Story {
             self.line("");
         }
         self.line("Where the error lives:");
-        self.lines(&show::places(&seen.places));
+        self.lines(&tables::places(&seen.compared.places));
         self.line("");
         self.say("True, but it does not say what is missing. This is as far as other tools go; the thinking is left to you.");
         self.command(&format!(
@@ -123,16 +122,16 @@ impl Story {
     }
 
     /// What is missing, and what else was tried.
-    pub(super) fn diagnose(&mut self, place: &Place, study: &Study) {
+    pub(super) fn diagnose(&mut self, place: &Place, findings: &Findings) {
         self.heading("3  Diagnose: what is missing?");
-        let all = &study.answer.diagnosis.candidates;
+        let all = &findings.diagnosis.candidates;
         self.say(&format!(
             "modelmill writes down every effect of its library at every place of this mechanism, {} in all: friction of many \
              kinds, springs, inertias, offsets, delays, rods. It fits them beside the model on one run, and believes only what \
              also lowers the error on another, which it did not fit.",
             count(all.len(), "candidate", "candidates")
         ));
-        self.say(&verdict(study));
+        self.say(&verdict(findings));
         let shown = all.iter().filter(|c| c.refused.is_none());
         let others = all.iter().filter(|c| c.refused.is_some()).take(OTHERS);
         let rows: Vec<Vec<String>> = shown
@@ -152,8 +151,8 @@ impl Story {
         ];
         self.lines(&table(2, &columns, &rows));
         self.line("");
-        for found in &study.answer.diagnosis.effects {
-            let kinds = &study.answer.candidates.kinds;
+        for found in &findings.diagnosis.effects {
+            let kinds = &findings.before.model.loaded.kinds;
             if let Some(kind) = kinds.iter().find(|k| k.name == found.effect.kind) {
                 self.say(&format!("{}: {}", words::effect(&found.effect), kind.says));
             }
@@ -194,17 +193,17 @@ impl Story {
     }
 
     /// Errors step by step, and the parameters in the end.
-    pub(super) fn ladder(&mut self, study: &Study) {
+    pub(super) fn ladder(&mut self, findings: &Findings) {
         self.heading("5  Identify again, and watch the error fall");
-        let diagnosis = &study.answer.diagnosis;
+        let diagnosis = &findings.diagnosis;
         self.bars(&diagnosis.ladder, diagnosis.noise_floor);
-        if let Ok(after) = &study.after
+        if let Ok(after) = &findings.after
             && let Some(result) = &after.identified
         {
             self.line("The parameters of the completed model, from the data alone:");
-            self.lines(&show::expressions(2, &after.model));
+            self.lines(&tables::expressions(2, &after.model));
             self.line("");
-            self.lines(&show::parameters(&result.fit.parameters));
+            self.lines(&tables::parameters(&result.fit.parameters));
             self.line("");
         }
         self.say(
@@ -251,18 +250,18 @@ impl Story {
     }
 
     /// The treatment of the paper.
-    pub(super) fn paper(&mut self, place: &Place, study: &Study) {
+    pub(super) fn paper(&mut self, place: &Place, findings: &Findings) {
         self.heading("6  The same question to a published model");
         self.say(
             "The paper that describes this robot lets the platform's mass m4 act at the joint in the balance of forces, and at \
              the middle of the coupler in the balance of moments. Its parameters come from drawings, and its authors saw an \
              error that they could not name. On a simulation of the robot exactly as the paper has it, with all parameters held:",
         );
-        self.say(&verdict(study));
-        let diagnosis = &study.answer.diagnosis;
+        self.say(&verdict(findings));
+        let diagnosis = &findings.diagnosis;
         self.bars(&diagnosis.ladder, diagnosis.noise_floor);
         for found in &diagnosis.effects {
-            let kinds = &study.answer.candidates.kinds;
+            let kinds = &findings.before.model.loaded.kinds;
             if let Some(kind) = kinds.iter().find(|k| k.name == found.effect.kind) {
                 self.say(&format!("{}: {}", words::effect(&found.effect), kind.says));
             }

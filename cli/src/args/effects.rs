@@ -1,0 +1,71 @@
+//! The command line of `effects` and `add`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use modelmill::add::{Said, Setting};
+
+/// `effects`.
+#[derive(Debug, Args)]
+pub(crate) struct EffectsArgs {
+    /// Explain this kind
+    pub(crate) kind: Option<String>,
+    /// Besides the library, the kinds of this model file (TOML)
+    #[arg(long, value_name = "MODEL")]
+    pub(crate) model: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `add`.
+#[derive(Debug, Args)]
+pub(crate) struct AddArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Kind of the effect; `modelmill effects` lists them
+    pub(crate) kind: String,
+    /// Where it acts: drives, coordinates, points, a part, `base` or `force`, as the kind has it; several share its
+    /// parameters
+    #[arg(long, value_name = "PLACE,...", required = true, value_delimiter = ',')]
+    pub(crate) at: Vec<String>,
+    /// Nominal value of a parameter (`Fc=25.9`) or its name (`Fc.name=Fc_left`), or the value of a constant (`vs=0.02`),
+    /// in SI units; may be repeated
+    #[arg(long, value_name = "NAME=VALUE", value_parser = parse_setting, allow_hyphen_values = true)]
+    pub(crate) set: Vec<Setting>,
+    /// A remark that stands above the effect
+    #[arg(long, value_name = "TEXT")]
+    pub(crate) comment: Option<String>,
+    /// Write the result into the model file itself
+    #[arg(long, conflicts_with = "out")]
+    pub(crate) in_place: bool,
+    /// Write the result to this file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Reads `NAME=VALUE` or `NAME.name=NAME`.
+fn parse_setting(text: &str) -> Result<Setting, String> {
+    let (left, right) = text
+        .split_once('=')
+        .ok_or("expected NAME=VALUE, such as Fc=25.9 or Fc.name=Fc_left")?;
+    let (left, right) = (left.trim(), right.trim());
+    if let Some(symbol) = left.strip_suffix(".name") {
+        return Ok(Setting {
+            symbol: symbol.to_owned(),
+            said: Said::Name(right.to_owned()),
+        });
+    }
+    match right.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(Setting {
+            symbol: left.to_owned(),
+            said: Said::Value(value),
+        }),
+        _ => Err(format!(
+            "`{right}` is no finite number; to name a parameter write {left}.name={right}"
+        )),
+    }
+}

@@ -1,0 +1,168 @@
+//! Options that say how recordings are read and prepared, shared by all commands that read them.
+
+use clap::{Args, ValueEnum};
+use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, Preparation, Reading, Smoothing};
+
+/// Order of the low-pass where none is asked for.
+const USUAL_ORDER: usize = 4;
+
+/// How recordings are read and states are prepared.
+#[derive(Debug, Clone, PartialEq, Args)]
+#[command(next_help_heading = "Reading and preparing recordings")]
+pub(crate) struct PreparationArgs {
+    /// The recording calls our column by another name, e.g. `--map theta1=pos_left`, or ours is a
+    /// sum of its columns, in other units perhaps: `--map "q6=(pos6 - pos5)/32 - 90 [deg]"`; may be
+    /// repeated. Ours are `t`, a coordinate, a coordinate with `_d` or `_dd`, a drive, and a drive
+    /// with `_var` for the variance of its force
+    #[arg(long, value_name = "OURS=THEIRS", value_parser = parse_map)]
+    pub(crate) map: Vec<(String, String)>,
+    /// Cut-off of the low-pass on positions, Hz; chosen from the signal if not given
+    #[arg(long, value_name = "HZ", value_parser = parse_cutoff, allow_negative_numbers = true)]
+    pub(crate) cutoff: Option<f64>,
+    /// Order of the Butterworth low-pass, which runs forwards and backwards [default: 4]
+    #[arg(long, value_name = "N", value_parser = parse_order, allow_negative_numbers = true)]
+    pub(crate) order: Option<usize>,
+    /// Samples dropped at the start and at the end, once derivatives are made; a single number
+    /// counts for both ends
+    #[arg(long, value_name = "N[,N]", value_parser = parse_trim, allow_hyphen_values = true)]
+    pub(crate) trim: Option<(usize, usize)>,
+    /// Keep every n-th sample, after a low-pass on forces and regressor alike
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_decimate, allow_negative_numbers = true)]
+    pub(crate) decimate: usize,
+    /// Which rates and accelerations are taken
+    #[arg(long, value_enum, default_value = "recorded")]
+    pub(crate) derivatives: DerivativesArg,
+    /// How positions are smoothed and differentiated
+    #[arg(long, value_enum, default_value = "auto")]
+    pub(crate) smoothing: SmoothingArg,
+    /// Period of the motion, s, for `--smoothing fourier`, which it asks for; found from the positions if not given
+    #[arg(long, value_name = "S", value_parser = parse_period)]
+    pub(crate) period: Option<f64>,
+    /// Leave out samples with NaN, infinite or empty fields instead of refusing the recording
+    #[arg(long)]
+    pub(crate) skip_bad_samples: bool,
+    /// Read only the samples between these times, s
+    #[arg(long, value_name = "FROM,TO", value_parser = parse_between, allow_hyphen_values = true)]
+    pub(crate) between: Option<(f64, f64)>,
+}
+
+/// Where derivatives come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DerivativesArg {
+    /// Recorded columns where there are any, the others from positions
+    Recorded,
+    /// All from positions, whatever the file holds
+    Positions,
+}
+
+/// How positions are smoothed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SmoothingArg {
+    /// A Fourier series where the run is periodic and the series leaves nothing but noise, unless --cutoff is given;
+    /// otherwise Butterworth's low-pass
+    Auto,
+    /// Butterworth's low-pass run both ways, then central differences
+    Butterworth,
+    /// Polynomials of degree 4 over windows that suit the cut-off
+    SavitzkyGolay,
+    /// A Fourier series up to the cut-off, for periodic motions
+    Fourier,
+}
+
+impl PreparationArgs {
+    /// As the library wants it.
+    pub(crate) fn reading(&self) -> Reading {
+        Reading {
+            columns: self.map.clone(),
+            preparation: self.preparation(),
+            skip_bad_samples: self.skip_bad_samples,
+            between: self.between,
+        }
+    }
+
+    fn preparation(&self) -> Preparation {
+        Preparation {
+            cutoff_hz: self.cutoff,
+            order: self.order.unwrap_or(USUAL_ORDER),
+            trim: self.trim,
+            decimate: self.decimate,
+            source: match self.derivatives {
+                DerivativesArg::Recorded => DerivativeSource::RecordedFirst,
+                DerivativesArg::Positions => DerivativeSource::Positions,
+            },
+            smoothing: match self.smoothing {
+                SmoothingArg::Auto => match self.period {
+                    None => Smoothing::Automatic,
+                    period => Smoothing::Fourier { period },
+                },
+                SmoothingArg::Butterworth => Smoothing::Butterworth,
+                SmoothingArg::SavitzkyGolay => Smoothing::SavitzkyGolay,
+                SmoothingArg::Fourier => Smoothing::Fourier {
+                    period: self.period,
+                },
+            },
+        }
+    }
+}
+
+pub(crate) fn parse_map(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((ours, theirs)) if !ours.trim().is_empty() && !theirs.trim().is_empty() => {
+            Ok((ours.trim().to_owned(), theirs.trim().to_owned()))
+        }
+        _ => Err("expected OURS=THEIRS, such as theta1=pos_left".to_owned()),
+    }
+}
+
+fn parse_cutoff(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("expected a frequency above 0 in Hz, such as 25".to_owned()),
+    }
+}
+
+fn parse_period(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("expected a time above 0 in s, such as 7.29".to_owned()),
+    }
+}
+
+fn parse_order(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(order) if (1..=MAX_FILTER_ORDER).contains(&order) => Ok(order),
+        _ => Err(format!(
+            "expected an order from 1 to {MAX_FILTER_ORDER}; 4 is usual"
+        )),
+    }
+}
+
+fn parse_trim(text: &str) -> Result<(usize, usize), String> {
+    let count = |text: &str| {
+        text.trim().parse::<usize>().map_err(|_| {
+            "expected a number of samples, such as 49, or two of them, such as 49,10".to_owned()
+        })
+    };
+    match text.split_once(',') {
+        Some((start, end)) => Ok((count(start)?, count(end)?)),
+        None => count(text).map(|both| (both, both)),
+    }
+}
+
+fn parse_between(text: &str) -> Result<(f64, f64), String> {
+    let times = text.split_once(',').map(|(from, to)| {
+        let time = |text: &str| text.trim().parse::<f64>().ok().filter(|t| t.is_finite());
+        (time(from), time(to))
+    });
+    match times {
+        Some((Some(from), Some(to))) if from < to => Ok((from, to)),
+        _ => Err("expected two times in s, the first before the second, such as 10,60".to_owned()),
+    }
+}
+
+fn parse_decimate(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(value) if value > 0 => Ok(value),
+        _ => Err("expected a whole number from 1 on; 1 keeps all samples".to_owned()),
+    }
+}

@@ -1,0 +1,188 @@
+//! `tour`: the whole story on bundled recordings: derive, compare, see where it fails, learn what is missing, add it, watch
+//! the error fall; then the same for the paper's own treatment. Everything it uses and makes goes into one folder, so that
+//! each command can be repeated by hand.
+
+mod bundled;
+mod story;
+
+use std::path::{Path, PathBuf};
+
+use modelmill::compare::Compared;
+use modelmill::diagnose::{Findings, Held, Question, words};
+use modelmill::print::{Spelling, edit};
+use modelmill::recording::{Reading, Recording};
+use modelmill::report::page;
+use modelmill::{Host, Model, along};
+
+use crate::args::TourArgs;
+use crate::failure::{Failure, Outcome};
+use crate::flags::{Flags, quoted};
+use crate::output;
+use crate::terminal;
+
+use bundled::{PLAIN, Runs, WITH_RODS};
+use story::Story;
+
+/// The page of the robot with rods.
+const RODS_PAGE: &str = "report.html";
+/// The page of the paper's treatment.
+const PAPER_PAGE: &str = "report-paper.html";
+/// The model with what was found.
+const EDITED: &str = "spidermill-completed.toml";
+
+/// Tells the story and writes its files.
+pub(crate) fn run(host: &Host, args: &TourArgs) -> Outcome {
+    let folder = args
+        .out
+        .clone()
+        .unwrap_or_else(|| std::env::temp_dir().join("modelmill-tour"));
+    output::make_folder(&folder)?;
+    let place = Place::unpack(&folder)?;
+    let mut story = Story::new(terminal::style());
+
+    let model = place.model(host, "spidermill.toml")?;
+    let runs = place.read(&model, &WITH_RODS)?;
+    story.derive(&place.name("spidermill.toml"), &model);
+    let seen = Seen::new(&model, &runs[1])?;
+    story.compare(&place, &model, &seen);
+
+    let flags = place.flags(&WITH_RODS);
+    let rods = diagnose(&model, &runs, Held::Known)?;
+    story.diagnose(&place, &rods);
+    let edited = place.add(&rods, &flags)?;
+    story.add(&place, edited.as_ref());
+    story.ladder(&rods);
+    place.write(RODS_PAGE, &page(&rods, &flags)?)?;
+
+    let model = place.model(host, "spidermill-paper.toml")?;
+    let runs = place.read(&model, &PLAIN)?;
+    let paper = diagnose(&model, &runs, Held::All)?;
+    story.paper(&place, &paper);
+    place.write(PAPER_PAGE, &page(&paper, &place.flags(&PLAIN))?)?;
+
+    story.pages(&place);
+    terminal::print(story.text.trim_start())
+}
+
+fn diagnose(model: &Model, [fit, check]: &[Recording; 2], held: Held) -> Outcome<Findings> {
+    let question = Question {
+        held,
+        again_with_nominal: false,
+    };
+    Ok(model.diagnose(&[fit], &[check], &question)?)
+}
+
+/// The folder of the tour.
+struct Place {
+    folder: PathBuf,
+}
+
+impl Place {
+    /// Writes models and recordings of the program into a folder.
+    fn unpack(folder: &Path) -> Outcome<Self> {
+        let place = Self {
+            folder: folder.to_owned(),
+        };
+        for (name, text) in bundled::MODELS {
+            place.write(name, text)?;
+        }
+        for runs in [&PLAIN, &WITH_RODS] {
+            for (name, text) in [runs.fit, runs.check] {
+                place.write(file_name(name), text)?;
+            }
+        }
+        Ok(place)
+    }
+
+    fn write(&self, name: &str, text: &str) -> Outcome {
+        output::write(&self.folder.join(name), text)
+    }
+
+    /// A file of the folder as a command has it.
+    fn name(&self, file: &str) -> String {
+        quoted(&self.folder.join(file).display().to_string())
+    }
+
+    /// Recordings as a command has them.
+    fn recordings(&self, runs: &Runs) -> String {
+        format!(
+            "--data {} --check {}",
+            self.name(file_name(runs.fit.0)),
+            self.name(file_name(runs.check.0))
+        )
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(file_name(name))
+    }
+
+    fn model(&self, host: &Host, name: &str) -> Outcome<Model> {
+        Ok(host.model(self.path(name))?)
+    }
+
+    fn read(&self, model: &Model, runs: &Runs) -> Outcome<[Recording; 2]> {
+        let read = |name: &str| model.recording(self.path(name), &Reading::default());
+        Ok([read(runs.fit.0)?, read(runs.check.0)?])
+    }
+
+    /// How the command line asks for the same.
+    fn flags(&self, runs: &Runs) -> Flags {
+        let [fit, check] = [runs.fit.0, runs.check.0].map(|name| self.path(name));
+        Flags::new(&[fit], &[check], &Reading::default())
+    }
+
+    /// Writes the model with what was found beside the one it came from; the commands for it, and the difference.
+    fn add(&self, findings: &Findings, flags: &Flags) -> Outcome<Option<(Vec<String>, String)>> {
+        let Some(edited) = &findings.edited else {
+            return Ok(None);
+        };
+        self.write(EDITED, &edited.text)?;
+        let model = &findings.before.model;
+        let commands = findings.entries.iter();
+        let commands = commands.map(|entry| flags.add(model, entry)).collect();
+        let names = ["spidermill.toml", EDITED];
+        let difference = edit::difference(model.text(), &edited.text, names);
+        let coloured = edit::coloured(&difference, terminal::style());
+        Ok(Some((commands, coloured)))
+    }
+}
+
+/// The last part of a bundled recording's name.
+fn file_name(name: &str) -> &str {
+    name.rsplit('/').next().unwrap_or(name)
+}
+
+/// The model with nominal parameters held against a recording.
+struct Seen {
+    compared: Compared,
+    time: Vec<f64>,
+    measured: Vec<Vec<f64>>,
+    errors: Vec<Vec<f64>>,
+}
+
+impl Seen {
+    fn new(model: &Model, recording: &Recording) -> Outcome<Self> {
+        let one = recording
+            .stretches
+            .first()
+            .ok_or_else(|| Failure::Input("the bundled recording has no sample".to_owned()))?;
+        let measured = along::measured(one)?;
+        let forces = along::forces(model, one, &model.nominal)?;
+        let errors = measured
+            .iter()
+            .zip(&forces)
+            .map(|(y, m)| y.iter().zip(m).map(|(y, m)| y - m).collect())
+            .collect();
+        Ok(Self {
+            compared: model.compare(&[recording], &model.nominal)?,
+            time: one.time(),
+            measured,
+            errors,
+        })
+    }
+}
+
+/// The verdict of a diagnosis in words.
+fn verdict(findings: &Findings) -> String {
+    words::verdict(&findings.diagnosis, findings.channels(), findings.judged)
+}

@@ -1,0 +1,85 @@
+//! Standard output and standard error: colours only on a terminal, warnings beside the result,
+//! quiet when the reader goes away.
+
+pub(crate) mod plot;
+pub(crate) mod progress;
+
+use std::io::{self, ErrorKind, IsTerminal, Write};
+
+use modelmill::text::Style;
+use modelmill::{Note, Severity};
+
+use crate::failure::{Failure, Outcome};
+
+/// Whether the user allows colours at all: `NO_COLOR` (no-color.org) and dumb terminals forbid them.
+fn colours_allowed() -> bool {
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
+    set("NO_COLOR").is_none() && set("TERM").is_none_or(|term| term != "dumb")
+}
+
+/// Colours for what goes to standard output.
+pub(crate) fn style() -> Style {
+    marked(colours_allowed() && io::stdout().is_terminal())
+}
+
+fn marked(in_colour: bool) -> Style {
+    if in_colour {
+        Style::COLOURED
+    } else {
+        Style::PLAIN
+    }
+}
+
+/// Whether messages on standard error may be coloured.
+pub(crate) fn errors_in_colour() -> bool {
+    colours_allowed() && io::stderr().is_terminal()
+}
+
+/// Writes the result of a command to standard output, with one line feed at its end.
+pub(crate) fn print(text: &str) -> Outcome {
+    let mut out = io::stdout().lock();
+    let end = if text.ends_with('\n') { "" } else { "\n" };
+    out.write_all(text.as_bytes())
+        .and_then(|()| out.write_all(end.as_bytes()))
+        .and_then(|()| out.flush())
+        .map_err(|error| match error.kind() {
+            ErrorKind::BrokenPipe => Failure::BrokenPipe,
+            _ => Failure::Input(format!("standard output cannot be written: {error}")),
+        })
+}
+
+/// Prints one JSON object to standard output.
+pub(crate) fn print_json(value: &serde_json::Value) -> Outcome {
+    print(&format!("{value:#}"))
+}
+
+/// Writes to standard error; who does not read it is not bothered.
+pub(crate) fn say(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}");
+}
+
+/// A warning on standard error.
+pub(crate) fn warn(text: &str) {
+    let style = marked(errors_in_colour());
+    say(&format!("{} {text}", style.yellow("warning:")));
+}
+
+/// A remark on standard error.
+pub(crate) fn note(text: &str) {
+    let style = marked(errors_in_colour());
+    say(&format!("{} {text}", style.bold("note:")));
+}
+
+/// A remark of the library on standard error.
+pub(crate) fn remark(note: &Note) {
+    match note.severity {
+        Severity::Warning => warn(&note.says),
+        Severity::Info => self::note(&note.says),
+    }
+}
+
+/// An error on standard error.
+pub(crate) fn error(text: &str) {
+    let style = marked(errors_in_colour());
+    say(&format!("{} {text}", style.bold_red("error:")));
+}

@@ -1,0 +1,89 @@
+//! The same test motion for other distances of the base joints, a length that the paper does not print: how large the
+//! error of the paper's treatment is beside the forces depends on it.
+//!
+//! The consistent treatment stands for the rig here, with which it agrees to rounding.
+
+use modelmill_identify::excite::{Motion, Series};
+use modelmill_identify::{PreparedAs, Run};
+
+use crate::bundled;
+use crate::study::{Along, Errors};
+use modelmill::along;
+use modelmill::stretch::Stretch;
+use modelmill::{Host, Outcome};
+
+/// Samples of the period.
+const SAMPLES: usize = 1000;
+/// Distances of the base joints, cm.
+const DISTANCES: [i32; 10] = [10, 20, 30, 40, 50, 60, 70, 80, 90, 100];
+
+/// Errors for one distance of the base joints.
+pub(crate) struct Length {
+    /// b, m.
+    pub(crate) distance: f64,
+    /// Of each drive.
+    pub(crate) errors: Vec<Errors>,
+}
+
+/// The errors for every distance at which the loops close all along.
+///
+/// Fails only when whoever watches stops it.
+pub(crate) fn scan(host: &Host, series: &[Series]) -> Outcome<Vec<Length>> {
+    host.watched("trying other lengths", DISTANCES.len(), |job| {
+        let distances = DISTANCES.iter().map(|cm| f64::from(*cm) / 100.0);
+        distances
+            .filter_map(|distance| {
+                job.add(1);
+                at(host, series, distance).ok()
+            })
+            .collect()
+    })
+}
+
+fn at(host: &Host, series: &[Series], distance: f64) -> Outcome<Length> {
+    let variant = |of: &str| {
+        let text = format!(
+            "schema = 1\nname = \"other_length\"\nextends = \"{of}\"\n[constants]\nb = {{ value = {distance}, unit = \"m\" }}\n"
+        );
+        bundled::variant(host, of, "other-length.toml", &text)
+    };
+    let motion = Motion::sample(series, SAMPLES);
+    let period = series.first().map_or(0.0, Series::period);
+    let time: Vec<f64> = (0..SAMPLES)
+        .map(|i| i as f64 * period / SAMPLES as f64)
+        .collect();
+    let data = Stretch::from(Run {
+        file: format!("the test motion for b = {distance} m"),
+        q: motion.q,
+        qd: motion.qd,
+        qdd: motion.qdd,
+        force: None,
+        missing_force: Vec::new(),
+        lines: (0..time.len() as u64).collect(),
+        time,
+        repeats: None,
+        prepared: PreparedAs::default(),
+        notes: Vec::new(),
+    });
+    let (paper, consistent) = (
+        variant("spidermill-paper.toml")?,
+        variant("spidermill.toml")?,
+    );
+    let forces = [
+        along::forces(&paper, &data, &paper.nominal)?,
+        along::forces(&consistent, &data, &consistent.nominal)?,
+    ];
+    let along = Along {
+        time: data.time(),
+        measured: forces[1].clone(),
+        printed: forces[0].clone(),
+        calculated: forces.clone(),
+        estimated: forces,
+    };
+    Ok(Length {
+        distance,
+        errors: (0..along.measured.len())
+            .map(|d| along.errors(d, &along.calculated[0]))
+            .collect(),
+    })
+}

@@ -1,0 +1,221 @@
+//! `experiment`: the paper's experiment, its Section 5, on the bundled rig: excitation, runs, both treatments of m4,
+//! Tables 1 and 2 beside the paper's, and where the errors come from, as one page.
+
+mod figures;
+mod lengths;
+mod page;
+mod page_forces;
+mod page_parameters;
+mod printed;
+mod runs;
+mod study;
+mod wording;
+
+mod bundled;
+
+use modelmill::text::Style;
+use modelmill::text::table::{Align, number, percent, table};
+use modelmill::{Host, Model, Outcome};
+use modelmill_identify::excite::Options;
+use serde_json::json;
+
+use runs::Periodic;
+use study::Bench;
+
+/// How the experiment is made; [`Request::default`] is the page that comes with the project.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Request {
+    /// Random trajectories within the limits that the search for the excitation tries first.
+    pub random: usize,
+    /// How many of the best random trajectories the search starts from.
+    pub starts: usize,
+    /// Seed of the search and of the test trajectory.
+    pub seed: u64,
+    /// Samples per second, Hz.
+    pub rate: f64,
+}
+
+/// Everything that the page tells.
+pub struct Experiment {
+    paper: Model,
+    /// Excitation for identification, and the test trajectory for verification.
+    trajectories: [Periodic; 2],
+    /// Without and with spindle rods.
+    benches: [Bench; 2],
+    /// The paper's base parameters: calculated, of the consistent treatment, and the paper's estimate.
+    base: [Vec<f64>; 3],
+    /// The error for other distances of the base joints.
+    lengths: Vec<lengths::Length>,
+    /// Samples per second.
+    rate: f64,
+}
+
+impl Experiment {
+    /// Makes the experiment.
+    ///
+    /// Fails only when whoever watches stops it, or a search within the limits finds nothing.
+    pub fn new(host: &Host, args: &Request) -> Outcome<Self> {
+        let load = |name: &str| bundled::model(host, name);
+        let paper = load("spidermill-paper.toml")?;
+        let consistent = load("spidermill.toml")?;
+        let (harmonics, period) = printed::EXCITATION;
+        let excitation = Options {
+            harmonics,
+            period,
+            random: args.random,
+            starts: args.starts,
+            seed: args.seed,
+            ..Options::default()
+        };
+        // A test is any lively motion; the best of a few random ones will do.
+        let test = Options {
+            harmonics: 5,
+            period: 5.0,
+            random: 40,
+            starts: 0,
+            seed: args.seed.wrapping_add(1),
+            ..Options::default()
+        };
+        let trajectories = [
+            runs::search(&paper, &excitation, "searching for the excitation")?,
+            runs::search(&paper, &test, "drawing the test trajectory")?,
+        ];
+        let bench = |name: &str| -> Outcome<Bench> {
+            let rig = bundled::rig(name)?;
+            let [identification, verification] = &trajectories;
+            Bench::new(
+                [&paper, &consistent],
+                runs::run(&rig, &paper, identification, args.rate)?,
+                runs::run(&rig, &paper, verification, args.rate)?,
+            )
+        };
+        let benches = [
+            bench("spidermill-full.toml")?,
+            bench("spidermill-with-rods.toml")?,
+        ];
+        let rig = bundled::rig("spidermill-full.toml")?;
+        let data = runs::run(&rig, &paper, &trajectories[0], args.rate)?;
+        let base = [
+            paper.nominal.clone(),
+            study::consistent_values(&paper, &consistent, &data)?,
+            study::values_with(&paper, &printed::ESTIMATED),
+        ];
+        let lengths = lengths::scan(host, &trajectories[1].series)?;
+        Ok(Self {
+            lengths,
+            paper,
+            trajectories,
+            benches,
+            base,
+            rate: args.rate,
+        })
+    }
+
+    /// The page.
+    pub fn page(&self) -> String {
+        page::render(self)
+    }
+
+    /// Error figures of all runs, for people.
+    pub fn text(&self, style: Style) -> String {
+        let mut lines = vec![style.bold(&format!(
+            "The paper's experiment: condition number {} (paper {})",
+            number(self.trajectories[0].condition_number),
+            printed::CONDITION_NUMBER
+        ))];
+        let mut rows = Vec::new();
+        for (bench, rig) in self.benches.iter().zip(["rig", "rig with rods"]) {
+            for (along, run) in bench.runs.iter().zip(["identification", "verification"]) {
+                for (t, treatment) in ["the paper's", "consistent"].into_iter().enumerate() {
+                    let mut row = vec![format!("{rig}, {run}"), treatment.to_owned()];
+                    for modelled in [&along.calculated[t], &along.estimated[t]] {
+                        row.extend((0..2).map(|d| percent(Some(along.errors(d, modelled).nrms))));
+                    }
+                    let remains = along.explained().remains;
+                    row.push(if t == 0 {
+                        percent(Some(remains))
+                    } else {
+                        String::new()
+                    });
+                    rows.push(row);
+                }
+            }
+        }
+        let columns = [
+            ("nrms", Align::Left),
+            ("treatment of m4", Align::Left),
+            ("calculated fe1", Align::Right),
+            ("fe10", Align::Right),
+            ("estimated fe1", Align::Right),
+            ("fe10", Align::Right),
+            ("left without m4's shift", Align::Right),
+        ];
+        lines.extend(table(2, &columns, &rows));
+        lines.join("\n")
+    }
+
+    /// All figures as one JSON object.
+    pub fn json(&self) -> serde_json::Value {
+        let bench = |bench: &Bench| {
+            let run = |k: usize| {
+                let along = &bench.runs[k];
+                let treatment = |t: usize| {
+                    let errors = |modelled: &study::Columns| -> Vec<serde_json::Value> {
+                        (0..modelled.len())
+                            .map(|d| {
+                                let e = along.errors(d, modelled);
+                                json!({ "nrms": e.nrms, "mean_relative": e.mean_relative, "median_relative": e.median_relative })
+                            })
+                            .collect()
+                    };
+                    json!({
+                        "calculated": errors(&along.calculated[t]),
+                        "estimated": errors(&along.estimated[t]),
+                    })
+                };
+                let explained = along.explained();
+                let printed = study::explained(&along.printed_change(), &along.placement());
+                json!({
+                    "paper": treatment(0),
+                    "consistent": treatment(1),
+                    "explained": {
+                        "remains": explained.remains,
+                        "correlation": explained.correlation,
+                    },
+                    "paper_change": {
+                        "remains": printed.remains,
+                        "correlation": printed.correlation,
+                    },
+                })
+            };
+            let solutions: Vec<_> = bench
+                .physical
+                .iter()
+                .map(|one| one.values.clone())
+                .collect();
+            json!({
+                "identification": run(0),
+                "verification": run(1),
+                "p_min": bench.fits[0].values(),
+                "table_1": solutions,
+            })
+        };
+        json!({
+            "condition_number": self.trajectories[0].condition_number,
+            "rate": self.rate,
+            "spidermill_full": bench(&self.benches[0]),
+            "spidermill_with_rods": bench(&self.benches[1]),
+            "lengths": self.lengths.iter().map(|length| {
+                json!({
+                    "b": length.distance,
+                    "nrms": length.errors.iter().map(|e| e.nrms).collect::<Vec<_>>(),
+                })
+            }).collect::<Vec<_>>(),
+            "p_min": {
+                "calculated": self.base[0],
+                "consistent": self.base[1],
+                "paper_estimated": self.base[2],
+            },
+        })
+    }
+}

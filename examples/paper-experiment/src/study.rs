@@ -1,0 +1,244 @@
+//! The comparison itself: both treatments of m4 on runs of a rig, and how much of the error of the paper's treatment
+//! is the force of the misplaced mass.
+
+use modelmill_identify::interpret::{Interpretation, Physical, interpret};
+use modelmill_identify::{FitFile, Run};
+
+use crate::printed;
+use modelmill::Model;
+use modelmill::along;
+use modelmill::identify::{Estimation, Identification, identify, regression};
+use modelmill::interpret as table_1;
+use modelmill::stretch::Stretch;
+use modelmill::{Error, Outcome};
+
+/// `[drive][sample]`
+pub(crate) type Columns = Vec<Vec<f64>>;
+
+/// What Table 1 takes as unknown.
+pub(crate) const UNKNOWN: [&str; 5] = ["m2", "m4", "dc3", "Ic12", "Ic32"];
+
+/// One rig with both treatments.
+pub(crate) struct Bench {
+    /// Runs: identification, verification.
+    pub(crate) runs: [Along; 2],
+    /// Fits of the paper's and of the consistent treatment.
+    pub(crate) fits: [Identification; 2],
+    /// Physical parameters of the paper's treatment, as in Table 1: all real solutions.
+    pub(crate) physical: Vec<Physical>,
+}
+
+/// A run of the rig with the forces of both treatments.
+pub(crate) struct Along {
+    /// s
+    pub(crate) time: Vec<f64>,
+    /// What the rig needs.
+    pub(crate) measured: Columns,
+    /// `[treatment]`, the paper's first; with calculated and with estimated parameters.
+    pub(crate) calculated: [Columns; 2],
+    pub(crate) estimated: [Columns; 2],
+    /// The paper's treatment with the parameters that the paper estimated on its own robot.
+    pub(crate) printed: Columns,
+}
+
+/// How much of an error one known force explains.
+#[derive(Clone, Copy)]
+pub(crate) struct Explained {
+    /// 2-norm of the error that is left without that force, as a share of the error.
+    pub(crate) remains: f64,
+    /// Correlation of the error with that force.
+    pub(crate) correlation: f64,
+}
+
+/// Error figures of one drive.
+#[derive(Clone, Copy)]
+pub(crate) struct Errors {
+    /// Mean of |error| / |measured|.
+    pub(crate) mean_relative: f64,
+    /// Median of the same.
+    pub(crate) median_relative: f64,
+    /// 2-norm of the error by that of the measured force.
+    pub(crate) nrms: f64,
+}
+
+impl Bench {
+    /// Identifies both models on the first run and holds them against both.
+    pub(crate) fn new(
+        models: [&Model; 2],
+        identification: Stretch,
+        verification: Stretch,
+    ) -> Outcome<Self> {
+        let data = [identification];
+        let check = [verification];
+        let [paper, consistent] = models;
+        let plain = Estimation::default();
+        let fits = [
+            identify(paper, &data, &[], &check, &plain)?,
+            identify(consistent, &data, &[], &check, &plain)?,
+        ];
+        let physical = physical(paper, &fits[0].fit)?;
+        let [identification] = &data;
+        let [verification] = &check;
+        let along = |one: &Stretch| -> Outcome<Along> {
+            let forces = |values: [&[f64]; 2]| -> Outcome<[Columns; 2]> {
+                Ok([
+                    along::forces(paper, one, values[0])?,
+                    along::forces(consistent, one, values[1])?,
+                ])
+            };
+            Ok(Along {
+                time: one.time(),
+                measured: along::measured(one)?,
+                calculated: forces([&paper.nominal, &consistent.nominal])?,
+                estimated: forces([&fits[0].values(), &fits[1].values()])?,
+                printed: along::forces(paper, one, &values_with(paper, &printed::ESTIMATED))?,
+            })
+        };
+        Ok(Self {
+            runs: [along(identification)?, along(verification)?],
+            physical,
+            fits,
+        })
+    }
+}
+
+impl Along {
+    /// Measured less modelled.
+    pub(crate) fn error(&self, modelled: &Columns) -> Columns {
+        difference(&self.measured, modelled)
+    }
+
+    /// What the platform's mass makes at its place and does not make where the paper puts it: the difference of both
+    /// treatments, of models alone.
+    pub(crate) fn placement(&self) -> Columns {
+        difference(&self.calculated[1], &self.calculated[0])
+    }
+
+    /// What the paper's own identification changed in the forces of its treatment, along this run.
+    pub(crate) fn printed_change(&self) -> Columns {
+        difference(&self.printed, &self.calculated[0])
+    }
+
+    /// How much of the error of the paper's treatment the placement is, over all drives.
+    pub(crate) fn explained(&self) -> Explained {
+        explained(&self.error(&self.calculated[0]), &self.placement())
+    }
+
+    /// Error figures of a drive for modelled forces.
+    pub(crate) fn errors(&self, drive: usize, modelled: &Columns) -> Errors {
+        let pairs = || self.measured[drive].iter().zip(&modelled[drive]);
+        let mut relative: Vec<f64> = pairs()
+            .filter(|(y, _)| **y != 0.0)
+            .map(|(y, m)| ((y - m) / y).abs())
+            .collect();
+        relative.sort_by(f64::total_cmp);
+        let error: f64 = pairs().map(|(y, m)| (y - m).powi(2)).sum();
+        let size: f64 = pairs().map(|(y, _)| y * y).sum();
+        Errors {
+            mean_relative: relative.iter().sum::<f64>() / relative.len().max(1) as f64,
+            median_relative: relative.get(relative.len() / 2).copied().unwrap_or(0.0),
+            nrms: (error / size).sqrt(),
+        }
+    }
+
+    /// Times at which the measured force of a drive passes through zero.
+    pub(crate) fn zeros(&self, drive: usize) -> Vec<f64> {
+        let force = &self.measured[drive];
+        (1..force.len())
+            .filter(|i| (force[i - 1] < 0.0) != (force[*i] < 0.0))
+            .map(|i| {
+                let share = force[i - 1] / (force[i - 1] - force[i]);
+                self.time[i - 1] + share * (self.time[i] - self.time[i - 1])
+            })
+            .collect()
+    }
+
+    /// Share of the samples of a drive whose force is below a share of its root mean square, and the share of the
+    /// mean relative error that they make.
+    pub(crate) fn near_zero(&self, drive: usize, modelled: &Columns, below: f64) -> [f64; 2] {
+        let force = &self.measured[drive];
+        let n = force.len() as f64;
+        let rms = (force.iter().map(|y| y * y).sum::<f64>() / n).sqrt();
+        let (mut count, mut part, mut all) = (0.0, 0.0, 0.0);
+        for (y, m) in force
+            .iter()
+            .zip(&modelled[drive])
+            .filter(|(y, _)| **y != 0.0)
+        {
+            let relative = ((y - m) / y).abs();
+            all += relative;
+            if y.abs() < below * rms {
+                count += 1.0;
+                part += relative;
+            }
+        }
+        [count / n, part / all]
+    }
+}
+
+/// How much of some forces others are, over all drives.
+pub(crate) fn explained(forces: &Columns, by: &Columns) -> Explained {
+    let (forces, by) = (forces.concat(), by.concat());
+    let rest: Vec<f64> = forces.iter().zip(&by).map(|(e, d)| e - d).collect();
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let norm = |a: &[f64]| dot(a, a).sqrt();
+    Explained {
+        remains: norm(&rest) / norm(&forces),
+        correlation: dot(&forces, &by) / (norm(&forces) * norm(&by)),
+    }
+}
+
+fn difference(a: &Columns, b: &Columns) -> Columns {
+    let columns = a.iter().zip(b);
+    columns
+        .map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect())
+        .collect()
+}
+
+/// The paper's base parameters that make the forces of the consistent treatment: it is the special case in which the
+/// half masses sit at the couplers' ends, so least squares finds them without error.
+pub(crate) fn consistent_values(
+    paper: &Model,
+    consistent: &Model,
+    data: &Stretch,
+) -> Outcome<Vec<f64>> {
+    let run = Run {
+        force: Some(along::forces(consistent, data, &consistent.nominal)?),
+        ..data.run.clone()
+    };
+    Ok(
+        regression::identify(paper, &[Stretch::from(run)], &[], &Estimation::default())?
+            .solution
+            .values,
+    )
+}
+
+/// The paper's base parameters for other values of some parameters.
+pub(crate) fn values_with(model: &Model, changed: &[(&str, f64)]) -> Vec<f64> {
+    let mechanism = &model.derivation.mechanism;
+    let parameters: Vec<f64> = mechanism
+        .parameters
+        .iter()
+        .map(|p| {
+            let other = changed.iter().find(|(name, _)| *name == p.name);
+            other.map_or(p.nominal, |(_, value)| *value)
+        })
+        .collect();
+    let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
+    model.derivation.base_values(&parameters, &constants)
+}
+
+/// Table 1: all real solutions for the parameters that the paper takes as unknown.
+fn physical(model: &Model, fit: &FitFile) -> Outcome<Vec<Physical>> {
+    let names = UNKNOWN.map(str::to_owned);
+    let unknown = table_1::unknown(model, &names)?;
+    let values: Vec<f64> = fit.parameters.iter().map(|p| p.value).collect();
+    let (problem, _) = table_1::problem(model, &unknown, &values, fit);
+    match interpret(&problem) {
+        Ok(
+            Interpretation::Exact { solutions } | Interpretation::LeastSquares { solutions, .. },
+        ) => Ok(solutions),
+        Ok(Interpretation::Undetermined { .. }) => Ok(Vec::new()),
+        Err(error) => Err(Error::input(format!("{}: {error}", model.path))),
+    }
+}

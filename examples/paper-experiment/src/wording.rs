@@ -1,0 +1,74 @@
+//! Numbers as the page says them: largest and least over runs, shares, and errors with rounding shown as such.
+
+use crate::Experiment;
+use crate::study::Along;
+use modelmill::text::table::significant;
+
+/// Below this, an error is rounding; its digits differ from machine to machine and say nothing.
+const ROUNDING: f64 = 1e-8;
+
+/// A parameter's value in the left column of Table 1.
+pub(crate) fn nominal(experiment: &Experiment, name: &str) -> f64 {
+    let parameters = &experiment.paper.derivation.mechanism.parameters;
+    let found = parameters.iter().find(|p| p.name == name);
+    found.map_or(f64::NAN, |p| p.nominal)
+}
+
+/// The largest of a figure over runs and drives.
+pub(crate) fn largest(runs: &[Along], of: impl Fn(&Along, usize) -> f64) -> f64 {
+    over(runs, of).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// The least.
+pub(crate) fn least(runs: &[Along], of: impl Fn(&Along, usize) -> f64) -> f64 {
+    over(runs, of).fold(f64::INFINITY, f64::min)
+}
+
+fn over<'a>(
+    runs: &'a [Along],
+    of: impl Fn(&Along, usize) -> f64 + 'a,
+) -> impl Iterator<Item = f64> + 'a {
+    let pairs = runs
+        .iter()
+        .flat_map(|along| (0..along.measured.len()).map(move |d| (along, d)));
+    pairs.map(move |(along, d)| of(along, d))
+}
+
+/// How much of the error the placement explains, in squares, at least over all runs.
+pub(crate) fn explained(runs: &[Along]) -> String {
+    let most = runs
+        .iter()
+        .map(|along| along.explained().remains)
+        .fold(0.0, f64::max);
+    share(1.0 - most * most)
+}
+
+/// A share near one.
+pub(crate) fn share(value: f64) -> String {
+    if 1.0 - value < 1e-6 {
+        return "more than 99.9999 %".to_owned();
+    }
+    format!("{:.2} %", 100.0 * value)
+}
+
+/// An error that is nothing but rounding, or its size.
+pub(crate) fn rounding(value: f64) -> String {
+    if value < ROUNDING {
+        "better than a part in 10^8".to_owned()
+    } else {
+        percent(value)
+    }
+}
+
+pub(crate) fn percent(value: f64) -> String {
+    if value < ROUNDING {
+        return "0.0000 %".to_owned();
+    }
+    format!("{} %", significant(100.0 * value, 3))
+}
+
+/// Four decimals, without the sign of a rounded zero.
+pub(crate) fn decimals(value: f64) -> String {
+    let rounded = (1e4 * value).round() / 1e4;
+    format!("{:.4}", if rounded == 0.0 { 0.0 } else { rounded })
+}

@@ -1,0 +1,99 @@
+//! `add`: effects go into a model file, which keeps its comments and layout.
+
+use modelmill_spec::EffectKind;
+use modelmill_spec::edit::{NewEffect, NewParameter};
+
+use crate::diagnose::added;
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+
+/// What is set of an effect.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// Symbol of a parameter or a constant of the kind.
+    pub symbol: String,
+    /// What is said of it.
+    pub said: Said,
+}
+
+/// What is said of a symbol.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Said {
+    /// Its value, or the nominal value of a parameter.
+    Value(f64),
+    /// The name of the parameter in the model file.
+    Name(String),
+}
+
+impl Model {
+    /// The model with effects added to its file; [`Model::text`] of the result is the edited file, in which all else is kept
+    /// byte for byte. Nothing is written.
+    ///
+    /// Fails when the file with the effects has no meaning: an unknown kind or place, a value that is missing, an effect twice.
+    pub fn with(&self, effects: &[NewEffect]) -> Outcome<Model> {
+        let added = added::add(self, effects)?;
+        self.host().derive(&self.path, added.loaded)
+    }
+}
+
+/// An effect of a kind at some places, with what is set: parameters or constants, as the kind has it. `kinds` are those that
+/// the model may use; an unknown kind is said when the effect is added.
+///
+/// Fails when the kind has no such symbol, or a name is given for a constant.
+pub fn new_effect(
+    kinds: &[EffectKind],
+    kind: &str,
+    at: &[String],
+    settings: &[Setting],
+) -> Outcome<NewEffect> {
+    let mut effect = NewEffect {
+        kind: kind.to_owned(),
+        at: at.iter().map(|name| name.trim().to_owned()).collect(),
+        ..NewEffect::default()
+    };
+    let Some(kind) = kinds.iter().find(|one| one.name == kind) else {
+        return Ok(effect);
+    };
+    let parameters: Vec<&str> = kind.parameters.iter().map(|p| p.symbol.as_str()).collect();
+    let constants: Vec<&str> = kind.constants.iter().map(|c| c.symbol.as_str()).collect();
+    for setting in settings {
+        let symbol = setting.symbol.as_str();
+        if parameters.contains(&symbol) {
+            let known = effect.parameters.iter().position(|p| p.symbol == symbol);
+            let at = known.unwrap_or_else(|| {
+                effect.parameters.push(NewParameter {
+                    symbol: symbol.to_owned(),
+                    ..NewParameter::default()
+                });
+                effect.parameters.len() - 1
+            });
+            let parameter = &mut effect.parameters[at];
+            match &setting.said {
+                Said::Value(value) => parameter.nominal = Some(*value),
+                Said::Name(name) => parameter.name = Some(name.clone()),
+            }
+            continue;
+        }
+        match (&setting.said, constants.contains(&symbol)) {
+            (Said::Value(value), true) => {
+                effect.constants.retain(|(known, _)| known != symbol);
+                effect.constants.push((symbol.to_owned(), *value));
+            }
+            (Said::Name(_), true) => {
+                return Err(Error::input(format!(
+                    "{symbol}.name: `{symbol}` is a constant of `{}`, which has a value and no name",
+                    kind.name
+                )));
+            }
+            (_, false) => {
+                let known: Vec<&str> = parameters.iter().chain(&constants).copied().collect();
+                return Err(Error::input(format!(
+                    "{symbol}: `{}` has no `{symbol}`; known are {}",
+                    kind.name,
+                    known.join(", ")
+                )));
+            }
+        }
+    }
+    Ok(effect)
+}

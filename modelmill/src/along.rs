@@ -1,0 +1,168 @@
+//! A model along a recording: its forces and reactions, the measured ones, and variables on which an error may depend.
+
+use modelmill_codegen::{Evaluator, Reactions, States};
+use modelmill_identify::decimate_columns;
+use modelmill_spec::DriveKind;
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::stretch::Stretch;
+
+/// The model's forces along a recording for given base parameters, `[drive][sample]`, decimated.
+pub fn forces(model: &Model, data: &Stretch, values: &[f64]) -> Outcome<Vec<Vec<f64>>> {
+    let evaluator = Evaluator::new(&model.derivation);
+    let columns = columns(model, data, |states| {
+        evaluator.inverse_dynamics(states, values)
+    })?;
+    decimated(columns, data)
+}
+
+/// Determined components of the reactions along a recording for nominal parameters, `[component][sample]`, decimated.
+pub fn reactions(model: &Model, data: &Stretch, reactions: &Reactions) -> Outcome<Vec<Vec<f64>>> {
+    let evaluator = Evaluator::new(&model.derivation);
+    let columns = columns(model, data, |states| evaluator.reactions(reactions, states))?;
+    decimated(columns, data)
+}
+
+/// The measured forces, `[drive][sample]`, decimated.
+pub fn measured(data: &Stretch) -> Outcome<Vec<Vec<f64>>> {
+    decimated(data.run.measured()?.to_vec(), data)
+}
+
+/// `[sample * n_drives + drive]`.
+pub fn interleaved(channels: &[Vec<f64>]) -> Vec<f64> {
+    let samples = channels.first().map_or(0, Vec::len);
+    (0..samples)
+        .flat_map(|sample| channels.iter().map(move |channel| channel[sample]))
+        .collect()
+}
+
+/// Variables on which an error may depend, decimated like the forces: coordinates and their
+/// derivatives, passive coordinates, lengths and rates of linear drives, and measured loads.
+pub fn variables(model: &Model, data: &Stretch) -> Outcome<Vec<(String, Vec<f64>)>> {
+    let run = &data.run;
+    let mut variables = Vec::new();
+    for (i, name) in model.active().into_iter().enumerate() {
+        variables.push((format!("{name}_d"), run.qd[i].clone()));
+        variables.push((format!("{name}_dd"), run.qdd[i].clone()));
+        variables.push((name, run.q[i].clone()));
+    }
+    let evaluator = Evaluator::new(&model.derivation);
+    let passive = model.passive();
+    if !passive.is_empty() {
+        let mut columns = columns(model, data, |states| evaluator.passive(states))?.into_iter();
+        variables.extend(passive.iter().cloned().zip(columns.by_ref()));
+        variables.extend(passive.iter().map(|name| format!("{name}_d")).zip(columns));
+    }
+    let mechanism = &model.derivation.mechanism;
+    let n_drives = mechanism.drives.len();
+    if mechanism
+        .drives
+        .iter()
+        .any(|d| matches!(d.kind, DriveKind::Linear { .. }))
+    {
+        let columns = columns(model, data, |states| evaluator.drives(states))?;
+        for (d, drive) in mechanism.drives.iter().enumerate() {
+            if matches!(drive.kind, DriveKind::Linear { .. })
+                && let [length, rate] = [d, n_drives + d].map(|i| columns.get(i).cloned())
+                && let (Some(length), Some(rate)) = (length, rate)
+            {
+                variables.push((format!("{}_length", drive.name), length));
+                variables.push((format!("{}_d", drive.name), rate));
+            }
+        }
+    }
+    // A force by the name of its column in the recording is the load.
+    for (drive, force) in mechanism.drives.iter().zip(run.force.iter().flatten()) {
+        variables.push((drive.name.clone(), force.clone()));
+    }
+    let (names, columns): (Vec<String>, Vec<Vec<f64>>) = variables.into_iter().unzip();
+    // Variables only say where: every n-th value will do, and keeps signs and ends as they are.
+    let factor = data.decimation();
+    let picked = columns
+        .into_iter()
+        .map(|column| column.into_iter().step_by(factor).collect());
+    Ok(names.into_iter().zip(picked).collect())
+}
+
+/// Columns of numbers along a recording, evaluated block by block.
+pub fn columns(
+    model: &Model,
+    data: &Stretch,
+    mut evaluate: impl FnMut(&States<'_>) -> Result<Vec<Vec<f64>>, modelmill_codegen::PoseFault>,
+) -> Outcome<Vec<Vec<f64>>> {
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    model.host().watched(
+        &format!("evaluating {}", data.run.file),
+        data.samples(),
+        |job| {
+            data.for_each_block(model, |states| {
+                job.step(states.len())?;
+                Ok::<_, Error>(evaluate(states).map(|block| {
+                    if columns.is_empty() {
+                        columns = block;
+                    } else {
+                        for (column, more) in columns.iter_mut().zip(block) {
+                            column.extend(more);
+                        }
+                    }
+                }))
+            })
+        },
+    )??;
+    Ok(columns)
+}
+
+/// The parallel filter, on every column; one of zeros stays one.
+pub fn decimated(columns: Vec<Vec<f64>>, data: &Stretch) -> Outcome<Vec<Vec<f64>>> {
+    let factor = data.decimation();
+    if factor == 1 {
+        return Ok(columns);
+    }
+    let is_zero = |column: &[f64]| column.iter().all(|x| *x == 0.0);
+    let moving: Vec<&[f64]> = columns
+        .iter()
+        .map(Vec::as_slice)
+        .filter(|column| !is_zero(column))
+        .collect();
+    let mut filtered = decimate_columns(&moving, factor)
+        .map_err(|error| Error::input(format!("{}: {error}", data.run.file)))?
+        .into_iter();
+    let picked = |column: &Vec<f64>| column.iter().copied().step_by(factor).collect();
+    Ok(columns
+        .iter()
+        .map(|column| {
+            if is_zero(column) {
+                picked(column)
+            } else {
+                filtered.next().unwrap_or_default()
+            }
+        })
+        .collect())
+}
+
+/// Rates of the drives, `[drive][sample]`, before decimation.
+pub fn drive_rates(model: &Model, data: &Stretch) -> Outcome<Vec<Vec<f64>>> {
+    let mechanism = &model.derivation.mechanism;
+    let active = model.active();
+    let is_linear = |kind: &DriveKind| matches!(kind, DriveKind::Linear { .. });
+    let lengths = if mechanism.drives.iter().any(|drive| is_linear(&drive.kind)) {
+        let evaluator = Evaluator::new(&model.derivation);
+        columns(model, data, |states| evaluator.drives(states))?
+    } else {
+        Vec::new()
+    };
+    let n = mechanism.drives.len();
+    let rates = mechanism.drives.iter().enumerate().map(|(d, drive)| {
+        let rate = match &drive.kind {
+            DriveKind::Joint(coordinate) => {
+                let name = &mechanism.coordinates[coordinate.0].name;
+                let place = active.iter().position(|other| other == name);
+                place.and_then(|place| data.run.qd.get(place))
+            }
+            DriveKind::Linear { .. } => lengths.get(n + d),
+        };
+        rate.cloned().unwrap_or_default()
+    });
+    Ok(rates.collect())
+}

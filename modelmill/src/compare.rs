@@ -1,0 +1,161 @@
+//! `compare`: how far a model is off along recordings, and where the error lives.
+
+use modelmill_identify::{Comparison, Figures, Note, Region};
+use modelmill_identify::{LocateOptions, TIME_COLUMN, locate};
+
+use crate::along::{self, interleaved, variables};
+use crate::error::Outcome;
+use crate::model::Model;
+use crate::recording::{self, Recording};
+use crate::stretch::Stretch;
+
+/// How far a model is off along recordings.
+pub struct Compared {
+    /// What the JSON calls the model.
+    pub model: String,
+    /// Names of the stretches, in order.
+    pub files: Vec<String>,
+    /// Error figures, in all and for each drive.
+    pub figures: Figures,
+    /// Where the error lives.
+    pub places: Places,
+    /// Remarks on the recordings.
+    pub notes: Vec<Note>,
+}
+
+impl Model {
+    /// Holds the model against recordings; `values` are those of its base parameters, in its order and their units.
+    ///
+    /// Fails when a recording lacks the force of a drive, or leads where the mechanism cannot stand.
+    pub fn compare(&self, recordings: &[&Recording], values: &[f64]) -> Outcome<Compared> {
+        let [data, _] = recording::stretches(self, recordings, &[]);
+        let measured = (data.iter().map(along::measured)).collect::<Outcome<Vec<_>>>()?;
+        let forces = data
+            .iter()
+            .map(|one| along::forces(self, one, values))
+            .collect::<Outcome<Vec<_>>>()?;
+        let pairs = (measured.iter().map(Vec::as_slice)).zip(forces.iter().map(Vec::as_slice));
+        Ok(Compared {
+            model: self.name.clone(),
+            files: data.iter().map(|one| one.run.file.clone()).collect(),
+            figures: figures(&self.drives(), pairs)?,
+            places: places(self, &data, &measured, &forces)?,
+            notes: data.iter().flat_map(Stretch::notes).cloned().collect(),
+        })
+    }
+}
+
+/// Error figures over several recordings; forces are `[drive][sample]` for each.
+pub fn figures<'a>(
+    drives: &[String],
+    pairs: impl IntoIterator<Item = (&'a [Vec<f64>], &'a [Vec<f64>])>,
+) -> Outcome<Figures> {
+    let mut comparison = Comparison::new(drives.iter().cloned());
+    for (measured, model) in pairs {
+        comparison.add(&interleaved(measured), &interleaved(model))?;
+    }
+    Ok(comparison.finish()?)
+}
+
+/// Errors below this fraction of the measured force are rounding of the numbers in the recording; where they sit says
+/// nothing about the mechanism.
+pub const ROUNDING: f64 = 1e-6;
+
+/// Where errors live.
+pub struct Places {
+    /// Regions that hold more than their share.
+    pub regions: Vec<Region>,
+    /// Drives whose error is so small that it was not looked at.
+    pub rounding: Vec<String>,
+}
+
+/// Regions of coordinates, rates, loads and time that hold more than their share of the error.
+///
+/// With several recordings, time is looked at in each of them on its own.
+pub fn places(
+    model: &Model,
+    data: &[Stretch],
+    measured: &[Vec<Vec<f64>>],
+    forces: &[Vec<Vec<f64>>],
+) -> Outcome<Places> {
+    let mut rounding = Vec::new();
+    let mut drives = Vec::new();
+    for (d, drive) in model.drives().into_iter().enumerate() {
+        if is_rounding(d, measured, forces) {
+            rounding.push(drive);
+        } else {
+            drives.push((d, drive));
+        }
+    }
+    if drives.is_empty() {
+        return Ok(Places {
+            regions: Vec::new(),
+            rounding,
+        });
+    }
+    let errors_of = |k: usize, d: usize| -> Vec<f64> {
+        let pairs = measured[k][d].iter().zip(&forces[k][d]);
+        pairs.map(|(y, m)| y - m).collect()
+    };
+    let mut joined: Vec<(String, Vec<f64>)> = Vec::new();
+    let mut errors: Vec<Vec<f64>> = vec![Vec::new(); drives.len()];
+    let mut in_time = Vec::new();
+    for (k, one) in data.iter().enumerate() {
+        let mut variables = variables(model, one)?;
+        let time = one.time();
+        if data.len() == 1 {
+            variables.push((TIME_COLUMN.to_owned(), time));
+        } else {
+            for (d, drive) in &drives {
+                let error = errors_of(k, *d);
+                let mut found = locate(
+                    &[(drive, &error)],
+                    &[(TIME_COLUMN, &time)],
+                    &LocateOptions::default(),
+                );
+                for region in &mut found {
+                    region.says = format!("{}: {}", one.run.file, region.says);
+                }
+                in_time.extend(found);
+            }
+        }
+        for (slot, (d, _)) in errors.iter_mut().zip(&drives) {
+            slot.extend(errors_of(k, *d));
+        }
+        if joined.is_empty() {
+            joined = variables;
+        } else {
+            for ((_, all), (_, values)) in joined.iter_mut().zip(variables) {
+                all.extend(values);
+            }
+        }
+    }
+    let errors: Vec<(&str, &[f64])> = drives
+        .iter()
+        .map(|(_, drive)| drive.as_str())
+        .zip(errors.iter().map(Vec::as_slice))
+        .collect();
+    let variables: Vec<(&str, &[f64])> = joined
+        .iter()
+        .map(|(name, values)| (name.as_str(), values.as_slice()))
+        .collect();
+    let mut regions = model
+        .host()
+        .watched("looking where the error lives", 0, |_| {
+            locate(&errors, &variables, &LocateOptions::default())
+        })?;
+    regions.extend(in_time);
+    Ok(Places { regions, rounding })
+}
+
+/// Whether the error of a drive is rounding beside its force.
+fn is_rounding(drive: usize, measured: &[Vec<Vec<f64>>], forces: &[Vec<Vec<f64>>]) -> bool {
+    let (mut error, mut size) = (0.0, 0.0);
+    for (measured, forces) in measured.iter().zip(forces) {
+        for (y, m) in measured[drive].iter().zip(&forces[drive]) {
+            error += (y - m).powi(2);
+            size += y * y;
+        }
+    }
+    error <= ROUNDING * ROUNDING * size
+}

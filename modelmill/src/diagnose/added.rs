@@ -1,0 +1,186 @@
+//! What was found as entries of a model file, and the edit of the file in memory.
+
+use modelmill_identify::diagnose::FoundEffect;
+use modelmill_spec::edit::{NewEffect, NewParameter};
+use modelmill_spec::{EffectKind, Loaded};
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+
+use super::problem::Answer;
+
+/// Significant digits of estimates that go into a model file.
+const DIGITS: usize = 5;
+
+/// A model file with everything that was found, not yet written.
+#[derive(Clone, Debug)]
+pub struct Added {
+    /// Its text.
+    pub text: String,
+    /// What it means.
+    pub loaded: Loaded,
+}
+
+/// The effects that were found, as entries with the estimates for nominal values.
+pub fn entries(answer: &Answer) -> Vec<NewEffect> {
+    let found = answer.diagnosis.effects.iter();
+    let entries = found.filter_map(|found| {
+        let kinds = &answer.candidates.kinds;
+        let kind = kinds.iter().find(|kind| kind.name == found.effect.kind)?;
+        Some((entry(found, kind, answer), kind.places == Some(2)))
+    });
+    // What couples two places may couple each with a third, and is no sum at either.
+    let (pairs, others): (Vec<_>, Vec<_>) = entries.partition(|(_, couples)| *couples);
+    let only = |entries: Vec<(NewEffect, bool)>| entries.into_iter().map(|(entry, _)| entry);
+    let mut made = apart(only(others).collect());
+    made.extend(only(pairs));
+    made
+}
+
+/// Entries of one kind that share places, such as friction at both drives and more of it at one, as entries that do not:
+/// a model file has a kind once at a place. Their parameters add up, since their columns are the same there.
+fn apart(entries: Vec<NewEffect>) -> Vec<NewEffect> {
+    let mut made: Vec<NewEffect> = Vec::new();
+    for entry in entries {
+        let meets = |one: &NewEffect| {
+            one.kind == entry.kind
+                && one.constants == entry.constants
+                && one.at.iter().any(|place| entry.at.contains(place))
+        };
+        let Some(k) = made.iter().position(meets) else {
+            made.push(entry);
+            continue;
+        };
+        let other = made.remove(k);
+        let more = entry.at.iter().filter(|p| !other.at.contains(p));
+        let places: Vec<String> = other.at.iter().chain(more).cloned().collect();
+        let of = |wanted: &dyn Fn(bool, bool) -> bool, effect: &NewEffect| NewEffect {
+            at: places
+                .iter()
+                .filter(|p| wanted(other.at.contains(p), entry.at.contains(p)))
+                .cloned()
+                .collect(),
+            ..effect.clone()
+        };
+        let groups = [
+            of(&|first, second| first && !second, &other),
+            of(&|first, second| first && second, &sum(&other, &entry)),
+            of(&|first, second| second && !first, &entry),
+        ];
+        made.splice(k..k, groups.into_iter().filter(|one| !one.at.is_empty()));
+    }
+    made
+}
+
+/// An estimate may belong to a parameter, to a constant that was found linearly, or to the product of both.
+fn entry(found: &FoundEffect, kind: &EffectKind, answer: &Answer) -> NewEffect {
+    let parameters = &answer.problem.candidates[found.candidate].parameters;
+    let mut effect = NewEffect {
+        kind: kind.name.clone(),
+        at: found.effect.at.clone(),
+        constants: found.constants.clone(),
+        ..NewEffect::default()
+    };
+    let estimates = parameters.iter().zip(&found.estimates);
+    for (parameter, value) in estimates.clone() {
+        let symbol = parameter.symbol.as_str();
+        if let Some((factor, constant)) = symbol.split_once('*') {
+            let of = estimates.clone().find(|(p, _)| p.symbol == factor);
+            if let Some((_, of)) = of
+                && *of != 0.0
+            {
+                effect
+                    .constants
+                    .push((constant.to_owned(), rounded(value / of)));
+            }
+        } else if kind.constants.iter().any(|c| c.symbol == symbol) {
+            effect.constants.push((symbol.to_owned(), rounded(*value)));
+        } else if kind.parameters.iter().any(|p| p.symbol == symbol) {
+            effect.parameters.push(NewParameter {
+                symbol: symbol.to_owned(),
+                nominal: Some(rounded(*value)),
+                ..NewParameter::default()
+            });
+        }
+    }
+    for (_, value) in &mut effect.constants {
+        *value = rounded(*value);
+    }
+    effect
+}
+
+/// Both effects at one place.
+fn sum(one: &NewEffect, other: &NewEffect) -> NewEffect {
+    let mut both = one.clone();
+    for more in &other.parameters {
+        let known = both.parameters.iter_mut().find(|p| p.symbol == more.symbol);
+        match known {
+            Some(p) => {
+                p.nominal = match (p.nominal, more.nominal) {
+                    (Some(a), Some(b)) => Some(rounded(a + b)),
+                    (a, b) => a.or(b),
+                }
+            }
+            None => both.parameters.push(more.clone()),
+        }
+    }
+    both
+}
+
+fn rounded(value: f64) -> f64 {
+    let text = format!("{value:.*e}", DIGITS - 1);
+    text.parse().unwrap_or(value)
+}
+
+/// Adds entries to the text of a model's file, one after the other.
+pub fn add(model: &Model, effects: &[NewEffect]) -> Outcome<Added> {
+    let mut text = model.text().to_owned();
+    let mut last = None;
+    for effect in effects {
+        let edited = model.host().edit(&model.path, &text, effect)?;
+        text = edited.text;
+        last = Some(edited.loaded);
+    }
+    let loaded = last.ok_or_else(|| Error::input("there is nothing to add"))?;
+    Ok(Added { text, loaded })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn friction(at: &[&str], size: f64) -> NewEffect {
+        NewEffect {
+            kind: "coulomb_friction".to_owned(),
+            at: at.iter().map(|p| (*p).to_owned()).collect(),
+            parameters: vec![NewParameter {
+                symbol: "Fc".to_owned(),
+                nominal: Some(size),
+                ..NewParameter::default()
+            }],
+            ..NewEffect::default()
+        }
+    }
+
+    #[test]
+    fn what_acts_twice_at_a_place_is_added_up_there() {
+        let made = apart(vec![
+            friction(&["a", "b", "c"], 25.0),
+            friction(&["c"], 15.0),
+        ]);
+        assert_eq!(made, [friction(&["a", "b"], 25.0), friction(&["c"], 40.0)]);
+        // The force at each place is what it was, whatever the order.
+        let made = apart(vec![
+            friction(&["c"], 15.0),
+            friction(&["a", "b"], 1.0),
+            friction(&["a", "b", "c"], 25.0),
+        ]);
+        let at = |place: &str| -> f64 {
+            let here = made.iter().filter(|e| e.at.iter().any(|p| p == place));
+            here.map(|e| e.parameters[0].nominal.unwrap()).sum()
+        };
+        for (place, force) in [("a", 26.0), ("b", 26.0), ("c", 40.0)] {
+            assert!((at(place) - force).abs() < 1e-9, "{made:?}");
+        }
+    }
+}

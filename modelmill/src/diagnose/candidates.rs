@@ -1,0 +1,372 @@
+//! Every effect that may be missing, written down as `add` would write it, in variants of the model: their derivation gives
+//! the columns of all.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use modelmill_codegen::{Derivation, Monomial};
+use modelmill_spec::{Effect, EffectKind, Loaded, Mechanics, Mechanism, Scale, Search, Sign};
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+
+use super::places::{Spot, fits, sets, spots};
+
+/// Values of a constant that are tried where the search has no scale of its own.
+const TRIED: usize = 15;
+/// Values of a rate that are tried.
+const RATES: usize = 14;
+/// Wavelengths that are tried at most.
+const WAVES: usize = 120;
+
+/// An effect as one entry of a model file.
+pub struct Single {
+    pub kind: usize,
+    pub spots: Vec<Spot>,
+    pub sort: Sort,
+    /// Symbols of its parameters with their positions among those of its variant.
+    pub parameters: Vec<(String, usize)>,
+    /// Symbols of constants that are searched for, with their names in the variant and how.
+    pub constants: Vec<(String, String, Search)>,
+    /// Symbols of constants whose values are given.
+    pub given: Vec<(String, f64)>,
+}
+
+/// A candidate: entries whose columns add up, since they share their parameters.
+pub struct Entry {
+    pub singles: Vec<usize>,
+}
+
+/// A kind that is a change of the model rather than columns of its own.
+pub struct Change {
+    pub kind: usize,
+    pub spot: Spot,
+}
+
+/// All candidates of a model, derived.
+pub struct Candidates {
+    pub kinds: Vec<EffectKind>,
+    pub singles: Vec<Single>,
+    pub entries: Vec<Entry>,
+    /// Effects whose constants are known.
+    pub known: Derivation,
+    /// Effects with constants that are searched for, whose columns are evaluated again and again.
+    pub searched: Derivation,
+    /// Effects that depend on what the drives carry.
+    pub carried: Derivation,
+    /// The base columns as functions of a tilt about x, y and z, whose constants are the last three; with its kind.
+    pub tilt: Option<(Change, Derivation)>,
+    /// A delay of the forces.
+    pub delay: Option<Change>,
+}
+
+/// How often the columns of an effect are evaluated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sort {
+    /// Once.
+    Known,
+    /// For every value of a constant.
+    Searched,
+    /// Whenever a fit says anew what the drives carry.
+    Carried,
+}
+
+/// Writes down and derives all candidates of a model.
+pub fn candidates(model: &Model) -> Outcome<Candidates> {
+    let loaded = &model.loaded;
+    let mechanism = &loaded.mechanism;
+    let all = spots(mechanism);
+    let mut singles: Vec<Single> = Vec::new();
+    let mut entries = Vec::new();
+    let mut variants = [
+        Variant::new(model)?,
+        Variant::new(model)?,
+        Variant::new(model)?,
+    ];
+    let (mut tilt, mut delay) = (None, None);
+    for (k, kind) in loaded.kinds.iter().enumerate() {
+        let fitting: Vec<&Spot> = all
+            .iter()
+            .filter(|spot| fits(mechanism, kind, spot))
+            .filter(|spot| kind.places == Some(2) || !has(mechanism, kind, &[*spot]))
+            .collect();
+        if let Some(mechanics @ (Mechanics::Tilt | Mechanics::Delay)) = kind.mechanics {
+            if let Some(spot) = fitting.first() {
+                let change = Change {
+                    kind: k,
+                    spot: (*spot).clone(),
+                };
+                match mechanics {
+                    Mechanics::Tilt => tilt = Some(change),
+                    _ => delay = Some(change),
+                }
+            }
+            continue;
+        }
+        // What must be known and is not cannot be tried.
+        if kind
+            .constants
+            .iter()
+            .any(|c| c.search.is_none() && c.value.is_none())
+        {
+            continue;
+        }
+        let first = singles.len();
+        let (places, sums) = sets(mechanism, kind, &fitting);
+        for spots in places {
+            if kind.places == Some(2) && has(mechanism, kind, &spots) {
+                continue;
+            }
+            let single = single(k, kind, &spots, singles.len(), &[]);
+            variants[single.sort as usize].write(kind, &single, singles.len());
+            singles.push(single);
+        }
+        for sum in sums {
+            entries.push(Entry {
+                singles: sum.iter().map(|i| first + i).collect(),
+            });
+        }
+    }
+    let own = mechanism.effects.len();
+    let [known, searched, carried] = variants;
+    let known = known.derive(model, own, &mut singles)?;
+    let searched = searched.derive(model, own, &mut singles)?;
+    let carried = carried.derive(model, own, &mut singles)?;
+    let tilt = match tilt {
+        Some(change) => Some((change, tilted(model)?)),
+        None => None,
+    };
+    Ok(Candidates {
+        kinds: loaded.kinds.clone(),
+        singles,
+        entries,
+        known,
+        searched,
+        carried,
+        tilt,
+        delay,
+    })
+}
+
+/// Whether the model has the effect at all of some places already.
+fn has(mechanism: &Mechanism, kind: &EffectKind, spots: &[&Spot]) -> bool {
+    let holds = |effect: &Effect| spots.iter().all(|spot| effect.places.contains(&spot.place));
+    let mut effects = mechanism.effects.iter();
+    effects.any(|effect| effect.kind == kind.name && holds(effect))
+}
+
+/// A kind at its places; constants that are given are not searched for.
+pub fn single(
+    k: usize,
+    kind: &EffectKind,
+    spots: &[&Spot],
+    number: usize,
+    given: &[(String, f64)],
+) -> Single {
+    let is_open = |symbol: &str| given.iter().all(|(known, _)| known != symbol);
+    let open = kind.constants.iter().filter(|c| is_open(&c.symbol));
+    let searched = open.filter_map(|c| {
+        let name = format!("candidate{number}_{}", c.symbol);
+        Some((c.symbol.clone(), name, c.search?))
+    });
+    let constants: Vec<_> = searched.collect();
+    let is_range = |c: &(String, String, Search)| c.2 != Search::Linear;
+    Single {
+        sort: if uses_load(kind) {
+            Sort::Carried
+        } else if constants.iter().any(is_range) {
+            Sort::Searched
+        } else {
+            Sort::Known
+        },
+        kind: k,
+        spots: spots.iter().copied().cloned().collect(),
+        parameters: Vec::new(),
+        constants,
+        given: given.to_vec(),
+    }
+}
+
+/// Whether the expression of a kind names the load of its place.
+pub fn uses_load(kind: &EffectKind) -> bool {
+    let mut words = kind
+        .expression
+        .split(|c: char| !c.is_alphanumeric() && c != '_');
+    words.any(|word| word == "load")
+}
+
+/// A variant of the model that has effects besides, as text.
+pub struct Variant {
+    text: String,
+    constants: String,
+    /// Which candidates it holds, in order.
+    singles: Vec<usize>,
+}
+
+impl Variant {
+    pub fn new(model: &Model) -> Outcome<Self> {
+        Ok(Self {
+            text: header(model)?,
+            constants: String::new(),
+            singles: Vec::new(),
+        })
+    }
+
+    pub fn write(&mut self, kind: &EffectKind, single: &Single, number: usize) {
+        self.singles.push(number);
+        let places: Vec<String> = single
+            .spots
+            .iter()
+            .map(|s| format!("\"{}\"", s.name))
+            .collect();
+        let _ = writeln!(
+            self.text,
+            "[[effect]]\nkind = \"{}\"\nat = [{}]",
+            kind.name,
+            places.join(", ")
+        );
+        // Which differences a part has depends on the part.
+        if kind.mechanics != Some(Mechanics::Part) {
+            let named: Vec<String> = (kind.parameters.iter())
+                .map(|p| format!("{0} = {{ name = \"candidate{number}_{0}\" }}", p.symbol))
+                .collect();
+            let _ = writeln!(self.text, "parameters = {{ {} }}", named.join(", "));
+        }
+        let searched =
+            (single.constants.iter()).map(|(symbol, name, _)| format!("{symbol} = \"{name}\""));
+        let given = (single.given.iter()).map(|(symbol, value)| format!("{symbol} = {value:?}"));
+        let constants: Vec<String> = searched.chain(given).collect();
+        if constants.is_empty() {
+            return;
+        }
+        let _ = writeln!(self.text, "constants = {{ {} }}", constants.join(", "));
+        for (symbol, name, _) in &single.constants {
+            let constant = kind.constants.iter().find(|c| c.symbol == *symbol);
+            let carries = single.spots[0].carries;
+            let unit = constant
+                .and_then(|c| c.units.iter().find(|(c, _)| *c == carries))
+                .map_or("1", |(_, unit)| unit.as_str());
+            let _ = writeln!(
+                self.constants,
+                "{name} = {{ value = 1, unit = \"{unit}\" }}"
+            );
+        }
+    }
+
+    /// Derives the columns of its effects alone; `own` effects of the model come before them.
+    pub fn derive(
+        mut self,
+        model: &Model,
+        own: usize,
+        singles: &mut [Single],
+    ) -> Outcome<Derivation> {
+        if !self.constants.is_empty() {
+            let _ = write!(self.text, "[constants]\n{}", self.constants);
+        }
+        let variant = load(model, &self.text)?;
+        let mechanism = &variant.mechanism;
+        let mut wanted = Vec::new();
+        for (number, effect) in self.singles.iter().zip(&mechanism.effects[own..]) {
+            let terms = effect.terms.iter();
+            singles[*number].parameters = terms
+                .map(|term| (term.symbol.clone(), term.parameter.0))
+                .collect();
+            wanted.extend(effect.terms.iter().map(|term| term.parameter.0));
+        }
+        let is_wanted =
+            |product: &Monomial| product.0.iter().any(|(p, n)| *n == 1 && wanted.contains(p));
+        modelmill_codegen::derive_columns(mechanism, &is_wanted)
+            .map_err(|error| Error::derivation(&model.path, error))
+    }
+}
+
+/// The base columns of a model as functions of a tilt of its base.
+pub fn tilted(model: &Model) -> Outcome<Derivation> {
+    let mut text = header(model)?;
+    let names = ["tx", "ty", "tz"].map(|t| (t, format!("candidate_{t}")));
+    let given: Vec<String> = names
+        .iter()
+        .map(|(t, name)| format!("{t} = \"{name}\""))
+        .collect();
+    let _ = write!(
+        text,
+        "[[effect]]\nkind = \"gravity_tilt\"\nat = \"base\"\nconstants = {{ {} }}\n[constants]\n",
+        given.join(", ")
+    );
+    for (_, name) in &names {
+        let _ = writeln!(text, "{name} = {{ value = 0, unit = \"rad\" }}");
+    }
+    let variant = load(model, &text)?;
+    let reduction = &model.derivation.reduction;
+    let base: Vec<&Monomial> = reduction
+        .retained
+        .iter()
+        .map(|k| &reduction.products[*k])
+        .collect();
+    let is_base = |product: &Monomial| base.contains(&product);
+    modelmill_codegen::derive_columns(&variant.mechanism, &is_base)
+        .map_err(|error| Error::derivation(&model.path, error))
+}
+
+fn load(model: &Model, text: &str) -> Outcome<Loaded> {
+    let name = Path::new(&model.path).with_file_name("candidates.toml");
+    model.host().load_text(&name, text)
+}
+
+fn header(model: &Model) -> Outcome<String> {
+    let file = Path::new(&model.path).file_name();
+    let file = file
+        .ok_or_else(|| Error::input(format!("{} is not the path of a model file", model.path)))?;
+    let extends = serde_json::to_string(&file.to_string_lossy()).map_err(Error::input)?;
+    Ok(format!(
+        "schema = 1\nname = \"candidates\"\nextends = {extends}\n"
+    ))
+}
+
+/// Values that are tried for the constant that a candidate searches for, given the largest rate and the travel of its place;
+/// one where there is none.
+pub fn grid(single: &Single, [rate, travel]: [f64; 2]) -> Vec<f64> {
+    for (_, _, search) in &single.constants {
+        let Search::Range { from, to, of } = *search else {
+            continue;
+        };
+        let evenly = |count: usize, low: f64, high: f64| -> Vec<f64> {
+            let at = |k: usize| low + (high - low) * k as f64 / (count - 1) as f64;
+            (0..count).map(at).collect()
+        };
+        let scale = match of {
+            Scale::Rate => rate,
+            Scale::Travel => travel,
+            Scale::One => 1.0,
+        };
+        if scale <= 0.0 {
+            continue;
+        }
+        return match of {
+            // Waves differ by how often they fit into the travel.
+            Scale::Travel if from > 0.0 => {
+                // So many that neighbours differ by less than half a wave over the travel.
+                let (few, many) = (1.0 / to, 1.0 / from);
+                let count = (2..WAVES).find(|n| (many - few) / (*n as f64) < 0.4);
+                let waves = evenly(count.unwrap_or(WAVES), few, many);
+                waves.into_iter().map(|times| scale / times).collect()
+            }
+            _ if from > 0.0 => {
+                let logs = evenly(RATES, (scale * from).ln(), (scale * to).ln());
+                logs.into_iter().map(f64::exp).collect()
+            }
+            _ => evenly(TRIED, scale * from, scale * to),
+        };
+    }
+    vec![1.0]
+}
+
+/// The sign of a kind's parameter, as the search knows it.
+pub fn sign(sign: Sign) -> modelmill_identify::diagnose::Sign {
+    use modelmill_identify::diagnose::Sign as Known;
+    match sign {
+        Sign::Positive => Known::Positive,
+        Sign::Negative => Known::Negative,
+        Sign::Any => Known::Any,
+    }
+}

@@ -1,0 +1,278 @@
+//! An effect that the user names, written down and derived like a candidate, with its columns along recordings.
+
+use modelmill_codegen::Evaluator;
+use modelmill_identify::diagnose::{Candidate, Choice, Column, Effect, Source};
+use modelmill_spec::edit::NewEffect;
+use modelmill_spec::{ActsOn, DriveKind, EffectKind, Mechanics, Mechanism, Search};
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+
+use super::candidates::{Candidates, Change, Entry, Variant, single, tilted, uses_load};
+use super::columns::{carried, columns};
+use super::numbers::{Runs, regressor};
+use super::places::{Spot, spots};
+
+/// An effect by its name, with values of its parameters and constants.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Named {
+    pub effect: Effect,
+    pub values: Vec<(String, f64)>,
+}
+
+/// Whether constants of an effect that have no given value are searched for or have their usual one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Constants {
+    Searched,
+    Usual,
+}
+
+/// A derived effect.
+pub struct Chosen {
+    pub named: Named,
+    pub kind: EffectKind,
+    candidates: Candidates,
+}
+
+/// Derives a named effect.
+///
+/// Fails, as `add` would, if kind, place or value is unknown or the model has the effect already.
+pub fn choose(model: &Model, named: &Named, constants: Constants) -> Outcome<Chosen> {
+    let loaded = &model.loaded;
+    check(model, named)?;
+    let mechanism = &loaded.mechanism;
+    let kind_is = |kind: &&EffectKind| kind.name == named.effect.kind;
+    let kind = loaded.kinds.iter().find(kind_is).cloned();
+    let kind = kind.ok_or_else(|| Error::input(format!("unknown kind {:?}", named.effect)))?;
+    if kind.mechanics == Some(Mechanics::Delay) {
+        return Err(Error::input(format!(
+            "`{}` moves all forces in time and adds none of its own, so that no motion can be sought along which its force \
+             differs; record fast and slow passages, and reversals at high acceleration",
+            kind.name
+        )));
+    }
+    let all = spots(mechanism);
+    let of_kind = named
+        .effect
+        .at
+        .iter()
+        .map(|place| spot(mechanism, &kind, &all, place));
+    let places: Vec<Spot> = of_kind.collect::<Outcome<_>>()?;
+    let mut singles = Vec::new();
+    let mut variants = [
+        Variant::new(model)?,
+        Variant::new(model)?,
+        Variant::new(model)?,
+    ];
+    let mut tilt = None;
+    let mut entries = Vec::new();
+    if kind.mechanics == Some(Mechanics::Tilt) {
+        let change = Change {
+            kind: 0,
+            spot: places[0].clone(),
+        };
+        tilt = Some((change, tilted(model)?));
+    } else {
+        let given = given(&kind, named, constants)?;
+        let joined = kind.places.is_some() || kind.mechanics == Some(Mechanics::Placement);
+        let together = if joined { places.len() } else { 1 };
+        for group in places.chunks(together) {
+            let group: Vec<&Spot> = group.iter().collect();
+            let one = single(0, &kind, &group, singles.len(), &given);
+            variants[one.sort as usize].write(&kind, &one, singles.len());
+            singles.push(one);
+        }
+        entries.push(Entry {
+            singles: (0..singles.len()).collect(),
+        });
+    }
+    let own = mechanism.effects.len();
+    let [known, searched, carried] = variants;
+    Ok(Chosen {
+        candidates: Candidates {
+            kinds: vec![kind.clone()],
+            known: known.derive(model, own, &mut singles)?,
+            searched: searched.derive(model, own, &mut singles)?,
+            carried: carried.derive(model, own, &mut singles)?,
+            singles,
+            entries,
+            tilt,
+            delay: None,
+        },
+        named: named.clone(),
+        kind,
+    })
+}
+
+/// What `add` would refuse.
+fn check(model: &Model, named: &Named) -> Outcome {
+    let kinds = &model.loaded.kinds;
+    let mut effect = NewEffect {
+        kind: named.effect.kind.clone(),
+        at: named.effect.at.clone(),
+        ..NewEffect::default()
+    };
+    if let Some(kind) = kinds.iter().find(|kind| kind.name == effect.kind) {
+        let constants: Vec<&str> = kind.constants.iter().map(|c| c.symbol.as_str()).collect();
+        let parameters = kind.parameters.iter().map(|p| p.symbol.as_str());
+        let known: Vec<&str> = parameters.chain(constants.iter().copied()).collect();
+        for (symbol, value) in &named.values {
+            if !known.contains(&symbol.as_str()) {
+                return Err(Error::input(format!(
+                    "`{}` has no `{symbol}`; known are {}",
+                    kind.name,
+                    known.join(", ")
+                )));
+            }
+            if constants.contains(&symbol.as_str()) {
+                effect.constants.push((symbol.clone(), *value));
+            }
+        }
+        // What must have a value is looked for, so that any will do here.
+        for one in kind.constants.iter().filter(|c| c.value.is_none()) {
+            if effect
+                .constants
+                .iter()
+                .all(|(symbol, _)| *symbol != one.symbol)
+            {
+                effect.constants.push((one.symbol.clone(), 1.0));
+            }
+        }
+    }
+    model.host().edit(&model.path, model.text(), &effect)?;
+    Ok(())
+}
+
+/// The place of a kind by its name.
+fn spot(mechanism: &Mechanism, kind: &EffectKind, all: &[Spot], name: &str) -> Outcome<Spot> {
+    let suits = |spot: &&Spot| spot.name == name && kind.on.contains(&spot.sort);
+    if let Some(spot) = all.iter().find(suits) {
+        return Ok(spot.clone());
+    }
+    // A joint with a drive of its own is known by the drive.
+    let drive = mechanism.drives.iter().find(|drive| match drive.kind {
+        DriveKind::Joint(i) => mechanism.coordinates[i.0].name == name,
+        DriveKind::Linear { .. } => false,
+    });
+    let advice = match drive {
+        Some(drive) if kind.on.contains(&ActsOn::Drive) => format!(
+            "it is the joint of the drive `{}`; name that instead",
+            drive.name
+        ),
+        _ => "it would be without effect there".to_owned(),
+    };
+    Err(Error::input(format!(
+        "`{}` at `{name}`: {advice}",
+        kind.name
+    )))
+}
+
+/// Constants with a value: those that are given and, where nothing is searched for, the usual ones. The position of rest
+/// of a spring and its like are found with the parameters in any case.
+fn given(kind: &EffectKind, named: &Named, constants: Constants) -> Outcome<Vec<(String, f64)>> {
+    let mut given = Vec::new();
+    for constant in &kind.constants {
+        if constant.search == Some(Search::Linear) {
+            continue;
+        }
+        let said = named
+            .values
+            .iter()
+            .find(|(symbol, _)| *symbol == constant.symbol);
+        let usual = constant
+            .value
+            .as_ref()
+            .and_then(|text| text.parse::<f64>().ok());
+        match (said, constants, constant.search, usual) {
+            (Some((_, value)), ..) => given.push((constant.symbol.clone(), *value)),
+            (None, Constants::Usual, Some(_), Some(value)) => {
+                given.push((constant.symbol.clone(), value));
+            }
+            (None, Constants::Searched, Some(_), _) | (None, _, None, Some(_)) => {}
+            (None, ..) => {
+                return Err(Error::input(format!(
+                    "`{}` has no usual value of `{symbol}`; write {}@{}:{symbol}=VALUE",
+                    kind.name,
+                    kind.name,
+                    named.effect.at.join(","),
+                    symbol = constant.symbol
+                )));
+            }
+        }
+    }
+    Ok(given)
+}
+
+impl Chosen {
+    /// The effect along recordings, with its columns for each value of a constant that is searched for; `None` if it has no
+    /// effect. `load` is what the drives carry.
+    pub fn candidate(
+        &self,
+        model: &Model,
+        all: &Runs<'_>,
+        load: &Column,
+    ) -> Outcome<Option<(Candidate, Vec<Choice>)>> {
+        let (made, _) = columns(&self.candidates, model, all)?;
+        let Some(candidate) = made.into_iter().next() else {
+            return Ok(None);
+        };
+        let only = |columns: Vec<Column>| {
+            vec![Choice {
+                constants: Vec::new(),
+                columns,
+            }]
+        };
+        let choices = match &candidate.source {
+            Source::Columns(choices) => choices.clone(),
+            Source::Carried => {
+                let made = carried(&self.candidates, model, all, load)?;
+                made.into_iter()
+                    .next()
+                    .map_or_else(Vec::new, |(_, c)| only(c))
+            }
+            Source::Tilt(tilt) => {
+                let level = vec![0.0; tilt.axes.len()];
+                let sum = |direction: [f64; 3]| {
+                    let mut sum = Column(vec![None; model.drives().len()]);
+                    for (share, change) in direction.iter().zip(&tilt.components) {
+                        for (nominal, change) in model.nominal.iter().zip(&change.base) {
+                            sum.add(share * nominal, change);
+                        }
+                    }
+                    sum
+                };
+                only(tilt.directions(&level).into_iter().map(sum).collect())
+            }
+            Source::Delay => Vec::new(),
+        };
+        Ok(Some((candidate, choices)))
+    }
+
+    /// Whether its force follows from the model's nominal values.
+    pub fn needs_nominal(&self) -> bool {
+        self.candidates.tilt.is_some() || uses_load(&self.kind)
+    }
+}
+
+/// Columns of the base that are to be found, what the bodies of the nominal model carry, and the force of what is known.
+pub fn base(model: &Model, all: &Runs<'_>) -> Outcome<(Vec<Column>, Column, Column)> {
+    let every = regressor(all, &Evaluator::new(&model.derivation), model)?;
+    let none = Column(vec![None; model.drives().len()]);
+    let (mut load, mut known) = (none.clone(), none);
+    let mut free = Vec::new();
+    for (k, column) in every.into_iter().enumerate() {
+        if !model.is_effect(k) {
+            load.add(model.nominal[k], &column);
+        }
+        if model.is_known(k) {
+            known.add(model.nominal[k], &column);
+        } else {
+            free.push(column);
+        }
+    }
+    let samples = all.iter().map(|(one, _)| one.time().len()).sum();
+    for channel in &mut load.0 {
+        channel.get_or_insert_with(|| vec![0.0; samples]);
+    }
+    Ok((free, load, known))
+}

@@ -1,0 +1,417 @@
+//! Columns of all candidates along the recordings, for every choice of their constants.
+
+use modelmill_codegen::Evaluator;
+use modelmill_identify::diagnose::{
+    Candidate, Choice, Column, Effect, EffectParameter, Sign, Source,
+};
+use modelmill_spec::{ActsOn, EffectKind, Mechanics, Search};
+use rayon::prelude::*;
+
+use crate::error::Outcome;
+use crate::model::Model;
+use crate::stretch::Stretch;
+
+use super::candidates::{Candidates, Change, Entry, Single, Sort, grid, sign};
+use super::numbers::{Motions, Runs, regressor_of};
+use super::tilt::{TILTS, tilt};
+
+/// Candidates with their columns; where each comes from is said in the same order.
+pub fn columns(
+    candidates: &Candidates,
+    model: &Model,
+    all: &Runs<'_>,
+) -> Outcome<(Vec<Candidate>, Vec<Origin>)> {
+    let is_known = |single: &Single| single.sort == Sort::Known;
+    let is_linear = |single: &Single| single.constants.iter().any(|c| c.2 == Search::Linear);
+    let grids: Vec<Vec<f64>> = if candidates.singles.iter().all(is_known) {
+        vec![vec![1.0]; candidates.singles.len()]
+    } else {
+        let motions = Motions::new(model, all)?;
+        let scales = shared_scales(candidates, &motions);
+        (candidates.singles.iter().zip(scales))
+            .map(|(single, scale)| grid(single, scale))
+            .collect()
+    };
+    // Nothing changes in a second round where no constant does.
+    let of_known = if candidates.singles.iter().any(is_linear) {
+        2
+    } else {
+        1
+    };
+    // `found[single][round]`; columns that are linear in a constant are looked at for its values 0 and 1.
+    let longest = grids.iter().map(Vec::len).max().unwrap_or(1);
+    let rounds = (0..of_known)
+        .map(|round| (Sort::Known, round))
+        .chain((0..longest).map(|round| (Sort::Searched, round)));
+    let jobs: Vec<(Sort, usize, Vec<usize>)> = rounds
+        .map(|(sort, round)| {
+            let takes_part = |k: &usize| {
+                candidates.singles[*k].sort == sort
+                    && (sort == Sort::Known || round < grids[*k].len())
+            };
+            let of_round = (0..candidates.singles.len()).filter(takes_part);
+            (sort, round, of_round.collect())
+        })
+        .filter(|(_, _, of_round): &(_, _, Vec<usize>)| !of_round.is_empty())
+        .collect();
+    let made: Vec<Outcome<Vec<Vec<Column>>>> = jobs
+        .par_iter()
+        .map(|(sort, round, of_round)| {
+            let value = |k: usize, search: &Search| match search {
+                Search::Linear => (*round).min(1) as f64,
+                Search::Range { .. } => grids[k][*round],
+            };
+            singles(candidates, of_round, model, all, *sort, &value)
+        })
+        .collect();
+    let mut found: Vec<Vec<Vec<Column>>> = vec![Vec::new(); candidates.singles.len()];
+    for ((_, _, of_round), columns) in jobs.iter().zip(made) {
+        for (k, columns) in of_round.iter().zip(columns?) {
+            found[*k].push(columns);
+        }
+    }
+    let (mut made, mut origins) = (Vec::new(), Vec::new());
+    for (k, entry) in candidates.entries.iter().enumerate() {
+        if let Some((candidate, felt)) = candidate(candidates, entry, &found, &grids) {
+            made.push(candidate);
+            origins.push(Origin::Entry(k, felt));
+        }
+    }
+    if let Some((change, derivation)) = &candidates.tilt {
+        let tilt = tilt(derivation, model, all)?;
+        if !tilt.axes.is_empty() {
+            let angle = |axis: &usize| EffectParameter {
+                symbol: TILTS[*axis].to_owned(),
+                unit: "rad".to_owned(),
+                sign: Sign::Any,
+            };
+            let parameters = tilt.axes.iter().map(angle).collect();
+            made.push(changed(candidates, change, parameters, Source::Tilt(tilt)));
+            origins.push(Origin::Tilt);
+        }
+    }
+    if let Some(change) = &candidates.delay {
+        let parameter = EffectParameter {
+            symbol: "T".to_owned(),
+            unit: "s".to_owned(),
+            sign: Sign::Any,
+        };
+        made.push(changed(candidates, change, vec![parameter], Source::Delay));
+        origins.push(Origin::Delay);
+    }
+    Ok((made, origins))
+}
+
+/// Largest rate and travel of the place of each single candidate. Places that may share a constant look for it on one grid,
+/// that of the place that moves most.
+fn shared_scales(candidates: &Candidates, motions: &Motions) -> Vec<[f64; 2]> {
+    let own = |single: &Single| motions.scale(single.spots[0].place);
+    let mut scales: Vec<[f64; 2]> = candidates.singles.iter().map(own).collect();
+    loop {
+        let before = scales.clone();
+        for entry in &candidates.entries {
+            let of_entry = entry.singles.iter().map(|k| scales[*k]);
+            let most = of_entry.fold([0.0_f64; 2], |m, s| [m[0].max(s[0]), m[1].max(s[1])]);
+            for k in &entry.singles {
+                scales[*k] = most;
+            }
+        }
+        if scales == before {
+            return scales;
+        }
+    }
+}
+
+/// Where a candidate comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// An entry of the candidates, and which of its parameters have an effect.
+    Entry(usize, Vec<bool>),
+    /// A tilt of the base.
+    Tilt,
+    /// A delay of the forces.
+    Delay,
+}
+
+fn changed(
+    candidates: &Candidates,
+    change: &Change,
+    parameters: Vec<EffectParameter>,
+    source: Source,
+) -> Candidate {
+    Candidate {
+        effect: Effect {
+            kind: candidates.kinds[change.kind].name.clone(),
+            at: vec![change.spot.name.clone()],
+        },
+        parameters,
+        searched: 0,
+        bears: bears(&candidates.kinds[change.kind]),
+        refines: None,
+        source,
+    }
+}
+
+/// Columns of some single candidates for given values of their constants.
+fn singles(
+    candidates: &Candidates,
+    which: &[usize],
+    model: &Model,
+    all: &Runs<'_>,
+    sort: Sort,
+    value: &dyn Fn(usize, &Search) -> f64,
+) -> Outcome<Vec<Vec<Column>>> {
+    let derivation = match sort {
+        Sort::Known => &candidates.known,
+        Sort::Searched => &candidates.searched,
+        Sort::Carried => &candidates.carried,
+    };
+    let mechanism = &derivation.mechanism;
+    let mut constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
+    for k in which {
+        for (_, name, search) in &candidates.singles[*k].constants {
+            if let Some(at) = mechanism.constants.iter().position(|c| c.name == *name) {
+                constants[at] = value(*k, search);
+            }
+        }
+    }
+    let evaluator = Evaluator::with_constants(derivation, constants);
+    let reduction = &derivation.reduction;
+    let holds =
+        |product: usize, parameter: usize| reduction.products[product].0.contains(&(parameter, 1));
+    let wanted = |k: usize| {
+        let mut parameters = which
+            .iter()
+            .flat_map(|w| &candidates.singles[*w].parameters);
+        parameters.any(|(_, parameter)| holds(reduction.retained[k], *parameter))
+    };
+    let columns = regressor_of(all, &evaluator, model, &wanted)?;
+    // Where a parameter stands in products, as a mass whose place is one, the others have their nominal values.
+    let of = |(_, parameter): &(String, usize)| -> Column {
+        let mut sum = Column(vec![None; model.drives().len()]);
+        for (k, product) in reduction.retained.iter().enumerate() {
+            let powers = &reduction.products[*product].0;
+            if holds(*product, *parameter) {
+                let others = powers.iter().filter(|(p, _)| p != parameter);
+                let value = |(p, n): &(usize, u32)| {
+                    let n = i32::try_from(*n).unwrap_or(i32::MAX);
+                    mechanism.parameters[*p].nominal.powi(n)
+                };
+                sum.add(others.map(value).product(), &columns[k]);
+            }
+        }
+        sum
+    };
+    Ok(which
+        .iter()
+        .map(|k| candidates.singles[*k].parameters.iter().map(of).collect())
+        .collect())
+}
+
+/// A candidate from the columns of its single places, with which of its parameters have an effect; `None` if none has.
+fn candidate(
+    candidates: &Candidates,
+    entry: &Entry,
+    found: &[Vec<Vec<Column>>],
+    grids: &[Vec<f64>],
+) -> Option<(Candidate, Vec<bool>)> {
+    let first = &candidates.singles[entry.singles[0]];
+    let kind = &candidates.kinds[first.kind];
+    let bears = bears(kind);
+    let mut parameters: Vec<EffectParameter> = (first.parameters.iter())
+        .filter_map(|(symbol, _)| {
+            let parameter = kind.parameters.iter().find(|p| p.symbol == *symbol)?;
+            let carries = first.spots[0].carries;
+            let unit = parameter.units.iter().find(|(c, _)| *c == carries);
+            Some(EffectParameter {
+                symbol: symbol.clone(),
+                unit: unit.map_or_else(String::new, |(_, unit)| unit.clone()),
+                sign: sign(parameter.sign),
+            })
+        })
+        .collect();
+    let places = entry
+        .singles
+        .iter()
+        .flat_map(|k| &candidates.singles[*k].spots);
+    let effect = Effect {
+        kind: kind.name.clone(),
+        at: places.map(|spot| spot.name.clone()).collect(),
+    };
+    if first.sort == Sort::Carried {
+        let felt = vec![true; parameters.len()];
+        let candidate = Candidate {
+            effect,
+            parameters,
+            searched: 0,
+            bears,
+            refines: kind.refines.clone(),
+            source: Source::Carried,
+        };
+        return Some((candidate, felt));
+    }
+    let sum = |round: usize| -> Vec<Column> {
+        let mut columns = found[entry.singles[0]][round].clone();
+        for other in &entry.singles[1..] {
+            let more = &found[*other];
+            for (column, more) in columns.iter_mut().zip(&more[round.min(more.len() - 1)]) {
+                column.add(1.0, more);
+            }
+        }
+        columns
+    };
+    let is_range = |c: &&(String, String, Search)| matches!(c.2, Search::Range { .. });
+    let searched = first.constants.iter().find(is_range);
+    let mut choices: Vec<Choice> = match searched {
+        Some((symbol, _, _)) => (grids[entry.singles[0]].iter().enumerate())
+            .map(|(round, value)| Choice {
+                constants: vec![(symbol.clone(), *value)],
+                columns: sum(round),
+            })
+            .collect(),
+        None => vec![Choice {
+            constants: Vec::new(),
+            columns: sum(0),
+        }],
+    };
+    let linear = first.constants.iter().find(|c| c.2 == Search::Linear);
+    if let (None, Some((symbol, _, _))) = (searched, linear) {
+        let mut shifts = sum(1);
+        for (shift, column) in shifts.iter_mut().zip(&choices[0].columns) {
+            shift.add(-1.0, column);
+        }
+        for (p, shift) in shifts.into_iter().enumerate() {
+            parameters.push(EffectParameter {
+                symbol: format!("{}*{symbol}", parameters[p].symbol),
+                unit: String::new(),
+                sign: Sign::Any,
+            });
+            choices[0].columns.push(shift);
+        }
+    }
+    // Parameters without any effect, such as a mass on the base, are none.
+    let felt: Vec<bool> = (0..parameters.len())
+        .map(|p| choices.iter().any(|choice| !choice.columns[p].is_zero()))
+        .collect();
+    let mut keep = felt.iter();
+    parameters.retain(|_| *keep.next().unwrap_or(&false));
+    for choice in &mut choices {
+        let mut keep = felt.iter();
+        choice.columns.retain(|_| *keep.next().unwrap_or(&false));
+    }
+    if parameters.is_empty() {
+        return None;
+    }
+    let candidate = Candidate {
+        effect,
+        parameters,
+        searched: usize::from(searched.is_some()),
+        bears,
+        refines: kind.refines.clone(),
+        source: Source::Columns(choices),
+    };
+    Some((candidate, felt))
+}
+
+/// Whether what a kind adds is part of what the drives carry.
+fn bears(kind: &EffectKind) -> bool {
+    kind.on.contains(&ActsOn::Point)
+        || matches!(
+            kind.mechanics,
+            Some(Mechanics::Rod | Mechanics::Part | Mechanics::Placement | Mechanics::Tilt)
+        )
+}
+
+/// Columns of all candidates that depend on what the drives carry, for loads that are stacked and decimated like the forces.
+pub fn carried(
+    candidates: &Candidates,
+    model: &Model,
+    all: &Runs<'_>,
+    load: &Column,
+) -> Outcome<Vec<(usize, Vec<Column>)>> {
+    let which: Vec<usize> = (0..candidates.singles.len())
+        .filter(|k| candidates.singles[*k].sort == Sort::Carried)
+        .collect();
+    if which.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut start = 0;
+    let mut loaded = Vec::new();
+    for (one, is_check) in all {
+        let kept = one.time().len();
+        let of = |values: &Option<Vec<f64>>| match values {
+            Some(values) => between(
+                &values[start..start + kept],
+                one.decimation(),
+                one.samples(),
+            ),
+            None => vec![0.0; one.samples()],
+        };
+        let mut one = (*one).clone();
+        one.load = Some(load.0.iter().map(of).collect());
+        loaded.push((one, *is_check));
+        start += kept;
+    }
+    let all: Vec<(&Stretch, bool)> = loaded.iter().map(|(one, check)| (one, *check)).collect();
+    let value = |_: usize, search: &Search| match search {
+        Search::Linear => 0.0,
+        Search::Range { from, to, .. } => 0.5 * (from + to),
+    };
+    let found = singles(candidates, &which, model, &all, Sort::Carried, &value)?;
+    let mut made = Vec::new();
+    for (k, entry) in candidates.entries.iter().enumerate() {
+        let place = |single: &usize| which.iter().position(|w| w == single);
+        let mut places = entry.singles.iter().filter_map(place);
+        let Some(first) = places.next() else { continue };
+        let mut columns = found[first].clone();
+        for other in places {
+            for (column, more) in columns.iter_mut().zip(&found[other]) {
+                column.add(1.0, more);
+            }
+        }
+        made.push((k, columns));
+    }
+    Ok(made)
+}
+
+/// Values between samples of which every n-th was kept.
+fn between(kept: &[f64], factor: usize, samples: usize) -> Vec<f64> {
+    let last = kept.len().saturating_sub(1);
+    let at = |i: usize| {
+        let k = (i / factor).min(last);
+        let share = (i - k * factor) as f64 / factor as f64;
+        kept[k] + share.min(1.0) * (kept[(k + 1).min(last)] - kept[k])
+    };
+    (0..samples).map(at).collect()
+}
+
+/// Columns of an entry for another value of the constant that is searched for.
+pub fn finer(
+    candidates: &Candidates,
+    model: &Model,
+    all: &Runs<'_>,
+    entry: &Entry,
+    constant: f64,
+) -> Option<Vec<Column>> {
+    let value = |_: usize, search: &Search| match search {
+        Search::Linear => 0.0,
+        Search::Range { .. } => constant,
+    };
+    let found = singles(
+        candidates,
+        &entry.singles,
+        model,
+        all,
+        Sort::Searched,
+        &value,
+    )
+    .ok()?;
+    let mut found = found.into_iter();
+    let mut columns = found.next()?;
+    for more in found {
+        for (column, more) in columns.iter_mut().zip(&more) {
+            column.add(1.0, more);
+        }
+    }
+    Some(columns)
+}

@@ -1,0 +1,513 @@
+//! What a diagnosis found, as values: the verdict, what is missing with estimates and doubles, the model with what was
+//! found beside the model as it is, and where errors live. Text, JSON and the page print them.
+
+use modelmill_identify::diagnose::{Diagnosis, Effect, FoundEffect, Verdict};
+use modelmill_identify::{FitParameter, Note, Region, Status};
+use modelmill_spec::Mechanics;
+use modelmill_spec::edit::NewEffect;
+
+use crate::along;
+use crate::compare::{self, Places};
+use crate::error::Outcome;
+use crate::model::Model;
+use crate::recording::{self, Recording};
+use crate::stretch::Stretch;
+
+use super::added::{self, Added};
+use super::chosen::Named;
+use super::problem::{self, Answer, Held};
+use super::versions::Version;
+use super::words::Judged;
+
+/// A base parameter is off its nominal value from this many of its deviations on, and from this share of it on.
+const SIGMAS: f64 = 5.0;
+const OFF: f64 = 0.01;
+
+/// What is asked of a diagnosis; [`Question::default`] identifies what the model file leaves open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Question {
+    /// Which parameters keep their nominal values.
+    pub held: Held,
+    /// Where base parameters come out off their nominal values, ask once more with all of them held: they may hide what is
+    /// missing.
+    pub again_with_nominal: bool,
+}
+
+impl Default for Question {
+    fn default() -> Self {
+        Self {
+            held: Held::Known,
+            again_with_nominal: true,
+        }
+    }
+}
+
+/// What a diagnosis found.
+pub struct Findings {
+    /// Verdict, ladder, candidates with the reason of their refusal, and what is left unexplained.
+    pub diagnosis: Diagnosis,
+    /// What is missing, with what is known of it.
+    pub missing: Vec<Missing>,
+    /// Base parameters of the bodies that are not what the file says, the farthest first.
+    pub off_nominal: Vec<OffNominal>,
+    /// The same question with all parameters held at their nominal values, where some are off and it was asked for.
+    pub with_nominal: Option<WithNominal>,
+    /// Where the error sits that matters: what is left unexplained, or that of the model as it is.
+    pub regions: Vec<Region>,
+    /// The model as it is, along all recordings.
+    pub before: Version,
+    /// The model with what was found, or why there is none; the reason is empty where nothing was found.
+    pub after: Result<Version, String>,
+    /// What was found, as entries of a model file.
+    pub entries: Vec<NewEffect>,
+    /// The model file with them.
+    pub edited: Option<Added>,
+    /// Where the error of the model as it is lives.
+    pub places: Places,
+    /// Where what is left in the end lives.
+    pub left: Option<Places>,
+    /// Where errors are judged.
+    pub judged: Judged,
+    /// Remarks on the recordings.
+    pub notes: Vec<Note>,
+    /// What was asked and with which columns.
+    pub(crate) answer: Answer,
+    /// Variables on which errors may depend, along the recordings that are judged.
+    pub(crate) variables: Vec<(String, Vec<f64>)>,
+}
+
+/// An effect that is missing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Missing {
+    /// Its kind and places.
+    pub effect: Effect,
+    /// Its parameters and constants.
+    pub estimates: Vec<Estimate>,
+    /// What the recordings cannot tell it from.
+    pub indistinguishable_from: Vec<Effect>,
+    /// Which experiment tells it from these, as the library says.
+    pub separate_by: Option<String>,
+    /// The motion that would tell it from these, if one can be sought.
+    pub separation: Option<Separation>,
+}
+
+/// Effects between which a motion is to decide.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Separation {
+    /// The effect that was found, with its values.
+    pub effect: Named,
+    /// What it may be taken for.
+    pub rivals: Vec<Effect>,
+    /// What is there in either case, with its constants.
+    pub beside: Vec<Named>,
+    /// Noise of the forces, if it is known.
+    pub noise: Option<f64>,
+}
+
+/// An estimate of a found effect.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// Symbol of the parameter or constant.
+    pub name: String,
+    /// Its value.
+    pub value: f64,
+    /// Standard deviation, where identification has the parameter by itself.
+    pub std: Option<f64>,
+    /// Unit of the value.
+    pub unit: String,
+}
+
+/// A base parameter that is not what the file says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OffNominal {
+    /// The parameter as it was identified.
+    pub parameter: FitParameter,
+    /// Its nominal value.
+    pub nominal: f64,
+    /// How many of its standard deviations lie between.
+    pub sigmas: f64,
+}
+
+/// A diagnosis with all parameters held at their nominal values.
+pub struct WithNominal {
+    /// Verdict, ladder and candidates.
+    pub diagnosis: Diagnosis,
+    /// What is missing then.
+    pub missing: Vec<(Effect, Vec<Estimate>)>,
+}
+
+impl Model {
+    /// Finds which physical effect the model lacks: `fit` is what parameters are fitted to, errors are judged on `check`, or
+    /// by cross-validation if there is none.
+    ///
+    /// Fails when a recording is too short, holds no force, or leads where the mechanism cannot stand.
+    pub fn diagnose(
+        &self,
+        fit: &[&Recording],
+        check: &[&Recording],
+        question: &Question,
+    ) -> Outcome<Findings> {
+        let [fit_data, check_data] = recording::stretches(self, fit, check);
+        let held = question.held;
+        let answer = problem::find(self, &fit_data, &check_data, held)?;
+        let judged = if check_data.is_empty() {
+            Judged::CrossValidation
+        } else {
+            Judged::Check
+        };
+        let notes = fit_data.iter().chain(&check_data).flat_map(Stretch::notes);
+        let notes = notes.cloned().collect();
+        let entries = added::entries(&answer);
+        let (edited, after) = if entries.is_empty() {
+            (None, Err(String::new()))
+        } else {
+            match added::add(self, &entries) {
+                Ok(edited) => {
+                    let after = with_effects(self, &edited, [fit, check], held);
+                    (Some(edited), after.map_err(|error| error.to_string()))
+                }
+                Err(error) => (None, Err(error.to_string())),
+            }
+        };
+        let before = Version::new(self.clone(), fit_data, check_data, held)?;
+        let places = places(&before)?;
+        let left = after.as_ref().ok().map(self::places).transpose()?;
+        let variables = variables(&before)?;
+        let mut findings = Findings {
+            diagnosis: answer.diagnosis.clone(),
+            missing: Vec::new(),
+            off_nominal: Vec::new(),
+            with_nominal: None,
+            regions: Vec::new(),
+            before,
+            after,
+            entries,
+            edited,
+            places,
+            left,
+            judged,
+            notes,
+            answer,
+            variables,
+        };
+        findings.missing = missing(&findings);
+        findings.off_nominal = off_nominal(findings.last());
+        findings.regions = regions(&findings);
+        if question.again_with_nominal && held != Held::All && !findings.off_nominal.is_empty() {
+            findings.with_nominal = Some(with_nominal(&findings)?);
+        }
+        Ok(findings)
+    }
+}
+
+impl Findings {
+    /// The model with what was found, or as it is.
+    pub fn last(&self) -> &Version {
+        self.after.as_ref().unwrap_or(&self.before)
+    }
+
+    /// Names of the drives, in the order of the channels.
+    pub fn channels(&self) -> &[String] {
+        &self.answer.problem.layout.channels
+    }
+}
+
+fn with_effects(
+    model: &Model,
+    edited: &Added,
+    recordings: [&[&Recording]; 2],
+    held: Held,
+) -> Outcome<Version> {
+    let delay = model.derivation.mechanism.force_delay;
+    let model = model.host().derive(&model.path, edited.loaded.clone())?;
+    let is_later = model.derivation.mechanism.force_delay.to_bits() != delay.to_bits();
+    let [fit, check] = if is_later {
+        // With a delay forces belong to earlier states.
+        let again = |recordings: &[&Recording]| -> Outcome<Vec<Stretch>> {
+            let all = recordings.iter().map(|one| one.prepared_for(&model));
+            Ok(all.collect::<Outcome<Vec<_>>>()?.concat())
+        };
+        [again(recordings[0])?, again(recordings[1])?]
+    } else {
+        recordings.map(|all| all.iter().flat_map(|one| one.stretches.clone()).collect())
+    };
+    let host = model.host().clone();
+    host.watched("identifying with what was found", 0, |_| {
+        Version::new(model, fit, check, held)
+    })?
+}
+
+/// The same question with all parameters held at their nominal values.
+fn with_nominal(findings: &Findings) -> Outcome<WithNominal> {
+    let version = &findings.before;
+    let of = |is_check: bool| -> Vec<Stretch> {
+        let runs = version.data.iter().zip(&version.runs);
+        let wanted = runs.filter(|(_, run)| run.is_check == is_check);
+        wanted.map(|(data, _)| data.clone()).collect()
+    };
+    let answer = problem::find(&version.model, &of(false), &of(true), Held::All)?;
+    let missing = answer.diagnosis.effects.iter().map(|found| {
+        let parameters = &answer.problem.candidates[found.candidate].parameters;
+        let estimates = parameters
+            .iter()
+            .zip(&found.estimates)
+            .map(|(p, value)| Estimate {
+                name: p.symbol.clone(),
+                value: *value,
+                std: None,
+                unit: p.unit.clone(),
+            });
+        (found.effect.clone(), estimates.collect())
+    });
+    Ok(WithNominal {
+        missing: missing.collect(),
+        diagnosis: answer.diagnosis,
+    })
+}
+
+fn missing(findings: &Findings) -> Vec<Missing> {
+    let found = findings.diagnosis.effects.iter();
+    found
+        .map(|found| Missing {
+            effect: found.effect.clone(),
+            estimates: estimates(findings, found),
+            indistinguishable_from: found.indistinguishable_from.clone(),
+            separate_by: separate_by(findings, found),
+            separation: separation(findings, found),
+        })
+        .collect()
+}
+
+/// Unit of a constant of a found effect at its places.
+fn unit_of_constant(findings: &Findings, found: &FoundEffect, name: &str) -> String {
+    let candidates = &findings.answer.candidates;
+    let kind = (candidates.kinds.iter()).find(|kind| kind.name == found.effect.kind);
+    let constant = kind.and_then(|kind| kind.constants.iter().find(|one| one.symbol == name));
+    let mut spots = candidates.singles.iter().flat_map(|single| &single.spots);
+    let spot = spots.find(|spot| found.effect.at.contains(&spot.name));
+    let units = constant.zip(spot).and_then(|(constant, spot)| {
+        let mut units = constant.units.iter();
+        units.find(|(carries, _)| *carries == spot.carries)
+    });
+    units.map_or_else(String::new, |(_, unit)| unit.clone())
+}
+
+/// Estimates of an effect with their deviations, from identification with everything that was found; where the model with
+/// the effects cannot say them apart, those of the search.
+fn estimates(findings: &Findings, found: &FoundEffect) -> Vec<Estimate> {
+    let parameters = &findings.answer.problem.candidates[found.candidate].parameters;
+    let of_search = parameters
+        .iter()
+        .zip(&found.estimates)
+        .map(|(p, value)| Estimate {
+            name: p.symbol.clone(),
+            value: *value,
+            std: None,
+            unit: p.unit.clone(),
+        });
+    let mut all: Vec<Estimate> = of_search.collect();
+    all.extend(found.constants.iter().map(|(name, value)| Estimate {
+        name: name.clone(),
+        value: *value,
+        std: None,
+        unit: unit_of_constant(findings, found, name),
+    }));
+    let is_its =
+        |entry: &&NewEffect| entry.kind == found.effect.kind && entry.at == found.effect.at;
+    if let Some(entry) = findings.entries.iter().find(is_its) {
+        for estimate in &mut all {
+            // What is held at zero, since its sign would make no sense, stays there.
+            if estimate.value == 0.0 {
+                continue;
+            }
+            if let Some(p) = identified(findings, entry, &estimate.name) {
+                estimate.value = p.value;
+                estimate.std = p.std;
+            } else if let Some((_, constant)) = estimate.name.clone().split_once('*') {
+                // A product of a parameter and a constant is told as the constant.
+                let known = entry
+                    .constants
+                    .iter()
+                    .find(|(symbol, _)| symbol == constant);
+                if let Some((_, value)) = known {
+                    estimate.value = *value;
+                    constant.clone_into(&mut estimate.name);
+                }
+            }
+        }
+    }
+    all
+}
+
+/// The identified parameter of an added effect, if the model with the effects has it by itself.
+fn identified<'a>(
+    findings: &'a Findings,
+    entry: &NewEffect,
+    symbol: &str,
+) -> Option<&'a FitParameter> {
+    let after = findings.after.as_ref().ok()?;
+    let fit = &after.identified.as_ref()?.fit;
+    let derivation = &after.model.derivation;
+    let mechanism = &derivation.mechanism;
+    let place = findings.entries.iter().position(|one| one == entry)?;
+    let first = mechanism
+        .effects
+        .len()
+        .checked_sub(findings.entries.len())?;
+    let effect = mechanism.effects.get(first + place)?;
+    let term = (effect.kind == entry.kind)
+        .then(|| effect.terms.iter().find(|term| term.symbol == symbol))??;
+    let reduction = &derivation.reduction;
+    let k = reduction
+        .retained
+        .iter()
+        .position(|k| reduction.products[*k].0 == [(term.parameter.0, 1)])?;
+    fit.parameters
+        .get(k)
+        .filter(|p| p.status == Status::Identified)
+}
+
+/// Which experiment tells an effect from its doubles, as the library says.
+fn separate_by(findings: &Findings, found: &FoundEffect) -> Option<String> {
+    if found.indistinguishable_from.is_empty() {
+        return None;
+    }
+    let kinds = &findings.answer.candidates.kinds;
+    let kind = kinds.iter().find(|kind| kind.name == found.effect.kind)?;
+    (!kind.doubles.is_empty()).then(|| kind.doubles.clone())
+}
+
+/// What a motion would have to decide. What only moves forces in time has no force of its own to be made large.
+fn separation(findings: &Findings, found: &FoundEffect) -> Option<Separation> {
+    let is_force = |effect: &&Effect| {
+        let kinds = findings.answer.candidates.kinds.iter();
+        let mut kind = kinds.filter(|kind| kind.name == effect.kind);
+        kind.all(|kind| kind.mechanics != Some(Mechanics::Delay))
+    };
+    let rivals = found.indistinguishable_from.iter().filter(is_force);
+    let rivals: Vec<Effect> = rivals.cloned().collect();
+    if rivals.is_empty() || !is_force(&&found.effect) {
+        return None;
+    }
+    let values = estimates(findings, found).into_iter();
+    let values = values.filter(|e| !e.name.contains('*') && e.value.is_finite());
+    let others = findings.diagnosis.effects.iter();
+    let others = others.filter(|other| other.effect != found.effect && is_force(&&other.effect));
+    let noise = &findings.answer.problem.noise;
+    let squares: f64 = noise.iter().map(|n| n * n).sum();
+    let noise = (squares / noise.len().max(1) as f64).sqrt();
+    Some(Separation {
+        effect: Named {
+            effect: found.effect.clone(),
+            values: values.map(|e| (e.name, e.value)).collect(),
+        },
+        rivals,
+        beside: others
+            .map(|other| Named {
+                effect: other.effect.clone(),
+                values: other.constants.clone(),
+            })
+            .collect(),
+        noise: (noise > 0.0 && noise.is_finite()).then_some(noise),
+    })
+}
+
+/// Base parameters of the bodies that are not what the file says, with the nominal value and the distance in deviations.
+fn off_nominal(version: &Version) -> Vec<OffNominal> {
+    let Some(identified) = &version.identified else {
+        return Vec::new();
+    };
+    let parameters = identified.fit.parameters.iter().enumerate();
+    let mut off: Vec<OffNominal> = parameters
+        .filter(|(k, p)| p.status == Status::Identified && !version.model.is_effect(*k))
+        .filter_map(|(_, p)| {
+            let (nominal, std) = (p.nominal?, p.std?);
+            let sigmas = (p.value - nominal).abs() / std;
+            let is_off =
+                std > 0.0 && sigmas > SIGMAS && (p.value - nominal).abs() > OFF * nominal.abs();
+            is_off.then(|| OffNominal {
+                parameter: p.clone(),
+                nominal,
+                sigmas,
+            })
+        })
+        .collect();
+    off.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
+    off
+}
+
+/// Where the error sits that matters: what is left unexplained, or that of the model as it is.
+fn regions(findings: &Findings) -> Vec<Region> {
+    let diagnosis = &findings.answer.diagnosis;
+    if diagnosis.verdict != Verdict::Unexplained {
+        return findings.places.regions.clone();
+    }
+    let channels = &findings.answer.problem.layout.channels;
+    let left = findings.left.as_ref().unwrap_or(&findings.places);
+    let mut regions = Vec::new();
+    for d in &diagnosis.unexplained {
+        let of_channel = left.regions.iter().filter(|r| r.channel == channels[*d]);
+        let before = regions.len();
+        regions.extend(of_channel.cloned());
+        if regions.len() == before {
+            regions.push(everywhere(findings, *d));
+        }
+    }
+    regions
+}
+
+/// A channel whose error sits nowhere in particular.
+fn everywhere(findings: &Findings, channel: usize) -> Region {
+    let name = findings.answer.problem.layout.channels[channel].clone();
+    let version = findings.last();
+    let judged = version.judged();
+    let times = judged.iter().flat_map(|k| &version.runs[*k].time);
+    let range = times.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| {
+        [low.min(*t), high.max(*t)]
+    });
+    let again = 100.0 * findings.answer.diagnosis.reproducible[channel];
+    Region {
+        says: format!(
+            "what is left of {name} is spread over all of the time, and {again:.0} % of its square comes again with the state"
+        ),
+        channel: name,
+        variable: modelmill_identify::TIME_COLUMN.to_owned(),
+        range,
+        share: 1.0,
+        samples: 1.0,
+    }
+}
+
+/// Where the error of a model lives on the recordings that are judged.
+fn places(version: &Version) -> Outcome<Places> {
+    let judged = version.judged();
+    let (first, last) = (
+        judged.first().copied().unwrap_or(0),
+        judged.last().map_or(0, |k| k + 1),
+    );
+    let runs = &version.runs[first..last];
+    let measured: Vec<_> = runs.iter().map(|run| run.measured.clone()).collect();
+    let forces: Vec<_> = runs.iter().map(|run| run.forces.clone()).collect();
+    compare::places(
+        &version.model,
+        &version.data[first..last],
+        &measured,
+        &forces,
+    )
+}
+
+/// Variables along the recordings that are judged, one after the other.
+fn variables(version: &Version) -> Outcome<Vec<(String, Vec<f64>)>> {
+    let mut joined: Vec<(String, Vec<f64>)> = Vec::new();
+    for k in version.judged() {
+        let variables = along::variables(&version.model, &version.data[k])?;
+        if joined.is_empty() {
+            joined = variables;
+        } else {
+            for ((_, all), (_, more)) in joined.iter_mut().zip(variables) {
+                all.extend(more);
+            }
+        }
+    }
+    Ok(joined)
+}

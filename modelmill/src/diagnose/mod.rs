@@ -1,0 +1,25 @@
+//! `diagnose`: which physical effect a model lacks. Candidates come from the effect library, their columns from the model's
+//! own derivation, and a search over sets of them decides.
+//!
+//! `places` -> `candidates` (what `add` would add) -> `columns` (numbers along the recordings) -> `problem` (posed and solved)
+//! -> `added` (the model file with what was found) -> `versions` (both models identified, along all recordings) -> `findings`.
+//! `chosen` does the same for effects that the user names; `words` puts verdicts into sentences.
+
+pub(crate) mod added;
+mod candidates;
+mod chosen;
+mod columns;
+mod findings;
+mod numbers;
+mod places;
+mod problem;
+mod tilt;
+mod versions;
+pub mod words;
+
+pub use candidates::sign;
+pub use chosen::{Chosen, Constants, Named, base, choose};
+pub use findings::{Estimate, Findings, Missing, OffNominal, Question, Separation, WithNominal};
+pub use modelmill_identify::diagnose::{Diagnosis, Effect, Rung, Verdict};
+pub use problem::{Held, ROUNDING};
+pub use versions::{Along, Version};

@@ -1,0 +1,225 @@
+//! Numbers along all recordings of a diagnosis: regressors, motions of places, each channel stacked and decimated alike.
+
+use modelmill_codegen::Evaluator;
+use modelmill_identify::diagnose::{Column, Layout, Stretch as LaidOut};
+use modelmill_spec::Place;
+
+use crate::along::decimated;
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::stretch::Stretch;
+
+/// Recordings of the fit, then those of the check.
+pub type Runs<'a> = [(&'a Stretch, bool)];
+
+/// Names of the channels and lengths of the stretches.
+pub fn layout(model: &Model, all: &Runs<'_>) -> Layout {
+    let stretch = |(one, is_check): &(&Stretch, bool)| {
+        let time = one.time();
+        let mean = |time: &[f64]| match time {
+            [first, .., last] => (last - first) / (time.len() - 1) as f64,
+            _ => 1.0,
+        };
+        LaidOut {
+            name: one.run.file.clone(),
+            samples: time.len(),
+            step: mean(&time),
+            sampled: mean(&one.run.time),
+            is_check: *is_check,
+        }
+    };
+    Layout {
+        channels: model.drives(),
+        stretches: all.iter().map(stretch).collect(),
+    }
+}
+
+/// Channels of all recordings one after the other, decimated like the forces.
+pub fn stack(
+    all: &Runs<'_>,
+    mut of: impl FnMut(&Stretch) -> Outcome<Vec<Vec<f64>>>,
+) -> Outcome<Vec<Vec<f64>>> {
+    let mut stacked: Vec<Vec<f64>> = Vec::new();
+    for (one, _) in all {
+        let columns = of(one)?;
+        stacked.resize(columns.len().max(stacked.len()), Vec::new());
+        for (whole, column) in stacked.iter_mut().zip(decimated(columns, one)?) {
+            whole.extend(column);
+        }
+    }
+    Ok(stacked)
+}
+
+/// Columns of a regressor along all recordings.
+pub fn regressor(all: &Runs<'_>, evaluator: &Evaluator<'_>, model: &Model) -> Outcome<Vec<Column>> {
+    regressor_of(all, evaluator, model, &|_| true)
+}
+
+/// The same of some columns only; the others are zero.
+pub fn regressor_of(
+    all: &Runs<'_>,
+    evaluator: &Evaluator<'_>,
+    model: &Model,
+    wanted: &dyn Fn(usize) -> bool,
+) -> Outcome<Vec<Column>> {
+    let n_drives = model.drives().len();
+    let mut stacked: Vec<Option<Vec<f64>>> = Vec::new();
+    let mut before = 0;
+    for (one, _) in all {
+        let columns = moving(one, evaluator, model, wanted)?;
+        stacked.resize(columns.len(), None);
+        let (slots, columns): (Vec<_>, Vec<_>) = (stacked.iter_mut().zip(columns))
+            .filter_map(|(slot, column)| Some((slot, column?)))
+            .unzip();
+        for (slot, column) in slots.into_iter().zip(decimated(columns, one)?) {
+            slot.get_or_insert_with(|| vec![0.0; before]).extend(column);
+        }
+        before += one.samples().div_ceil(one.decimation());
+        for column in stacked.iter_mut().flatten() {
+            column.resize(before, 0.0);
+        }
+    }
+    let n = stacked.len() / n_drives.max(1);
+    // Drives are outermost.
+    let mut by_column = vec![Column::default(); n];
+    for (k, values) in stacked.into_iter().enumerate() {
+        by_column[k % n].0.push(values);
+    }
+    Ok(by_column)
+}
+
+/// Columns along one recording, drive by drive; `None` where they are zero throughout, as most are on most drives.
+fn moving(
+    one: &Stretch,
+    evaluator: &Evaluator<'_>,
+    model: &Model,
+    wanted: &dyn Fn(usize) -> bool,
+) -> Outcome<Vec<Option<Vec<f64>>>> {
+    let n_drives = model.drives().len();
+    let mut columns: Vec<Option<Vec<f64>>> = Vec::new();
+    let mut before = 0;
+    one.for_each_block(model, |states| {
+        Ok::<_, Error>(evaluator.regressor_blocks(states, |samples, block| {
+            columns.resize(block.len(), None);
+            let n = block.len() / n_drives.max(1);
+            for (k, (column, values)) in columns.iter_mut().zip(block).enumerate() {
+                if !wanted(k % n) || (column.is_none() && values.iter().all(|x| *x == 0.0)) {
+                    continue;
+                }
+                let column = column.get_or_insert_with(|| {
+                    let mut zeros = Vec::with_capacity(one.samples());
+                    zeros.resize(before, 0.0);
+                    zeros
+                });
+                column.extend_from_slice(values);
+            }
+            before += samples;
+            Ok(())
+        }))
+    })?;
+    Ok(columns)
+}
+
+/// Variables on which an unknown force may depend.
+pub fn variables(model: &Model, all: &Runs<'_>) -> Vec<(String, Vec<f64>)> {
+    let mut variables = Vec::new();
+    for (i, name) in model.active().into_iter().enumerate() {
+        for (suffix, order) in [("", 0), ("_d", 1), ("_dd", 2)] {
+            let of = |one: &Stretch| -> Vec<f64> {
+                let run = &one.run;
+                let values = [&run.q, &run.qd, &run.qdd][order];
+                values[i]
+                    .iter()
+                    .copied()
+                    .step_by(one.decimation())
+                    .collect()
+            };
+            let values = all.iter().flat_map(|(one, _)| of(one)).collect();
+            variables.push((format!("{name}{suffix}"), values));
+        }
+    }
+    variables
+}
+
+/// Largest rate and travel of a place; zero where it has none.
+pub struct Motions {
+    drives: Vec<Vec<f64>>,
+    active: Vec<usize>,
+    active_motion: Vec<[Vec<f64>; 2]>,
+    passive: Vec<usize>,
+    passive_motion: Vec<Vec<f64>>,
+}
+
+impl Motions {
+    pub fn new(model: &Model, all: &Runs<'_>) -> Outcome<Self> {
+        let evaluator = Evaluator::new(&model.derivation);
+        let (active, passive) = model.derivation.coordinates();
+        let drives = states(all, model, |states| evaluator.drives(states))?;
+        let passive_motion = if passive.is_empty() {
+            Vec::new()
+        } else {
+            states(all, model, |states| evaluator.passive(states))?
+        };
+        let motion = |order: usize, i: usize| -> Vec<f64> {
+            let one = |(data, _): &(&Stretch, bool)| [&data.run.q, &data.run.qd][order][i].clone();
+            all.iter().flat_map(one).collect()
+        };
+        Ok(Self {
+            drives,
+            active_motion: (0..active.len())
+                .map(|i| [motion(0, i), motion(1, i)])
+                .collect(),
+            active,
+            passive,
+            passive_motion,
+        })
+    }
+
+    /// Largest rate and travel.
+    pub fn scale(&self, place: Place) -> [f64; 2] {
+        let n = self.drives.len() / (2 + self.active.len()).max(1);
+        let found = match place {
+            Place::Drive(d) => Some((&self.drives[n + d.0], &self.drives[d.0])),
+            Place::Coordinate(i) => {
+                let at = |list: &[usize]| list.iter().position(|k| *k == i.0);
+                let passive = at(&self.passive).map(|k| {
+                    (
+                        &self.passive_motion[self.passive.len() + k],
+                        &self.passive_motion[k],
+                    )
+                });
+                let active = at(&self.active).map(|k| &self.active_motion[k]);
+                active.map(|[q, qd]| (qd, q)).or(passive)
+            }
+            _ => None,
+        };
+        let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let travel = |values: &[f64]| {
+            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            high - low
+        };
+        found.map_or([0.0; 2], |(rate, value)| [largest(rate), travel(value)])
+    }
+}
+
+fn states(
+    all: &Runs<'_>,
+    model: &Model,
+    mut evaluate: impl FnMut(
+        &modelmill_codegen::States<'_>,
+    ) -> Result<Vec<Vec<f64>>, modelmill_codegen::PoseFault>,
+) -> Outcome<Vec<Vec<f64>>> {
+    let mut stacked: Vec<Vec<f64>> = Vec::new();
+    for (one, _) in all {
+        one.for_each_block(model, |states| {
+            Ok::<_, Error>(evaluate(states).map(|columns| {
+                stacked.resize(columns.len(), Vec::new());
+                for (whole, column) in stacked.iter_mut().zip(columns) {
+                    whole.extend(column);
+                }
+            }))
+        })?;
+    }
+    Ok(stacked)
+}

@@ -1,0 +1,211 @@
+//! Places at which effects of a kind may act, alone, in pairs, and alike at several.
+
+use modelmill_spec::{
+    ActsOn, Carries, DriveIdx, DriveKind, EffectKind, Exact, Inertial, Mechanics, Mechanism,
+    Motion, PartIdx, Place, PointIdx, Symbol,
+};
+
+/// A place with its name and what it carries.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spot {
+    pub name: String,
+    pub carries: Carries,
+    pub sort: ActsOn,
+    pub place: Place,
+}
+
+/// All places of a mechanism.
+pub fn spots(mechanism: &Mechanism) -> Vec<Spot> {
+    let carries = |motion: Motion| match motion {
+        Motion::Revolute => Carries::Torque,
+        Motion::Prismatic => Carries::Force,
+    };
+    let spot = |name: &str, carries: Carries, sort: ActsOn, place: Place| Spot {
+        name: name.to_owned(),
+        carries,
+        sort,
+        place,
+    };
+    let mut spots = Vec::new();
+    let mut driven = Vec::new();
+    for (d, drive) in mechanism.drives.iter().enumerate() {
+        let carries = match drive.kind {
+            DriveKind::Joint(i) => {
+                driven.push(i.0);
+                carries(mechanism.coordinates[i.0].motion)
+            }
+            DriveKind::Linear { .. } => Carries::Force,
+        };
+        let place = Place::Drive(DriveIdx(d));
+        spots.push(spot(&drive.name, carries, ActsOn::Drive, place));
+    }
+    // A joint with a drive of its own is the same place.
+    for (i, coordinate) in mechanism.coordinates.iter().enumerate() {
+        if !driven.contains(&i) {
+            let place = Place::Coordinate(modelmill_spec::CoordinateIdx(i));
+            let carries = carries(coordinate.motion);
+            spots.push(spot(&coordinate.name, carries, ActsOn::Coordinate, place));
+        }
+    }
+    // What is fixed to the base feels nothing.
+    for (i, point) in mechanism.points.iter().enumerate() {
+        if point.frame.0 != 0 {
+            let place = Place::Point(PointIdx(i));
+            spots.push(spot(&point.name, Carries::Mass, ActsOn::Point, place));
+        }
+    }
+    for (i, part) in mechanism.parts.iter().enumerate() {
+        let place = Place::Part(PartIdx(i));
+        spots.push(spot(&part.name, Carries::Elsewhere, ActsOn::Part, place));
+    }
+    spots.push(spot("base", Carries::Elsewhere, ActsOn::Base, Place::Base));
+    spots.push(spot(
+        "force",
+        Carries::Elsewhere,
+        ActsOn::Force,
+        Place::Force,
+    ));
+    spots
+}
+
+/// Whether a kind may act at a place and could say something there.
+pub fn fits(mechanism: &Mechanism, kind: &EffectKind, spot: &Spot) -> bool {
+    let has_unit = |units: &[(Carries, String)]| units.iter().any(|(c, _)| *c == spot.carries);
+    let has_units = kind.parameters.iter().all(|p| has_unit(&p.units));
+    if !kind.on.contains(&spot.sort) {
+        return false;
+    }
+    match (kind.mechanics, spot.place) {
+        (Some(Mechanics::Rod), Place::Drive(d)) => {
+            matches!(mechanism.drives[d.0].kind, DriveKind::Linear { .. })
+        }
+        (Some(Mechanics::Placement), Place::Point(p)) => !displaced(mechanism, p).is_empty(),
+        (Some(Mechanics::Part), Place::Part(p)) => is_tied(mechanism, p),
+        (Some(Mechanics::Tilt | Mechanics::Delay), _) => true,
+        // Of the points that a loop joins one is enough.
+        (None, Place::Point(p)) => {
+            let mut loops = mechanism.loops.iter();
+            has_units && loops.all(|l| l.joins[1] != p)
+        }
+        // Waves along the travel come from drives.
+        (None, Place::Coordinate(_)) => has_units && !is_wave(kind),
+        _ => has_units,
+    }
+}
+
+/// Whether a kind repeats itself along the travel of its place.
+pub fn is_wave(kind: &EffectKind) -> bool {
+    use modelmill_spec::{Scale, Search};
+    kind.constants.iter().any(|c| {
+        matches!(
+            c.search,
+            Some(Search::Range {
+                of: Scale::Travel,
+                ..
+            })
+        )
+    })
+}
+
+/// Masses of the lumped masses at a point whose moments are taken elsewhere.
+fn displaced(mechanism: &Mechanism, point: PointIdx) -> Vec<&Exact> {
+    let point = &mechanism.points[point.0];
+    let masses = mechanism.lumped_masses.iter().filter(|lump| {
+        lump.frame == point.frame && lump.force_at == point.at && lump.moment_at != lump.force_at
+    });
+    masses.map(|lump| &lump.mass).collect()
+}
+
+/// Whether a part shares its parameters with another one.
+fn is_tied(mechanism: &Mechanism, part: PartIdx) -> bool {
+    let parameters = |inertial: &Inertial| {
+        let (Inertial::AboutCentre { mass, inertia, .. } | Inertial::Linear { mass, inertia, .. }) =
+            inertial;
+        let mut found = Vec::new();
+        for exact in std::iter::once(mass).chain(inertia) {
+            exact.for_each_symbol(&mut |symbol| {
+                if let Symbol::Parameter(p) = symbol {
+                    found.push(p);
+                }
+            });
+        }
+        found
+    };
+    let own = parameters(&mechanism.parts[part.0].inertial);
+    let mut others = mechanism.parts.iter().enumerate();
+    let tied = others.any(|(i, other)| {
+        let theirs = parameters(&other.inertial);
+        i != part.0 && own.iter().any(|p| theirs.contains(p))
+    });
+    let names = mechanism.parts.iter();
+    let same = |other: &&modelmill_spec::Part| other.name == mechanism.parts[part.0].name;
+    tied && names.filter(same).count() == 1
+}
+
+/// Sets of places at which a kind may act with shared parameters, and how each is to be written: one effect at all of them,
+/// or the sum of effects at each.
+///
+/// Each place alone; pairs for kinds that need two; and in machines with loops, whose sides are often alike, all drives, all
+/// passive joints and all active ones.
+pub fn sets<'a>(
+    mechanism: &Mechanism,
+    kind: &EffectKind,
+    spots: &[&'a Spot],
+) -> (Vec<Vec<&'a Spot>>, Vec<Vec<usize>>) {
+    if kind.places == Some(2) {
+        let mut pairs = Vec::new();
+        for (i, one) in spots.iter().enumerate() {
+            for other in &spots[i + 1..] {
+                let are_drives = one.sort == ActsOn::Drive && other.sort == ActsOn::Drive;
+                if are_drives && one.carries == other.carries {
+                    pairs.push(vec![*one, *other]);
+                }
+            }
+        }
+        let sets = (0..pairs.len()).map(|k| vec![k]).collect();
+        return (pairs, sets);
+    }
+    if kind.mechanics == Some(Mechanics::Placement) {
+        // Shares of one mass are misplaced together.
+        let mut groups: Vec<(Vec<&Exact>, Vec<&Spot>)> = Vec::new();
+        for spot in spots {
+            let Place::Point(p) = spot.place else {
+                continue;
+            };
+            let masses = displaced(mechanism, p);
+            match groups.iter_mut().find(|(known, _)| *known == masses) {
+                Some((_, group)) => group.push(spot),
+                None => groups.push((masses, vec![spot])),
+            }
+        }
+        let groups: Vec<Vec<&Spot>> = groups.into_iter().map(|(_, group)| group).collect();
+        let sets = (0..groups.len()).map(|k| vec![k]).collect();
+        return (groups, sets);
+    }
+    let singles: Vec<Vec<&Spot>> = spots.iter().map(|spot| vec![*spot]).collect();
+    let mut sets: Vec<Vec<usize>> = (0..singles.len()).map(|k| vec![k]).collect();
+    // Waves along the travel differ in their phase, even at places that are alike otherwise.
+    if mechanism.loops.is_empty() || is_wave(kind) {
+        return (singles, sets);
+    }
+    let is_passive = |spot: &Spot| match spot.place {
+        Place::Coordinate(i) => mechanism.coordinates[i.0].passive,
+        _ => false,
+    };
+    for sort in [ActsOn::Drive, ActsOn::Coordinate] {
+        for passive in [false, true] {
+            for carries in [Carries::Force, Carries::Torque] {
+                let alike: Vec<usize> = (0..spots.len())
+                    .filter(|k| {
+                        let s = spots[*k];
+                        s.sort == sort && s.carries == carries && is_passive(s) == passive
+                    })
+                    .collect();
+                if alike.len() > 1 {
+                    sets.push(alike);
+                }
+            }
+        }
+    }
+    (singles, sets)
+}

@@ -1,0 +1,202 @@
+//! A diagnosis from a model and its recordings: the problem is posed in numbers, and solved.
+
+use modelmill_codegen::Evaluator;
+use modelmill_identify::diagnose::{
+    Column, Diagnosis, Problem, Source, Supply, diagnose, white_noise,
+};
+
+use crate::along::drive_rates;
+use crate::error::{Error, Outcome};
+use crate::identify::regression::nothing_measured;
+use crate::model::Model;
+use crate::stretch::Stretch;
+use crate::text::table::count;
+
+use super::candidates::{Candidates, candidates};
+use super::columns::{Origin, carried, columns, finer};
+use super::numbers::{Runs, layout, regressor, stack, variables};
+
+/// Errors below this share of a force are rounding, of the recording or of whatever simulated it.
+pub const ROUNDING: f64 = 3e-6;
+
+/// Which parameters keep their nominal values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Held {
+    /// Those that are numbers of the file.
+    Known,
+    /// All.
+    All,
+}
+
+/// Samples that each recording must have.
+const FEWEST: usize = 60;
+
+/// What was asked and what was found.
+pub struct Answer {
+    pub problem: Problem,
+    pub diagnosis: Diagnosis,
+    pub candidates: Candidates,
+}
+
+/// Finds what a model lacks.
+pub fn find(model: &Model, fit: &[Stretch], check: &[Stretch], held: Held) -> Outcome<Answer> {
+    let candidates = model
+        .host()
+        .watched("writing down what may be missing", 0, |_| candidates(model))??;
+    let all: Vec<(&Stretch, bool)> = (fit.iter().map(|one| (one, false)))
+        .chain(check.iter().map(|one| (one, true)))
+        .collect();
+    let (mut problem, origins) =
+        model
+            .host()
+            .watched("computing what each would add", 0, |_| {
+                problem(&candidates, model, &all)
+            })??;
+    hold(&mut problem, model, held);
+    let supply = Made {
+        candidates: &candidates,
+        origins: &origins,
+        model,
+        all: &all,
+    };
+    let diagnosis = model
+        .host()
+        .watched("looking for what is missing", 0, |_| {
+            diagnose(&problem, &supply)
+        })?;
+    Ok(Answer {
+        problem,
+        diagnosis,
+        candidates,
+    })
+}
+
+/// Columns that are made while the search goes on.
+struct Made<'a> {
+    candidates: &'a Candidates,
+    origins: &'a [Origin],
+    model: &'a Model,
+    all: &'a Runs<'a>,
+}
+
+impl Supply for Made<'_> {
+    fn finer(&self, candidate: usize, constant: f64) -> Option<Vec<Column>> {
+        let Origin::Entry(k, felt) = &self.origins[candidate] else {
+            return None;
+        };
+        let entry = &self.candidates.entries[*k];
+        let columns = finer(self.candidates, self.model, self.all, entry, constant)?;
+        let kept = columns.into_iter().zip(felt).filter(|(_, felt)| **felt);
+        Some(kept.map(|(column, _)| column).collect())
+    }
+
+    fn carried(&self, load: &Column) -> Vec<(usize, Vec<Column>)> {
+        // Poses without answer were reported when the recordings were evaluated for the first time.
+        let made = carried(self.candidates, self.model, self.all, load).unwrap_or_default();
+        let place = |entry: usize| {
+            let is_its = |origin: &Origin| matches!(origin, Origin::Entry(k, _) if *k == entry);
+            self.origins.iter().position(is_its)
+        };
+        made.into_iter()
+            .filter_map(|(entry, columns)| Some((place(entry)?, columns)))
+            .collect()
+    }
+}
+
+/// The problem in numbers, with all columns of the base.
+fn problem(
+    candidates: &Candidates,
+    model: &Model,
+    all: &Runs<'_>,
+) -> Outcome<(Problem, Vec<Origin>)> {
+    let measured = stack(all, |one| Ok(one.run.measured()?.to_vec()))?;
+    if measured.iter().flatten().all(|force| *force == 0.0) {
+        let file = all.first().map(|(one, _)| one.run.file.as_str());
+        return Err(Error::input(nothing_measured(
+            file.unwrap_or("the recording"),
+        )));
+    }
+    for (one, _) in all {
+        let samples = one.time().len();
+        if samples < FEWEST {
+            return Err(Error::input(format!(
+                "{}: {} to be looked at, too few to tell effects from chance; give a longer recording or decimate less, \
+                 so that at least {FEWEST} are left",
+                one.run.file,
+                count(samples, "sample is left", "samples are left"),
+            )));
+        }
+    }
+    let (columns, origins) = columns(candidates, model, all)?;
+    let problem = Problem {
+        layout: layout(model, all),
+        noise: measured.iter().map(|force| noise(force)).collect(),
+        measured: Column::new(measured),
+        base: regressor(all, &Evaluator::new(&model.derivation), model)?,
+        candidates: columns,
+        base_bears: (0..model.base.len()).map(|k| !model.is_effect(k)).collect(),
+        friction: friction(model, all)?,
+        variables: variables(model, all),
+        held: None,
+    };
+    Ok((problem, origins))
+}
+
+/// Takes what is not free off the measured forces.
+fn hold(problem: &mut Problem, model: &Model, held: Held) {
+    let is_held = |k: usize| held == Held::All || model.is_known(k);
+    let mut known = Column(vec![None; model.drives().len()]);
+    let (mut free, mut bears) = (Vec::new(), Vec::new());
+    for (k, column) in std::mem::take(&mut problem.base).into_iter().enumerate() {
+        if is_held(k) {
+            known.add(model.nominal[k], &column);
+        } else {
+            free.push(column);
+            bears.push(problem.base_bears[k]);
+        }
+    }
+    for candidate in &mut problem.candidates {
+        if let Source::Tilt(tilt) = &mut candidate.source {
+            for change in &mut tilt.components {
+                let mut free = Vec::new();
+                for (k, column) in std::mem::take(&mut change.base).into_iter().enumerate() {
+                    if is_held(k) {
+                        change.held.add(model.nominal[k], &column);
+                    } else {
+                        free.push(column);
+                    }
+                }
+                change.base = free;
+            }
+        }
+    }
+    problem.base = free;
+    problem.base_bears = bears;
+    if !known.is_zero() {
+        problem.measured.add(-1.0, &known);
+        problem.held = Some(known);
+    }
+}
+
+/// Viscous and dry friction and an offset of every drive by itself.
+fn friction(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Column>> {
+    let rates = stack(all, |one| drive_rates(model, one))?;
+    let mut friction = Vec::new();
+    for (d, rate) in rates.iter().enumerate() {
+        let sign = |v: &f64| if *v == 0.0 { 0.0 } else { v.signum() };
+        let signs = rate.iter().map(sign).collect();
+        for values in [rate.clone(), signs, vec![1.0; rate.len()]] {
+            let mut column = Column(vec![None; rates.len()]);
+            column.0[d] = Some(values);
+            friction.push(column);
+        }
+    }
+    Ok(friction)
+}
+
+/// White noise of a force, but not less than what rounding leaves of it.
+fn noise(force: &[f64]) -> f64 {
+    let squares = force.iter().map(|f| f * f).sum::<f64>();
+    let size = (squares / force.len().max(1) as f64).sqrt();
+    white_noise(force).max(ROUNDING * size)
+}

@@ -1,0 +1,97 @@
+//! What forces change by with gravity along each axis of the base, for a base that may be tilted.
+
+use modelmill_codegen::{Derivation, Evaluator};
+use modelmill_identify::diagnose::{Column, Sensitivity, Tilt};
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+use crate::error::Outcome;
+use crate::model::Model;
+
+use super::numbers::{Runs, regressor};
+
+/// Constants of a tilt, about x, y and z.
+pub const TILTS: [&str; 3] = ["tx", "ty", "tz"];
+
+/// What each base column changes by with gravity along each axis of the base, those of known parameters included, and the
+/// axes about which a tilt is felt. Gravity is turned into each axis, both ways: forces are linear in it.
+pub fn tilt(derivation: &Derivation, model: &Model, all: &Runs<'_>) -> Outcome<Tilt> {
+    let mechanism = &derivation.mechanism;
+    let usual: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
+    let gravity = model.gravity();
+    let size = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
+    let mut tilt = Tilt {
+        gravity,
+        axes: Vec::new(),
+        components: std::array::from_fn(|_| Sensitivity::default()),
+    };
+    if size == 0.0 {
+        return Ok(tilt);
+    }
+    let own = &model.derivation.reduction;
+    for (axis, component) in tilt.components.iter_mut().enumerate() {
+        let along = |sign: f64| {
+            let mut constants = usual.clone();
+            let angles = angles_to(gravity.map(|g| sign * g / size), axis);
+            for (symbol, angle) in TILTS.iter().zip(angles) {
+                let name = format!("candidate_{symbol}");
+                if let Some(at) = mechanism.constants.iter().position(|c| c.name == name) {
+                    constants[at] = angle;
+                }
+            }
+            regressor(
+                all,
+                &Evaluator::with_constants(derivation, constants),
+                model,
+            )
+        };
+        let [before, after] = [along(-1.0)?, along(1.0)?];
+        component.held = Column(vec![None; model.drives().len()]);
+        // The base columns in the order of the model.
+        for retained in &own.retained {
+            let product = &own.products[*retained];
+            let reduction = &derivation.reduction;
+            let place = reduction
+                .retained
+                .iter()
+                .position(|p| reduction.products[*p] == *product);
+            let mut change = Column(vec![None; model.drives().len()]);
+            if let Some(place) = place {
+                change.add(0.5 / size, &after[place]);
+                change.add(-0.5 / size, &before[place]);
+            }
+            component.base.push(change);
+        }
+    }
+    let every = Tilt {
+        axes: vec![0, 1, 2],
+        ..tilt.clone()
+    };
+    for (axis, direction) in every.directions(&[0.0; 3]).into_iter().enumerate() {
+        let is_felt = (0..own.retained.len()).any(|k| {
+            let mut change = Column(vec![None; model.drives().len()]);
+            for (share, component) in direction.iter().zip(&tilt.components) {
+                change.add(*share, &component.base[k]);
+            }
+            let values = change.0.iter().flatten().flatten();
+            values.fold(0.0_f64, |m, x| m.max(x.abs())) > 1e-6
+        });
+        if is_felt {
+            tilt.axes.push(axis);
+        }
+    }
+    Ok(tilt)
+}
+
+/// Angles of a base, about x, y and z, in which a direction lies along an axis: a column of Rz Ry Rx is the direction.
+fn angles_to(direction: [f64; 3], axis: usize) -> [f64; 3] {
+    let along = Vector3::from(direction);
+    // Any vector that is not along it completes the frame.
+    let other = Vector3::ith(along.iamin(), 1.0);
+    let next = along.cross(&other).normalize();
+    let mut turn = Matrix3::zeros();
+    turn.set_column(axis, &along);
+    turn.set_column((axis + 1) % 3, &next);
+    turn.set_column((axis + 2) % 3, &along.cross(&next));
+    let (x, y, z) = Rotation3::from_matrix_unchecked(turn).euler_angles();
+    [x, y, z]
+}

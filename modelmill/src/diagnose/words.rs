@@ -1,0 +1,157 @@
+//! What was found, in sentences.
+
+use modelmill_identify::diagnose::{Diagnosis, Effect, Rung, Verdict};
+
+use crate::diagnose::ROUNDING;
+use crate::text::table::percent;
+
+/// Where errors are judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Judged {
+    /// On recordings that were kept for it.
+    Check,
+    /// On blocks of the fit that take turns.
+    CrossValidation,
+}
+
+impl Judged {
+    /// For a sentence: `on ...`.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Check => "on the check run",
+            Self::CrossValidation => "in cross-validation",
+        }
+    }
+
+    /// For a column.
+    pub fn short(self) -> &'static str {
+        match self {
+            Self::Check => "check",
+            Self::CrossValidation => "cross",
+        }
+    }
+}
+
+/// The name of a kind in words.
+pub fn kind(name: &str) -> String {
+    name.replace('_', " ")
+}
+
+/// A kind with its places.
+pub fn effect(effect: &Effect) -> String {
+    format!("{} ({})", kind(&effect.kind), effect.at.join(", "))
+}
+
+/// Effects in a row.
+pub fn effects(effects: &[Effect]) -> String {
+    let all: Vec<String> = effects.iter().map(effect).collect();
+    match all.as_slice() {
+        [] => "nothing".to_owned(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+/// What a step of the ladder did.
+pub fn rung(rung: &Rung) -> String {
+    if rung.added.is_empty() && rung.dropped.is_empty() {
+        return "the model as it is".to_owned();
+    }
+    let mut says = Vec::new();
+    says.extend(rung.added.iter().map(|one| format!("+ {}", effect(one))));
+    says.extend(rung.dropped.iter().map(|one| format!("− {}", effect(one))));
+    says.join(" ")
+}
+
+/// What the errors are held against: the noise in the forces, or rounding where there is none.
+pub fn floor(diagnosis: &Diagnosis) -> String {
+    let floor = percent(Some(diagnosis.noise_floor));
+    if diagnosis.noise_floor <= 2.0 * ROUNDING {
+        format!("there is no noise in the forces, and what is below {floor} is rounding")
+    } else {
+        format!("the noise in the forces is {floor}")
+    }
+}
+
+/// The verdict in one or two sentences with figures.
+pub fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged) -> String {
+    let ladder = &diagnosis.ladder;
+    let (Some(first), Some(last)) = (ladder.first(), ladder.last()) else {
+        return String::new();
+    };
+    let noise = floor(diagnosis);
+    let found: Vec<Effect> = diagnosis.effects.iter().map(|f| f.effect.clone()).collect();
+    let falls = format!(
+        "the error {} falls from {} to {}",
+        judged.words(),
+        percent(Some(first.check)),
+        percent(Some(last.check))
+    );
+    match diagnosis.verdict {
+        Verdict::Adequate => format!(
+            "The model is adequate: it misses the forces by {} {}; {noise}. No effect of the library would lower that where it \
+             was not fitted.",
+            percent(Some(first.check)),
+            judged.words()
+        ),
+        Verdict::MissingEffect => format!(
+            "The model lacks {}. With {} {falls}; {noise}.",
+            effects(&found),
+            if found.len() == 1 { "it" } else { "them" },
+        ),
+        Verdict::Unexplained => {
+            let of = |d: &usize| 100.0 * diagnosis.reproducible[*d];
+            let unexplained = diagnosis.unexplained.iter();
+            let (again, noisy): (Vec<&usize>, Vec<&usize>) =
+                unexplained.partition(|d| of(d) >= 1.0);
+            let mut sits: Vec<String> = again
+                .iter()
+                .map(|d| {
+                    format!(
+                        "{} ({:.0} % of what is left there comes again with the state)",
+                        channels[**d],
+                        of(d)
+                    )
+                })
+                .collect();
+            let names: Vec<&str> = noisy.iter().map(|d| channels[**d].as_str()).collect();
+            if !names.is_empty() {
+                sits.push(format!(
+                    "{} (above the noise there, and neighbouring samples resemble each other)",
+                    names.join(", ")
+                ));
+            }
+            let besides = if found.is_empty() {
+                format!(
+                    "The model misses the forces by {} {}; {noise}.",
+                    percent(Some(last.check)),
+                    judged.words()
+                )
+            } else {
+                format!("With {} {falls}; {noise}.", effects(&found))
+            };
+            format!(
+                "Something is missing that no effect of the library explains, in {}. {besides}",
+                sits.join(" and ")
+            )
+        }
+    }
+}
+
+/// Text in lines of some letters at most, broken between words.
+pub fn lines(text: &str, letters: usize) -> Vec<String> {
+    let mut lines: Vec<String> = vec![String::new()];
+    for word in text.split_whitespace() {
+        let line = lines.len() - 1;
+        let line = &mut lines[line];
+        if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > letters {
+            lines.push(word.to_owned());
+        } else {
+            if !line.is_empty() {
+                line.push(' ');
+            }
+            line.push_str(word);
+        }
+    }
+    lines
+}

@@ -1,0 +1,125 @@
+//! `evaluate`: a model's forces along a recording, of the drives or in the joints.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use modelmill_codegen::Reactions;
+
+use crate::along;
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::recording::{self, Reading};
+
+/// Columns of numbers along a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Evaluated {
+    /// Times of the samples that are kept, s.
+    pub time: Vec<f64>,
+    /// Names and values of the columns, N or N m.
+    pub columns: Vec<(String, Vec<f64>)>,
+    /// Components that equations of motion do not determine, since the mechanism is held there more often than once.
+    pub left_out: Vec<String>,
+}
+
+impl Model {
+    /// The model's forces along a recording, one column for each drive, when they act: without a delay of their reading.
+    /// `values` are those of the base parameters.
+    ///
+    /// Fails when the recording lacks a position, or leads where the mechanism cannot stand.
+    pub fn evaluate(
+        &self,
+        path: impl AsRef<Path>,
+        reading: &Reading,
+        values: &[f64],
+    ) -> Outcome<Evaluated> {
+        let mut found = Evaluated::of(self.drives(), Vec::new());
+        for stretch in &recording::read_as_recorded(self, path.as_ref(), reading)? {
+            found.extend(&stretch.time(), along::forces(self, stretch, values)?);
+        }
+        Ok(found)
+    }
+
+    /// What the joints and the cuts of loops transmit along a recording, for the parameters of the model file: one column for
+    /// each component that is determined.
+    ///
+    /// Fails as [`Model::evaluate`] does.
+    pub fn evaluate_reactions(
+        &self,
+        path: impl AsRef<Path>,
+        reading: &Reading,
+    ) -> Outcome<Evaluated> {
+        let derived = self.derivation.reactions();
+        let reactions = derived.map_err(|error| Error::derivation(&self.path, error))?;
+        let components = components(&reactions);
+        let mut found = Evaluated::of(components.told, components.left_out);
+        for stretch in &recording::read_as_recorded(self, path.as_ref(), reading)? {
+            found.extend(
+                &stretch.time(),
+                along::reactions(self, stretch, &reactions)?,
+            );
+        }
+        Ok(found)
+    }
+}
+
+impl Evaluated {
+    fn of(names: Vec<String>, left_out: Vec<String>) -> Self {
+        Self {
+            time: Vec::new(),
+            columns: names.into_iter().map(|name| (name, Vec::new())).collect(),
+            left_out,
+        }
+    }
+
+    fn extend(&mut self, time: &[f64], columns: Vec<Vec<f64>>) {
+        self.time.extend(time);
+        for ((_, whole), more) in self.columns.iter_mut().zip(columns) {
+            whole.extend(more);
+        }
+    }
+
+    /// The columns as text (CSV), `t` first.
+    pub fn csv(&self) -> String {
+        let names: Vec<&str> = self.columns.iter().map(|(name, _)| name.as_str()).collect();
+        let mut text = format!("t,{}\n", names.join(","));
+        for (i, t) in self.time.iter().enumerate() {
+            let _ = write!(text, "{t}");
+            for (_, values) in &self.columns {
+                let _ = write!(text, ",{}", values[i]);
+            }
+            text.push('\n');
+        }
+        text
+    }
+}
+
+/// Names of the components of all reactions, such as `elbow.Fx`, `elbow.Mz`, and of a loop `closure.Fx`.
+struct Components {
+    /// Those that are determined, in the order of the program's outputs.
+    told: Vec<String>,
+    left_out: Vec<String>,
+}
+
+fn components(reactions: &Reactions) -> Components {
+    let mut found = Components {
+        told: Vec::new(),
+        left_out: Vec::new(),
+    };
+    let mut sort = |name: &str, kind: char, places: &[Option<usize>; 3]| {
+        for (axis, place) in ['x', 'y', 'z'].into_iter().zip(places) {
+            let column = format!("{name}.{kind}{axis}");
+            match place {
+                Some(_) => found.told.push(column),
+                None => found.left_out.push(column),
+            }
+        }
+    };
+    for joint in &reactions.joints {
+        sort(&joint.name, 'F', &joint.force);
+        sort(&joint.name, 'M', &joint.moment);
+    }
+    for closed in &reactions.loops {
+        sort(&closed.name, 'F', &closed.force);
+    }
+    found
+}

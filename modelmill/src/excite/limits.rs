@@ -1,0 +1,176 @@
+//! Limits on the command line, which join those of the model file or replace them: `theta1=1.5:2.1`, `theta1_d=1.2`,
+//! `spindle_left=1500`, `R3m.x=0.2:0.7`, `singularity=0.3`.
+
+use modelmill_identify::excite::CoordinateLimits;
+use modelmill_spec::{CoordinateIdx, DriveIdx, Limits, PointIdx};
+
+use crate::error::{Error, Outcome};
+use crate::excite::plant::AXES;
+use crate::model::Model;
+
+/// One limit of the command line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limit {
+    name: String,
+    /// As it is written.
+    value: f64,
+    ends: [f64; 2],
+}
+
+impl Limit {
+    /// Reads `NAME=SIZE` or `NAME=LOW:HIGH`.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let expected = || {
+            "expected NAME=SIZE or NAME=LOW:HIGH, such as theta1_d=1.2 or theta1=1.5:2.1".to_owned()
+        };
+        let (name, range) = text.split_once('=').ok_or_else(expected)?;
+        let number = |text: &str| {
+            let value: Option<f64> = text.trim().parse().ok();
+            value.filter(|v| v.is_finite()).ok_or_else(expected)
+        };
+        let (value, ends) = match range.split_once(':') {
+            Some((low, high)) => (f64::NAN, [number(low)?, number(high)?]),
+            None => {
+                let size = number(range)?;
+                (size, [-size, size])
+            }
+        };
+        if ends[0] >= ends[1] {
+            return Err(
+                "this range is empty; the lower end comes first, and a size is above 0".to_owned(),
+            );
+        }
+        Ok(Self {
+            name: name.trim().to_owned(),
+            value,
+            ends,
+        })
+    }
+}
+
+/// The model file's limits with those of the command line put in.
+pub fn limits(model: &Model, given: &[Limit]) -> Outcome<Limits> {
+    let mechanism = &model.derivation.mechanism;
+    let mut limits = mechanism.limits.clone();
+    for limit in given {
+        let name = limit.name.as_str();
+        if name == "singularity" {
+            if !(limit.value > 0.0 && limit.value < 1.0) {
+                return Err(Error::options(
+                    "--limits singularity: expected a share of the nominal pose's value between 0 and 1, such as 0.3"
+                        .to_owned(),
+                ));
+            }
+            limits.singularity = Some(limit.value);
+        } else if let Some((point, axis)) = name.rsplit_once('.')
+            && let Some(axis) = AXES.iter().position(|a| *a == axis)
+            && let Some(i) = mechanism.points.iter().position(|p| p.name == point)
+        {
+            let known = limits.points.iter_mut().find(|(p, _)| p.0 == i);
+            match known {
+                Some((_, ranges)) => ranges[axis] = Some(limit.ends),
+                None => {
+                    let mut ranges = [None; 3];
+                    ranges[axis] = Some(limit.ends);
+                    limits.points.push((PointIdx(i), ranges));
+                }
+            }
+        } else if let Some(i) = mechanism.drives.iter().position(|d| d.name == name) {
+            limits.forces.retain(|(d, _)| d.0 != i);
+            limits.forces.push((DriveIdx(i), limit.ends));
+        } else {
+            coordinate(model, &mut limits, limit)?;
+        }
+    }
+    Ok(limits)
+}
+
+fn coordinate(model: &Model, limits: &mut Limits, limit: &Limit) -> Outcome {
+    let coordinates = &model.derivation.mechanism.coordinates;
+    let name = limit.name.as_str();
+    let (stem, derivative) = match (name.strip_suffix("_dd"), name.strip_suffix("_d")) {
+        (Some(stem), _) => (stem, 2),
+        (None, Some(stem)) => (stem, 1),
+        _ => (name, 0),
+    };
+    let Some(i) = coordinates.iter().position(|c| c.name == stem) else {
+        return Err(Error::input(format!(
+            "--limits {name}: {} has no such coordinate, drive or point; expected one of {}, with _d for a rate and _dd \
+             for an acceleration, a drive such as {}, a point with .x, .y or .z, or `singularity`",
+            model.path,
+            coordinates
+                .iter()
+                .map(|c| c.name.as_str())
+                .collect::<Vec<_>>()
+                .join(", "),
+            model.drives().join(", ")
+        )));
+    };
+    if coordinates[i].passive && derivative > 0 {
+        return Err(Error::input(format!(
+            "--limits {name}: `{stem}` is passive, and only its position can be limited; limit rates of active coordinates"
+        )));
+    }
+    if derivative > 0 && !(limit.ends[0] < 0.0 && limit.ends[1] > 0.0) {
+        return Err(Error::input(format!(
+            "--limits {name}: the range must contain 0, for periodic motion turns back; one number means both directions"
+        )));
+    }
+    let position = limits.coordinates.iter().position(|(c, _)| c.0 == i);
+    let k = position.unwrap_or_else(|| {
+        limits.coordinates.push((
+            CoordinateIdx(i),
+            modelmill_spec::CoordinateLimits::default(),
+        ));
+        limits.coordinates.len() - 1
+    });
+    let one = &mut limits.coordinates[k].1;
+    *[&mut one.position, &mut one.rate, &mut one.acceleration][derivative] = Some(limit.ends);
+    Ok(())
+}
+
+/// Limits of the active coordinates, in their order; each must have a range of positions.
+pub fn of_active(model: &Model, limits: &Limits) -> Outcome<Vec<CoordinateLimits>> {
+    let (active, _) = model.derivation.coordinates();
+    let coordinates = &model.derivation.mechanism.coordinates;
+    let of_one = |i: &usize| {
+        let found = limits.coordinates.iter().find(|(c, _)| c.0 == *i);
+        let limits = found.map(|(_, limits)| *limits).unwrap_or_default();
+        Some(CoordinateLimits {
+            name: coordinates[*i].name.clone(),
+            position: limits.position?,
+            rate: limits.rate,
+            acceleration: limits.acceleration,
+        })
+    };
+    let missing: Vec<&str> = active
+        .iter()
+        .filter(|i| of_one(i).is_none())
+        .map(|i| coordinates[*i].name.as_str())
+        .collect();
+    if let Some(first) = missing.first() {
+        return Err(Error::input(format!(
+            "{}: the positions of {} have no limits, and excitation would grow without end; add \
+             `[limits.coordinates]` with `{first} = {{ position = [low, high], rate = ..., acceleration = ... }}` to the \
+             model file, or give --limits {first}=LOW:HIGH",
+            model.path,
+            missing.join(", ")
+        )));
+    }
+    Ok(active.iter().filter_map(of_one).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_read_and_nonsense_is_refused() {
+        let ends = |text: &str| Limit::parse(text).unwrap().ends.to_vec();
+        assert_eq!(ends("q=1:2"), [1.0, 2.0]);
+        assert_eq!(ends("q_d = 3"), [-3.0, 3.0]);
+        for text in ["q", "q=", "q=2:1", "q=-1", "q=1:x", "q=nan", "q=1:inf"] {
+            assert!(Limit::parse(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,284 @@
+//! `excite`: the periodic trajectory that tells the base parameters apart best, eq. (14), (15) and (17), or that tells an
+//! effect from what it may be taken for.
+
+pub mod limits;
+pub mod plant;
+mod separate;
+mod separated;
+
+use std::fmt::Write as _;
+
+use modelmill_identify::Note;
+use modelmill_identify::excite::{
+    Excitation, Motion, Plant, excite, scaled_condition_number, steps,
+};
+
+use crate::diagnose::Named;
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::recording::Recording;
+use crate::report::svg::Figure;
+use crate::text::table::significant;
+
+pub use limits::Limit;
+pub use modelmill_identify::excite::{Criterion, Options};
+use plant::ModelPlant;
+pub use separated::Separated;
+
+/// What is asked of an excitation; [`Request::default`] is the paper's, with samples at 500 Hz.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// The search: harmonics, period, criterion, how many trajectories are tried, seed.
+    pub options: Options,
+    /// Samples per second of the trajectory, Hz.
+    pub rate: f64,
+    /// Limits beside those of the model file, or in their place.
+    pub limits: Vec<Limit>,
+    /// Instead of exciting the base parameters, tell effects apart.
+    pub separate: Option<Separate>,
+}
+
+impl Default for Request {
+    fn default() -> Self {
+        Self {
+            options: Options::default(),
+            rate: 500.0,
+            limits: Vec::new(),
+            separate: None,
+        }
+    }
+}
+
+/// Effects that are to be told apart.
+#[derive(Clone, Debug)]
+pub struct Separate {
+    /// The effect that is to differ most, with values of its parameters and constants, SI units.
+    pub effect: Named,
+    /// What it may be taken for. Constants without a value are fitted like parameters.
+    pub from: Vec<Named>,
+    /// What is there in either case and the model file lacks.
+    pub beside: Vec<Named>,
+    /// Standard deviation of the noise in the forces, N or N m, against which the difference is held.
+    pub noise: Option<f64>,
+}
+
+/// A trajectory that was found.
+pub struct Excited {
+    /// What the JSON calls the model.
+    pub model: String,
+    /// Coefficients, condition numbers, and how close the trajectory comes to its limits.
+    pub found: Excitation,
+    /// How it was searched for.
+    pub options: Options,
+    /// By how much effects differ along it, where that was asked for.
+    pub separated: Option<Separated>,
+    /// Condition number with columns of equal norm.
+    pub scaled: Option<f64>,
+    /// Times of one period, s.
+    pub time: Vec<f64>,
+    /// Positions, rates and accelerations of the active coordinates at these times.
+    pub motion: Motion,
+    /// Names of the active coordinates, in their order.
+    pub coordinates: Vec<String>,
+    /// A picture of the trajectory (SVG).
+    pub picture: String,
+    /// Remarks.
+    pub notes: Vec<Note>,
+}
+
+impl Model {
+    /// Searches for the periodic trajectory within limits that tells the base parameters apart best, or effects; `recordings`
+    /// are compared with when effects are told apart, and give their size and the noise where these are not given.
+    ///
+    /// Fails when a coordinate has no limits, when no trajectory keeps them, or when no motion tells the effects apart.
+    pub fn excite(&self, request: &Request, recordings: &[&Recording]) -> Outcome<Excited> {
+        let all_limits = limits::limits(self, &request.limits)?;
+        let coordinates = limits::of_active(self, &all_limits)?;
+        let mut options = request.options.clone();
+        let plant = ModelPlant::new(self, &all_limits);
+        let asked = match &request.separate {
+            Some(asked) => Some(separated::ask(
+                self,
+                &plant,
+                &coordinates,
+                &options,
+                asked,
+                recordings,
+            )?),
+            None => None,
+        };
+        let notes = asked
+            .as_ref()
+            .map_or_else(Vec::new, |asked| asked.notes.clone());
+        for note in &notes {
+            self.host().note(note);
+        }
+        let separating = asked.as_ref().map(|asked| asked.plant(&plant, self));
+        if separating.is_some() {
+            options.criterion = Criterion::Separation;
+        } else if !plant.has_unknowns() {
+            return Err(Error::input(format!(
+                "{}: no base parameter is unknown, so there is nothing to excite",
+                self.path
+            )));
+        }
+        let searched: &dyn Plant = match &separating {
+            Some(separating) => separating,
+            None => &plant,
+        };
+        let found = self
+            .host()
+            .watched("searching for a trajectory", steps(&options), |job| {
+                excite(searched, &coordinates, &options, &|more| job.add(more))
+            })?
+            .map_err(|error| Error::input(format!("{}: {error}", self.path)))?;
+        let samples = samples(request.rate, options.period);
+        let motion = Motion::sample(&found.series, samples);
+        let time: Vec<f64> = (0..samples)
+            // Picoseconds are enough, and 7.288 reads better than 7.287999999999999.
+            .map(|i| (1e12 * i as f64 * options.period / samples as f64).round() / 1e12)
+            .collect();
+        let apart = match &separating {
+            Some(separating) => {
+                let apart = separating.along(&motion, &separating.which);
+                Some(apart.ok_or_else(|| {
+                    Error::input(format!(
+                        "{}: nothing is left of the difference at {} samples per second; give a higher --rate",
+                        self.path, request.rate
+                    ))
+                })?)
+            }
+            None => None,
+        };
+        drop(separating);
+        let separated = match (asked, apart) {
+            (Some(asked), Some(apart)) => Some(Separated {
+                apart,
+                random: (-found.first).exp(),
+                before: asked.before(self)?,
+                unit: separated::unit(self),
+                drives: self.drives().len(),
+                samples,
+                asked,
+            }),
+            _ => None,
+        };
+        let title = match &separated {
+            Some(separated) => format!("{}: tells {}", self.name, separated.asked.words()),
+            None => format!(
+                "{}: excitation with condition number {}",
+                self.name,
+                significant(found.condition_number, 4)
+            ),
+        };
+        let scaled = plant
+            .regressor(&motion)
+            .filter(|w| w.ncols() > 0)
+            .map(|w| scaled_condition_number(&w))
+            .filter(|c| c.is_finite());
+        Ok(Excited {
+            model: self.name.clone(),
+            picture: picture(self, &plant, &found, &title, &time, &motion),
+            found,
+            options,
+            separated,
+            scaled,
+            time,
+            motion,
+            coordinates: self.active(),
+            notes,
+        })
+    }
+}
+
+/// Samples over one period.
+fn samples(rate: f64, period: f64) -> usize {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a float that is too large or negative becomes the nearest number of samples"
+    )]
+    let samples = (rate * period).round() as usize;
+    samples.max(1)
+}
+
+impl Excited {
+    /// The trajectory as a recording without forces (CSV): `t`, positions, rates and accelerations.
+    pub fn csv(&self) -> String {
+        let mut text = "t".to_owned();
+        for suffix in ["", "_d", "_dd"] {
+            for name in &self.coordinates {
+                let _ = write!(text, ",{name}{suffix}");
+            }
+        }
+        text.push('\n');
+        for (i, t) in self.time.iter().enumerate() {
+            let _ = write!(text, "{t}");
+            for columns in [&self.motion.q, &self.motion.qd, &self.motion.qdd] {
+                for column in columns {
+                    let _ = write!(text, ",{}", column[i]);
+                }
+            }
+            text.push('\n');
+        }
+        text
+    }
+}
+
+/// Positions around their means, rates, accelerations and the nominal model's forces.
+fn picture(
+    model: &Model,
+    plant: &ModelPlant<'_>,
+    found: &Excitation,
+    title: &str,
+    time: &[f64],
+    motion: &Motion,
+) -> String {
+    let names = model.active();
+    let mut figure = Figure::new(title, time);
+    let around: Vec<Vec<f64>> = motion
+        .q
+        .iter()
+        .zip(&found.series)
+        .map(|(q, series)| q.iter().map(|q| q - series.offset).collect())
+        .collect();
+    let means: Vec<String> = names
+        .iter()
+        .zip(&found.series)
+        .map(|(name, series)| format!("{name} {}", significant(series.offset, 4)))
+        .collect();
+    let mut panel = |title: &str, columns: &[Vec<f64>], names: &[String]| {
+        let curves: Vec<(&str, &[f64])> = names
+            .iter()
+            .map(String::as_str)
+            .zip(columns.iter().map(Vec::as_slice))
+            .collect();
+        figure.panel(title, &curves);
+    };
+    let motions = model.motions();
+    let unit = match motions.iter().filter(|(_, is_angle)| *is_angle).count() {
+        0 => "m",
+        angles if angles == motions.len() => "rad",
+        _ => "rad or m",
+    };
+    let title = format!("position around the mean ({}), {unit}", means.join(", "));
+    panel(&title, &around, &names);
+    let per = |seconds: &str| {
+        unit.replace("rad", &format!("rad/{seconds}"))
+            .replace('m', &format!("m/{seconds}"))
+    };
+    panel(&format!("rate, {}", per("s")), &motion.qd, &names);
+    panel(
+        &format!("acceleration, {}", per("s^2")),
+        &motion.qdd,
+        &names,
+    );
+    if let Some(forces) = plant.forces(motion) {
+        panel(
+            "force of the nominal model, N or N m",
+            &forces,
+            &model.drives(),
+        );
+    }
+    figure.finish()
+}

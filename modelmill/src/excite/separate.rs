@@ -1,0 +1,446 @@
+//! A model whose motion is to tell effects apart: an effect, what it may be taken for, and what is fitted in any case go
+//! in; along a motion or a recording comes out by how much they differ.
+//!
+//! Columns come from where the diagnosis has them, so that kinds of one's own are told apart like all others.
+
+use modelmill_identify::diagnose::{Candidate, Choice, Column, Effect, Sign, white_noise};
+use modelmill_identify::excite::separate::{Question, Separation, fit, separation};
+use modelmill_identify::excite::{Motion, Plant};
+use modelmill_identify::{PreparedAs, Run};
+use nalgebra::DMatrix;
+
+use crate::diagnose::words;
+use crate::diagnose::{Chosen, Constants, Named, ROUNDING, base, choose};
+use crate::error::{Error, Outcome};
+use crate::excite::plant::ModelPlant;
+use crate::model::Model;
+use crate::stretch::Stretch;
+
+/// What is to be told apart, derived.
+pub struct Pair {
+    /// The effect with its constants.
+    truth: Chosen,
+    /// The effect as it would be fitted, where constants of it are searched for.
+    fitted: Option<Chosen>,
+    /// What it may be taken for.
+    pub rivals: Vec<Rival>,
+    /// What is there in either case.
+    beside: Vec<Chosen>,
+    /// Values of the effect's parameters by symbol; of either sign if none is given.
+    sizes: Vec<(String, f64)>,
+    /// Noise of each drive's force; all alike if it is not known.
+    noise: Option<Vec<f64>>,
+}
+
+/// What an effect may be taken for.
+pub struct Rival {
+    chosen: Chosen,
+    /// Whether the effect holds it as a special case, so that nothing tells when the rival is true.
+    pub is_held: bool,
+}
+
+impl Rival {
+    pub fn effect(&self) -> &Effect {
+        &self.chosen.named.effect
+    }
+}
+
+/// How far effects are apart along a motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Apart {
+    pub figures: Separation,
+    /// The rival that is nearest, by its position, and its constants.
+    pub rival: usize,
+    pub constants: Vec<(String, f64)>,
+    /// The smaller of both directions that can be told at all.
+    pub force: f64,
+}
+
+impl Pair {
+    /// Derives what the command line names.
+    pub fn new(model: &Model, separate: &Named, from: &[Named], beside: &[Named]) -> Outcome<Self> {
+        let all: Vec<&Named> = std::iter::once(separate)
+            .chain(from)
+            .chain(beside)
+            .collect();
+        for (k, one) in all.iter().enumerate() {
+            if all[..k].iter().any(|known| is_same(known, one)) {
+                return Err(Error::input(format!(
+                    "{} is named twice; --separate, --from and --beside take different effects",
+                    words::effect(&one.effect)
+                )));
+            }
+        }
+        let choose = |named: &Named, constants: Constants| choose(model, named, constants);
+        let truth = choose(separate, Constants::Usual)?;
+        let parameters = &truth.kind.parameters;
+        let is_size = |symbol: &str| {
+            truth.kind.mechanics == Some(modelmill_spec::Mechanics::Tilt)
+                || parameters.iter().any(|p| p.symbol == symbol)
+        };
+        let constants = &truth.kind.constants;
+        let is_linear = |symbol: &str| {
+            let mut of = constants.iter().filter(|c| c.symbol == symbol);
+            of.any(|c| c.search == Some(modelmill_spec::Search::Linear))
+        };
+        let mut sizes: Vec<(String, f64)> = separate.values.clone();
+        // A constant beside which the effect is linear is found as a product with its parameter.
+        for (symbol, value) in &separate.values {
+            for (parameter, size) in &separate.values {
+                if is_linear(symbol) && is_size(parameter) {
+                    sizes.push((format!("{parameter}*{symbol}"), size * value));
+                }
+            }
+        }
+        sizes.retain(|(symbol, _)| is_size(symbol) || symbol.contains('*'));
+        let is_searched = |c: &modelmill_spec::KindConstant| {
+            matches!(c.search, Some(modelmill_spec::Search::Range { .. }))
+        };
+        let free = Named {
+            effect: separate.effect.clone(),
+            values: Vec::new(),
+        };
+        let is_tilt = truth.kind.mechanics == Some(modelmill_spec::Mechanics::Tilt);
+        let fitted = (!is_tilt && truth.kind.constants.iter().any(is_searched))
+            .then(|| choose(&free, Constants::Searched))
+            .transpose()?;
+        let rivals = from
+            .iter()
+            .map(|named| {
+                Ok(Rival {
+                    chosen: choose(named, Constants::Searched)?,
+                    is_held: false,
+                })
+            })
+            .collect::<Outcome<Vec<Rival>>>()?;
+        let beside = beside
+            .iter()
+            .map(|named| choose(named, Constants::Usual))
+            .collect::<Outcome<Vec<Chosen>>>()?;
+        Ok(Self {
+            truth,
+            fitted,
+            rivals,
+            beside,
+            sizes,
+            noise: None,
+        })
+    }
+
+    /// The effect that is to be told from the others.
+    pub fn effect(&self) -> &Effect {
+        &self.truth.named.effect
+    }
+
+    /// Values of its parameters; none if they are not known.
+    pub fn sizes(&self) -> &[(String, f64)] {
+        &self.sizes
+    }
+
+    /// Effects that are there in either case.
+    pub fn beside(&self) -> impl Iterator<Item = &Effect> {
+        self.beside.iter().map(|one| &one.named.effect)
+    }
+
+    /// One noise for all drives.
+    pub fn set_noise(&mut self, size: f64, drives: usize) {
+        self.noise = Some(vec![size; drives]);
+    }
+
+    /// Noise of all drives together, if it is known.
+    pub fn noise(&self) -> Option<f64> {
+        let noise = self.noise.as_ref()?;
+        let squares: f64 = noise.iter().map(|n| n * n).sum();
+        Some((squares / noise.len().max(1) as f64).sqrt())
+    }
+
+    /// Takes from recordings what is not known: the noise, and the size of the effect by a fit beside the base.
+    pub fn learn(&mut self, model: &Model, data: &[Stretch]) -> Outcome {
+        let mut measured: Vec<Vec<f64>> = Vec::new();
+        for one in data {
+            let forces = crate::along::measured(one)?;
+            measured.resize(forces.len(), Vec::new());
+            for (whole, force) in measured.iter_mut().zip(forces) {
+                whole.extend(force);
+            }
+        }
+        if self.noise.is_none() {
+            let noise = |force: &Vec<f64>| {
+                let squares: f64 = force.iter().map(|f| f * f).sum();
+                let size = (squares / force.len().max(1) as f64).sqrt();
+                white_noise(force).max(ROUNDING * size)
+            };
+            let noise: Vec<f64> = measured.iter().map(noise).collect();
+            self.noise = noise.iter().all(|n| *n > 0.0).then_some(noise);
+        }
+        if !self.sizes.is_empty() {
+            return Ok(());
+        }
+        let runs: Vec<(&Stretch, bool)> = data.iter().map(|one| (one, false)).collect();
+        let samples = measured.first().map_or(0, Vec::len);
+        let Some(terms) = self.terms(model, &runs)? else {
+            return Ok(());
+        };
+        let weights = self.weights(model.drives().len());
+        // What is known is taken off.
+        let mut forces = Column::new(measured);
+        forces.add(-1.0, &terms.known);
+        let forces = matrix(&[forces], &weights, samples);
+        let base = matrix(&terms.base, &weights, samples);
+        let effect = matrix(&terms.truth.1, &weights, samples);
+        let found = fit(&base, &effect, forces.as_slice());
+        let found = &found[base.ncols()..];
+        self.sizes = terms
+            .truth
+            .0
+            .parameters
+            .iter()
+            .map(|p| p.symbol.clone())
+            .zip(found.iter().copied())
+            .collect();
+        Ok(())
+    }
+
+    /// Rows are divided by their noise relative to that of all.
+    fn weights(&self, drives: usize) -> Vec<f64> {
+        match (&self.noise, self.noise()) {
+            (Some(noise), Some(all)) => noise.iter().map(|n| all / n).collect(),
+            _ => vec![1.0; drives],
+        }
+    }
+
+    /// Columns along recordings; `None` if the effect has none.
+    fn terms(&self, model: &Model, runs: &[(&Stretch, bool)]) -> Outcome<Option<Terms>> {
+        let (mut columns, load, known) = base(model, runs)?;
+        let Some((candidate, choices)) = self.truth.candidate(model, runs, &load)? else {
+            return Ok(None);
+        };
+        for one in &self.beside {
+            if let Some((_, choices)) = one.candidate(model, runs, &load)? {
+                columns.extend(choices.into_iter().flat_map(|choice| choice.columns));
+            }
+        }
+        let Some(truth) = choices.into_iter().next() else {
+            return Ok(None);
+        };
+        Ok(Some(Terms {
+            base: columns,
+            load,
+            known,
+            truth: (candidate, truth.columns),
+        }))
+    }
+
+    /// How far the effects are apart along recordings, from the rivals of some positions; `None` if the effect has no force
+    /// there.
+    pub fn along(
+        &self,
+        model: &Model,
+        data: &[Stretch],
+        which: &[usize],
+    ) -> Outcome<Option<Apart>> {
+        let runs: Vec<(&Stretch, bool)> = data.iter().map(|one| (one, false)).collect();
+        let samples: usize = data.iter().map(|one| one.time().len()).sum();
+        let Some(terms) = self.terms(model, &runs)? else {
+            return Ok(None);
+        };
+        let weights = self.weights(model.drives().len());
+        let of = |columns: &[Column]| matrix(columns, &weights, samples);
+        let (candidate, columns) = &terms.truth;
+        let fitted = match &self.fitted {
+            Some(fitted) => fitted.candidate(model, &runs, &terms.load)?,
+            None => None,
+        };
+        let fitted: Vec<DMatrix<f64>> = match fitted {
+            Some((_, choices)) => choices.iter().map(|c| of(&c.columns)).collect(),
+            None => vec![of(columns)],
+        };
+        let mut owners: Vec<(usize, Vec<(String, f64)>)> = Vec::new();
+        let mut rivals = Vec::new();
+        for k in which {
+            let rival = &self.rivals[*k].chosen;
+            let found = rival.candidate(model, &runs, &terms.load)?;
+            // What has no effect mimics nothing.
+            let choices = found.map_or_else(
+                || {
+                    vec![Choice {
+                        constants: Vec::new(),
+                        columns: Vec::new(),
+                    }]
+                },
+                |(_, choices)| choices,
+            );
+            for choice in choices {
+                rivals.push(of(&choice.columns));
+                owners.push((*k, choice.constants));
+            }
+        }
+        let figures = separation(&Question {
+            base: of(&terms.base),
+            effect: self.force(candidate, &of(columns)),
+            fitted,
+            rivals,
+        });
+        Ok(figures.map(|figures| {
+            let (rival, constants) = owners[figures.rival].clone();
+            let force = if self.rivals[rival].is_held {
+                figures.left
+            } else {
+                figures.left.min(figures.reverse)
+            };
+            Apart {
+                figures,
+                rival,
+                constants,
+                force,
+            }
+        }))
+    }
+
+    /// The effect's force: its columns times their values, or each by itself in units where no value is known.
+    fn force(&self, candidate: &Candidate, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        if self.sizes.is_empty() {
+            return columns.clone();
+        }
+        let value = |symbol: &str| {
+            let known = self.sizes.iter().find(|(known, _)| known == symbol);
+            known.map_or(0.0, |(_, value)| *value)
+        };
+        let values: Vec<f64> = (candidate.parameters.iter())
+            .map(|p| value(&p.symbol))
+            .collect();
+        columns * DMatrix::from_column_slice(values.len(), 1, &values)
+    }
+
+    /// Parameters whose values are of a sign that makes no sense.
+    pub fn wrong_signs(&self) -> Vec<&str> {
+        let wrong = |symbol: &str, value: f64| {
+            let parameter = self.truth.kind.parameters.iter();
+            let sign = parameter
+                .filter(|p| p.symbol == symbol)
+                .map(|p| p.sign)
+                .next();
+            match sign.map(crate::diagnose::sign) {
+                Some(Sign::Positive) => value < 0.0,
+                Some(Sign::Negative) => value > 0.0,
+                _ => false,
+            }
+        };
+        let sizes = self.sizes.iter();
+        sizes
+            .filter(|(symbol, value)| wrong(symbol, *value))
+            .map(|(symbol, _)| symbol.as_str())
+            .collect()
+    }
+
+    /// Whether any force of an effect follows from nominal values.
+    pub fn needs_nominal(&self) -> bool {
+        let rivals = self.rivals.iter().map(|rival| &rival.chosen);
+        std::iter::once(&self.truth)
+            .chain(rivals)
+            .chain(&self.beside)
+            .any(Chosen::needs_nominal)
+    }
+}
+
+/// Whether both are one effect at the same places.
+fn is_same(one: &Named, other: &Named) -> bool {
+    one.effect.kind == other.effect.kind
+        && one.effect.at.len() == other.effect.at.len()
+        && one
+            .effect
+            .at
+            .iter()
+            .all(|place| other.effect.at.contains(place))
+}
+
+/// Columns of a pair.
+struct Terms {
+    /// Of all that is fitted in any case.
+    base: Vec<Column>,
+    /// What the drives carry.
+    load: Column,
+    /// What the model's known parameters say.
+    known: Column,
+    truth: (Candidate, Vec<Column>),
+}
+
+/// Columns with one drive below the other.
+fn matrix(columns: &[Column], weights: &[f64], samples: usize) -> DMatrix<f64> {
+    let mut matrix = DMatrix::zeros(weights.len() * samples, columns.len());
+    for (k, column) in columns.iter().enumerate() {
+        for (d, (values, weight)) in column.0.iter().zip(weights).enumerate() {
+            let Some(values) = values else { continue };
+            let mut rows = matrix.view_mut((d * samples, k), (samples, 1));
+            for (row, value) in rows.iter_mut().zip(values) {
+                *row = weight * value;
+            }
+        }
+    }
+    matrix
+}
+
+/// A model with limits whose motion tells effects apart.
+pub struct SeparatingPlant<'a> {
+    pub inner: &'a ModelPlant<'a>,
+    pub model: &'a Model,
+    pub pair: &'a Pair,
+    /// Rivals that can be told apart at all.
+    pub which: Vec<usize>,
+}
+
+impl SeparatingPlant<'_> {
+    /// How far the effects are apart along a motion.
+    pub fn along(&self, motion: &Motion, which: &[usize]) -> Option<Apart> {
+        let data = [recording(self.inner, motion)?];
+        self.pair.along(self.model, &data, which).ok()?
+    }
+}
+
+impl Plant for SeparatingPlant<'_> {
+    fn regressor(&self, motion: &Motion) -> Option<DMatrix<f64>> {
+        // Without anything to find there is no condition.
+        self.inner
+            .regressor(motion)
+            .filter(|matrix| matrix.ncols() > 0)
+    }
+
+    fn limits(&self) -> Vec<String> {
+        self.inner.limits()
+    }
+
+    fn excess(&self, motion: &Motion) -> Option<Vec<Vec<f64>>> {
+        self.inner.excess(motion)
+    }
+
+    fn apart(&self, motion: &Motion) -> Option<f64> {
+        self.along(motion, &self.which).map(|apart| apart.force)
+    }
+}
+
+/// A motion as a recording with the forces of the nominal model.
+fn recording(plant: &ModelPlant<'_>, motion: &Motion) -> Option<Stretch> {
+    let samples = motion.q.first().map_or(0, Vec::len);
+    Some(Stretch {
+        run: Run {
+            file: "the trajectory".to_owned(),
+            time: (0..samples).map(|i| i as f64).collect(),
+            q: motion.q.clone(),
+            qd: motion.qd.clone(),
+            qdd: motion.qdd.clone(),
+            force: Some(plant.forces(motion)?),
+            missing_force: Vec::new(),
+            lines: Vec::new(),
+            repeats: None,
+            prepared: PreparedAs {
+                decimate: 1,
+                ..PreparedAs::default()
+            },
+            notes: Vec::new(),
+        },
+        variance: None,
+        weights: None,
+        maps_from_degrees: String::new(),
+        load: None,
+    })
+}

@@ -1,0 +1,396 @@
+//! Telling effects apart: which effects can be told apart at all, by how much along the trajectory, and how
+//! many samples that takes.
+
+use std::fmt::Write as _;
+
+use modelmill_identify::Note;
+use modelmill_identify::diagnose::Effect;
+use modelmill_identify::excite::{CoordinateLimits, Options, random_motions};
+use modelmill_spec::Motion as Joint;
+use serde_json::{Map, Value, json};
+
+use crate::diagnose::words;
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::recording::{self, Recording};
+use crate::stretch::Stretch;
+use crate::text::table::{Align, count, significant, table};
+
+use super::Separate;
+use super::plant::ModelPlant;
+use super::separate::{Apart, Pair, SeparatingPlant};
+
+/// Motions that are looked at before the search, for what no motion can tell.
+const LOOKED_AT: usize = 24;
+/// A difference is plain from this many standard deviations on, all samples taken together. `diagnose` calls effects
+/// indistinguishable below three.
+const PLAIN: f64 = 5.0;
+
+/// Effects that are to be told apart, ready for the search.
+pub(crate) struct Asked {
+    pub(crate) pair: Pair,
+    /// Recordings to compare with.
+    data: Vec<Stretch>,
+    /// Rivals that can be told apart at all.
+    pub(crate) which: Vec<usize>,
+    /// Remarks.
+    pub(crate) notes: Vec<Note>,
+}
+
+/// By how much effects differ along a trajectory.
+pub struct Separated {
+    /// The effects.
+    pub(crate) asked: Asked,
+    /// Along the trajectory, with the samples of the file.
+    pub apart: Apart,
+    /// Along the best of the random trajectories.
+    pub random: f64,
+    /// Along the recordings that were given.
+    pub before: Option<Apart>,
+    /// What forces are measured in.
+    pub unit: &'static str,
+    /// How many drives there are.
+    pub drives: usize,
+    /// Samples of one period.
+    pub samples: usize,
+}
+
+/// Derives what is asked and looks at random motions for what cannot be told at all.
+pub(crate) fn ask(
+    model: &Model,
+    plant: &ModelPlant<'_>,
+    limits: &[CoordinateLimits],
+    options: &Options,
+    asked: &Separate,
+    recordings: &[&Recording],
+) -> Outcome<Asked> {
+    let mut notes = Vec::new();
+    let mut pair = Pair::new(model, &asked.effect, &asked.from, &asked.beside)?;
+    if let Some(size) = asked.noise {
+        pair.set_noise(size, model.drives().len());
+    }
+    let [data, _] = recording::stretches(model, recordings, &[]);
+    if !data.is_empty() {
+        pair.learn(model, &data)?;
+    }
+    if let [first, ..] = pair.wrong_signs()[..] {
+        notes.push(Note::warning(format!(
+            "the value of `{first}` has a sign that makes no sense for `{}`",
+            pair.effect().kind
+        )));
+    }
+    let motions = random_motions(plant, limits, options, LOOKED_AT)
+        .map_err(|error| Error::input(format!("{}: {error}", model.path)))?;
+    let mut which = Vec::new();
+    for k in 0..pair.rivals.len() {
+        let probe = SeparatingPlant {
+            inner: plant,
+            model,
+            pair: &pair,
+            which: vec![k],
+        };
+        let all: Vec<Apart> = motions
+            .iter()
+            .filter_map(|m| probe.along(m, &[k]))
+            .collect();
+        let name = words::effect(pair.effect());
+        if all.is_empty() {
+            let why = if pair.needs_nominal() {
+                "; its force follows from nominal values, which the model file must give"
+            } else {
+                ""
+            };
+            return Err(Error::input(format!(
+                "{}: {name} adds no force along any motion within the limits{why}",
+                model.path
+            )));
+        }
+        if all.iter().all(|one| one.figures.is_in_base()) {
+            return Err(Error::input(format!(
+                "{}: base parameters take up {name} along every motion, so that no experiment finds it; it shows only as \
+                 values that are off their nominal ones",
+                model.path
+            )));
+        }
+        if all.iter().all(|one| one.figures.is_mimicked()) {
+            let rival = words::effect(pair.rivals[k].effect());
+            notes.push(Note::warning(format!(
+                "no motion tells {name} from {rival}, which can say all that it says beside the base parameters{}; it is left \
+                 out",
+                if pair.beside().next().is_some() {
+                    " and the effects of --beside"
+                } else {
+                    ""
+                }
+            )));
+            continue;
+        }
+        pair.rivals[k].is_held = all.iter().all(|one| one.figures.holds_rival());
+        which.push(k);
+    }
+    if which.is_empty() {
+        return Err(Error::input(format!(
+            "{}: no experiment tells {} from {}; the simpler one is right until something else than forces speaks. Where \
+             only some values of the effect are the same, give others (NAME=VALUE behind a colon)",
+            model.path,
+            words::effect(pair.effect()),
+            words::effects(
+                &pair
+                    .rivals
+                    .iter()
+                    .map(|r| r.effect().clone())
+                    .collect::<Vec<_>>()
+            ),
+        )));
+    }
+    Ok(Asked {
+        pair,
+        data,
+        which,
+        notes,
+    })
+}
+
+impl Asked {
+    /// The plant for the search.
+    pub fn plant<'a>(&'a self, inner: &'a ModelPlant<'a>, model: &'a Model) -> SeparatingPlant<'a> {
+        SeparatingPlant {
+            inner,
+            model,
+            pair: &self.pair,
+            which: self.which.clone(),
+        }
+    }
+
+    /// How far the effects are apart along the recordings.
+    pub fn before(&self, model: &Model) -> Outcome<Option<Apart>> {
+        if self.data.is_empty() {
+            return Ok(None);
+        }
+        self.pair.along(model, &self.data, &self.which)
+    }
+
+    /// Samples of the recordings.
+    fn samples(&self) -> usize {
+        self.data.iter().map(|one| one.time().len()).sum()
+    }
+
+    fn rivals(&self) -> Vec<Effect> {
+        let of = |k: &usize| self.pair.rivals[*k].effect().clone();
+        self.which.iter().map(of).collect()
+    }
+
+    /// Both sides in words.
+    pub fn words(&self) -> String {
+        format!(
+            "{} from {}",
+            words::effect(self.pair.effect()),
+            words::effects(&self.rivals())
+        )
+    }
+}
+
+/// What forces of a model are measured in.
+pub fn unit(model: &Model) -> &'static str {
+    let mechanism = &model.derivation.mechanism;
+    let is_force = |drive: &modelmill_spec::Drive| match drive.kind {
+        modelmill_spec::DriveKind::Joint(i) => {
+            mechanism.coordinates[i.0].motion == Joint::Prismatic
+        }
+        modelmill_spec::DriveKind::Linear { .. } => true,
+    };
+    let forces = mechanism
+        .drives
+        .iter()
+        .filter(|drive| is_force(drive))
+        .count();
+    match forces {
+        0 => "N m",
+        n if n == mechanism.drives.len() => "N",
+        _ => "N or N m",
+    }
+}
+
+impl Separated {
+    /// The difference in standard deviations of the white noise, over some samples of each drive; `None` where the noise is
+    /// not known.
+    fn deviations(&self, apart: &Apart, samples: usize) -> Option<f64> {
+        let noise = self.asked.pair.noise()?;
+        Some(apart.force / noise * ((samples * self.drives) as f64).sqrt())
+    }
+
+    /// Periods of the trajectory until the difference is plain, at least one.
+    fn periods(&self) -> Option<f64> {
+        let one = self.deviations(&self.apart, self.samples)?;
+        Some((PLAIN / one).powi(2).ceil().max(1.0))
+    }
+
+    pub fn json(&self) -> Value {
+        let pair = &self.asked.pair;
+        let one = |apart: &Apart, samples: usize| {
+            let constants = apart.constants.iter().map(|(s, v)| (s.clone(), json!(v)));
+            let is_held = pair.rivals[apart.rival].is_held;
+            json!({
+                "apart": apart.force,
+                "effect": apart.figures.effect,
+                "beyond_base": apart.figures.beyond,
+                "left": apart.figures.left,
+                "reverse": (!is_held).then_some(apart.figures.reverse),
+                "nearest": {
+                    "kind": pair.rivals[apart.rival].effect().kind,
+                    "at": pair.rivals[apart.rival].effect().at,
+                    "constants": constants.collect::<Map<_, _>>(),
+                },
+                "samples": samples,
+                "deviations": self.deviations(apart, samples),
+            })
+        };
+        let left_out: Vec<&Effect> = (0..pair.rivals.len())
+            .filter(|k| !self.asked.which.contains(k))
+            .map(|k| pair.rivals[k].effect())
+            .collect();
+        let values = pair.sizes().iter().map(|(s, v)| (s.clone(), json!(v)));
+        json!({
+            "effect": pair.effect(),
+            "values": values.collect::<Map<_, _>>(),
+            "from": self.asked.rivals(),
+            "inseparable": left_out,
+            "beside": pair.beside().collect::<Vec<_>>(),
+            "noise": pair.noise(),
+            "unit": self.unit,
+            "trajectory": one(&self.apart, self.samples),
+            "best_random": self.random,
+            "periods_needed": self.periods(),
+            "recordings": self.before.as_ref().map(|before| one(before, self.asked.samples())),
+        })
+    }
+
+    /// For people.
+    pub fn text(&self, evaluations: usize, random: usize) -> Vec<String> {
+        let pair = &self.asked.pair;
+        let mut lines = vec![format!("  tells {}", self.asked.words())];
+        let beside: Vec<Effect> = pair.beside().cloned().collect();
+        if !beside.is_empty() {
+            lines.push(format!("  beside {}", words::effects(&beside)));
+        }
+        let sizes: Vec<String> = (pair.sizes().iter())
+            .map(|(symbol, value)| format!("{symbol} = {}", significant(*value, 5)))
+            .collect();
+        lines.push(if sizes.is_empty() {
+            "  no size is given: each parameter of the effect is 1 in its unit, of either sign"
+                .to_owned()
+        } else {
+            format!("  with {}", sizes.join(", "))
+        });
+        lines.push(String::new());
+        let force = |value: f64| self.force(value);
+        let row = |name: &str, apart: &Apart, samples: usize| {
+            let nearest = pair.rivals[apart.rival].effect();
+            let constants = apart.constants.iter();
+            let constants: Vec<String> = constants
+                .map(|(symbol, value)| format!("{symbol} = {}", significant(*value, 3)))
+                .collect();
+            let mut nearest = words::effect(nearest);
+            if !constants.is_empty() {
+                nearest = format!("{nearest}, {}", constants.join(", "));
+            }
+            let deviations = self.deviations(apart, samples);
+            vec![
+                name.to_owned(),
+                force(apart.figures.effect),
+                force(apart.force),
+                deviations.map_or_else(String::new, |n| significant(n, 3)),
+                nearest,
+            ]
+        };
+        let mut rows: Vec<Vec<String>> = Vec::new();
+        if let Some(before) = &self.before {
+            rows.push(row("the recordings", before, self.asked.samples()));
+        }
+        rows.push(vec![
+            format!(
+                "best of {}",
+                count(random, "random trajectory", "random trajectories")
+            ),
+            String::new(),
+            force(self.random),
+            String::new(),
+            String::new(),
+        ]);
+        rows.push(row(
+            "one period of this trajectory",
+            &self.apart,
+            self.samples,
+        ));
+        lines.extend(table(
+            2,
+            &[
+                ("root mean square, all drives", Align::Left),
+                ("effect", Align::Right),
+                ("apart", Align::Right),
+                ("in deviations", Align::Right),
+                ("nearest", Align::Left),
+            ],
+            &rows,
+        ));
+        let gain = self.apart.force / self.random;
+        let mut says = format!(
+            "{} times as far apart as along the best random trajectory",
+            significant(gain, 3)
+        );
+        if let Some(before) = &self.before
+            && before.force > 0.0
+        {
+            let _ = write!(
+                says,
+                ", and {} times as far as in the recordings",
+                significant(self.apart.force / before.force, 3)
+            );
+        }
+        lines.push(format!(
+            "  {says}; {} were evaluated",
+            count(evaluations, "trajectory", "trajectories")
+        ));
+        lines.extend(self.remarks());
+        lines
+    }
+
+    fn force(&self, value: f64) -> String {
+        format!("{} {}", significant(value, 3), self.unit)
+    }
+
+    /// What the figures mean.
+    fn remarks(&self) -> Vec<String> {
+        let pair = &self.asked.pair;
+        let mut lines = indented(&match (pair.noise(), self.periods()) {
+            (Some(noise), Some(periods)) => format!(
+                "Against white noise of {} it takes {} for {PLAIN} standard deviations of all samples together; noise that \
+                 resembles itself takes longer, and `diagnose` tells what a recording is worth.",
+                self.force(noise),
+                if periods > 1.0 {
+                    format!("{periods} periods")
+                } else {
+                    "no more than one period".to_owned()
+                }
+            ),
+            _ => "With --noise SIZE, or --data RUN, it says how many periods it takes.".to_owned(),
+        });
+        for k in &self.asked.which {
+            let rival = &pair.rivals[*k];
+            if rival.is_held {
+                lines.extend(indented(&format!(
+                    "{} is a special case of {} here: if it is the true one, nothing but its simplicity tells.",
+                    words::effect(rival.effect()),
+                    words::effect(pair.effect())
+                )));
+            }
+        }
+        lines
+    }
+}
+
+/// A sentence in lines.
+fn indented(says: &str) -> Vec<String> {
+    let lines = words::lines(says, 98);
+    lines.iter().map(|line| format!("  {line}")).collect()
+}

@@ -1,0 +1,91 @@
+//! `generate`: a model as code.
+
+use modelmill_codegen::{emit, emit_c, emit_python, module_name};
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+
+pub use modelmill_codegen::EmittedFile;
+
+/// Languages that models are emitted for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Language {
+    /// One module for `no_std` and `std`.
+    #[default]
+    Rust,
+    /// A crate that builds a static and a shared library, and their header.
+    C,
+    /// A crate that builds a Python module for numpy arrays.
+    Python,
+}
+
+/// What is emitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Code {
+    /// For which language.
+    pub language: Language,
+    /// With the equation of motion: mass matrix, velocity terms, gravity, forward dynamics.
+    pub dynamics: bool,
+    /// With what the joints transmit: forces and moments in all joints, and the forces that close loops.
+    pub reactions: bool,
+    /// With a function that holds base parameters against all parameters, for a test of one's own.
+    pub self_test: bool,
+}
+
+impl Model {
+    /// The model as source files: one module in Rust, or a crate with a copy of the runtime, so that its folder can go
+    /// anywhere. Paths are relative to that folder.
+    ///
+    /// Fails when a language lacks something that is asked for, or the mechanism has no such equations.
+    pub fn generate(&self, code: &Code) -> Outcome<Vec<EmittedFile>> {
+        let more = [
+            ("the equation of motion", code.dynamics),
+            ("reactions", code.reactions),
+            ("a self-test", code.self_test),
+        ];
+        if let Some((what, _)) = more.iter().find(|(_, asked)| *asked)
+            && code.language != Language::Rust
+        {
+            return Err(Error::options(format!(
+                "only the Rust module can have {what}"
+            )));
+        }
+        let what = format!("writing the code of {}", self.name);
+        self.host().watched(&what, 0, |_| match code.language {
+            Language::Rust => Ok(vec![EmittedFile {
+                path: format!("{}.rs", module_name(&self.derivation.mechanism.name)),
+                text: self.module(code)?,
+            }]),
+            Language::C => Ok(with_runtime(emit_c(&self.derivation))),
+            Language::Python => Ok(with_runtime(emit_python(&self.derivation))),
+        })?
+    }
+
+    fn module(&self, code: &Code) -> Outcome<String> {
+        let derivation = &self.derivation;
+        let fault = |error| Error::derivation(&self.path, error);
+        let mut emitted = emit(derivation);
+        if code.dynamics {
+            let dynamics = derivation.dynamics().map_err(fault)?;
+            emitted = emitted.with_dynamics(derivation, &dynamics);
+        }
+        if code.reactions {
+            let reactions = derivation.reactions().map_err(fault)?;
+            emitted = emitted.with_reactions(derivation, &reactions);
+        }
+        if code.self_test {
+            emitted = emitted.with_self_test(derivation);
+        }
+        Ok(emitted.file())
+    }
+}
+
+/// A crate with a copy of the runtime.
+fn with_runtime(mut files: Vec<EmittedFile>) -> Vec<EmittedFile> {
+    let runtime = modelmill_runtime::source::FILES;
+    files.extend(runtime.map(|(path, text)| EmittedFile {
+        path: format!("modelmill-runtime/{path}"),
+        text: text.to_owned(),
+    }));
+    files
+}

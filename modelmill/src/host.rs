@@ -1,0 +1,123 @@
+//! What verbs get from outside: files, libraries of effects, and somebody who watches.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use modelmill_identify::{FitFile, Note};
+use modelmill_spec::edit::{EditFailure, Edited, NewEffect, add_to_model};
+use modelmill_spec::{EffectKind, Loaded};
+
+use crate::error::{Error, Outcome};
+use crate::progress::{Job, Progress, Silent, watched};
+
+/// Where files come from, which kinds of effects there are besides the library's, and who hears what goes on.
+///
+/// Every model keeps the host that it was read by, so that what a verb reads later, such as a variant with one more effect,
+/// comes from the same place.
+#[derive(Clone)]
+pub struct Host {
+    libraries: Vec<PathBuf>,
+    progress: Arc<dyn Progress>,
+}
+
+impl Default for Host {
+    fn default() -> Self {
+        Self {
+            libraries: Vec::new(),
+            progress: Arc::new(Silent),
+        }
+    }
+}
+
+impl Host {
+    /// Files come from disk, there are no further libraries, and nobody listens.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// With further libraries of kinds of effects, for every model that is read.
+    #[must_use]
+    pub fn with_libraries(mut self, paths: impl IntoIterator<Item = PathBuf>) -> Self {
+        self.libraries.extend(paths);
+        self
+    }
+
+    /// With somebody who hears what goes on and may stop it.
+    #[must_use]
+    pub fn with_progress(mut self, progress: Arc<dyn Progress>) -> Self {
+        self.progress = progress;
+        self
+    }
+
+    /// The libraries that every model may use.
+    pub fn libraries(&self) -> &[PathBuf] {
+        &self.libraries
+    }
+
+    /// The kinds of effects of the program's library and of the host's.
+    ///
+    /// Fails with every finding about the host's libraries, each with its place.
+    pub fn kinds(&self) -> Outcome<Vec<EffectKind>> {
+        let mut read = modelmill_spec::read_limited;
+        Ok(modelmill_spec::kinds_with(&self.libraries, &mut read)?)
+    }
+
+    /// Reads a model file and validates it, without deriving it.
+    ///
+    /// Fails with every finding about the files, each with its place.
+    pub fn load(&self, path: &Path) -> Outcome<Loaded> {
+        watched(
+            &*self.progress,
+            &format!("reading {}", path.display()),
+            0,
+            |_| modelmill_spec::load_file_with(path, &self.libraries),
+        )?
+        .map_err(Into::into)
+    }
+
+    /// Validates the text of a model file; `path` is what messages call it, and where the paths in it start.
+    ///
+    /// Fails with every finding about the files, each with its place.
+    pub fn load_text(&self, path: &Path, text: &str) -> Outcome<Loaded> {
+        let mut read = modelmill_spec::read_limited;
+        let name = path.to_string_lossy();
+        Ok(modelmill_spec::load_with(
+            &name,
+            text,
+            &self.libraries,
+            &mut read,
+        )?)
+    }
+
+    /// Adds an effect to the text of a model file, keeping its comments and layout; the result is validated.
+    ///
+    /// Fails when the file with the effect has no meaning: unknown kind or place, a value that is missing, an effect twice.
+    pub fn edit(&self, path: &str, text: &str, effect: &NewEffect) -> Outcome<Edited> {
+        let mut read = modelmill_spec::read_limited;
+        add_to_model(path, text, effect, &self.libraries, &mut read).map_err(
+            |failure| match failure {
+                EditFailure::Effect(says) => Error::input(format!("{path}: {says}")),
+                EditFailure::Model(failure) => (*failure).into(),
+            },
+        )
+    }
+
+    /// Runs a job that somebody may watch and stop.
+    ///
+    /// Fails with [`Error::Cancelled`] if somebody asked it to stop.
+    pub fn watched<T>(&self, what: &str, total: usize, work: impl FnOnce(&Job) -> T) -> Outcome<T> {
+        watched(&*self.progress, what, total, work)
+    }
+
+    /// Reads a fit, as [`crate::identify::Identification::json`] wrote it.
+    ///
+    /// Fails with the place of what is wrong with the file.
+    pub fn fit(&self, path: &Path) -> Outcome<FitFile> {
+        Ok(FitFile::read(path)?)
+    }
+
+    /// Passes a remark on to whoever watches.
+    pub(crate) fn note(&self, note: &Note) {
+        self.progress.notes(note);
+    }
+}

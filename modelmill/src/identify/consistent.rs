@@ -1,0 +1,268 @@
+//! Physical consistency of a model file's bodies: what must be positive definite, and base parameters as functions of the
+//! physical ones.
+
+use modelmill_identify::estimate::{
+    BaseMap, BodyMatrix, PhysicalParameters, physical_parameters, planar_pseudo_inertia,
+    pseudo_inertia,
+};
+use modelmill_identify::{Deviations, Solution, Triangle};
+use modelmill_spec::{Exact, Inertial, Mechanism, Sign, Symbol};
+use nalgebra::{DMatrix, DVector};
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+
+/// Physical parameters that bodies can have, with the names of the bodies.
+pub fn find(
+    model: &Model,
+    triangle: &Triangle,
+    solution: &Solution,
+    deviations: &Deviations,
+    unknown: &[usize],
+) -> Outcome<(PhysicalParameters, Vec<String>)> {
+    let mechanism = &model.derivation.mechanism;
+    let start = start(model, solution, deviations, unknown);
+    let mut bodies = bodies(mechanism);
+    for p in model.positive_effects() {
+        // One whose nominal value is not given and whose column repeats another's stays free.
+        if start[p] > 0.0 {
+            bodies.push(BodyMatrix {
+                name: mechanism.parameters[p].name.clone(),
+                matrix: Box::new(move |x: &[f64]| number(x[p])),
+                copies: 1.0,
+            });
+        }
+    }
+    let base = |x: &[f64]| base_map(model, unknown, x);
+    let base: &BaseMap<'_> = &base;
+    let found = physical_parameters(triangle, solution, deviations, &start, base, &bodies)
+        .map_err(|error| Error::input(format!("{}: {error}", model.path)))?;
+    Ok((found, bodies.into_iter().map(|body| body.name).collect()))
+}
+
+/// Nominal values; where the file gives none for a parameter of an effect, what least squares found.
+fn start(
+    model: &Model,
+    solution: &Solution,
+    deviations: &Deviations,
+    unknown: &[usize],
+) -> Vec<f64> {
+    let parameters = &model.derivation.mechanism.parameters;
+    let mut start: Vec<f64> = parameters.iter().map(|p| p.nominal).collect();
+    for p in model.positive_effects() {
+        if start[p] > 0.0 {
+            continue;
+        }
+        for (i, k) in unknown.iter().enumerate() {
+            if let [(product, factor)] = model.products_of(*k).as_slice()
+                && product.0 == [(p, 1)]
+            {
+                let deviation = if deviations.std[i].is_finite() {
+                    deviations.std[i]
+                } else {
+                    0.0
+                };
+                start[p] = (solution.values[i] / factor).max(deviation / factor.abs());
+            }
+        }
+    }
+    start
+}
+
+/// Base parameters and their derivatives.
+fn base_map(model: &Model, unknown: &[usize], x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+    let mut values = DVector::zeros(unknown.len());
+    let mut slopes = DMatrix::zeros(unknown.len(), x.len());
+    for (row, k) in unknown.iter().enumerate() {
+        for (product, factor) in model.products_of(*k) {
+            let powers: Vec<(usize, i32)> = product
+                .0
+                .iter()
+                .map(|(p, n)| (*p, i32::try_from(*n).unwrap_or(i32::MAX)))
+                .collect();
+            values[row] += factor * powers.iter().map(|(p, n)| x[*p].powi(*n)).product::<f64>();
+            for (at, (p, n)) in powers.iter().enumerate() {
+                let others = powers.iter().enumerate().filter(|(other, _)| *other != at);
+                let others: f64 = others.map(|(_, (q, m))| x[*q].powi(*m)).product();
+                slopes[(row, *p)] += factor * f64::from(*n) * x[*p].powi(n - 1) * others;
+            }
+        }
+    }
+    (values, slopes)
+}
+
+fn number(value: f64) -> DMatrix<f64> {
+    DMatrix::from_element(1, 1, value)
+}
+
+/// What must be positive definite: the pseudo-inertia of a part that has all three moments, mass and inertia about the
+/// centre of one that is only seen turning about one axis, and masses of points.
+fn bodies(mechanism: &Mechanism) -> Vec<BodyMatrix<'_>> {
+    let mut bodies = Vec::new();
+    for part in &mechanism.parts {
+        add_part(mechanism, &part.name, &part.inertial, &mut bodies);
+    }
+    for (k, lump) in mechanism.lumped_masses.iter().enumerate() {
+        if has_parameter(&lump.mass) {
+            bodies.push(BodyMatrix {
+                name: format!(
+                    "lumped mass {} on {}",
+                    k + 1,
+                    mechanism.frames[lump.frame.0].name
+                ),
+                matrix: Box::new(|x: &[f64]| number(value(mechanism, &lump.mass, x))),
+                copies: 1.0,
+            });
+        }
+    }
+    bodies
+}
+
+fn add_part<'a>(
+    mechanism: &'a Mechanism,
+    name: &str,
+    inertial: &'a Inertial,
+    bodies: &mut Vec<BodyMatrix<'a>>,
+) {
+    let (Inertial::AboutCentre {
+        mass,
+        centre: place,
+        inertia,
+    }
+    | Inertial::Linear {
+        mass,
+        first_moment: place,
+        inertia,
+    }) = inertial;
+    let all = std::iter::once(mass).chain(place).chain(inertia);
+    if !all.clone().any(has_parameter) {
+        return;
+    }
+    let name = if name.is_empty() {
+        "a part".to_owned()
+    } else {
+        format!("part {name}")
+    };
+    let about = |which: &str| format!("{name}, {which}");
+    let has_mass = !mass.is_zero();
+    let diagonal = [0, 3, 5];
+    let moments: Vec<usize> = (0..3)
+        .filter(|axis| !inertia[diagonal[*axis]].is_zero())
+        .collect();
+    match moments.as_slice() {
+        [] if has_mass => bodies.push(BodyMatrix {
+            name,
+            matrix: Box::new(move |x: &[f64]| number(value(mechanism, mass, x))),
+            copies: 1.0,
+        }),
+        [axis] if has_mass => {
+            let axis = *axis;
+            bodies.push(BodyMatrix {
+                name,
+                matrix: Box::new(move |x: &[f64]| {
+                    let (m, h, i) = about_origin(mechanism, inertial, x);
+                    planar_pseudo_inertia(
+                        m,
+                        [h[(axis + 1) % 3], h[(axis + 2) % 3]],
+                        i[diagonal[axis]],
+                    )
+                }),
+                copies: 2.0,
+            });
+        }
+        [_, _, _] if has_mass => bodies.push(BodyMatrix {
+            name,
+            matrix: Box::new(move |x: &[f64]| {
+                let (m, h, i) = about_origin(mechanism, inertial, x);
+                pseudo_inertia(m, h, i)
+            }),
+            copies: 1.0,
+        }),
+        axes => {
+            for axis in axes {
+                let moment = &inertia[diagonal[*axis]];
+                bodies.push(BodyMatrix {
+                    name: about(["inertia about x", "inertia about y", "inertia about z"][*axis]),
+                    matrix: Box::new(move |x: &[f64]| number(value(mechanism, moment, x))),
+                    copies: 1.0,
+                });
+            }
+            if has_mass {
+                bodies.push(BodyMatrix {
+                    name: about("mass"),
+                    matrix: Box::new(move |x: &[f64]| number(value(mechanism, mass, x))),
+                    copies: 1.0,
+                });
+            }
+        }
+    }
+}
+
+/// Mass, first moment and inertia about the frame's origin.
+fn about_origin(
+    mechanism: &Mechanism,
+    inertial: &Inertial,
+    x: &[f64],
+) -> (f64, [f64; 3], [f64; 6]) {
+    let get = |exact: &Exact| value(mechanism, exact, x);
+    match inertial {
+        Inertial::Linear {
+            mass,
+            first_moment,
+            inertia,
+        } => (
+            get(mass),
+            std::array::from_fn(|i| get(&first_moment[i])),
+            std::array::from_fn(|i| get(&inertia[i])),
+        ),
+        Inertial::AboutCentre {
+            mass,
+            centre,
+            inertia,
+        } => {
+            let m = get(mass);
+            let [a, b, c]: [f64; 3] = std::array::from_fn(|i| get(&centre[i]));
+            // Steiner's rule; off-diagonal entries are elements of the matrix.
+            let steiner = [
+                b * b + c * c,
+                -a * b,
+                -a * c,
+                a * a + c * c,
+                -b * c,
+                a * a + b * b,
+            ];
+            (
+                m,
+                [m * a, m * b, m * c],
+                std::array::from_fn(|i| get(&inertia[i]) + m * steiner[i]),
+            )
+        }
+    }
+}
+
+fn value(mechanism: &Mechanism, exact: &Exact, x: &[f64]) -> f64 {
+    exact.evaluate(&|symbol| match symbol {
+        Symbol::Parameter(p) => x[p.0],
+        Symbol::Constant(c) => mechanism.constants[c.0].value,
+        _ => 0.0,
+    })
+}
+
+fn has_parameter(exact: &Exact) -> bool {
+    exact.mentions(&|symbol| matches!(symbol, Symbol::Parameter(_)))
+}
+
+impl Model {
+    /// Parameters of effects that must be positive, ascending.
+    fn positive_effects(&self) -> Vec<usize> {
+        let effects = &self.derivation.mechanism.effects;
+        let mut found: Vec<usize> = effects
+            .iter()
+            .flat_map(|effect| effect.terms.iter().map(|term| term.parameter.0))
+            .filter(|p| self.sign_of(*p) == Sign::Positive)
+            .collect();
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+}

@@ -1,0 +1,148 @@
+//! Instruments for recordings: the motion that was asked for, or the same motion one period later.
+
+use modelmill_identify::place_word;
+
+use crate::error::{Error, Outcome};
+use crate::identify::options::{Estimation, Weights};
+use crate::recording::Recording;
+use crate::stretch::Stretch;
+
+/// What stands in for the states against noise that runs through the controller.
+#[derive(Clone, Copy, Default)]
+pub enum Instruments<'a> {
+    /// Nothing.
+    #[default]
+    None,
+    /// The states one period later, s.
+    Period(f64),
+    /// Recordings of the motion that was asked for, one for each of the fit, in step with it.
+    Recordings(&'a [&'a Recording]),
+}
+
+/// One stretch of instruments for each of `data`; none if none are asked for.
+pub fn along(
+    data: &[Stretch],
+    instruments: &Instruments<'_>,
+    options: &Estimation,
+) -> Outcome<Vec<Stretch>> {
+    if matches!(instruments, Instruments::None) {
+        return Ok(Vec::new());
+    }
+    if options.weights == Weights::Channels {
+        return Err(Error::options(
+            "--instruments goes with --weights none or variance: weights from residuals would depend on the estimate that \
+             the instruments are to mend",
+        ));
+    }
+    match instruments {
+        Instruments::None => Ok(Vec::new()),
+        Instruments::Period(period) => data.iter().map(|one| shifted(one, *period)).collect(),
+        Instruments::Recordings(recordings) => {
+            let all: Vec<Stretch> = recordings
+                .iter()
+                .flat_map(|one| one.stretches.clone())
+                .collect();
+            in_step(data, &all)?;
+            Ok(all)
+        }
+    }
+}
+
+/// Fails unless instruments have the same times as the recordings.
+fn in_step(data: &[Stretch], instruments: &[Stretch]) -> Outcome {
+    if data.len() != instruments.len() {
+        return Err(Error::options(format!(
+            "--instruments gives {} for {} of --data (recordings count once for each stretch between gaps); give one for \
+             each, in the same order",
+            instruments.len(),
+            data.len()
+        )));
+    }
+    for (own, theirs) in data.iter().zip(instruments) {
+        let (a, b) = (&own.run.time, &theirs.run.time);
+        let step = a
+            .windows(2)
+            .map(|w| w[1] - w[0])
+            .fold(f64::INFINITY, f64::min);
+        let apart = a
+            .iter()
+            .zip(b)
+            .position(|(x, y)| (x - y).abs() > 0.01 * step);
+        if let Some(sample) = apart {
+            return Err(Error::input(format!(
+                "{}, {} {}: t = {} s, but t = {} s in the recording {}; instruments must have the same times",
+                theirs.run.file,
+                place_word(&theirs.run.file),
+                theirs.run.lines.get(sample).copied().unwrap_or(0),
+                b[sample],
+                a[sample],
+                own.run.file
+            )));
+        }
+        if a.len() != b.len() {
+            return Err(Error::input(format!(
+                "{}: {} samples after preparation, but {} in {}; instruments must have the same times",
+                theirs.run.file,
+                b.len(),
+                a.len(),
+                own.run.file
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// The same recording with the states of the next period, at its end with those of the one before.
+fn shifted(data: &Stretch, period: f64) -> Outcome<Stretch> {
+    let time = &data.run.time;
+    let n = time.len();
+    let span = time
+        .last()
+        .zip(time.first())
+        .map_or(0.0, |(last, first)| last - first);
+    let step = span / n.saturating_sub(1).max(1) as f64;
+    if span < 1.5 * period || period < 2.0 * step {
+        return Err(Error::input(format!(
+            "{}: the recording lasts {span:.3} s, which is not one and a half periods of {period} s; instruments from \
+             another period need two of them",
+            data.run.file
+        )));
+    }
+    // By time, not by a number of samples, for steps may be uneven.
+    let nearest = |t: f64| {
+        let at = time.partition_point(|x| *x < t).clamp(1, n - 1);
+        if t - time[at - 1] < time[at] - t {
+            at - 1
+        } else {
+            at
+        }
+    };
+    let mut places = Vec::with_capacity(n);
+    for t in time {
+        let wanted = if t + period <= time[n - 1] + 0.5 * step {
+            t + period
+        } else {
+            t - period
+        };
+        let at = nearest(wanted);
+        if (time[at] - wanted).abs() > 0.75 * step {
+            return Err(Error::input(format!(
+                "{}: there is no sample one period of {period} s away from t = {t} s; are there gaps?",
+                data.run.file
+            )));
+        }
+        places.push(at);
+    }
+    let mut shifted = data.clone();
+    let run = &mut shifted.run;
+    let columns = run
+        .q
+        .iter_mut()
+        .chain(&mut run.qd)
+        .chain(&mut run.qdd)
+        .chain(run.force.iter_mut().flatten());
+    for column in columns {
+        *column = places.iter().map(|at| column[*at]).collect();
+    }
+    Ok(shifted)
+}

@@ -1,0 +1,316 @@
+//! `identify`: base parameters from recordings by least squares, with what they are worth.
+
+mod consistent;
+mod instruments;
+mod options;
+pub mod regression;
+mod standstill;
+
+use modelmill_identify::estimate::FEWEST_ROWS;
+use modelmill_identify::fit_parameters;
+use modelmill_identify::{Figures, FitFile, FitParameter, Note, ParameterInfo, Repeats, Status};
+use modelmill_spec::Sign;
+
+use crate::along;
+use crate::compare;
+use crate::error::Outcome;
+use crate::model::Model;
+use crate::recording::{self, Recording};
+use crate::stretch::Stretch;
+use crate::text::table::{count, number};
+
+pub use instruments::Instruments;
+pub use modelmill_identify::estimate::HUBER_BOUND;
+pub use options::{Estimation, Weights};
+use regression::{Identified, More};
+
+/// Instruments whose smallest canonical correlation with the regressor is below this deserve a warning.
+const WEAK_INSTRUMENTS: f64 = 0.2;
+
+/// A fit with the figures that the nominal parameters have on the same recordings.
+pub struct Identification {
+    /// The fit, as `--parameters` reads it.
+    pub fit: FitFile,
+    /// Figures with nominal parameters on the recordings of the fit.
+    pub nominal_fit: Figures,
+    /// The same on the recordings of the check.
+    pub nominal_check: Option<Figures>,
+    /// What the estimator found.
+    pub found: Identified,
+    /// How it was asked.
+    pub options: Estimation,
+    /// What the user should know about the result; the fit holds it too.
+    pub notes: Vec<Note>,
+    /// Periods and noise floors of periodic recordings, by their names.
+    pub repeats: Vec<(String, Repeats)>,
+}
+
+impl Model {
+    /// Identifies the base parameters from the recordings of `fit`, eq. (12), and holds the result against those of `check`.
+    ///
+    /// Fails when there are fewer equations than unknowns, when no force was measured, or when a recording leads where the
+    /// mechanism cannot stand.
+    pub fn identify(
+        &self,
+        fit: &[&Recording],
+        check: &[&Recording],
+        options: &Estimation,
+    ) -> Outcome<Identification> {
+        self.identify_with(fit, &Instruments::None, check, options)
+    }
+
+    /// As [`Model::identify`], by instrumental variables against noise that runs through the controller.
+    pub fn identify_with(
+        &self,
+        fit: &[&Recording],
+        instruments: &Instruments<'_>,
+        check: &[&Recording],
+        options: &Estimation,
+    ) -> Outcome<Identification> {
+        let [mut fit, check] = recording::stretches(self, fit, check);
+        if let Some(part) = options.standstill {
+            standstill::leave_out(self, &mut fit, part)?;
+        }
+        let instruments = instruments::along(&fit, instruments, options)?;
+        let found = identify(self, &fit, &instruments, &check, options)?;
+        for note in &found.notes {
+            self.host().note(note);
+        }
+        Ok(found)
+    }
+}
+
+/// Identifies a model from some recordings and holds it against others.
+pub fn identify(
+    model: &Model,
+    data: &[Stretch],
+    instruments: &[Stretch],
+    check: &[Stretch],
+    options: &Estimation,
+) -> Outcome<Identification> {
+    let found = regression::identify(model, data, instruments, options)?;
+    let solution = &found.solution;
+    let infos = model.infos();
+    let unknown: Vec<ParameterInfo> = found.unknown.iter().map(|k| infos[*k].clone()).collect();
+    let mut parameters = fit_parameters(&unknown, solution, &found.deviations);
+    if let More::Essential(dropped, _) = &found.more {
+        for one in dropped {
+            parameters[one.parameter].status = Status::NotEssential;
+        }
+    }
+    for (k, info) in infos.iter().enumerate() {
+        if model.is_known(k) {
+            parameters.insert(k, known(info, model.nominal[k]));
+        }
+    }
+    let notes = remarks(model, &found, &parameters);
+    let values: Vec<f64> = parameters.iter().map(|p| p.value).collect();
+    let names: Vec<String> = unknown.into_iter().map(|info| info.expression).collect();
+    let (fit, nominal_fit) = both_figures(model, data, &values)?;
+    let recordings = data.iter().chain(check);
+    let repeats = recordings
+        .clone()
+        .filter_map(|one| Some((one.run.file.clone(), one.run.repeats.clone()?)))
+        .collect();
+    let (check, nominal_check) = if check.is_empty() {
+        (None, None)
+    } else {
+        let (identified, nominal) = both_figures(model, check, &values)?;
+        (Some(identified), Some(nominal))
+    };
+    let finite = |value: f64| value.is_finite().then_some(value);
+    let mut all_notes: Vec<Note> = recordings.flat_map(Stretch::notes).cloned().collect();
+    all_notes.extend(notes.iter().cloned());
+    let constants = &model.derivation.mechanism.constants;
+    Ok(Identification {
+        fit: FitFile {
+            model: model.name.clone(),
+            samples: fit.samples,
+            condition_number: finite(solution.condition_number),
+            scaled_condition_number: finite(solution.scaled_condition_number),
+            covariance: covariance(&found, parameters.len()),
+            parameters,
+            constants: constants
+                .iter()
+                .map(|c| (c.name.clone(), c.value))
+                .collect(),
+            undetermined: solution.says_undetermined(&names),
+            fit,
+            check,
+            data: all_notes,
+        },
+        nominal_fit,
+        nominal_check,
+        found,
+        options: options.clone(),
+        notes,
+        repeats,
+    })
+}
+
+/// The covariance of all base parameters, of which the known ones have none.
+fn covariance(found: &Identified, n: usize) -> Option<Vec<Vec<f64>>> {
+    let mut rows = vec![vec![0.0; n]; n];
+    for (a, i) in found.unknown.iter().enumerate() {
+        for (b, j) in found.unknown.iter().enumerate() {
+            rows[*i][*j] = found.deviations.covariance[(a, b)];
+        }
+    }
+    let is_known = found.deviations.std.iter().all(|s| s.is_finite())
+        && rows.iter().flatten().all(|c| c.is_finite());
+    is_known.then_some(rows)
+}
+
+/// A parameter that is a number of the model file.
+fn known(info: &ParameterInfo, value: f64) -> FitParameter {
+    FitParameter {
+        name: info.name.clone(),
+        expression: info.expression.clone(),
+        value,
+        std: None,
+        classical_std: None,
+        effective_samples: None,
+        unit: info.unit.clone(),
+        nominal: info.nominal,
+        status: Status::Known,
+    }
+}
+
+/// What is not as one would wish: known parameters, undetermined ones, no deviations, impossible values.
+fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Vec<Note> {
+    let solution = &found.solution;
+    let mut notes = Vec::new();
+    for p in parameters.iter().filter(|p| p.status == Status::Known) {
+        notes.push(Note::info(format!(
+            "{} = {} holds numbers of the model file only: it is known, its force is taken off the measured one, and it is \
+             not identified.",
+            p.name, p.expression
+        )));
+    }
+    let unknown: Vec<&FitParameter> = found.unknown.iter().map(|k| &parameters[*k]).collect();
+    let names: Vec<String> = unknown.iter().map(|p| p.expression.clone()).collect();
+    if let More::Instruments(strength, _) = &found.more
+        && *strength < WEAK_INSTRUMENTS
+    {
+        notes.push(Note::warning(format!(
+            "The instruments say little: their smallest correlation with the regressor is {}. Are they of the same motion, \
+             and in step with the recording?",
+            number(*strength)
+        )));
+    }
+    if found
+        .weighting
+        .as_ref()
+        .is_some_and(|weighting| !weighting.settled)
+    {
+        notes.push(Note::warning(
+            "The weights have not settled: residuals depend on the weights from one solution to the next; leave out --weights \
+             or --robust.",
+        ));
+    }
+    for direction in &solution.undetermined {
+        let kept: Vec<String> = direction
+            .changes
+            .iter()
+            .map(|(i, _)| kept(unknown[*i]))
+            .collect();
+        let how = if kept.len() == 1 {
+            "it stays at"
+        } else {
+            "of all values that fit equally well those nearest to the nominal ones are taken:"
+        };
+        notes.push(Note::warning(format!(
+            "{}; {how} {}.",
+            direction.says(&names),
+            kept.join(", ")
+        )));
+    }
+    if solution.rows <= solution.rank {
+        notes.push(Note::warning(format!(
+            "There {} for as many unknown base parameters: no degree of freedom is left for the residuals, so neither \
+             standard deviations nor the error of the fit say anything; use a longer recording.",
+            match solution.rows {
+                1 => "is 1 equation".to_owned(),
+                n => format!("are {n} equations"),
+            }
+        )));
+    } else if found.deviations.few_samples {
+        notes.push(Note::warning(format!(
+            "There are only {} equations for {}: standard deviations take the residuals for independent and are too small \
+             if they are not, and the error of the fit says little; use a longer recording (at least {FEWEST_ROWS} \
+             equations for each parameter).",
+            solution.rows,
+            count(
+                solution.values.len(),
+                "unknown base parameter",
+                "unknown base parameters"
+            ),
+        )));
+    }
+    for (k, p) in parameters.iter().enumerate() {
+        let slack = 2.0 * p.std.unwrap_or(0.0);
+        let (wrong, expected) = match model.sign(k) {
+            Sign::Positive => (p.value < -slack, "positive"),
+            Sign::Negative => (p.value > slack, "negative"),
+            Sign::Any => continue,
+        };
+        if wrong && p.status == Status::Identified {
+            notes.push(Note::warning(format!(
+                "{} = {} comes out as {} {}, but must be {expected} to make physical sense: the model lacks something, or \
+                 the recording excites it too little.",
+                p.name,
+                p.expression,
+                number(p.value),
+                p.unit
+            )));
+        }
+    }
+    notes
+}
+
+/// The value of an undetermined parameter beside its nominal one.
+fn kept(p: &FitParameter) -> String {
+    let value = number(p.value);
+    match p.nominal {
+        Some(nominal) if number(nominal) == value => {
+            format!("{} = {value} {} (its nominal value)", p.name, p.unit)
+        }
+        Some(nominal) => format!(
+            "{} = {value} {} (nominal {})",
+            p.name,
+            p.unit,
+            number(nominal)
+        ),
+        None => format!(
+            "{} = {value} {} (the file gives no nominal value, 0 stands for it)",
+            p.name, p.unit
+        ),
+    }
+}
+
+/// Figures with identified and with nominal values.
+fn both_figures(model: &Model, data: &[Stretch], values: &[f64]) -> Outcome<(Figures, Figures)> {
+    let measured = data
+        .iter()
+        .map(along::measured)
+        .collect::<Outcome<Vec<_>>>()?;
+    let figures_of = |values: &[f64]| {
+        let forces = data
+            .iter()
+            .map(|one| along::forces(model, one, values))
+            .collect::<Outcome<Vec<_>>>()?;
+        let pairs = measured
+            .iter()
+            .map(Vec::as_slice)
+            .zip(forces.iter().map(Vec::as_slice));
+        compare::figures(&model.drives(), pairs)
+    };
+    Ok((figures_of(values)?, figures_of(&model.nominal)?))
+}
+
+impl Identification {
+    /// The identified values.
+    pub fn values(&self) -> Vec<f64> {
+        self.fit.parameters.iter().map(|p| p.value).collect()
+    }
+}

@@ -1,0 +1,447 @@
+//! Least squares over recordings: rows of the regressor are made block by block and kept only if
+//! they fit a modest memory; else they are made again for every pass.
+
+use modelmill_codegen::{Evaluator, PoseFault, States};
+use modelmill_identify::estimate::{
+    Dropped, EssentialOptions, Estimate, EstimateOptions, PhysicalParameters, Visit, Weighting,
+    essential, estimate, instrumental, with_prior,
+};
+use modelmill_identify::{Deviations, LeastSquaresError, Solution, decimate_table};
+
+use crate::along::{interleaved, measured};
+use crate::error::{Error, Outcome};
+use crate::identify::consistent;
+use crate::identify::options::{Estimation, Weights};
+use crate::model::Model;
+use crate::progress::Job;
+use crate::stretch::Stretch;
+use crate::stretch::variances;
+use crate::text::table::{count, percent};
+
+/// Numbers of the regressor that are kept between passes: 32 MB; beyond, making them again costs less than memory.
+const KEPT: usize = 1 << 22;
+
+/// What least squares found.
+pub struct Identified {
+    /// The solution.
+    pub solution: Solution,
+    /// What it is worth.
+    pub deviations: Deviations,
+    /// The base parameters that solution and deviations are about, by position.
+    pub unknown: Vec<usize>,
+    /// What the rows were multiplied by.
+    pub weighting: Option<Weighting>,
+    /// What more was asked for.
+    pub more: More,
+}
+
+/// What is beside least squares.
+pub enum More {
+    /// Nothing.
+    Nothing,
+    /// Parameters were left out; those by position among the unknown ones, and by how much the residual rose.
+    Essential(Vec<Dropped>, f64),
+    /// Nominal values counted as measurements.
+    Prior(usize),
+    /// Physical parameters that bodies can have, beside the residual norm of the solution without that demand.
+    Physical(Box<PhysicalParameters>, Vec<String>, f64),
+    /// Instrumental variables: how strong they are, and what least squares finds.
+    Instruments(f64, Vec<f64>),
+}
+
+/// Identifies the base parameters of a model from recordings, eq. (12). What is a number of the model file is no unknown:
+/// its force is taken off the measured one. `instruments` has one recording for each of `data`, or none.
+pub fn identify(
+    model: &Model,
+    data: &[Stretch],
+    instruments: &[Stretch],
+    args: &Estimation,
+) -> Outcome<Identified> {
+    if model.base.is_empty() {
+        return Err(Error::input(format!(
+            "{}: no parameter has an effect on the drives, so there is nothing to identify",
+            model.path
+        )));
+    }
+    let (known, unknown): (Vec<usize>, Vec<usize>) =
+        (0..model.base.len()).partition(|k| model.is_known(*k));
+    if unknown.is_empty() {
+        return Err(Error::input(format!(
+            "{}: every base parameter is a number of the file, so there is nothing to identify; \
+             declare what is unknown in [parameters]",
+            model.path
+        )));
+    }
+    let known: Vec<(usize, f64)> = known.into_iter().map(|k| (k, model.nominal[k])).collect();
+    let nominal: Vec<f64> = unknown.iter().map(|k| model.nominal[*k]).collect();
+    let samples: usize = data.iter().map(Stretch::samples).sum();
+    let mut runs = data
+        .iter()
+        .enumerate()
+        .map(|(k, one)| {
+            Rows::new(
+                model,
+                one,
+                instruments.get(k),
+                &known,
+                &unknown,
+                args.weights,
+            )
+        })
+        .collect::<Outcome<Vec<Rows<'_>>>>()?;
+    enough(data, &runs, unknown.len(), model)?;
+    not_idle(data, &runs)?;
+    // Plain least squares: one pass for the solution, two for the deviations. How often rows are reweighted nobody knows.
+    let reweighted = args.weights == Weights::Channels || args.robust.is_some();
+    let passes = if reweighted { 0 } else { 3 };
+    model
+        .host()
+        .watched("identifying", passes * samples, |job| {
+            for run in &mut runs {
+                run.keep_if_small(job)?;
+            }
+            let channels = model.drives().len();
+            let show = |visit: &mut Visit<'_>| -> Outcome {
+                runs.iter()
+                    .try_for_each(|run| run.show::<Error>(job, visit))
+            };
+            if !instruments.is_empty() {
+                let found = instrumental(unknown.len(), channels, show)?;
+                let more = More::Instruments(found.strength, found.least_squares.values);
+                return Ok(Identified {
+                    solution: found.solution,
+                    deviations: found.deviations,
+                    unknown: unknown.clone(),
+                    weighting: None,
+                    more,
+                });
+            }
+            let options = EstimateOptions {
+                by_channel: args.weights == Weights::Channels,
+                huber: args.robust,
+                ..EstimateOptions::default()
+            };
+            let found = estimate(&nominal, channels, &options, show)?;
+            refine(model, found, &unknown, &nominal, args)
+        })?
+}
+
+/// What is done with the reduced rows.
+fn refine(
+    model: &Model,
+    found: Estimate,
+    unknown: &[usize],
+    nominal: &[f64],
+    args: &Estimation,
+) -> Outcome<Identified> {
+    let Estimate {
+        mut solution,
+        mut deviations,
+        weighting,
+        triangle,
+    } = found;
+    let mut more = More::Nothing;
+    let asks = args.prior.is_some() || args.essential || args.physical;
+    if asks && solution.rows <= solution.rank {
+        return Err(Error::input(format!(
+            "{} for {}: no degree of freedom is left for the residuals, from which --prior, --essential and --physical learn \
+             what the recording is worth; use a longer recording",
+            count(solution.rows, "equation", "equations"),
+            count(solution.rank, "base parameter", "base parameters")
+        )));
+    }
+    if let Some(sigma) = args.prior {
+        let beliefs = model.beliefs(unknown, sigma);
+        if beliefs.is_empty() {
+            let parameters = &model.derivation.mechanism.parameters;
+            return Err(Error::input(format!(
+                "{}: --prior takes {} of each nominal value for its uncertainty, but the nominal values of {} are 0 or not \
+                 given, which says nothing of their size; write others in [parameters] (`nominal = ...`), or leave --prior out",
+                model.path,
+                percent(Some(sigma)),
+                match parameters.as_slice() {
+                    [one] => format!("the only parameter `{}`", one.name),
+                    all => format!("all {} parameters", all.len()),
+                }
+            )));
+        }
+        (solution, deviations) = with_prior(&triangle, &solution, &deviations, nominal, &beliefs)?;
+        more = More::Prior(beliefs.len());
+    } else if args.essential {
+        let found = essential(
+            &triangle,
+            &solution,
+            &deviations,
+            &EssentialOptions::default(),
+        )?;
+        solution.values = found.values;
+        solution.classical_std = found.classical_std;
+        solution.condition_number = found.condition_number;
+        solution.scaled_condition_number = found.scaled_condition_number;
+        // What is left out says so itself.
+        solution.undetermined.clear();
+        solution.determined = deviations.std.iter().map(|_| true).collect();
+        deviations.effective_samples = (found.std.iter().zip(&solution.classical_std))
+            .map(|(std, classical)| deviations.samples as f64 * (classical / std).powi(2))
+            .collect();
+        deviations.std = found.std;
+        more = More::Essential(found.dropped, found.rise);
+    } else if args.physical {
+        let before = solution.residual_norm;
+        let (found, bodies) = consistent::find(model, &triangle, &solution, &deviations, unknown)?;
+        solution.values.clone_from(&found.base);
+        solution.residual_norm = found.residual_norm;
+        deviations.std.clone_from(&found.base_std);
+        // Nominal values say what the recordings do not.
+        solution.undetermined.clear();
+        solution.determined = found.base.iter().map(|_| true).collect();
+        more = More::Physical(Box::new(found), bodies, before);
+    }
+    let is_weighted = weighting.by_channel || weighting.huber.is_some();
+    Ok(Identified {
+        solution,
+        deviations,
+        unknown: unknown.to_vec(),
+        weighting: is_weighted.then_some(weighting),
+        more,
+    })
+}
+
+/// Fails when there are fewer equations than unknown parameters.
+fn enough(data: &[Stretch], runs: &[Rows<'_>], unknown: usize, model: &Model) -> Outcome {
+    let equations: usize = runs.iter().map(|run| run.measured.len()).sum();
+    if equations >= unknown {
+        return Ok(());
+    }
+    Err(Error::input(format!(
+        "{}: {} of all drives make {} for {}; use a longer recording{}",
+        data.iter()
+            .map(|one| one.run.file.as_str())
+            .collect::<Vec<_>>()
+            .join(", "),
+        count(equations / model.drives().len().max(1), "sample", "samples"),
+        count(equations, "equation", "equations"),
+        count(unknown, "unknown base parameter", "unknown base parameters"),
+        if data.iter().any(|one| one.decimation() > 1) {
+            ", or decimate less"
+        } else {
+            ""
+        }
+    )))
+}
+
+/// Fails when all measured forces are zero: everything would fit them with zeros, without any doubt.
+fn not_idle(data: &[Stretch], runs: &[Rows<'_>]) -> Outcome {
+    let is_idle = |run: &Rows<'_>| run.measured.iter().all(|force| *force == 0.0);
+    if !runs.iter().all(is_idle) {
+        return Ok(());
+    }
+    let files: Vec<&str> = data.iter().map(|one| one.run.file.as_str()).collect();
+    Err(Error::input(nothing_measured(&files.join(", "))))
+}
+
+/// What is wrong with recordings whose forces are zero throughout.
+pub fn nothing_measured(files: &str) -> String {
+    format!(
+        "{files}: the measured forces are zero throughout, so that there is nothing to explain; record the forces of the \
+         drives, or name their columns with --map"
+    )
+}
+
+/// The rows of one recording: regressors of the instruments, if there are any, and of the recording itself.
+struct Rows<'a> {
+    model: &'a Model,
+    data: &'a Stretch,
+    instruments: Option<&'a Stretch>,
+    /// Columns that are known, with their parameters' values.
+    known: &'a [(usize, f64)],
+    /// The other columns.
+    unknown: &'a [usize],
+    /// Interleaved per sample, decimated.
+    measured: Vec<f64>,
+    /// What rows are multiplied by, if not by 1.
+    factors: Option<Vec<f64>>,
+    kept: Option<Vec<f64>>,
+}
+
+impl<'a> Rows<'a> {
+    fn new(
+        model: &'a Model,
+        data: &'a Stretch,
+        instruments: Option<&'a Stretch>,
+        known: &'a [(usize, f64)],
+        unknown: &'a [usize],
+        weights: Weights,
+    ) -> Outcome<Self> {
+        let drives = model.drives();
+        let spread = if weights == Weights::Variance {
+            let Some(variance) = &data.variance else {
+                let columns: Vec<String> = drives
+                    .iter()
+                    .map(|d| format!("`{}`", variances::column(d)))
+                    .collect();
+                return Err(Error::input(format!(
+                    "{}: --weights variance needs the variance of every drive's force, in the columns {}; name yours with \
+                     --map, or use --weights channels",
+                    data.run.file,
+                    columns.join(", ")
+                )));
+            };
+            Some(variances::factors(
+                variance,
+                &data.run,
+                &drives,
+                data.decimation(),
+            )?)
+        } else {
+            None
+        };
+        let factors = product(spread, data.weights.as_deref());
+        Ok(Self {
+            model,
+            data,
+            instruments,
+            known,
+            unknown,
+            measured: interleaved(&measured(data)?),
+            factors,
+            kept: None,
+        })
+    }
+
+    /// Numbers of a row before the known columns leave.
+    fn width(&self) -> usize {
+        self.model.base.len() * (1 + usize::from(self.instruments.is_some()))
+    }
+
+    /// Decimation needs the whole table at hand; else it is kept if it is not too large.
+    fn keep_if_small(&mut self, job: &Job) -> Outcome {
+        let width = self.width() * self.model.drives().len();
+        let decimation = self.data.decimation();
+        if decimation == 1 && self.data.samples() * width > KEPT {
+            return Ok(());
+        }
+        let mut table = Vec::with_capacity(self.data.samples() * width);
+        self.blocks::<Error>(&mut |w| {
+            job.add(w.len() / width.max(1));
+            table.extend_from_slice(w);
+            Ok(())
+        })?;
+        if decimation > 1 {
+            table = decimate_table(&table, width, decimation)
+                .map_err(|error| Error::input(format!("{}: {error}", self.data.run.file)))?;
+        }
+        self.kept = Some(table);
+        Ok(())
+    }
+
+    /// Shows all rows with the measured values.
+    fn show<E: From<Error> + From<LeastSquaresError>>(
+        &self,
+        job: &Job,
+        visit: &mut Visit<'_>,
+    ) -> Result<(), E> {
+        if let Some(table) = &self.kept {
+            self.show_unknown(table, 0, visit)?;
+            job.add(self.data.samples());
+            return Ok(());
+        }
+        let mut row = 0;
+        self.blocks::<E>(&mut |w| {
+            let rows = w.len() / self.width();
+            self.show_unknown(w, row, visit)?;
+            row += rows;
+            job.add(rows / self.model.drives().len().max(1));
+            Ok(())
+        })
+    }
+
+    /// Shows rows of the unknown columns, with what the known ones make taken off the measured values, and weighed;
+    /// `first` is the first of the rows.
+    fn show_unknown(
+        &self,
+        w: &[f64],
+        first: usize,
+        visit: &mut Visit<'_>,
+    ) -> Result<(), LeastSquaresError> {
+        let at = first..first + w.len() / self.width();
+        let measured = &self.measured[at.clone()];
+        let factors = self.factors.as_ref().map(|factors| &factors[at]);
+        if self.known.is_empty() && factors.is_none() {
+            return visit(w, measured);
+        }
+        let n = self.model.base.len();
+        let mut rows = Vec::with_capacity(w.len());
+        let mut rest = Vec::with_capacity(measured.len());
+        for (i, (row, y)) in w.chunks_exact(self.width()).zip(measured).enumerate() {
+            let factor = factors.map_or(1.0, |factors| factors[i]);
+            for part in row.chunks_exact(n) {
+                rows.extend(self.unknown.iter().map(|k| factor * part[*k]));
+            }
+            // The recording's own regressor comes last.
+            let own = &row[self.width() - n..];
+            rest.push(factor * (y - self.known.iter().map(|(k, p)| own[*k] * p).sum::<f64>()));
+        }
+        visit(&rows, &rest)
+    }
+
+    /// Blocks of the regressor, row by row; behind each row of the instruments the one of the recording.
+    fn blocks<E: From<Error>>(
+        &self,
+        visit: &mut dyn FnMut(&[f64]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let evaluator = Evaluator::new(&self.model.derivation);
+        let drives = self.model.drives().len();
+        let width = self.width();
+        let (mut rows, mut start) = (Vec::new(), 0);
+        self.data.for_each_block(self.model, |states| {
+            rows.clear();
+            rows.resize(states.len() * drives * width, 0.0);
+            if let Some(instruments) = self.instruments {
+                let theirs = instruments.states(start, start + states.len());
+                fill(&evaluator, &theirs, drives, width, 0, &mut rows)
+                    .map_err(|fault| instruments.fault(self.model, fault, start))?;
+            }
+            start += states.len();
+            let place = width - self.model.base.len();
+            if let Err(fault) = fill(&evaluator, states, drives, width, place, &mut rows) {
+                return Ok(Err(fault));
+            }
+            visit(&rows)?;
+            Ok(Ok(()))
+        })
+    }
+}
+
+/// What rows are multiplied by when both the variances and the equations left out have their say.
+fn product(spread: Option<Vec<f64>>, weights: Option<&[f64]>) -> Option<Vec<f64>> {
+    match (spread, weights) {
+        (Some(spread), Some(weights)) => {
+            Some(spread.iter().zip(weights).map(|(s, w)| s * w).collect())
+        }
+        (spread, weights) => spread.or_else(|| weights.map(<[f64]>::to_vec)),
+    }
+}
+
+/// Writes the regressor of some states into rows of `width` numbers, from `place` on.
+fn fill(
+    evaluator: &Evaluator<'_>,
+    states: &States<'_>,
+    drives: usize,
+    width: usize,
+    place: usize,
+    rows: &mut [f64],
+) -> Result<(), PoseFault> {
+    let mut first = 0;
+    evaluator.regressor_blocks(states, |len, columns| {
+        let n = columns.len() / drives.max(1);
+        for (k, column) in columns.iter().enumerate() {
+            let at = first * width + (k / n) * width + place + k % n;
+            for (slot, value) in rows[at..].iter_mut().step_by(drives * width).zip(*column) {
+                *slot = *value;
+            }
+        }
+        first += len * drives;
+        Ok(())
+    })
+}

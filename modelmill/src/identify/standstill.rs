@@ -1,0 +1,64 @@
+//! Equations at standstill: while a drive hardly moves its friction takes any value, and the sign of its rate is noise,
+//! so that they may be left out of a fit.
+
+use modelmill_identify::Note;
+
+use crate::along::drive_rates;
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::stretch::Stretch;
+use crate::text::table::count;
+
+/// Gives equations at standstill the weight 0, and says how many there are.
+///
+/// `part` is the share of a drive's fastest rate below which it stands still.
+pub fn leave_out(model: &Model, data: &mut [Stretch], part: f64) -> Outcome {
+    let drives = model.drives();
+    let rates: Vec<Vec<Vec<f64>>> = data
+        .iter()
+        .map(|one| {
+            let rates = drive_rates(model, one)?;
+            let pick = |rate: Vec<f64>| rate.into_iter().step_by(one.decimation()).collect();
+            Ok(rates.into_iter().map(pick).collect())
+        })
+        .collect::<Outcome<_>>()?;
+    let fastest: Vec<f64> = (0..drives.len())
+        .map(|d| {
+            let all = rates.iter().flat_map(|run| &run[d]);
+            all.map(|rate| rate.abs()).fold(0.0, f64::max)
+        })
+        .collect();
+    let mut out = vec![0; drives.len()];
+    let mut of = 0;
+    for (one, run) in data.iter_mut().zip(&rates) {
+        let samples = run.first().map_or(0, Vec::len);
+        of += samples;
+        let weights = one
+            .weights
+            .get_or_insert_with(|| vec![1.0; samples * drives.len()]);
+        for (k, row) in weights.chunks_exact_mut(drives.len()).enumerate() {
+            for (d, weight) in row.iter_mut().enumerate() {
+                if run[d][k].abs() <= part * fastest[d] {
+                    *weight = 0.0;
+                    out[d] += 1;
+                }
+            }
+        }
+    }
+    for (drive, out) in drives.iter().zip(out) {
+        if out == of {
+            return Err(Error::input(format!(
+                "`{drive}` stands still in all recordings of the fit, so --standstill leaves nothing of it; \
+                 use a recording in which it moves, or leave --standstill out"
+            )));
+        }
+        if out > 0 {
+            data[0].note(model, Note::info(format!(
+                "Of the {} of `{drive}` {out} are left out of the fit: it is slower there than {part} of its fastest \
+                 (--standstill). Error figures count them.",
+                count(of, "equation", "equations"),
+            )));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,236 @@
+//! `interpret`: physical parameters from identified base parameters, the others held at their nominal values.
+
+use modelmill_identify::interpret::{
+    Interpretation, Physical, Polynomial, Problem, exact, interpret,
+};
+use modelmill_identify::{Direction, FitFile, Note, Status};
+use modelmill_spec::Sign;
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::text::table::{count, number};
+
+/// Physical parameters that were solved for.
+pub struct Interpreted {
+    /// The model.
+    pub model: Model,
+    /// Indices of the unknown parameters.
+    pub unknown: Vec<usize>,
+    /// Base parameters that hold unknowns.
+    pub used: Vec<usize>,
+    /// All real solutions, or what is not determined.
+    pub found: Interpretation,
+    /// Remarks.
+    pub notes: Vec<Note>,
+}
+
+impl Model {
+    /// Solves identified base parameters for physical ones, the others held at their nominal values: all real solutions, as
+    /// in Table 1 of the paper. `file` is what messages call the fit.
+    ///
+    /// Fails when a name is none of the model's parameters, when the fit belongs to another model, or when the equations
+    /// are too many to be solved exactly.
+    pub fn interpret(&self, fit: &FitFile, file: &str, unknown: &[String]) -> Outcome<Interpreted> {
+        let unknown = self::unknown(self, unknown)?;
+        let values = self.values_of(fit, file)?;
+        let (problem, used) = problem(self, &unknown, &values.values, fit);
+        let found = self
+            .host()
+            .watched("solving for the unknown parameters", 0, |_| {
+                interpret(&problem)
+            })?
+            .map_err(|error| Error::input(format!("{}: {error}", self.path)))?;
+        let mut interpreted = Interpreted {
+            model: self.clone(),
+            unknown,
+            used,
+            found,
+            notes: values.notes,
+        };
+        let remarks = interpreted.remarks(fit).into_iter().map(Note::warning);
+        interpreted.notes.extend(remarks);
+        for note in &interpreted.notes {
+            self.host().note(note);
+        }
+        Ok(interpreted)
+    }
+}
+
+/// Indices of the unknown parameters, in the order in which they are asked for.
+pub fn unknown(model: &Model, names: &[String]) -> Outcome<Vec<usize>> {
+    let parameters = &model.derivation.mechanism.parameters;
+    let mut found = Vec::new();
+    for name in names.iter().map(|name| name.trim()) {
+        let Some(i) = parameters.iter().position(|p| p.name == name) else {
+            let all: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
+            return Err(Error::input(format!(
+                "--unknown {name}: {} declares no such parameter; its parameters are {}",
+                model.path,
+                all.join(", ")
+            )));
+        };
+        if found.contains(&i) {
+            return Err(Error::options(format!(
+                "--unknown names `{name}` twice; name each parameter once"
+            )));
+        }
+        found.push(i);
+    }
+    Ok(found)
+}
+
+/// The equations in the unknowns alone, and which base parameters hold an unknown.
+pub fn problem(
+    model: &Model,
+    unknown: &[usize],
+    values: &[f64],
+    fit: &FitFile,
+) -> (Problem, Vec<usize>) {
+    let mechanism = &model.derivation.mechanism;
+    let constants: Vec<_> = mechanism.constants.iter().map(|c| exact(c.value)).collect();
+    let nominal: Vec<_> = mechanism
+        .parameters
+        .iter()
+        .map(|p| exact(p.nominal))
+        .collect();
+    let mut equations = Vec::new();
+    for terms in model.derivation.base_polynomials(&constants) {
+        let mut equation = Polynomial::new(unknown.len());
+        for (product, mut factor) in terms {
+            let mut powers = Vec::new();
+            for (parameter, exponent) in &product.0 {
+                match unknown.iter().position(|u| u == parameter) {
+                    Some(i) => powers.push((i, *exponent)),
+                    None => {
+                        for _ in 0..*exponent {
+                            factor *= &nominal[*parameter];
+                        }
+                    }
+                }
+            }
+            equation.add_term(&powers, &factor);
+        }
+        equations.push(equation);
+    }
+    let used: Vec<usize> = (0..equations.len())
+        .filter(|k| (0..unknown.len()).any(|i| equations[*k].mentions(i)))
+        .collect();
+    // Positions in the fit's own order.
+    let at: Vec<usize> = used
+        .iter()
+        .filter_map(|k| {
+            let name = &model.base[*k].name;
+            fit.parameters.iter().position(|p| p.name == *name)
+        })
+        .collect();
+    let problem = Problem {
+        equations: used.iter().map(|k| equations[*k].clone()).collect(),
+        values: used.iter().map(|k| values[*k]).collect(),
+        covariance: fit.covariance_of(&at).map(|(covariance, _)| covariance),
+        nominal: unknown
+            .iter()
+            .map(|u| mechanism.parameters[*u].nominal)
+            .collect(),
+    };
+    (problem, used)
+}
+
+impl Interpreted {
+    /// Names of the unknown parameters.
+    pub fn names(&self) -> Vec<String> {
+        let parameters = &self.model.derivation.mechanism.parameters;
+        let names = self.unknown.iter();
+        names.map(|u| parameters[*u].name.clone()).collect()
+    }
+
+    /// All real solutions; none where something is not determined.
+    pub fn solutions(&self) -> &[Physical] {
+        match &self.found {
+            Interpretation::Exact { solutions }
+            | Interpretation::LeastSquares { solutions, .. } => solutions,
+            Interpretation::Undetermined { .. } => &[],
+        }
+    }
+
+    /// Directions in which the unknowns may change without any effect.
+    pub fn directions(&self) -> &[Direction] {
+        match &self.found {
+            Interpretation::Undetermined { directions, .. } => directions,
+            _ => &[],
+        }
+    }
+
+    /// What is not determined, in words.
+    pub(crate) fn undetermined(&self) -> Vec<String> {
+        let names = self.names();
+        let directions = self.directions().iter();
+        directions
+            .map(|direction| match direction.changes.as_slice() {
+                [(i, _)] => format!("{} has no effect on the base parameters", names[*i]),
+                _ => direction.says(&names).replace(
+                    "changes nothing",
+                    "changes no base parameter (near the nominal values)",
+                ),
+            })
+            .collect()
+    }
+
+    /// Why a value cannot be, if it cannot.
+    pub(crate) fn objection(&self, i: usize, value: f64) -> Option<&'static str> {
+        match self.model.sign_of(self.unknown[i]) {
+            Sign::Positive if value < 0.0 => Some("must not be negative"),
+            Sign::Negative if value > 0.0 => Some("must not be positive"),
+            _ => None,
+        }
+    }
+
+    /// What the user should know beside the numbers.
+    fn remarks(&self, fit: &FitFile) -> Vec<String> {
+        let mut says = Vec::new();
+        let used: Vec<_> = self
+            .used
+            .iter()
+            .filter_map(|k| {
+                let name = &self.model.base[*k].name;
+                fit.parameters.iter().find(|p| p.name == *name)
+            })
+            .collect();
+        let undetermined: Vec<&str> = used
+            .iter()
+            .filter(|p| p.status == Status::Undetermined)
+            .map(|p| p.name.as_str())
+            .collect();
+        if !undetermined.is_empty() {
+            says.push(format!(
+                "the recordings of the fit do not determine {}: what is solved from them rests on nominal values",
+                undetermined.join(", ")
+            ));
+        }
+        if !self.solutions().is_empty() {
+            if used.iter().any(|p| p.std.is_none()) {
+                says.push("the fit gives no deviations, so the solutions have none".to_owned());
+            } else if fit.covariance.is_none() && used.len() > 1 {
+                says.push(
+                    "the fit gives no covariance: the base parameters are taken as independent, which may make the \
+                     deviations too large or too small"
+                        .to_owned(),
+                );
+            }
+        }
+        if let (Interpretation::LeastSquares { .. }, Some(best)) =
+            (&self.found, self.solutions().first())
+            && let Some(chi_squared) = best.chi_squared
+        {
+            let freedom = self.used.len() - self.unknown.len();
+            if chi_squared > 9.0 * freedom as f64 {
+                says.push(format!(
+                    "the base parameters contradict the nominal values that are held: chi^2 is {} for {}; take more \
+                     parameters as unknown",
+                    number(chi_squared),
+                    count(freedom, "degree of freedom", "degrees of freedom")
+                ));
+            }
+        }
+        says
+    }
+}

@@ -1,0 +1,120 @@
+//! `diff`: what a variant changes, for people who review it.
+
+use modelmill_codegen::review::Equations;
+use modelmill_codegen::{OperationCount, Stage};
+
+use crate::model::Model;
+use crate::model::entries::entries;
+
+/// A named entry before and after; equal ones are left out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Change {
+    /// What it is called: its table and its own name, or a product of parameters.
+    pub name: String,
+    /// What it was; `None` if it is new.
+    pub before: Option<String>,
+    /// What it is now; `None` if it is gone.
+    pub after: Option<String>,
+}
+
+/// Named entries that differ, in the order of the first list, then of the second.
+fn changed(before: &[(String, String)], after: &[(String, String)]) -> Vec<Change> {
+    let find = |list: &[(String, String)], name: &str| {
+        list.iter()
+            .find(|(n, _)| n == name)
+            .map(|(_, text)| text.clone())
+    };
+    let added = after
+        .iter()
+        .filter(|(name, _)| find(before, name).is_none());
+    before
+        .iter()
+        .chain(added)
+        .map(|(name, _)| Change {
+            name: name.clone(),
+            before: find(before, name),
+            after: find(after, name),
+        })
+        .filter(|change| change.before != change.after)
+        .collect()
+}
+
+/// Everything that differs between two models.
+#[derive(Clone, Debug)]
+pub struct Changes {
+    /// Entries of the model files.
+    pub entries: Vec<Change>,
+    /// p_g, eq. (5): which products are in it, or without effect.
+    pub products: Vec<Change>,
+    /// Dependences of columns, eq. (6).
+    pub dependencies: Vec<Change>,
+    /// p_min, eq. (16), by retained products.
+    pub base: Vec<Change>,
+    /// Operations of a call by the name of the function, before and after.
+    pub operations: Vec<(&'static str, OperationCount, OperationCount)>,
+}
+
+impl Changes {
+    /// What changes from one model to another.
+    pub fn between(before: &Model, after: &Model) -> Self {
+        let products = |model: &Model| -> Vec<(String, String)> {
+            let reduction = &model.derivation.reduction;
+            let mechanism = &model.derivation.mechanism;
+            let with = reduction.products.iter().map(|p| (p, "in p_g"));
+            let without = reduction
+                .without_effect
+                .iter()
+                .map(|p| (p, "without effect"));
+            with.chain(without)
+                .map(|(p, text)| (p.text(mechanism), text.to_owned()))
+                .collect()
+        };
+        let base = |model: &Model| -> Vec<(String, String)> {
+            let list = model.base.iter();
+            list.map(|b| (b.retained.clone(), b.expression.clone()))
+                .collect()
+        };
+        let count = |pick: &dyn Fn(&Model) -> OperationCount| (pick(before), pick(after));
+        let regressor = count(&|m| m.derivation.programs.regressor.count(Stage::State));
+        let dynamics = count(&|m| m.derivation.programs.inverse_dynamics.count(Stage::State));
+        Self {
+            entries: changed(
+                &entries(&before.derivation.mechanism),
+                &entries(&after.derivation.mechanism),
+            ),
+            products: changed(&products(before), &products(after)),
+            dependencies: changed(&dependencies(before), &dependencies(after)),
+            base: changed(&base(before), &base(after)),
+            operations: vec![
+                ("regressor", regressor.0, regressor.1),
+                ("inverse dynamics", dynamics.0, dynamics.1),
+            ],
+        }
+    }
+}
+
+/// The dependencies by product: `d1*h[m1*dc1] + d1^2*h[m1*dc1^2]`.
+fn dependencies(model: &Model) -> Vec<(String, String)> {
+    let equations = Equations::new(&model.derivation, None);
+    equations
+        .dependencies
+        .into_iter()
+        .filter(|line| !line.equals.is_empty())
+        .map(|line| {
+            let terms: Vec<String> = line
+                .equals
+                .iter()
+                .map(|(retained, factor)| match factor.as_str() {
+                    "1" => format!("h[{retained}]"),
+                    "-1" => format!("-h[{retained}]"),
+                    factor if factor.contains(" + ") || factor.contains(" - ") => {
+                        format!("({factor})*h[{retained}]")
+                    }
+                    factor => format!("{factor}*h[{retained}]"),
+                })
+                .collect();
+            let right = terms.join(" + ").replace("+ -", "- ");
+            (format!("h[{}]", line.parameter), right)
+        })
+        .collect()
+}

@@ -1,0 +1,286 @@
+//! The entries of a model as pairs of a name and a text, so that two models can be compared.
+
+use modelmill_spec::{
+    Action, Angle, Axis, Convention, DriveKind, Effect, Exact, Inertial, Length, Mechanism, Motion,
+    Place, PlaceQuantity, Step, Symbol,
+};
+
+/// Entries as they are collected.
+#[derive(Default)]
+struct Entries(Vec<(String, String)>);
+
+impl Entries {
+    /// Entries of the same name are told apart by their place in the file.
+    fn add(&mut self, kind: &str, name: &str, text: String) {
+        let mut key = format!("{kind} {name}").trim().to_owned();
+        let mut twin = 1;
+        while self.0.iter().any(|(other, _)| *other == key) {
+            twin += 1;
+            key = format!("{kind} {name} ({twin})");
+        }
+        self.0.push((key, text));
+    }
+}
+
+/// All entries in the order of the file, each named by its table and its own name.
+pub fn entries(m: &Mechanism) -> Vec<(String, String)> {
+    let mut entries = Entries::default();
+    quantities(m, &mut entries);
+    geometry(m, &mut entries);
+    bodies(m, &mut entries);
+    actuation(m, &mut entries);
+    entries.0
+}
+
+fn quantities(m: &Mechanism, entries: &mut Entries) {
+    entries.add("gravity", "", triple(m, &m.gravity));
+    for c in &m.constants {
+        entries.add("constant", &c.name, format!("{} {}", c.value, c.unit));
+    }
+    for p in &m.parameters {
+        entries.add("parameter", &p.name, format!("{} {}", p.nominal, p.unit));
+    }
+    for c in &m.coordinates {
+        let motion = match c.motion {
+            Motion::Revolute => "revolute",
+            Motion::Prismatic => "prismatic",
+        };
+        let passive = if c.passive { ", passive" } else { "" };
+        let what = format!("{motion}{passive}, nominal {}", c.nominal);
+        entries.add("coordinate", &c.name, what);
+    }
+}
+
+fn geometry(m: &Mechanism, entries: &mut Entries) {
+    for f in &m.frames {
+        if f.convention == Convention::Base {
+            continue;
+        }
+        let steps: Vec<String> = f.steps.iter().map(|s| step(m, s)).collect();
+        let steps = if steps.is_empty() {
+            "no displacement".to_owned()
+        } else {
+            steps.join(" ")
+        };
+        let what = format!("on {}, {steps}", m.frames[f.parent.0].name);
+        entries.add("frame", &f.name, what);
+    }
+    for p in &m.points {
+        let what = format!("on {} at {}", m.frames[p.frame.0].name, triple(m, &p.at));
+        entries.add("point", &p.name, what);
+    }
+}
+
+fn bodies(m: &Mechanism, entries: &mut Entries) {
+    for p in &m.parts {
+        let inertial = match &p.inertial {
+            Inertial::AboutCentre {
+                mass,
+                centre,
+                inertia,
+            } => format!(
+                "mass {}, centre {}, inertia about it {}",
+                text(m, mass),
+                triple(m, centre),
+                tensor(m, inertia)
+            ),
+            Inertial::Linear {
+                mass,
+                first_moment,
+                inertia,
+            } => format!(
+                "mass {}, first moment {}, inertia about the origin {}",
+                text(m, mass),
+                triple(m, first_moment),
+                tensor(m, inertia)
+            ),
+        };
+        let what = format!("on {}, {inertial}", m.frames[p.frame.0].name);
+        entries.add("part", &p.name, what);
+    }
+    for l in &m.lumped_masses {
+        let places = if l.force_at == l.moment_at {
+            format!("at {}", triple(m, &l.force_at))
+        } else {
+            format!(
+                "at {} for the balance of forces and at {} for the balance of moments",
+                triple(m, &l.force_at),
+                triple(m, &l.moment_at)
+            )
+        };
+        let frame = &m.frames[l.frame.0].name;
+        let what = format!("{} of {} on {frame}, {places}", l.share, text(m, &l.mass));
+        entries.add("lumped mass on", frame, what);
+    }
+}
+
+fn actuation(m: &Mechanism, entries: &mut Entries) {
+    for l in &m.loops {
+        let [a, b] = l.joins.map(|p| m.points[p.0].name.clone());
+        entries.add("loop", &l.name, format!("joins {a} and {b}"));
+    }
+    for d in &m.drives {
+        let how = match d.kind {
+            DriveKind::Joint(i) => format!("on the joint {}", m.coordinates[i.0].name),
+            DriveKind::Linear { from, to } => format!(
+                "linear, from {} to {}",
+                m.points[from.0].name, m.points[to.0].name
+            ),
+        };
+        entries.add("drive", &d.name, how);
+    }
+    for e in &m.effects {
+        let name = format!("{} at {}", e.kind, places(m, e));
+        entries.add("effect", &name, terms(m, e));
+    }
+    let retained: Vec<String> = m.retain.iter().map(|powers| product(m, powers)).collect();
+    if !retained.is_empty() {
+        entries.add("retain", "", retained.join(", "));
+    }
+    for (ours, theirs) in &m.recording.columns {
+        entries.add("column", ours, theirs.clone());
+    }
+}
+
+fn triple(m: &Mechanism, vector: &[Exact; 3]) -> String {
+    let entries: Vec<String> = vector.iter().map(|e| text(m, e)).collect();
+    format!("({})", entries.join(", "))
+}
+
+fn text(m: &Mechanism, exact: &Exact) -> String {
+    exact.to_text(&|symbol| m.symbol_name(symbol).to_owned())
+}
+
+fn product(m: &Mechanism, powers: &[(modelmill_spec::ParameterIdx, u32)]) -> String {
+    let factors: Vec<String> = powers
+        .iter()
+        .map(|(p, n)| match n {
+            1 => m.parameters[p.0].name.clone(),
+            n => format!("{}^{n}", m.parameters[p.0].name),
+        })
+        .collect();
+    factors.join("*")
+}
+
+fn tensor(m: &Mechanism, inertia: &[Exact; 6]) -> String {
+    let entries: Vec<String> = ["xx", "xy", "xz", "yy", "yz", "zz"]
+        .iter()
+        .zip(inertia)
+        .filter(|(_, value)| !value.is_zero())
+        .map(|(name, value)| format!("{name} {}", text(m, value)))
+        .collect();
+    if entries.is_empty() {
+        "zero".to_owned()
+    } else {
+        entries.join(", ")
+    }
+}
+
+fn step(m: &Mechanism, step: &Step) -> String {
+    let letter = |axis: &Axis| match axis {
+        Axis::X => "x",
+        Axis::Y => "y",
+        Axis::Z => "z",
+    };
+    match step {
+        Step::Rotate(axis, angle) => format!("R{}({})", letter(axis), angle_text(m, angle)),
+        Step::Translate(axis, length) => format!("T{}({})", letter(axis), length_text(m, length)),
+    }
+}
+
+fn angle_text(m: &Mechanism, angle: &Angle) -> String {
+    let mut terms: Vec<String> = angle
+        .terms
+        .iter()
+        .map(|(symbol, factor)| times(&factor.to_string(), m.symbol_name(*symbol)))
+        .collect();
+    let pi = angle.pi.to_string();
+    if pi != "0" {
+        terms.push(times(&pi, "pi"));
+    }
+    join(&terms)
+}
+
+fn length_text(m: &Mechanism, length: &Length) -> String {
+    let mut terms: Vec<String> = length
+        .coordinates
+        .iter()
+        .map(|(i, factor)| times(&factor.to_string(), m.symbol_name(Symbol::Coordinate(*i))))
+        .collect();
+    if !length.offset.is_zero() {
+        terms.push(text(m, &length.offset));
+    }
+    join(&terms)
+}
+
+fn times(factor: &str, what: &str) -> String {
+    match factor {
+        "1" => what.to_owned(),
+        "-1" => format!("-{what}"),
+        factor => format!("{factor}*{what}"),
+    }
+}
+
+fn join(terms: &[String]) -> String {
+    if terms.is_empty() {
+        return "0".to_owned();
+    }
+    terms.join(" + ").replace("+ -", "- ")
+}
+
+fn places(m: &Mechanism, effect: &Effect) -> String {
+    let names = effect.places.iter().map(|place| m.place_name(*place));
+    names.collect::<Vec<_>>().join(", ")
+}
+
+/// The name of a symbol of an effect. Where there is only one place, its quantities are called as the columns of a
+/// recording are.
+fn at_place(m: &Mechanism, effect: &Effect, symbol: Symbol) -> String {
+    let (Symbol::Place(quantity), [place]) = (symbol, effect.places.as_slice()) else {
+        return m.symbol_name(symbol).to_owned();
+    };
+    let (name, position) = match place {
+        Place::Coordinate(i) => (&m.coordinates[i.0].name, ""),
+        Place::Drive(d) => match m.drives[d.0].kind {
+            DriveKind::Joint(i) => (&m.coordinates[i.0].name, ""),
+            DriveKind::Linear { .. } => (&m.drives[d.0].name, "_length"),
+        },
+        Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => {
+            return m.symbol_name(symbol).to_owned();
+        }
+    };
+    match quantity {
+        PlaceQuantity::Coordinate => format!("{name}{position}"),
+        PlaceQuantity::Rate => format!("{name}_d"),
+        PlaceQuantity::Acceleration => format!("{name}_dd"),
+        _ => m.symbol_name(symbol).to_owned(),
+    }
+}
+
+fn terms(m: &Mechanism, effect: &Effect) -> String {
+    if !matches!(effect.action, Action::Local) {
+        let names = effect.terms.iter().map(|term| {
+            let parameter = &m.parameters[term.parameter.0];
+            format!("{} {}", term.symbol, parameter.name)
+        });
+        let constants = effect.constants.iter();
+        let values = constants.map(|(symbol, value)| format!("{symbol} = {}", text(m, value)));
+        return names.chain(values).collect::<Vec<_>>().join(", ");
+    }
+    let terms: Vec<String> = effect
+        .terms
+        .iter()
+        .map(|term| {
+            let name = &m.parameters[term.parameter.0].name;
+            let expression = term
+                .expression
+                .to_text(&|symbol| at_place(m, effect, symbol));
+            match expression.as_str() {
+                "1" => name.clone(),
+                expression if expression.contains([' ', '/']) => format!("{name}*({expression})"),
+                expression => format!("{name}*{expression}"),
+            }
+        })
+        .collect();
+    join(&terms)
+}

@@ -1,0 +1,397 @@
+//! A model file that was read and derived, with names for people.
+
+mod changes;
+mod entries;
+mod equations;
+mod sampled_rank;
+mod summary;
+mod values;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use modelmill_codegen::review::base_expression;
+use modelmill_codegen::{BaseParameter, Derivation, Monomial};
+use modelmill_identify::estimate::Belief;
+use modelmill_identify::{Note, ParameterInfo};
+use modelmill_spec::{
+    EffectKind, Exact, Inertial, Mechanism, Motion, ParameterIdx, PlaceQuantity, Sign, Symbol,
+};
+
+use crate::error::{Error, Outcome};
+use crate::host::Host;
+
+pub use changes::{Change, Changes};
+pub use equations::Written;
+pub use modelmill_codegen::review::Format;
+pub use modelmill_spec::Loaded;
+pub use sampled_rank::SampledRank;
+pub use summary::{Checked, Summary};
+pub use values::Values;
+
+/// A model file that was read and derived. A clone shares what was derived.
+#[derive(Clone)]
+pub struct Model {
+    /// The file's name without folder and extension; what the JSON calls the model.
+    pub name: String,
+    /// What messages call the file.
+    pub path: String,
+    /// What the file says.
+    pub loaded: Arc<Loaded>,
+    /// Everything the mill knows about it.
+    pub derivation: Arc<Derivation>,
+    /// The base parameters.
+    pub base: Vec<BaseParameter>,
+    /// Their values from the file's nominal values.
+    pub nominal: Vec<f64>,
+    /// What was found on the way that may not be intended, beside the warnings of `loaded`.
+    pub notes: Vec<Note>,
+    /// The sign that each dynamic parameter must have.
+    signs: Vec<Sign>,
+    /// Where the file came from.
+    host: Host,
+}
+
+impl Model {
+    /// Reads a model file from disk and derives it.
+    ///
+    /// Fails with every finding about the file, each with its place, or with the reason why it cannot be derived.
+    pub fn open(path: impl AsRef<Path>) -> Outcome<Self> {
+        Host::new().model(path)
+    }
+
+    /// Derives a model from the text of its file, which extends nothing.
+    ///
+    /// Fails as [`Model::open`] does.
+    pub fn from_text(name: &str, text: &str) -> Outcome<Self> {
+        let host = Host::new();
+        let loaded = host.load_text(Path::new(name), text)?;
+        host.derive(name, loaded)
+    }
+}
+
+impl Host {
+    /// Reads a model file and derives it.
+    ///
+    /// Fails with every finding about the file, each with its place, or with the reason why it cannot be derived.
+    pub fn model(&self, path: impl AsRef<Path>) -> Outcome<Model> {
+        let path = path.as_ref();
+        let loaded = self.load(path)?;
+        self.derive(&path.display().to_string(), loaded)
+    }
+
+    /// Derives a model that was read from `path`.
+    ///
+    /// Fails with the reason why it cannot be derived.
+    pub fn derive(&self, path: &str, loaded: Loaded) -> Outcome<Model> {
+        let mechanism = &loaded.mechanism;
+        let derivation = self
+            .watched(&format!("deriving {}", mechanism.name), 0, |_| {
+                modelmill_codegen::derive(mechanism)
+            })?
+            .map_err(|error| Error::derivation(path, error))?;
+        let mut notes = Vec::new();
+        for (k, says) in retained_in_vain(&derivation) {
+            let place = loaded.retain.get(k).map(|span| {
+                let (line, column) = loaded.sources.line_and_column(*span);
+                let file = loaded.sources.files.get(span.file);
+                let file = file.map_or_else(|| path.to_owned(), |f| f.path.display().to_string());
+                format!("{file}:{line}:{column}")
+            });
+            let place = place.unwrap_or_else(|| path.to_owned());
+            notes.push(Note::warning(format!("{place}: {says}")));
+        }
+        let stem = Path::new(path).file_stem();
+        Ok(Model {
+            name: stem.map_or_else(
+                || mechanism.name.clone(),
+                |s| s.to_string_lossy().into_owned(),
+            ),
+            path: path.to_owned(),
+            base: base(&derivation),
+            nominal: derivation.nominal_base_values(),
+            signs: signs(mechanism, &loaded.kinds),
+            loaded: Arc::new(loaded),
+            derivation: Arc::new(derivation),
+            notes,
+            host: self.clone(),
+        })
+    }
+}
+
+/// The base parameters, with expressions as the page of equations writes them out.
+fn base(derivation: &Derivation) -> Vec<BaseParameter> {
+    let mut base = derivation.base_parameters();
+    for (k, one) in base.iter_mut().enumerate() {
+        one.expression = base_expression(derivation, k).text();
+    }
+    base
+}
+
+/// What `retain` asks for that cannot be, in words, by its place in the list.
+pub fn retained_in_vain(derivation: &Derivation) -> Vec<(usize, String)> {
+    let reduction = &derivation.reduction;
+    let mechanism = &derivation.mechanism;
+    let mut says = Vec::new();
+    for (k, powers) in mechanism.retain.iter().enumerate() {
+        let wanted = Monomial(powers.iter().map(|(p, n)| (p.0, *n)).collect());
+        let name = wanted.text(mechanism);
+        let why = match reduction.products.iter().position(|p| *p == wanted) {
+            Some(at) if reduction.retained.contains(&at) => continue,
+            Some(_) => "its column depends on those of products that are retained before it",
+            None if reduction.without_effect.contains(&wanted) => {
+                "it has no effect on the drives: its column is zero"
+            }
+            None => "there is no such product in the equations",
+        };
+        says.push((k, format!("`{name}` of `retain` cannot be retained: {why}")));
+    }
+    says
+}
+
+/// The sign that each dynamic parameter must have: masses, moments of inertia, and what kinds of effects say.
+fn signs(mechanism: &Mechanism, kinds: &[EffectKind]) -> Vec<Sign> {
+    let mut signs = vec![Sign::Any; mechanism.parameters.len()];
+    let mut positive = |exact: &Exact| {
+        if let Some(p) = multiple_of(exact) {
+            signs[p.0] = Sign::Positive;
+        }
+    };
+    for part in &mechanism.parts {
+        let (Inertial::AboutCentre { mass, inertia, .. } | Inertial::Linear { mass, inertia, .. }) =
+            &part.inertial;
+        positive(mass);
+        for i in [0, 3, 5] {
+            positive(&inertia[i]);
+        }
+    }
+    for lumped in &mechanism.lumped_masses {
+        positive(&lumped.mass);
+    }
+    for effect in &mechanism.effects {
+        let Some(kind) = kinds.iter().find(|kind| kind.name == effect.kind) else {
+            continue;
+        };
+        for term in &effect.terms {
+            let known = kind.parameters.iter().find(|one| one.symbol == term.symbol);
+            if let Some(parameter) = known.filter(|one| one.sign != Sign::Any) {
+                signs[term.parameter.0] = parameter.sign;
+            }
+        }
+    }
+    signs
+}
+
+/// The parameter of which an expression is a positive rational multiple.
+fn multiple_of(exact: &Exact) -> Option<ParameterIdx> {
+    let is_positive = |exact: &Exact| {
+        let mut free = true;
+        exact.for_each_symbol(&mut |_| free = false);
+        free && exact.evaluate(&|_| 0.0) > 0.0
+    };
+    match exact {
+        Exact::Symbol(Symbol::Parameter(p)) => Some(*p),
+        Exact::Quotient(above, below) if is_positive(below) => multiple_of(above),
+        Exact::Product(factors) => {
+            let mut others = factors.iter().filter(|factor| !is_positive(factor));
+            let one = others.next()?;
+            others.next().is_none().then(|| multiple_of(one))?
+        }
+        _ => None,
+    }
+}
+
+impl Model {
+    /// Where the model came from.
+    pub fn host(&self) -> &Host {
+        &self.host
+    }
+
+    /// The text of its file.
+    pub fn text(&self) -> &str {
+        self.loaded
+            .sources
+            .files
+            .first()
+            .map_or("", |file| &file.text)
+    }
+
+    /// The files that it was read from.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        self.loaded.sources.paths()
+    }
+
+    /// Gravity in the frame of the base with the constants of the file, m/s^2.
+    pub fn gravity(&self) -> [f64; 3] {
+        let mechanism = &self.derivation.mechanism;
+        let value = |symbol| match symbol {
+            Symbol::Constant(c) => mechanism.constants[c.0].value,
+            _ => 0.0,
+        };
+        mechanism.gravity.each_ref().map(|g| g.evaluate(&value))
+    }
+
+    /// Active coordinates with whether they are angles.
+    pub fn motions(&self) -> Vec<(String, bool)> {
+        let coordinates = self.derivation.mechanism.coordinates.iter();
+        coordinates
+            .filter(|c| !c.passive)
+            .map(|c| (c.name.clone(), c.motion == Motion::Revolute))
+            .collect()
+    }
+
+    /// Products that a base parameter consists of, with what they are multiplied by for the file's constants.
+    pub fn products_of(&self, k: usize) -> Vec<(&Monomial, f64)> {
+        let reduction = &self.derivation.reduction;
+        let constants = &self.derivation.mechanism.constants;
+        let constants: Vec<f64> = constants.iter().map(|c| c.value).collect();
+        let mut products = vec![(&reduction.products[reduction.retained[k]], 1.0)];
+        for line in &reduction.dependencies {
+            for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
+                let factor = factor.value_f64(&constants);
+                products.push((&reduction.products[line.product], factor));
+            }
+        }
+        products
+    }
+
+    /// The sign that a dynamic parameter must have.
+    pub fn sign_of(&self, parameter: usize) -> Sign {
+        self.signs[parameter]
+    }
+
+    /// What the nominal values say beforehand of some base parameters, each product of parameters with the relative standard
+    /// deviation `sigma`; nothing of those that the file gives no value for.
+    pub fn beliefs(&self, among: &[usize], sigma: f64) -> Vec<Belief> {
+        let parameters = &self.derivation.mechanism.parameters;
+        let values: Vec<f64> = parameters.iter().map(|p| p.nominal).collect();
+        let believed = among.iter().enumerate().filter_map(|(i, k)| {
+            // Summands may cancel, their uncertainties do not.
+            let squares = self
+                .products_of(*k)
+                .iter()
+                .map(|(product, factor)| (factor * product.value(&values)).powi(2))
+                .sum::<f64>();
+            (squares > 0.0).then(|| Belief {
+                parameter: i,
+                value: self.nominal[*k],
+                std: sigma * squares.sqrt(),
+            })
+        });
+        believed.collect()
+    }
+
+    /// Whether a base parameter consists of numbers of the model file only, so that there is nothing to identify.
+    pub fn is_known(&self, k: usize) -> bool {
+        self.products_of(k).iter().all(|(p, _)| p.0.is_empty())
+    }
+
+    /// Whether a base parameter belongs to an effect rather than to the bodies.
+    pub fn is_effect(&self, k: usize) -> bool {
+        let reduction = &self.derivation.reduction;
+        let powers = &reduction.products[reduction.retained[k]].0;
+        let effects = self.derivation.mechanism.effects.iter();
+        let mut terms = effects.flat_map(|effect| &effect.terms);
+        terms.any(|term| powers.iter().any(|(p, _)| *p == term.parameter.0))
+    }
+
+    /// The sign that a base parameter must have, where all of its summands must have the same.
+    pub fn sign(&self, k: usize) -> Sign {
+        let sign_of = |(product, factor): &(&Monomial, f64)| {
+            let mut is_positive = *factor > 0.0;
+            for (p, power) in &product.0 {
+                match self.signs[*p] {
+                    _ if power % 2 == 0 => {}
+                    Sign::Positive => {}
+                    Sign::Negative => is_positive = !is_positive,
+                    Sign::Any => return Sign::Any,
+                }
+            }
+            if is_positive {
+                Sign::Positive
+            } else {
+                Sign::Negative
+            }
+        };
+        let products = self.products_of(k);
+        let mut signs = products
+            .iter()
+            .filter(|(_, factor)| *factor != 0.0)
+            .map(sign_of);
+        let first = signs.next().unwrap_or(Sign::Any);
+        if signs.all(|sign| sign == first) {
+            first
+        } else {
+            Sign::Any
+        }
+    }
+
+    /// Names of the active coordinates, in the order of the file.
+    pub fn active(&self) -> Vec<String> {
+        self.coordinates(false)
+    }
+
+    /// Names of the passive coordinates, in the order of the file.
+    pub fn passive(&self) -> Vec<String> {
+        self.coordinates(true)
+    }
+
+    fn coordinates(&self, passive: bool) -> Vec<String> {
+        let coordinates = self.derivation.mechanism.coordinates.iter();
+        coordinates
+            .filter(|c| c.passive == passive)
+            .map(|c| c.name.clone())
+            .collect()
+    }
+
+    /// Names of the drives.
+    pub fn drives(&self) -> Vec<String> {
+        let drives = self.derivation.mechanism.drives.iter();
+        drives.map(|d| d.name.clone()).collect()
+    }
+
+    /// The base parameters as a fit describes them.
+    pub fn infos(&self) -> Vec<ParameterInfo> {
+        self.base
+            .iter()
+            .enumerate()
+            .map(|(k, base)| ParameterInfo {
+                name: base.name.clone(),
+                expression: base.expression.clone(),
+                unit: base.unit.clone(),
+                nominal: self.has_nominal(k).then(|| self.nominal[k]),
+            })
+            .collect()
+    }
+
+    /// Whether the file gives a nominal value for anything that a base parameter consists of.
+    pub fn has_nominal(&self, k: usize) -> bool {
+        let reduction = &self.derivation.reduction;
+        let parameters = &self.derivation.mechanism.parameters;
+        let lumped = reduction
+            .dependencies
+            .iter()
+            .filter(|line| line.equals.iter().any(|(at, _)| *at == k))
+            .map(|line| line.product);
+        std::iter::once(reduction.retained[k])
+            .chain(lumped)
+            .any(|product| {
+                let powers = &reduction.products[product].0;
+                powers.iter().all(|(p, _)| parameters[*p].nominal != 0.0)
+            })
+    }
+
+    /// Effects whose force depends on the load of the drive.
+    pub fn load_dependent(&self) -> Vec<&str> {
+        let effects = self.derivation.mechanism.effects.iter();
+        effects
+            .filter(|effect| {
+                effect.terms.iter().any(|term| {
+                    term.expression
+                        .mentions(&|symbol| symbol == Symbol::Place(PlaceQuantity::Load))
+                })
+            })
+            .map(|effect| effect.kind.as_str())
+            .collect()
+    }
+}

@@ -1,0 +1,86 @@
+//! `check`: what a model file holds, and how sound its base is.
+
+use modelmill_codegen::Derivation;
+use modelmill_identify::Note;
+
+use crate::error::Outcome;
+use crate::model::Model;
+use crate::model::sampled_rank::{SampledRank, judged_rank};
+
+/// A model that was looked over.
+pub struct Checked {
+    /// The model.
+    pub model: Model,
+    /// What it consists of.
+    pub summary: Summary,
+    /// Eq. (9) on the file's values, where it has an answer.
+    pub rank: Option<SampledRank>,
+    /// Where the numeric rank says something else than exact reduction.
+    pub warnings: Vec<String>,
+}
+
+impl Model {
+    /// Looks the model over: what it consists of, and its rank in numbers beside the exact one.
+    ///
+    /// Fails only when whoever watches stops it.
+    pub fn check(&self) -> Outcome<Checked> {
+        // Without any product there is nothing whose rank could be looked at.
+        let (rank, warnings) = if self.derivation.reduction.products.is_empty() {
+            (None, Vec::new())
+        } else {
+            let judged = judged_rank(self)?;
+            (judged.found, judged.warnings)
+        };
+        for says in &warnings {
+            self.host()
+                .note(&Note::warning(format!("{}: {says}", self.path)));
+        }
+        Ok(Checked {
+            model: self.clone(),
+            summary: Summary::new(&self.derivation),
+            rank,
+            warnings,
+        })
+    }
+}
+
+/// What a model consists of.
+#[derive(Clone, Debug)]
+pub struct Summary {
+    /// Parts.
+    pub bodies: usize,
+    /// Lumped masses.
+    pub lumped_masses: usize,
+    /// Active coordinates.
+    pub active: Vec<String>,
+    /// Passive coordinates.
+    pub passive: Vec<String>,
+    /// Loops.
+    pub loops: Vec<String>,
+    /// Drives.
+    pub drives: Vec<String>,
+    /// Kinds of the effects.
+    pub effects: Vec<String>,
+    /// Dynamic parameters.
+    pub parameters: Vec<String>,
+}
+
+impl Summary {
+    fn new(derivation: &Derivation) -> Self {
+        let m = &derivation.mechanism;
+        let coordinates = |passive: bool| {
+            let wanted = m.coordinates.iter().filter(|c| c.passive == passive);
+            wanted.map(|c| c.name.clone()).collect()
+        };
+        Self {
+            bodies: m.parts.len(),
+            lumped_masses: m.lumped_masses.len(),
+            active: coordinates(false),
+            passive: coordinates(true),
+            loops: m.loops.iter().map(|l| l.name.clone()).collect(),
+            drives: m.drives.iter().map(|d| d.name.clone()).collect(),
+            effects: m.effects.iter().map(|e| e.kind.clone()).collect(),
+            parameters: m.parameters.iter().map(|p| p.name.clone()).collect(),
+        }
+    }
+}

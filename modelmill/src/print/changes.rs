@@ -1,0 +1,93 @@
+//! What a variant changes, as JSON and for people.
+
+use serde_json::{Value, json};
+
+use crate::model::{Change, Changes, Model};
+use crate::text::Style;
+
+impl Changes {
+    /// All changes as one JSON object.
+    pub fn json(&self, before: &Model, after: &Model) -> Value {
+        let list = |changes: &[Change]| -> Vec<Value> {
+            changes
+                .iter()
+                .map(|c| json!({ "name": c.name, "before": c.before, "after": c.after }))
+                .collect()
+        };
+        let base = |model: &Model| -> Vec<Value> {
+            let list = model.base.iter();
+            list.map(
+                |b| json!({ "name": b.name, "retained": b.retained, "expression": b.expression }),
+            )
+            .collect()
+        };
+        let operations: serde_json::Map<String, Value> = self
+            .operations
+            .iter()
+            .map(|(name, before, after)| {
+                (
+                    name.replace(' ', "_"),
+                    json!({ "before": before, "after": after }),
+                )
+            })
+            .collect();
+        json!({
+            "before": { "model": before.name, "base": base(before) },
+            "after": { "model": after.name, "base": base(after) },
+            "entries": list(&self.entries),
+            "parameters": list(&self.products),
+            "dependencies": list(&self.dependencies),
+            "base": list(&self.base),
+            "operations": operations,
+        })
+    }
+
+    /// The same for people.
+    pub fn text(&self, before: &Model, after: &Model, style: Style) -> String {
+        let mut lines = vec![style.bold(&format!("{} -> {}", before.path, after.path))];
+        let mut section = |title: &str, none: &str, changes: &[Change]| {
+            lines.push(String::new());
+            lines.push(style.bold(title));
+            if changes.is_empty() {
+                lines.push(format!("  {none}"));
+            }
+            for change in changes {
+                let name = &change.name;
+                if let Some(text) = &change.before {
+                    lines.push(style.red(&format!("  - {name}: {text}")));
+                }
+                if let Some(text) = &change.after {
+                    lines.push(style.green(&format!("  + {name}: {text}")));
+                }
+            }
+        };
+        section("entries of the model", "no change", &self.entries);
+        let n = |model: &Model| model.derivation.reduction.products.len();
+        section(
+            &format!("p_g, eq. (5): {} -> {} products", n(before), n(after)),
+            "no change",
+            &self.products,
+        );
+        section("dependencies, eq. (6)", "no change", &self.dependencies);
+        section(
+            &format!(
+                "p_min, eq. (16), by retained product: {} -> {}",
+                before.base.len(),
+                after.base.len()
+            ),
+            "no change",
+            &self.base,
+        );
+        lines.push(String::new());
+        lines.push(style.bold("operations per call"));
+        for (name, before, after) in &self.operations {
+            if before == after {
+                lines.push(format!("  {name}: {after} (no change)"));
+            } else {
+                lines.push(style.red(&format!("  - {name}: {before}")));
+                lines.push(style.green(&format!("  + {name}: {after}")));
+            }
+        }
+        lines.join("\n")
+    }
+}

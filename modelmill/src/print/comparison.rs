@@ -1,0 +1,40 @@
+//! How far a model is off, as JSON and for people.
+
+use serde_json::{Value, json};
+
+use crate::compare::Compared;
+use crate::error::{Error, Outcome};
+use crate::print::tables;
+use crate::text::Style;
+use crate::text::table::count;
+
+impl Compared {
+    /// Figures, regions and remarks as one JSON object; `parameters` says whose values they are: `nominal` or a file.
+    pub fn json(&self, parameters: &str) -> Outcome<Value> {
+        let mut object = json!({ "model": self.model, "parameters": parameters });
+        let figures = serde_json::to_value(&self.figures).map_err(Error::input)?;
+        if let (Some(object), Some(figures)) = (object.as_object_mut(), figures.as_object()) {
+            object.extend(figures.clone());
+            object.insert("where".to_owned(), json!(self.places.regions));
+            object.insert("data".to_owned(), json!(self.notes));
+        }
+        Ok(object)
+    }
+
+    /// The same for people.
+    pub fn text(&self, parameters: &str, style: Style) -> String {
+        let mut lines = vec![style.bold(&format!(
+            "{} with {parameters} parameters on {}",
+            self.model,
+            self.files.join(", "),
+        ))];
+        let samples = count(self.figures.samples, "sample", "samples");
+        lines.push(format!("  {samples}"));
+        lines.push(String::new());
+        lines.extend(tables::figures(&[("error", &self.figures)]));
+        lines.push(String::new());
+        lines.push(style.bold("where the error lives"));
+        lines.extend(tables::places(&self.places));
+        lines.join("\n")
+    }
+}

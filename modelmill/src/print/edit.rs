@@ -1,0 +1,52 @@
+//! An edit of a model file: its difference, and the effect that was added.
+
+use modelmill_spec::edit::NewEffect;
+use serde_json::{Value, json};
+use similar::TextDiff;
+
+use crate::text::Style;
+
+/// Lines around a change that the difference shows.
+const CONTEXT: usize = 3;
+
+/// The change as a unified diff.
+pub fn difference(old: &str, new: &str, [before, after]: [&str; 2]) -> String {
+    TextDiff::from_lines(old, new)
+        .unified_diff()
+        .context_radius(CONTEXT)
+        .header(before, after)
+        .to_string()
+}
+
+/// A diff for the terminal.
+pub fn coloured(difference: &str, style: Style) -> String {
+    let lines = difference.lines().map(|line| {
+        if line.starts_with("+++") || line.starts_with("---") {
+            style.bold(line)
+        } else if line.starts_with('+') {
+            style.green(line)
+        } else if line.starts_with('-') {
+            style.red(line)
+        } else if line.starts_with("@@") {
+            style.cyan(line)
+        } else {
+            line.to_owned()
+        }
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// An effect as scripts read it.
+pub fn described(effect: &NewEffect) -> Value {
+    let parameters = effect.parameters.iter().map(|one| {
+        let said = json!({ "name": one.name, "nominal": one.nominal });
+        (one.symbol.clone(), said)
+    });
+    let constants = effect.constants.iter();
+    json!({
+        "kind": effect.kind,
+        "at": effect.at,
+        "parameters": parameters.collect::<serde_json::Map<String, Value>>(),
+        "constants": constants.map(|(s, v)| (s.clone(), json!(v))).collect::<serde_json::Map<String, Value>>(),
+    })
+}

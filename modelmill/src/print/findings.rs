@@ -1,0 +1,283 @@
+//! What a diagnosis found as JSON and for people.
+
+use modelmill_identify::diagnose::{Rung, Verdict};
+use serde_json::{Value, json};
+
+use crate::diagnose::{Estimate, Findings, words};
+use crate::print::Spelling;
+use crate::text::Style;
+use crate::text::table::{Align, number, percent, significant, table};
+
+/// Candidates that the text names.
+const NAMED: usize = 6;
+
+impl Findings {
+    /// All that was found as one JSON object; `spelling` says how its reader asks for what it advises.
+    pub fn json(&self, spelling: &dyn Spelling) -> Value {
+        let diagnosis = &self.diagnosis;
+        let channels = self.channels();
+        let model = &self.before.model;
+        let effects: Vec<Value> = (self.missing.iter())
+            .map(|missing| {
+                let separation = missing.separation.as_ref();
+                json!({
+                    "kind": missing.effect.kind,
+                    "at": missing.effect.at,
+                    "estimates": estimates(&missing.estimates),
+                    "indistinguishable_from": missing.indistinguishable_from,
+                    "separate_by": missing.separate_by,
+                    "separate_command": separation.and_then(|asked| spelling.separate(model, asked)),
+                })
+            })
+            .collect();
+        let candidates: Vec<Value> = (diagnosis.candidates.iter())
+            .map(|c| {
+                json!({"kind": c.effect.kind, "at": c.effect.at, "explained": c.explained, "gain": c.gain, "refused": c.refused})
+            })
+            .collect();
+        let off: Vec<Value> = (self.off_nominal.iter())
+            .map(|off| {
+                let p = &off.parameter;
+                json!({"name": p.name, "expression": p.expression, "nominal": off.nominal, "value": p.value, "sigmas": off.sigmas, "unit": p.unit})
+            })
+            .collect();
+        let unexplained: Vec<Value> = (diagnosis.unexplained.iter())
+            .map(|d| json!({"channel": channels[*d], "reproducible": diagnosis.reproducible[*d]}))
+            .collect();
+        json!({
+            "model": model.name,
+            "verdict": diagnosis.verdict,
+            "noise_floor": diagnosis.noise_floor,
+            "steps": steps(&diagnosis.ladder),
+            "effects": effects,
+            "candidates": candidates,
+            "parameters_off_nominal": off,
+            "unexplained": unexplained,
+            "data": self.notes,
+            "where": self.regions,
+            "with_nominal_parameters": self.with_nominal.as_ref().map(|held| {
+                json!({
+                    "verdict": held.diagnosis.verdict,
+                    "steps": steps(&held.diagnosis.ladder),
+                    "effects": held.missing.iter().map(|(effect, found)| {
+                        json!({"kind": effect.kind, "at": effect.at, "estimates": estimates(found)})
+                    }).collect::<Vec<_>>(),
+                })
+            }),
+        })
+    }
+
+    /// The answer for people, line by line.
+    pub fn text(&self, style: Style, spelling: &dyn Spelling) -> Vec<String> {
+        let diagnosis = &self.diagnosis;
+        let channels = self.channels();
+        let verdict = words::verdict(diagnosis, channels, self.judged);
+        let mut lines: Vec<String> = (words::lines(&verdict, 100).iter())
+            .map(|line| style.bold(line))
+            .collect();
+        lines.push(String::new());
+        lines.push(style.bold("the ladder: relative error, step by step"));
+        let rows: Vec<Vec<String>> = (diagnosis.ladder.iter())
+            .map(|rung| {
+                vec![
+                    words::rung(rung),
+                    percent(Some(rung.fit)),
+                    percent(Some(rung.check)),
+                ]
+            })
+            .collect();
+        lines.extend(table(
+            2,
+            &[
+                ("step", Align::Left),
+                ("fit", Align::Right),
+                (self.judged.short(), Align::Right),
+            ],
+            &rows,
+        ));
+        lines.push(format!("  {}", words::floor(diagnosis)));
+        self.missing_text(style, spelling, &mut lines);
+        lines.push(String::new());
+        lines.push(style.bold(if diagnosis.verdict == Verdict::Unexplained {
+            "where what is left sits"
+        } else {
+            "where the error of the model as it is sits"
+        }));
+        let places = &self.regions;
+        lines.extend(places.iter().map(|region| format!("  {}.", region.says)));
+        if places.is_empty() {
+            lines.push("  No region of coordinates, rates, loads or time stands out.".to_owned());
+        }
+        self.refused_text(style, &mut lines);
+        self.off_text(style, spelling, &mut lines);
+        if !self.entries.is_empty() {
+            lines.push(String::new());
+            lines.push(style.bold("how to go on"));
+            for entry in &self.entries {
+                lines.push(format!("  {}", spelling.add(&self.before.model, entry)));
+            }
+        }
+        if let Err(says) = &self.after
+            && !says.is_empty()
+        {
+            lines.push(format!(
+                "  The model with what was found cannot be made: {says}"
+            ));
+        }
+        lines
+    }
+
+    /// What was found, with values and doubles.
+    fn missing_text(&self, style: Style, spelling: &dyn Spelling, lines: &mut Vec<String>) {
+        if self.missing.is_empty() {
+            return;
+        }
+        lines.push(String::new());
+        lines.push(style.bold("what is missing"));
+        for found in &self.missing {
+            let values: Vec<String> = (found.estimates.iter())
+                .map(|e| {
+                    let std = e
+                        .std
+                        .map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
+                    let unit = if e.unit == "1" { "" } else { &e.unit };
+                    let said = format!("{} = {}{std} {unit}", e.name, number(e.value));
+                    said.trim_end().to_owned().trim_end().to_owned()
+                })
+                .collect();
+            lines.push(format!(
+                "  {}: {}",
+                words::effect(&found.effect),
+                values.join(", ")
+            ));
+            let mut kinds = self.answer.candidates.kinds.iter();
+            if let Some(kind) = kinds.find(|kind| kind.name == found.effect.kind) {
+                lines.push(style.dim(&format!("    {}", kind.says)));
+            }
+            if !found.indistinguishable_from.is_empty() {
+                lines.push(format!(
+                    "    These recordings cannot tell it from {}.",
+                    words::effects(&found.indistinguishable_from)
+                ));
+                if let Some(says) = &found.separate_by {
+                    let wrapped = words::lines(says, 96);
+                    lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
+                }
+                if let Some(asked) = &found.separation
+                    && let Some(command) = spelling.separate(&self.before.model, asked)
+                {
+                    lines.push("    Motion that tells them apart is sought by".to_owned());
+                    lines.push(format!("      {command}"));
+                }
+            }
+        }
+    }
+
+    /// The best of what was refused, with the reason.
+    fn refused_text(&self, style: Style, lines: &mut Vec<String>) {
+        let candidates = self.diagnosis.candidates.iter();
+        let rows: Vec<Vec<String>> = candidates
+            .filter_map(|c| {
+                let why = c.refused.clone()?;
+                (c.explained > 0.01).then(|| {
+                    vec![
+                        words::effect(&c.effect),
+                        percent(Some(c.explained)),
+                        if why == "sign" {
+                            "beside what was found its sign makes no sense".to_owned()
+                        } else {
+                            why
+                        },
+                    ]
+                })
+            })
+            .take(NAMED)
+            .collect();
+        if rows.is_empty() {
+            return;
+        }
+        lines.push(String::new());
+        lines.push(style.bold("what was considered and refused"));
+        lines.extend(table(
+            2,
+            &[
+                ("candidate", Align::Left),
+                ("explains alone", Align::Right),
+                ("refused because", Align::Left),
+            ],
+            &rows,
+        ));
+    }
+
+    /// Parameters that differ from what the file says.
+    fn off_text(&self, style: Style, spelling: &dyn Spelling, lines: &mut Vec<String>) {
+        if self.off_nominal.is_empty() {
+            return;
+        }
+        let rows: Vec<Vec<String>> = (self.off_nominal.iter())
+            .map(|off| {
+                let p = &off.parameter;
+                vec![
+                    p.name.clone(),
+                    number(off.nominal),
+                    number(p.value),
+                    significant(off.sigmas, 2),
+                    p.unit.clone(),
+                    p.expression.clone(),
+                ]
+            })
+            .collect();
+        lines.push(String::new());
+        lines.push(style.bold("base parameters off their nominal values"));
+        lines.extend(table(
+            2,
+            &[
+                ("", Align::Left),
+                ("nominal", Align::Right),
+                ("identified", Align::Right),
+                ("sigmas", Align::Right),
+                ("unit", Align::Left),
+                ("", Align::Left),
+            ],
+            &rows,
+        ));
+        lines.push(
+            "  They make up for what the nominal values lack, such as a payload or a misplaced mass."
+                .to_owned(),
+        );
+        let Some(held) = &self.with_nominal else {
+            return;
+        };
+        let says = words::verdict(&held.diagnosis, self.channels(), self.judged);
+        let says = format!("With all parameters held at their nominal values: {says}");
+        lines.extend(
+            words::lines(&says, 98)
+                .iter()
+                .map(|line| format!("  {line}")),
+        );
+        lines.push(format!("  ({} tells more.)", spelling.held()));
+    }
+}
+
+/// Estimates as scripts read them.
+fn estimates(all: &[Estimate]) -> Vec<Value> {
+    let one =
+        |e: &Estimate| json!({"name": e.name, "value": e.value, "std": e.std, "unit": e.unit});
+    all.iter().map(one).collect()
+}
+
+/// The ladder as scripts read it.
+fn steps(ladder: &[Rung]) -> Vec<Value> {
+    let step = |rung: &Rung| {
+        json!({
+            "added": rung.added.first(),
+            "also_added": rung.added.get(1..).unwrap_or_default(),
+            "dropped": rung.dropped,
+            "fit": rung.fit,
+            "check": rung.check,
+            "gain": rung.evidence.map(|e| e.gain),
+            "evidence": rung.evidence,
+        })
+    };
+    ladder.iter().map(step).collect()
+}

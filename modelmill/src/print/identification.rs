@@ -1,0 +1,79 @@
+//! An identification as JSON and for people.
+
+use modelmill_identify::Status;
+use serde_json::{Value, json};
+
+use crate::error::{Error, Outcome};
+use crate::identify::Identification;
+use crate::model::Model;
+use crate::print::{estimation, tables};
+use crate::text::Style;
+use crate::text::table::{count, number};
+
+impl Identification {
+    /// The fit with all figures as one JSON object, from which [`modelmill_identify::FitFile`] is read again.
+    pub fn json(&self, model: &Model) -> Outcome<Value> {
+        let mut value = serde_json::to_value(&self.fit).map_err(Error::input)?;
+        if let Some(object) = value.as_object_mut() {
+            object.insert(
+                "nominal".to_owned(),
+                json!({ "fit": self.nominal_fit, "check": self.nominal_check }),
+            );
+            object.insert(
+                "estimator".to_owned(),
+                estimation::json(model, &self.found, &self.options),
+            );
+            if !self.repeats.is_empty() {
+                let repeats = self
+                    .repeats
+                    .iter()
+                    .map(|(file, repeats)| (file.clone(), json!(repeats)));
+                let repeats: serde_json::Map<String, Value> = repeats.collect();
+                object.insert("repeats".to_owned(), json!(repeats));
+            }
+        }
+        Ok(value)
+    }
+
+    /// The result for people.
+    pub fn text(&self, model: &Model, style: Style) -> String {
+        let fit = &self.fit;
+        let estimator = estimation::text(model, &self.found, &model.infos());
+        let identified = fit.parameters.iter().filter(|p| p.status != Status::Known);
+        let identified = identified.count();
+        let mut lines = vec![style.bold(&format!(
+            "{}: {} from {}",
+            fit.model,
+            count(identified, "base parameter", "base parameters"),
+            count(fit.samples, "sample", "samples")
+        ))];
+        lines.extend(tables::expressions(2, model));
+        lines.push(String::new());
+        lines.extend(tables::parameters(&fit.parameters));
+        lines.push(String::new());
+        lines.push(format!(
+            "  condition number {}, {} with columns of equal norm",
+            fit.condition_number
+                .map_or_else(|| "infinite".to_owned(), number),
+            fit.scaled_condition_number
+                .map_or_else(|| "infinite".to_owned(), number),
+        ));
+        lines.extend(estimator.iter().map(|line| format!("  {line}")));
+        lines.push(String::new());
+        lines.push(style.bold("error"));
+        let has_nominal = (0..model.base.len()).any(|k| model.has_nominal(k));
+        let mut figures = Vec::new();
+        if has_nominal {
+            figures.push(("fit, nominal", &self.nominal_fit));
+        }
+        figures.push(("fit, identified", &fit.fit));
+        if let (Some(check), Some(nominal)) = (&fit.check, &self.nominal_check) {
+            if has_nominal {
+                figures.push(("check, nominal", nominal));
+            }
+            figures.push(("check, identified", check));
+        }
+        lines.extend(tables::figures(&figures));
+        lines.join("\n")
+    }
+}

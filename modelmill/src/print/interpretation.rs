@@ -1,0 +1,177 @@
+//! Physical parameters as JSON and for people.
+
+use modelmill_identify::interpret::{Interpretation, Physical};
+use serde_json::{Map, Value, json};
+
+use crate::interpret::Interpreted;
+use crate::text::Style;
+use crate::text::table::{Align, count, number, significant, table};
+
+impl Interpreted {
+    /// All that was found as one JSON object.
+    pub fn json(&self) -> Value {
+        let parameters = &self.model.derivation.mechanism.parameters;
+        let names = self.names();
+        let solution = |one: &Physical| -> Value {
+            let entries = names.iter().enumerate().map(|(i, name)| {
+                let parameter = &parameters[self.unknown[i]];
+                let value = json!({
+                    "value": one.values[i],
+                    "std": one.std.as_ref().map(|std| std[i]),
+                    "unit": parameter.unit,
+                    "nominal": parameter.nominal,
+                    "plausible": self.objection(i, one.values[i]).is_none(),
+                });
+                (name.clone(), value)
+            });
+            Value::Object(entries.collect::<Map<_, _>>())
+        };
+        let residuals = |one: &Physical| -> Value {
+            let entries = self.used.iter().zip(&one.residuals);
+            let entries = entries.map(|(k, r)| (self.model.base[*k].name.clone(), json!(r)));
+            json!({
+                "chi_squared": one.chi_squared,
+                "residuals": Value::Object(entries.collect::<Map<_, _>>()),
+            })
+        };
+        let method = match &self.found {
+            Interpretation::Exact { .. } => "exact",
+            Interpretation::LeastSquares { .. } => "least_squares",
+            Interpretation::Undetermined { .. } => "none",
+        };
+        let determined: Vec<&String> = match &self.found {
+            Interpretation::Undetermined { determined, .. } => {
+                let pairs = names.iter().zip(determined);
+                pairs.filter(|(_, d)| **d).map(|(name, _)| name).collect()
+            }
+            _ => names.iter().collect(),
+        };
+        json!({
+            "model": self.model.name,
+            "identifiable": !matches!(self.found, Interpretation::Undetermined { .. }),
+            "method": method,
+            "solutions": self.solutions().iter().map(solution).collect::<Vec<_>>(),
+            "fit": self.solutions().iter().map(residuals).collect::<Vec<_>>(),
+            "undetermined": self.undetermined(),
+            "determined": determined,
+            "base_parameters": self.used.iter().map(|k| self.model.base[*k].name.clone()).collect::<Vec<_>>(),
+        })
+    }
+
+    /// The same for people.
+    pub fn text(&self, style: Style) -> String {
+        let solutions = self.solutions();
+        let unknowns = count(
+            self.unknown.len(),
+            "unknown parameter",
+            "unknown parameters",
+        );
+        let equations = count(self.used.len(), "base parameter", "base parameters");
+        let head = match &self.found {
+            Interpretation::Undetermined { .. } => format!(
+                "{}: {equations} do not determine {unknowns}",
+                self.model.name
+            ),
+            Interpretation::Exact { .. } => format!(
+                "{}: {} for {unknowns} from {equations}, and no others",
+                self.model.name,
+                count(solutions.len(), "real solution", "real solutions"),
+            ),
+            Interpretation::LeastSquares {
+                is_linear: true, ..
+            } => format!(
+                "{}: {unknowns} from {equations} by weighted least squares",
+                self.model.name
+            ),
+            Interpretation::LeastSquares { starts, .. } => format!(
+                "{}: {} of weighted least squares for {unknowns} from {equations}, looked for from {}",
+                self.model.name,
+                count(solutions.len(), "minimum", "minima"),
+                count(*starts, "start", "starts"),
+            ),
+        };
+        let mut lines = vec![style.bold(&head)];
+        for says in self.undetermined() {
+            lines.push(format!("  {says}."));
+        }
+        if !self.directions().is_empty() {
+            lines.push(
+                "  Hold one parameter of each line at its nominal value, that is, leave it out of --unknown."
+                    .to_owned(),
+            );
+        }
+        if let (Interpretation::Exact { .. }, []) = (&self.found, solutions) {
+            lines.push(
+                "  No real values of these parameters give the base parameters; hold others at their nominal values."
+                    .to_owned(),
+            );
+        }
+        for (k, one) in solutions.iter().enumerate() {
+            lines.push(String::new());
+            if solutions.len() > 1 {
+                lines.push(format!("  solution {}", k + 1));
+            }
+            lines.extend(self.table(one));
+            if matches!(self.found, Interpretation::LeastSquares { .. }) {
+                lines.extend(self.residuals(one));
+            }
+        }
+        lines.join("\n")
+    }
+
+    fn table(&self, one: &Physical) -> Vec<String> {
+        let parameters = &self.model.derivation.mechanism.parameters;
+        let rows: Vec<Vec<String>> = (0..self.unknown.len())
+            .map(|i| {
+                let parameter = &parameters[self.unknown[i]];
+                vec![
+                    parameter.name.clone(),
+                    number(parameter.nominal),
+                    number(one.values[i]),
+                    one.std
+                        .as_ref()
+                        .map_or_else(|| "-".to_owned(), |std| significant(std[i], 2)),
+                    parameter.unit.clone(),
+                    self.objection(i, one.values[i])
+                        .unwrap_or_default()
+                        .to_owned(),
+                ]
+            })
+            .collect();
+        let columns = [
+            ("parameter", Align::Left),
+            ("nominal", Align::Right),
+            ("solved", Align::Right),
+            ("std", Align::Right),
+            ("unit", Align::Left),
+            ("", Align::Left),
+        ];
+        table(2, &columns, &rows)
+    }
+
+    fn residuals(&self, one: &Physical) -> Vec<String> {
+        let rows: Vec<Vec<String>> = self
+            .used
+            .iter()
+            .zip(&one.residuals)
+            .map(|(k, residual)| {
+                let base = &self.model.base[*k];
+                vec![
+                    base.name.clone(),
+                    significant(*residual, 3),
+                    base.unit.clone(),
+                ]
+            })
+            .collect();
+        let columns = [
+            ("base parameter", Align::Left),
+            ("residual", Align::Right),
+            ("unit", Align::Left),
+        ];
+        let mut lines = table(2, &columns, &rows);
+        if let Some(chi_squared) = one.chi_squared {
+            lines.push(format!("  chi^2 {}", number(chi_squared)));
+        }
+        lines
+    }
+}

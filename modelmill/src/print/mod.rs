@@ -1,0 +1,18 @@
+//! Printers of results: JSON objects for scripts, text for people. Each prints a value of the library; none looks anything up.
+
+mod changes;
+mod comparison;
+pub mod edit;
+pub mod effects;
+mod estimation;
+mod excitation;
+mod findings;
+mod identification;
+mod interpretation;
+mod reduction;
+mod spelling;
+mod summary;
+pub mod tables;
+
+pub use spelling::{Spelling, Words};
+pub use summary::faults;

@@ -1,0 +1,45 @@
+//! A reduction of a rig as JSON and for people.
+
+use std::fmt::Write as _;
+
+use modelmill_reduction::Report;
+use serde_json::{Value, json};
+
+use crate::reduce::Reduced;
+
+impl Reduced {
+    /// Findings and forces as one JSON object; `out` is where the model file goes.
+    pub fn json(&self, out: &str) -> Value {
+        json!({
+            "rig": self.rig,
+            "out": out,
+            "findings": findings(&self.reduction.report),
+            "forces": self.forces.iter().map(|f| json!({ "drive": f.drive, "nrms": f.nrms })).collect::<Vec<_>>(),
+            "poses": self.poses,
+        })
+    }
+
+    /// The same for people.
+    pub fn text(&self) -> String {
+        let mut text = self.reduction.report.text();
+        text.push_str("Price - forces of the model against those of the rig, relative\n");
+        for one in &self.forces {
+            let _ = writeln!(text, "  {:<16}{:.1e}", one.drive, one.nrms);
+        }
+        text
+    }
+}
+
+fn findings(report: &Report) -> Vec<Value> {
+    let findings = report.findings.iter();
+    findings
+        .map(|finding| {
+            let sizes: Vec<Value> = finding
+                .sizes
+                .iter()
+                .map(|size| json!({ "of": size.of, "value": size.value, "unit": size.unit, "is_felt": size.is_felt() }))
+                .collect();
+            json!({ "step": finding.step, "about": finding.about, "says": finding.says, "sizes": sizes })
+        })
+        .collect()
+}

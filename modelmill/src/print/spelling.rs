@@ -1,0 +1,66 @@
+//! How the reader of a text asks for what the text advises: on a command line, in a notebook, in Rust.
+
+use std::fmt::Write as _;
+
+use modelmill_spec::edit::NewEffect;
+
+use crate::diagnose::Separation;
+use crate::model::Model;
+
+/// How the reader of a text asks for what it advises. The program spells its flags, a notebook its keywords.
+pub trait Spelling {
+    /// Adds an effect to the file of a model.
+    fn add(&self, model: &Model, effect: &NewEffect) -> String;
+
+    /// Identifies a model once more from the same recordings.
+    fn identify(&self, model: &Model) -> String;
+
+    /// Seeks motion along which effects differ; `None` where that cannot be asked for.
+    fn separate(&self, model: &Model, separation: &Separation) -> Option<String>;
+
+    /// Holds all parameters at their nominal values in a diagnosis.
+    fn held(&self) -> String;
+}
+
+/// Plain words, for whoever calls the library.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Words;
+
+impl Spelling for Words {
+    fn add(&self, model: &Model, effect: &NewEffect) -> String {
+        let mut says = format!(
+            "{}: add {} at {}",
+            model.name,
+            effect.kind,
+            effect.at.join(", ")
+        );
+        let parameters = effect.parameters.iter();
+        let values = parameters.filter_map(|p| Some((p.symbol.as_str(), p.nominal?)));
+        let constants = effect.constants.iter().map(|(s, v)| (s.as_str(), *v));
+        for (k, (symbol, value)) in values.chain(constants).enumerate() {
+            let joint = if k == 0 { " with" } else { "," };
+            let _ = write!(says, "{joint} {symbol} = {value}");
+        }
+        says
+    }
+
+    fn identify(&self, model: &Model) -> String {
+        format!("{}: identify again", model.name)
+    }
+
+    fn separate(&self, model: &Model, separation: &Separation) -> Option<String> {
+        let effect = &separation.effect.effect;
+        let rivals: Vec<&str> = separation.rivals.iter().map(|r| r.kind.as_str()).collect();
+        Some(format!(
+            "{}: seek motion that tells {} at {} from {}",
+            model.name,
+            effect.kind,
+            effect.at.join(", "),
+            rivals.join(", ")
+        ))
+    }
+
+    fn held(&self) -> String {
+        "`Question::held`".to_owned()
+    }
+}

@@ -1,0 +1,193 @@
+//! What a model file holds, as JSON and for people; and what is wrong with one that has no meaning, as JSON.
+
+use modelmill_codegen::{Derivation, module_name};
+use modelmill_spec::{Diagnostic, DriveKind, Failure, Mechanism, Motion, Severity, Sources};
+use serde_json::{Value, json};
+
+use crate::model::{Checked, SampledRank, Summary, retained_in_vain};
+use crate::text::Style;
+use crate::text::table::count;
+
+impl Checked {
+    /// What the model holds as one JSON object, with all warnings.
+    pub fn json(&self) -> Value {
+        let model = &self.model;
+        let loaded = &model.loaded;
+        let mut warnings = diagnostics(&loaded.warnings, &loaded.sources);
+        let in_vain = retained_in_vain(&model.derivation).into_iter();
+        warnings.extend(in_vain.map(|(k, says)| {
+            let span = loaded.retain.get(k);
+            let place = span.map(|span| loaded.sources.line_and_column(*span));
+            json!({
+                "severity": "warning",
+                "says": says,
+                "file": model.path,
+                "line": place.map(|p| p.0),
+                "column": place.map(|p| p.1),
+            })
+        }));
+        let judged = self.warnings.iter();
+        warnings.extend(
+            judged.map(|says| json!({ "severity": "warning", "says": says, "file": model.path })),
+        );
+        let mut object = self.summary.json(&model.name, &model.derivation, &warnings);
+        object["numeric_rank"] = self.rank.as_ref().map_or(Value::Null, SampledRank::json);
+        object
+    }
+
+    /// The same for people.
+    pub fn text(&self, style: Style) -> String {
+        let model = &self.model;
+        self.summary
+            .text(&model.name, &model.derivation, self.rank.as_ref(), style)
+    }
+}
+
+/// What is wrong with a file that has no meaning, as one JSON object.
+pub fn faults(failure: &Failure) -> Value {
+    json!({
+        "valid": false,
+        "diagnostics": diagnostics(&failure.diagnostics, &failure.sources),
+    })
+}
+
+fn diagnostics(found: &[Diagnostic], sources: &Sources) -> Vec<Value> {
+    found
+        .iter()
+        .map(|one| {
+            let place = one.span.map(|span| {
+                let (line, column) = sources.line_and_column(span);
+                let file = sources.files.get(span.file);
+                (file.map(|f| f.path.display().to_string()), line, column)
+            });
+            json!({
+                "severity": match one.severity {
+                    Severity::Error => "error",
+                    Severity::Warning => "warning",
+                },
+                "says": one.message,
+                "file": place.as_ref().map(|p| &p.0),
+                "line": place.as_ref().map(|p| p.1),
+                "column": place.as_ref().map(|p| p.2),
+                "expected": one.label,
+                "help": one.help,
+            })
+        })
+        .collect()
+}
+
+impl Summary {
+    fn json(&self, name: &str, derivation: &Derivation, warnings: &[Value]) -> Value {
+        json!({
+            "model": name,
+            "module": module_name(&derivation.mechanism.name),
+            "valid": true,
+            "title": derivation.mechanism.title,
+            "bodies": self.bodies,
+            "lumped_masses": self.lumped_masses,
+            "joints": { "active": self.active, "passive": self.passive },
+            "loops": self.loops,
+            "actuators": self.drives,
+            "effects": self.effects,
+            "degrees_of_freedom": self.active.len(),
+            "parameters": self.parameters,
+            "products": derivation.reduction.products.len(),
+            "base_parameters": derivation.reduction.retained.len(),
+            "diagnostics": warnings,
+        })
+    }
+
+    fn text(
+        &self,
+        name: &str,
+        derivation: &Derivation,
+        rank: Option<&SampledRank>,
+        style: Style,
+    ) -> String {
+        let m = &derivation.mechanism;
+        let mut lines = vec![style.bold(&format!("{name}: sound"))];
+        if let Some(title) = &m.title {
+            lines.push(format!("  {title}"));
+        }
+        let mut line = |what: &str, text: String| lines.push(format!("  {what:<20}{text}"));
+        let list = |names: &[String]| match names {
+            [] => String::new(),
+            names => format!(": {}", names.join(", ")),
+        };
+        let module = module_name(&m.name);
+        let whose = if module == m.name {
+            "the file's `name`"
+        } else {
+            "for the file's `name`, which is a word of Rust or of emitted code"
+        };
+        line("module", format!("{module} ({whose})"));
+        line("bodies", self.bodies.to_string());
+        if self.lumped_masses > 0 {
+            line("lumped masses", self.lumped_masses.to_string());
+        }
+        let joints: Vec<String> = m
+            .coordinates
+            .iter()
+            .map(|c| joint(c.motion, &c.name, c.passive))
+            .collect();
+        line("joints", format!("{}{}", joints.len(), list(&joints)));
+        line(
+            "loops",
+            format!("{}{}", self.loops.len(), list(&self.loops)),
+        );
+        line(
+            "actuators",
+            format!("{}{}", self.drives.len(), list(&drives(m))),
+        );
+        line("degrees of freedom", self.active.len().to_string());
+        if !self.effects.is_empty() {
+            line(
+                "effects",
+                format!("{}{}", self.effects.len(), list(&self.effects)),
+            );
+        }
+        line(
+            "parameters",
+            format!("{}{}", self.parameters.len(), list(&self.parameters)),
+        );
+        let reduction = &derivation.reduction;
+        line(
+            "p_g and p_min",
+            format!(
+                "{} with an effect on the actuators, {}",
+                count(reduction.products.len(), "product", "products"),
+                count(
+                    reduction.retained.len(),
+                    "base parameter",
+                    "base parameters"
+                ),
+            ),
+        );
+        if let Some(rank) = rank {
+            line("numeric rank", rank.text());
+        }
+        lines.join("\n")
+    }
+}
+
+fn joint(motion: Motion, name: &str, passive: bool) -> String {
+    match (motion, passive) {
+        (Motion::Revolute, false) => name.to_owned(),
+        (Motion::Revolute, true) => format!("{name} (passive)"),
+        (Motion::Prismatic, false) => format!("{name} (prismatic)"),
+        (Motion::Prismatic, true) => format!("{name} (prismatic, passive)"),
+    }
+}
+
+fn drives(m: &Mechanism) -> Vec<String> {
+    m.drives
+        .iter()
+        .map(|drive| match drive.kind {
+            DriveKind::Joint(i) => format!("{} (on {})", drive.name, m.coordinates[i.0].name),
+            DriveKind::Linear { from, to } => format!(
+                "{} (from {} to {})",
+                drive.name, m.points[from.0].name, m.points[to.0].name
+            ),
+        })
+        .collect()
+}

@@ -1,0 +1,119 @@
+//! Results in text, for people: parameters, figures and regions.
+
+use modelmill_identify::{Figures, FitParameter, Status};
+
+use crate::compare::{Places, ROUNDING};
+use crate::model::Model;
+use crate::text::table::{Align, number, percent, significant, table};
+
+/// Identified base parameters beside their nominal values.
+pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
+    let rows: Vec<Vec<String>> = parameters
+        .iter()
+        .map(|p| {
+            vec![
+                p.name.clone(),
+                p.nominal.map_or_else(|| "-".to_owned(), number),
+                if p.status == Status::Identified {
+                    number(p.value)
+                } else {
+                    format!("({})", number(p.value))
+                },
+                match (p.status, p.std) {
+                    (Status::Known, _) => "known".to_owned(),
+                    (Status::NotEssential, _) => "not essential".to_owned(),
+                    (Status::Undetermined, _) => "not determined".to_owned(),
+                    (Status::Identified, Some(std)) => significant(std, 2),
+                    (Status::Identified, None) => "—".to_owned(),
+                },
+                p.std.map_or_else(String::new, |std| {
+                    if p.value == 0.0 {
+                        "-".to_owned()
+                    } else {
+                        percent(Some((std / p.value).abs()))
+                    }
+                }),
+                p.unit.clone(),
+            ]
+        })
+        .collect();
+    table(
+        2,
+        &[
+            ("parameter", Align::Left),
+            ("nominal", Align::Right),
+            ("identified", Align::Right),
+            ("std", Align::Right),
+            ("std", Align::Right),
+            ("unit", Align::Left),
+        ],
+        &rows,
+    )
+}
+
+/// Which name stands for which expression, as JSON and fits write it: `p1_min = ...`.
+pub fn expressions(indent: usize, model: &Model) -> Vec<String> {
+    let indent = " ".repeat(indent);
+    let lines = model.base.iter();
+    lines
+        .map(|base| format!("{indent}{} = {}", base.name, base.expression))
+        .collect()
+}
+
+/// Error figures of several comparisons, one line for the total and one for each channel.
+pub fn figures(named: &[(&str, &Figures)]) -> Vec<String> {
+    let mut rows = Vec::new();
+    for (name, figures) in named {
+        rows.push(vec![
+            (*name).to_owned(),
+            "all".to_owned(),
+            percent(figures.nrms),
+            String::new(),
+            String::new(),
+            significant(figures.rms, 4),
+            String::new(),
+        ]);
+        for (channel, one) in &figures.channels {
+            rows.push(vec![
+                String::new(),
+                channel.clone(),
+                percent(one.nrms),
+                percent(one.abs_ratio),
+                percent(one.mean_relative),
+                significant(one.rms, 4),
+                significant(one.max_abs, 4),
+            ]);
+        }
+    }
+    table(
+        2,
+        &[
+            ("", Align::Left),
+            ("drive", Align::Left),
+            ("nrms", Align::Right),
+            ("sum|e|/sum|f|", Align::Right),
+            ("mean relative", Align::Right),
+            ("rms", Align::Right),
+            ("largest", Align::Right),
+        ],
+        &rows,
+    )
+}
+
+/// Where an error lives, one sentence for each region.
+pub fn places(places: &Places) -> Vec<String> {
+    let regions = places.regions.iter();
+    let mut lines: Vec<String> = regions
+        .map(|region| format!("  {}.", region.says))
+        .collect();
+    if !places.rounding.is_empty() {
+        lines.push(format!(
+            "  The error of {} is below {ROUNDING:e} of the force, which is rounding: there is nothing to find.",
+            places.rounding.join(", ")
+        ));
+    }
+    if lines.is_empty() {
+        lines.push("  No region of coordinates, rates, loads or time stands out.".to_owned());
+    }
+    lines
+}

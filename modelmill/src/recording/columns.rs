@@ -1,0 +1,166 @@
+//! Which columns of a recording are ours: the user's `--map`, then what the model file says, applied to the names
+//! that the file has.
+
+use modelmill_identify::{Computed, NotFinite, ReadOptions};
+use modelmill_spec::{ColumnFault, ColumnSum, Quantity, read_column};
+
+use super::options::Reading;
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+
+/// How a recording whose columns are called `header` is read; `file` is what messages call it.
+/// Fails when a mapping makes no sense for this model, or asks for columns that are not there.
+pub fn read_options(
+    model: &Model,
+    args: &Reading,
+    header: &[String],
+    file: &str,
+) -> Outcome<ReadOptions> {
+    let mechanism = &model.derivation.mechanism;
+    let known = mechanism.columns();
+    let mut mapping = Mapping::default();
+    for (k, (ours, text)) in args.columns.iter().enumerate() {
+        let Some(quantity) = quantity_of(&known, ours) else {
+            return Err(unknown(model, &known, ours));
+        };
+        if args.columns[..k].iter().any(|(other, _)| other == ours) {
+            return Err(Error::options(format!(
+                "--map {ours}=...: `{ours}` is mapped twice; give each name one mapping"
+            )));
+        }
+        match read(model, text, quantity, header) {
+            Ok(sum) => mapping.add(ours, sum),
+            // The reader of the recording says what is missing and lists what there is.
+            Err(ColumnFault::Missing { column, .. }) if column == *text => {
+                mapping.renames.push((ours.clone(), text.clone()));
+            }
+            Err(fault @ ColumnFault::Missing { .. }) => {
+                return Err(Error::input(format!(
+                    "{file}: --map {ours}={text}: {fault} {}",
+                    listed(header)
+                )));
+            }
+            Err(fault) => {
+                return Err(Error::options(format!("--map {ours}={text}: {fault}")));
+            }
+        }
+    }
+    for (ours, text) in &mechanism.recording.columns {
+        if args.columns.iter().any(|(mine, _)| mine == ours) {
+            continue;
+        }
+        let Some(quantity) = quantity_of(&known, ours) else {
+            continue;
+        };
+        match read(model, text, quantity, header) {
+            Ok(sum) if mapping.takes_away(&sum) => {}
+            Ok(sum) => mapping.add(ours, sum),
+            // A recording may have our names, or lack what can be done without.
+            Err(ColumnFault::Missing { .. })
+                if header.contains(ours) || can_lack(ours, quantity) => {}
+            Err(fault) => {
+                return Err(Error::input(format!(
+                    "{file}: the model file takes `{ours}` from `{text}`, but {fault} {} \
+                     Map one onto it with `--map {ours}=THEIRS`",
+                    listed(header)
+                )));
+            }
+        }
+    }
+    Ok(ReadOptions {
+        renames: mapping.renames,
+        computed: mapping.computed,
+        not_finite: if args.skip_bad_samples {
+            NotFinite::LeaveOut
+        } else {
+            NotFinite::Refuse
+        },
+        wanted: Some(known.into_iter().map(|(name, _)| name).collect()),
+        between: args.between,
+        ..ReadOptions::default()
+    })
+}
+
+/// What was found so far.
+#[derive(Default)]
+struct Mapping {
+    renames: Vec<(String, String)>,
+    computed: Vec<Computed>,
+}
+
+impl Mapping {
+    fn add(&mut self, ours: &str, sum: ColumnSum) {
+        match sum.terms.as_slice() {
+            [(theirs, factor)] if factor.total_cmp(&1.0).is_eq() && sum.offset == 0.0 => {
+                self.renames.push((ours.to_owned(), theirs.clone()));
+            }
+            _ => self.computed.push(Computed {
+                name: ours.to_owned(),
+                terms: sum.terms,
+                offset: sum.offset,
+            }),
+        }
+    }
+
+    /// Whether a column that the user has given another name would be needed under this one.
+    fn takes_away(&self, sum: &ColumnSum) -> bool {
+        sum.terms.len() == 1
+            && self
+                .renames
+                .iter()
+                .any(|(_, theirs)| *theirs == sum.terms[0].0)
+    }
+}
+
+fn read(
+    model: &Model,
+    text: &str,
+    quantity: Quantity,
+    header: &[String],
+) -> Result<ColumnSum, ColumnFault> {
+    let constants = &model.derivation.mechanism.constants;
+    read_column(text, quantity, header, &|name| {
+        constants.iter().find(|c| c.name == name).map(|c| c.value)
+    })
+}
+
+fn quantity_of(known: &[(String, Quantity)], ours: &str) -> Option<Quantity> {
+    let found = known.iter().find(|(name, _)| name == ours);
+    found.map(|(_, quantity)| *quantity)
+}
+
+/// Derivatives, forces and variances may be missing: they are prepared, or asked for where they are needed.
+fn can_lack(ours: &str, quantity: Quantity) -> bool {
+    match quantity {
+        Quantity::Time => false,
+        Quantity::Angle(order) | Quantity::Length(order) => order > 0 && ours.contains("_d"),
+        _ => true,
+    }
+}
+
+fn unknown(model: &Model, known: &[(String, Quantity)], ours: &str) -> Error {
+    let why = if model.passive().iter().any(|name| name == ours) {
+        "is passive: it is computed from the loops and not read"
+    } else {
+        "is no name of this model"
+    };
+    let known: Vec<&str> = known.iter().map(|(name, _)| name.as_str()).collect();
+    Error::options(format!(
+        "--map {ours}=...: `{ours}` {why}; expected one of {}",
+        known.join(", ")
+    ))
+}
+
+fn listed(header: &[String]) -> String {
+    let shown: Vec<String> = header
+        .iter()
+        .take(40)
+        .map(|name| format!("`{name}`"))
+        .collect();
+    let more = if header.len() > 40 {
+        format!(" and {} more", header.len() - 40)
+    } else {
+        String::new()
+    };
+    format!("The columns are: {}{more}.", shown.join(", "))
+}

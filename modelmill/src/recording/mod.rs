@@ -1,0 +1,251 @@
+//! Recordings of a model: read with the names that the model and the user give, prepared, and looked at before anything is
+//! believed.
+
+mod columns;
+mod options;
+mod piped;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use modelmill_identify::{Note, Recording as Raw, Run, name_of_bytes};
+
+use crate::audit;
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::stretch::{Stretch, variances};
+
+use columns::read_options;
+
+pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER};
+pub use modelmill_identify::{Preparation, Smoothing};
+pub use options::Reading;
+use piped::piped;
+
+/// Reads a recording with the columns that a model needs.
+fn read_raw(model: &Model, path: &Path, reading: &Reading) -> Outcome<Raw> {
+    let piped = piped(path)?;
+    let name = path.display().to_string();
+    let name = piped
+        .as_ref()
+        .map_or(name.clone(), |bytes| name_of_bytes(&name, bytes));
+    let header = match &piped {
+        Some(bytes) => Raw::names_in_bytes(bytes, &name)?,
+        None => Raw::names_in(path)?,
+    };
+    let options = read_options(model, reading, &header, &name)?;
+    let read = || match &piped {
+        Some(bytes) => Raw::from_bytes(bytes, &name, &options),
+        None => Raw::read_with(path, &options),
+    };
+    Ok(model
+        .host()
+        .watched(&format!("reading {name}"), 0, |_| read())??)
+}
+
+/// The stretches of a recording; where the model says that forces are read late, each force has the states of the moment at
+/// which it acted.
+fn prepared(model: &Model, raw: &Raw, reading: &Reading) -> Outcome<Vec<Stretch>> {
+    let delay = model.derivation.mechanism.force_delay;
+    let mut data = prepare(model, raw, reading, delay)?;
+    note_idle_options(&mut data, reading);
+    for note in data.iter().flat_map(Stretch::notes) {
+        model.host().note(note);
+    }
+    Ok(data)
+}
+
+/// The stretches of a recording with states and forces as it has them side by side.
+pub(crate) fn read_as_recorded(
+    model: &Model,
+    path: &Path,
+    reading: &Reading,
+) -> Outcome<Vec<Stretch>> {
+    let raw = read_raw(model, path, reading)?;
+    let mut data = prepare(model, &raw, reading, 0.0)?;
+    note_idle_options(&mut data, reading);
+    for note in data.iter().flat_map(Stretch::notes) {
+        model.host().note(note);
+    }
+    Ok(data)
+}
+
+/// Gives every force the states of the moment at which it acted, by the model's delay.
+fn pair(run: &mut Run, delay: f64) -> Outcome {
+    if delay == 0.0 {
+        return Ok(());
+    }
+    let ms = 1e3 * delay;
+    let Some((start, end)) = run.pair_with_earlier_states(delay) else {
+        return Err(Error::input(format!(
+            "{}: the model's `time_delay` of {ms} ms leaves fewer than four of {} samples with states to go with; check T, \
+             which is in seconds",
+            run.file,
+            run.time.len()
+        )));
+    };
+    let (side, lost) = if start > 0 {
+        ("first", start)
+    } else {
+        ("last", end)
+    };
+    let lost = match lost {
+        0 => String::new(),
+        1 => format!("; the {side} sample has no states to go with and is left out"),
+        n => format!("; the {side} {n} samples have no states to go with and are left out"),
+    };
+    run.notes.push(Note::info(format!(
+        "Forces of {} are held against the states of {ms} ms before, as the model's `time_delay` says{lost}.",
+        run.file
+    )));
+    Ok(())
+}
+
+fn prepare(model: &Model, recording: &Raw, args: &Reading, delay: f64) -> Outcome<Vec<Stretch>> {
+    let preparation = &args.preparation;
+    let mut runs =
+        model
+            .host()
+            .watched(&format!("preparing {}", recording.file()), 0, |_| {
+                recording.runs_with(&model.active(), &model.drives(), preparation)
+            })??;
+    if let Some(first) = runs.first_mut() {
+        let suspicions = recording.suspicions(&model.motions(), preparation.source);
+        first.notes.splice(0..0, suspicions);
+        let oddities = recording.oddities(&model.motions(), &model.drives());
+        first.notes.splice(0..0, oddities);
+    }
+    let motions = model.motions();
+    let angles = motions.iter().filter(|(_, is_angle)| *is_angle);
+    let maps: Vec<String> = angles
+        .map(|(name, _)| recording.maps_from_degrees(name))
+        .collect();
+    let maps_from_degrees = maps.join(" ");
+    for run in &mut runs {
+        let idle = run.suspicious_forces(&model.drives());
+        run.notes.extend(idle);
+        pair(run, delay)?;
+    }
+    let with_variance = runs.into_iter().map(|run| {
+        let variance = variances::of(recording, &run, &model.drives())?;
+        Ok(Stretch {
+            run,
+            variance,
+            weights: None,
+            load: None,
+            maps_from_degrees: maps_from_degrees.clone(),
+        })
+    });
+    with_variance.collect()
+}
+
+/// Says that options of the filter do nothing where all derivatives are recorded.
+fn note_idle_options(data: &mut [Stretch], args: &Reading) {
+    let usual = Preparation::default();
+    let given: Vec<&str> = [
+        args.preparation.cutoff_hz.map(|_| "--cutoff"),
+        (args.preparation.order != usual.order).then_some("--order"),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    if given.is_empty() || data.iter().any(|one| one.run.prepared.cutoff_hz.is_some()) {
+        return;
+    }
+    if let Some(one) = data.first_mut() {
+        let does = if given.len() == 1 { "does" } else { "do" };
+        one.run.notes.push(Note::warning(format!(
+            "{} {does} nothing to {}: it holds all rates and accelerations, so none are made from positions; ask for \
+             that with `--derivatives positions`.",
+            given.join(" and "),
+            one.run.file
+        )));
+    }
+}
+
+/// Warns of recordings that are given twice, also as copies: they count twice, or make a check that proves nothing.
+pub fn note_twins(model: &Model, data: &mut [Stretch], check: &mut [Stretch]) {
+    for k in 1..data.len() {
+        let (before, rest) = data.split_at_mut(k);
+        if let Some(twin) = before.iter().find(|other| other.is_twin_of(&rest[0])) {
+            let says = format!(
+                "{} and {} are the same recording: it counts twice, and deviations come out too small; give it once.",
+                twin.run.file, rest[0].run.file
+            );
+            rest[0].note(model, Note::warning(says));
+        }
+    }
+    for one in check {
+        if let Some(twin) = data.iter().find(|other| other.is_twin_of(one)) {
+            let says = format!(
+                "{} is used for the fit and {} for the check, but they are the same recording: such a check proves \
+                 nothing; check on another motion.",
+                twin.run.file, one.run.file
+            );
+            one.note(model, Note::warning(says));
+        }
+    }
+}
+
+/// A recording of a model: as it was read, and its stretches between gaps in time, prepared for the model.
+#[derive(Clone)]
+pub struct Recording {
+    /// One stretch or, where the recording is cut at gaps in time, several.
+    pub stretches: Vec<Stretch>,
+    raw: Arc<Raw>,
+    reading: Reading,
+}
+
+impl Model {
+    /// Reads a recording (CSV, Parquet or MATLAB's format 5), prepares its states, and looks at it before anything is believed:
+    /// what was done and what looks odd stands in the notes of its stretches.
+    ///
+    /// Fails with place and remedy when a column is missing or holds no number, or time stands still.
+    pub fn recording(&self, path: impl AsRef<Path>, reading: &Reading) -> Outcome<Recording> {
+        let raw = read_raw(self, path.as_ref(), reading)?;
+        Recording::new(self, raw, reading)
+    }
+}
+
+impl Recording {
+    fn new(model: &Model, raw: Raw, reading: &Reading) -> Outcome<Self> {
+        let raw = Arc::new(raw);
+        let mut stretches = prepared(model, &raw, reading)?;
+        audit::examine(model, &mut stretches);
+        Ok(Self {
+            stretches,
+            raw,
+            reading: reading.clone(),
+        })
+    }
+
+    /// What messages call its file.
+    pub fn file(&self) -> &str {
+        self.raw.file()
+    }
+
+    /// Remarks on all stretches.
+    pub fn notes(&self) -> impl Iterator<Item = &Note> {
+        self.stretches.iter().flat_map(Stretch::notes)
+    }
+
+    /// The stretches prepared once more, for another model of the same machine, whose forces may act later.
+    pub(crate) fn prepared_for(&self, model: &Model) -> Outcome<Vec<Stretch>> {
+        prepared(model, &self.raw, &self.reading)
+    }
+}
+
+/// The stretches of recordings for fit and check, with remarks on those that are given twice.
+pub(crate) fn stretches(
+    model: &Model,
+    fit: &[&Recording],
+    check: &[&Recording],
+) -> [Vec<Stretch>; 2] {
+    let [mut fit, mut check] = [fit, check].map(|all| {
+        all.iter()
+            .flat_map(|one| one.stretches.clone())
+            .collect::<Vec<_>>()
+    });
+    note_twins(model, &mut fit, &mut check);
+    [fit, check]
+}

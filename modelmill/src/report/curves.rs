@@ -1,0 +1,259 @@
+//! Measured and calculated forces over time: pictures that stand by themselves, and the same numbers packed for the script
+//! that zooms into them.
+//!
+//! Long recordings keep the least and the largest value of each of many stretches, so that no peak is lost and the page
+//! stays small; values are packed as 16-bit steps between the least and the largest of a curve.
+
+use std::fmt::Write as _;
+
+use serde_json::json;
+
+use super::draw::{Axis, LEFT, Picture, RIGHT, WIDTH, attribute, line, range, with_room};
+use super::units::force_unit;
+use crate::diagnose::{Along, Version};
+use crate::report::svg::{escape, thinned};
+
+/// Values that all curves of a page may have together.
+const BUDGET: usize = 420_000;
+/// Values that a curve has at least, if it has as many.
+const LEAST: usize = 1200;
+/// Points of a curve in the picture that stands by itself.
+const STILL: usize = 600;
+/// Recordings of which curves are shown.
+pub const MOST_RUNS: usize = 6;
+/// Height of a panel.
+const HEIGHT: f64 = 190.0;
+
+struct Curve<'a> {
+    name: &'a str,
+    class: &'a str,
+    span: [f64; 2],
+    values: Vec<f64>,
+}
+
+/// Curves of all recordings, those of the check first and open.
+pub fn section(before: &Version, after: Option<&Version>) -> String {
+    let mut order: Vec<usize> = (0..before.runs.len()).collect();
+    order.sort_by_key(|k| !before.runs[*k].is_check);
+    let shown = order.len().min(MOST_RUNS);
+    let drives = before.model.drives().len();
+    let curves = shown * drives * if after.is_some() { 5 } else { 3 };
+    let most = (BUDGET / curves.max(1)).max(LEAST);
+    let mut html = String::new();
+    for (place, k) in order[..shown].iter().enumerate() {
+        let run = &before.runs[*k];
+        let title = format!(
+            "{} {}",
+            if run.is_check {
+                "Check run"
+            } else {
+                "Run of the fit"
+            },
+            run.name
+        );
+        let open = if place == 0 { " open" } else { "" };
+        let _ = writeln!(
+            html,
+            "<details class=\"run\"{open} data-curves=\"run{k}\">\n<summary>{}</summary>",
+            escape(&title)
+        );
+        html.push_str(&of_run(before, after, *k, most));
+        html.push_str("</details>\n");
+    }
+    if shown < order.len() {
+        let _ = writeln!(
+            html,
+            "<p>{} more recordings are in the figures and not drawn here.</p>",
+            order.len() - shown
+        );
+    }
+    html
+}
+
+fn of_run(before: &Version, after: Option<&Version>, k: usize, most: usize) -> String {
+    let mut html = String::new();
+    let mut packed = Vec::new();
+    for (d, drive) in before.model.drives().iter().enumerate() {
+        let unit = force_unit(&before.model, d);
+        for (title, curves) in panels(before, after, k, d, drive) {
+            let title = format!("{title}, {unit}");
+            html.push_str(&still(&title, &curves));
+            let curves: Vec<_> = curves.iter().map(|curve| pack(curve, most)).collect();
+            packed.push(json!({ "title": title, "unit": unit, "curves": curves }));
+        }
+    }
+    // Text of a script must not hold what ends it.
+    let text = json!({ "panels": packed }).to_string();
+    let text = text.replace('<', "\\u003c");
+    let _ = writeln!(
+        html,
+        "<script type=\"application/json\" id=\"run{k}\">{text}</script>"
+    );
+    html
+}
+
+/// Forces of a drive, and below them their errors.
+fn panels<'a>(
+    before: &Version,
+    after: Option<&Version>,
+    k: usize,
+    d: usize,
+    drive: &str,
+) -> [(String, Vec<Curve<'a>>); 2] {
+    let curve = |name, class, run: &Along, values: Vec<f64>| Curve {
+        name,
+        class,
+        span: [
+            run.time.first().copied().unwrap_or(0.0),
+            run.time.last().copied().unwrap_or(1.0),
+        ],
+        values,
+    };
+    let run = &before.runs[k];
+    let mut forces = vec![
+        curve("measured", "c-measured", run, run.measured[d].clone()),
+        curve("model as it is", "c-before", run, run.forces[d].clone()),
+    ];
+    let mut errors = vec![curve("error as it is", "c-before", run, run.error(d))];
+    if let Some(run) = after.and_then(|after| after.runs.get(k)) {
+        let values = run.forces[d].clone();
+        forces.push(curve("with the effects", "c-after", run, values));
+        errors.push(curve(
+            "error with the effects",
+            "c-after",
+            run,
+            run.error(d),
+        ));
+    }
+    [
+        (drive.to_owned(), forces),
+        (format!("{drive}: measured less model"), errors),
+    ]
+}
+
+/// The picture without any script.
+fn still(title: &str, curves: &[Curve<'_>]) -> String {
+    let spans: Vec<f64> = curves.iter().flat_map(|c| c.span).collect();
+    let time = range(&spans);
+    let values = with_room(range(curves.iter().flat_map(|c| &c.values)), 0.05);
+    let x = Axis::new(time, [LEFT, WIDTH - RIGHT]);
+    let y = Axis::new(values, [HEIGHT - 34.0, 8.0]);
+    let mut picture = Picture::new(WIDTH, HEIGHT);
+    picture.frame(&x, &y, "time, s", [9, 4]);
+    for curve in curves {
+        picture.path(
+            &format!("curve {}", curve.class),
+            &line(&curve.values, &x, curve.span, &y, STILL),
+        );
+    }
+    let names: Vec<String> = curves
+        .iter()
+        .map(|c| {
+            format!(
+                "<span class=\"key {}\" data-curve=\"{}\">{}</span>",
+                c.class,
+                attribute(c.name),
+                escape(c.name)
+            )
+        })
+        .collect();
+    format!(
+        "<figure class=\"plot\"><figcaption><b>{}</b> {}</figcaption>\n{}</figure>\n",
+        escape(title),
+        names.join(" "),
+        picture.finish(&format!("{title} over time"))
+    )
+}
+
+/// A curve for the script: the number that a step stands for, and the steps.
+fn pack(curve: &Curve<'_>, most: usize) -> serde_json::Value {
+    let values = &curve.values;
+    let kept: Vec<f64> = thinned(values, most).into_iter().map(|(_, v)| v).collect();
+    let [low, high] = range(&kept);
+    let (low, step) = if high > low {
+        (low, (high - low) / 65_534.0)
+    } else {
+        (if low.is_finite() { low } else { 0.0 }, 0.0)
+    };
+    let mut bytes = Vec::with_capacity(2 * kept.len());
+    for value in &kept {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "between 0 and 65534"
+        )]
+        let steps = if !value.is_finite() {
+            u16::MAX
+        } else if step > 0.0 {
+            ((value - low) / step).round() as u16
+        } else {
+            0
+        };
+        bytes.extend(steps.to_le_bytes());
+    }
+    json!({
+        "name": curve.name,
+        "class": curve.class,
+        "span": curve.span,
+        "low": low,
+        "step": step,
+        "samples": values.len(),
+        "data": base64(&bytes),
+    })
+}
+
+/// Bytes as text (RFC 4648).
+fn base64(bytes: &[u8]) -> String {
+    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for three in bytes.chunks(3) {
+        let byte = |i: usize| u32::from(three.get(i).copied().unwrap_or(0));
+        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
+        for i in 0..4 {
+            if i <= three.len() {
+                let letter = LETTERS[(bits >> (18 - 6 * i) & 63) as usize];
+                text.push(char::from(letter));
+            } else {
+                text.push('=');
+            }
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_written_as_the_standard_has_it() {
+        // Test vectors of RFC 4648, section 10.
+        for (bytes, text) in [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foob", "Zm9vYg=="),
+            ("foobar", "Zm9vYmFy"),
+        ] {
+            assert_eq!(base64(bytes.as_bytes()), text);
+        }
+    }
+
+    #[test]
+    fn packing_keeps_every_peak() {
+        let mut values = vec![0.0; 50_000];
+        values[31_234] = 7.0;
+        values[100] = -3.0;
+        let curve = Curve {
+            name: "error",
+            class: "c-before",
+            span: [0.0, 10.0],
+            values,
+        };
+        let packed = pack(&curve, 2000);
+        assert_eq!(packed["low"], -3.0);
+        assert!((packed["step"].as_f64().unwrap() * 65_534.0 - 10.0).abs() < 1e-9);
+        assert!(packed["data"].as_str().unwrap().len() < 6000);
+    }
+}

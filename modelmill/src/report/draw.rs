@@ -1,0 +1,306 @@
+//! Drawing by hand: axes with round ticks, panels, and paths of SVG. Colours are classes, so that a page may be light or dark.
+
+use std::fmt::Write as _;
+
+use crate::report::svg::{escape, thinned};
+
+/// Width of a picture in its own units.
+pub const WIDTH: f64 = 860.0;
+/// Room for the ticks at the left.
+pub const LEFT: f64 = 66.0;
+/// Room at the right.
+pub const RIGHT: f64 = 14.0;
+
+/// An axis from one value to another over a stretch of the picture.
+#[derive(Clone, Copy, Debug)]
+pub struct Axis {
+    pub from: f64,
+    pub to: f64,
+    pub start: f64,
+    pub end: f64,
+    /// Whether decades are of equal length.
+    pub log: bool,
+}
+
+impl Axis {
+    /// An axis; one that has no length gets some.
+    pub fn new(range: [f64; 2], pixels: [f64; 2]) -> Self {
+        let [mut from, mut to] = range;
+        if !(from.is_finite() && to.is_finite()) {
+            (from, to) = (0.0, 1.0);
+        }
+        if to - from <= f64::EPSILON * from.abs().max(to.abs()) {
+            let room = 0.5 * from.abs().max(f64::MIN_POSITIVE * 1e10);
+            (from, to) = (from - room, to + room);
+        }
+        Self {
+            from,
+            to,
+            start: pixels[0],
+            end: pixels[1],
+            log: false,
+        }
+    }
+
+    /// An axis of decades; values must be positive.
+    pub fn decades(range: [f64; 2], pixels: [f64; 2]) -> Self {
+        let from = range[0].max(1e-300);
+        let to = range[1].max(from * 1.5);
+        Self {
+            log: true,
+            ..Self::new([from, to], pixels)
+        }
+    }
+
+    /// Where a value lies, kept within the axis.
+    pub fn at(&self, value: f64) -> f64 {
+        let share = if self.log {
+            (value.max(1e-300) / self.from).ln() / (self.to / self.from).ln()
+        } else {
+            (value - self.from) / (self.to - self.from)
+        };
+        self.start + (self.end - self.start) * share.clamp(0.0, 1.0)
+    }
+
+    /// Round values along the axis with their labels, about `most` of them.
+    pub fn ticks(&self, most: usize) -> Vec<(f64, String)> {
+        if most == 0 {
+            return Vec::new();
+        }
+        if self.log {
+            return self.decade_ticks(most);
+        }
+        let step = round_step((self.to - self.from) / most.max(1) as f64);
+        let first = (self.from / step - 1e-9).ceil();
+        let mut ticks = Vec::new();
+        for k in 0..=2 * most.max(1) {
+            let value = (first + k as f64) * step;
+            if value > self.to + 1e-9 * step {
+                break;
+            }
+            ticks.push((value, label(value, step)));
+        }
+        ticks
+    }
+
+    fn decade_ticks(&self, most: usize) -> Vec<(f64, String)> {
+        let decades = (self.to / self.from).log10();
+        let mut ticks = Vec::new();
+        let steps: &[f64] = if decades <= 2.0 {
+            &[1.0, 2.0, 5.0]
+        } else {
+            &[1.0]
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "exponents of ten")]
+        let (low, high) = (
+            self.from.log10().floor() as i32,
+            self.to.log10().ceil() as i32,
+        );
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a few decades"
+        )]
+        let every = ((decades / most.max(1) as f64).ceil() as usize).max(1);
+        for exponent in (low..=high).step_by(every) {
+            for step in steps {
+                let value = step * 10_f64.powi(exponent);
+                if value >= self.from * 0.999 && value <= self.to * 1.001 {
+                    ticks.push((value, label(value, value)));
+                }
+            }
+        }
+        ticks
+    }
+}
+
+/// The next of 1, 2 or 5 times a power of ten that is not below a number.
+fn round_step(rough: f64) -> f64 {
+    let rough = rough.max(f64::MIN_POSITIVE * 1e10);
+    let decade = 10_f64.powf(rough.log10().floor());
+    let steps = [1.0, 2.0, 5.0, 10.0];
+    let step = steps.into_iter().find(|s| s * decade >= rough * 0.999);
+    step.unwrap_or(10.0) * decade
+}
+
+/// A tick's label with as many digits as steps need.
+fn label(value: f64, step: f64) -> String {
+    if value.abs() < 1e-9 * step.abs() {
+        return "0".to_owned();
+    }
+    if value.abs() >= 1e5 || step.abs() < 1e-4 {
+        let text = format!("{value:.1e}");
+        return text.replace(".0e", "e");
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a few decimals"
+    )]
+    let decimals = (-(step.abs() * 1.001).log10().floor()).max(0.0) as usize;
+    format!("{value:.decimals$}").replace('-', "−")
+}
+
+/// A picture as it grows.
+pub struct Picture {
+    body: String,
+    width: f64,
+    height: f64,
+}
+
+impl Picture {
+    /// An empty one.
+    pub fn new(width: f64, height: f64) -> Self {
+        Self {
+            body: String::new(),
+            width,
+            height,
+        }
+    }
+
+    /// Grid, ticks and a frame around a pair of axes; `x` may be without labels.
+    pub fn frame(&mut self, x: &Axis, y: &Axis, title: &str, n_ticks: [usize; 2]) {
+        let (left, right) = (x.start, x.end);
+        let (bottom, top) = (y.start, y.end);
+        for (value, label) in x.ticks(n_ticks[0]) {
+            let at = x.at(value);
+            let _ = write!(
+                self.body,
+                r#"<path class="grid" d="M{at:.1} {top:.1}V{bottom:.1}"/><text class="tick" x="{at:.1}" y="{:.1}" text-anchor="middle">{label}</text>"#,
+                bottom + 15.0
+            );
+        }
+        for (value, label) in y.ticks(n_ticks[1]) {
+            let at = y.at(value);
+            let _ = write!(
+                self.body,
+                r#"<path class="grid" d="M{left:.1} {at:.1}H{right:.1}"/><text class="tick" x="{:.1}" y="{:.1}" text-anchor="end">{label}</text>"#,
+                left - 6.0,
+                at + 4.0
+            );
+        }
+        let _ = write!(
+            self.body,
+            r#"<path class="frame" d="M{left:.1} {top:.1}H{right:.1}V{bottom:.1}H{left:.1}Z"/>"#
+        );
+        if !title.is_empty() {
+            let _ = write!(
+                self.body,
+                r#"<text class="tick" x="{right:.1}" y="{:.1}" text-anchor="end">{}</text>"#,
+                bottom + 31.0,
+                escape(title)
+            );
+        }
+    }
+
+    /// A path with a class.
+    pub fn path(&mut self, class: &str, d: &str) {
+        let _ = write!(self.body, r#"<path class="{class}" d="{d}"/>"#);
+    }
+
+    /// Text at a place; `anchor` as SVG has it.
+    pub fn text(&mut self, class: &str, at: [f64; 2], anchor: &str, text: &str) {
+        let _ = write!(
+            self.body,
+            r#"<text class="{class}" x="{:.1}" y="{:.1}" text-anchor="{anchor}">{}</text>"#,
+            at[0],
+            at[1],
+            escape(text)
+        );
+    }
+
+    /// A rectangle from one corner to the opposite one.
+    pub fn rect(&mut self, class: &str, a: [f64; 2], b: [f64; 2]) {
+        let _ = write!(
+            self.body,
+            r#"<rect class="{class}" x="{:.1}" y="{:.1}" width="{:.1}" height="{:.1}"/>"#,
+            a[0].min(b[0]),
+            a[1].min(b[1]),
+            (a[0] - b[0]).abs(),
+            (a[1] - b[1]).abs()
+        );
+    }
+
+    /// A dot.
+    pub fn dot(&mut self, class: &str, at: [f64; 2], radius: f64) {
+        let _ = write!(
+            self.body,
+            r#"<circle class="{class}" cx="{:.1}" cy="{:.1}" r="{radius}"/>"#,
+            at[0], at[1]
+        );
+    }
+
+    /// The picture's text; `says` is what it shows, for those who cannot see it.
+    pub fn finish(self, says: &str) -> String {
+        format!(
+            r#"<svg role="img" aria-label="{}" viewBox="0 0 {:.0} {:.0}">{}</svg>"#,
+            attribute(says),
+            self.width,
+            self.height,
+            self.body
+        )
+    }
+}
+
+/// Text within an attribute.
+pub fn attribute(text: &str) -> String {
+    escape(text).replace('"', "&quot;")
+}
+
+/// A curve over an axis, thinned to what can be seen; values that are no numbers are gaps.
+pub fn line(values: &[f64], x: &Axis, span: [f64; 2], y: &Axis, points: usize) -> String {
+    let last = values.len().max(2) - 1;
+    let mut d = String::new();
+    let mut pen = 'M';
+    for (i, value) in thinned(values, points) {
+        if !value.is_finite() {
+            pen = 'M';
+            continue;
+        }
+        let at = span[0] + (span[1] - span[0]) * i as f64 / last as f64;
+        let _ = write!(d, "{pen}{:.0} {:.1}", x.at(at), y.at(value));
+        pen = 'L';
+    }
+    d
+}
+
+/// Least and largest of all finite values.
+pub fn range<'a>(values: impl IntoIterator<Item = &'a f64>) -> [f64; 2] {
+    let finite = values.into_iter().filter(|v| v.is_finite());
+    finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
+        [low.min(*v), high.max(*v)]
+    })
+}
+
+/// The range with some room at both ends.
+pub fn with_room([low, high]: [f64; 2], share: f64) -> [f64; 2] {
+    let room = share * (high - low);
+    [low - room, high + room]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_within_the_axis() {
+        let axis = Axis::new([-0.37, 1.13], [0.0, 100.0]);
+        let labels: Vec<String> = axis.ticks(6).into_iter().map(|(_, l)| l).collect();
+        assert_eq!(labels, ["0", "0.5", "1.0"]);
+        let axis = Axis::decades([3e-4, 0.2], [0.0, 100.0]);
+        let ticks: Vec<f64> = axis.ticks(6).into_iter().map(|(v, _)| v).collect();
+        assert_eq!(ticks.len(), 3);
+        assert!((axis.at(0.2) - 100.0).abs() < 1e-9 && axis.at(3e-4).abs() < 1e-9);
+    }
+
+    #[test]
+    fn odd_ranges_do_no_harm() {
+        for range in [[0.0, 0.0], [f64::NAN, 1.0], [5.0, 5.0], [1e300, -1e300]] {
+            let axis = Axis::new(range, [0.0, 100.0]);
+            assert!(
+                axis.at(0.0).is_finite() && axis.ticks(5).len() < 20,
+                "{range:?}"
+            );
+        }
+    }
+}

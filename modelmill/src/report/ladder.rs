@@ -1,0 +1,95 @@
+//! The ladder: errors on fit and check step by step on an axis of decades, against the noise of the forces.
+
+use modelmill_identify::diagnose::Rung;
+
+use super::draw::{Axis, Picture, WIDTH};
+use crate::diagnose::words::{self, Judged};
+use crate::text::table::percent;
+
+/// Least height of a step, and that of a line of its label.
+const ROW: f64 = 46.0;
+const LINE: f64 = 14.0;
+const TOP: f64 = 34.0;
+const LEFT: f64 = 290.0;
+/// Longest line of a label.
+const LETTERS: usize = 38;
+
+/// The picture.
+pub fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
+    let errors = ladder.iter().flat_map(|rung| [rung.fit, rung.check]);
+    let all: Vec<f64> = errors.chain([noise]).filter(|e| *e > 0.0).collect();
+    let low = all.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = all.iter().copied().fold(0.0, f64::max);
+    if !low.is_finite() {
+        return String::new();
+    }
+    let labels: Vec<Vec<String>> = ladder
+        .iter()
+        .map(|rung| words::lines(&words::rung(rung), LETTERS))
+        .collect();
+    let longest = labels.iter().map(Vec::len).max().unwrap_or(1);
+    let row = ROW.max(LINE * longest as f64 + 8.0);
+    let bottom = TOP + row * ladder.len() as f64;
+    let percents = [100.0 * low / 1.6, 100.0 * high * 1.6];
+    let x = Axis::decades(percents, [LEFT, WIDTH - 110.0]);
+    let y = Axis::new([0.0, 1.0], [bottom, TOP]);
+    let mut picture = Picture::new(WIDTH, bottom + 40.0);
+    picture.frame(&x, &y, "error / force, %", [7, 0]);
+    if noise > 0.0 {
+        let at = x.at(100.0 * noise);
+        picture.path("noise", &format!("M{at:.1} {TOP:.1}V{bottom:.1}"));
+        let anchor = if at > 0.5 * (x.start + x.end) {
+            "end"
+        } else {
+            "start"
+        };
+        let aside = if anchor == "end" { -5.0 } else { 5.0 };
+        picture.text(
+            "tick",
+            [at + aside, TOP - 8.0],
+            anchor,
+            &format!("noise {}", percent(Some(noise))),
+        );
+    }
+    let mut last: Option<[f64; 3]> = None;
+    for (k, rung) in ladder.iter().enumerate() {
+        let middle = TOP + row * (k as f64 + 0.5);
+        let [fit, check] = [rung.fit, rung.check].map(|e| x.at(100.0 * e));
+        if let Some([fit_before, check_before, before]) = last {
+            picture.path(
+                "rung c-fit",
+                &format!("M{fit_before:.1} {before:.1}L{fit:.1} {:.1}", middle - 7.0),
+            );
+            picture.path(
+                "rung c-after",
+                &format!(
+                    "M{check_before:.1} {:.1}L{check:.1} {:.1}",
+                    before + 14.0,
+                    middle + 7.0
+                ),
+            );
+        }
+        picture.dot("dot c-fit", [fit, middle - 7.0], 5.0);
+        picture.dot("dot c-after", [check, middle + 7.0], 5.0);
+        last = Some([fit, check, middle - 7.0]);
+        let right = WIDTH - 104.0;
+        picture.text(
+            "tick c-fit",
+            [right, middle - 3.0],
+            "start",
+            &format!("fit {}", percent(Some(rung.fit))),
+        );
+        picture.text(
+            "tick c-after",
+            [right, middle + 12.0],
+            "start",
+            &format!("{} {}", judged.short(), percent(Some(rung.check))),
+        );
+        for (i, line) in labels[k].iter().enumerate() {
+            let up = 0.5 * LINE * (labels[k].len() as f64 - 1.0);
+            let at = [LEFT - 12.0, middle + 4.0 - up + LINE * i as f64];
+            picture.text("label", at, "end", line);
+        }
+    }
+    picture.finish("errors on the fit and where it was not fitted, step by step")
+}

@@ -1,0 +1,28 @@
+//! `report`: what a diagnosis found as one self-contained page.
+//!
+//! `words`, `tables`, and pictures (`ladder`, `curves`, `maps`, `regions`, `spectrum`) -> `page`. The pictures stand by
+//! themselves; `page.js` makes curves that can be zoomed and tables that can be sorted out of them.
+
+mod curves;
+mod draw;
+mod ladder;
+mod maps;
+mod page;
+mod regions;
+mod spectrum;
+pub mod svg;
+mod tables;
+mod units;
+
+use crate::diagnose::{Findings, Version, words};
+
+pub use page::page;
+
+/// Which colour is which model.
+fn keys(with_after: bool) -> &'static str {
+    if with_after {
+        "<span class=\"key c-before\">as it is</span> <span class=\"key c-after\">with the effects</span>"
+    } else {
+        "<span class=\"key c-before\">as it is</span>"
+    }
+}

@@ -1,0 +1,282 @@
+//! The page: what a user asks, in that order; one file that needs no other.
+
+use std::fmt::Write as _;
+
+use modelmill_codegen::review::Format;
+use modelmill_identify::diagnose::Verdict;
+
+use super::{Findings, curves, keys, ladder, maps, regions, spectrum, tables, words};
+use crate::compare::Places;
+use crate::error::Outcome;
+use crate::print::Spelling;
+use crate::report::svg::escape;
+use crate::text::table::percent;
+
+/// The page's text; `spelling` says how its reader asks for what it advises.
+///
+/// Fails only when whoever watches stops it.
+pub fn page(findings: &Findings, spelling: &dyn Spelling) -> Outcome<String> {
+    let last = findings.last();
+    let equations = last.model.equations(Format::Html)?.text;
+    let name = &findings.before.model.name;
+    let mut page = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <title>{0}: what the model lacks</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{1}{2}</style>\n</head>\n\
+         <body>\n<main>\n<h1>{0}: what the model lacks</h1>\n",
+        escape(name),
+        between(&equations, "<style>", "</style>"),
+        include_str!("page.css"),
+    );
+    let sections = [
+        ("ladder", "How the error falls", the_ladder(findings)),
+        (
+            "found",
+            "What was found, and how to go on",
+            found(findings, spelling),
+        ),
+        (
+            "curves",
+            "Measured and calculated forces",
+            the_curves(findings),
+        ),
+        ("where", "Where the error lives", location(findings)),
+        (
+            "frequency",
+            "At which frequencies",
+            spectrum::figures(&findings.before, findings.after.as_ref().ok()),
+        ),
+        ("candidates", "What else was tried", candidates(findings)),
+        ("parameters", "Parameters", parameters(findings)),
+        (
+            "data",
+            "What was done to the recordings",
+            tables::data(findings),
+        ),
+        ("equations", "Equations", embedded(findings, &equations)),
+    ];
+    page.push_str("<nav>");
+    for (id, title, _) in &sections {
+        let _ = write!(page, "<a href=\"#report-{id}\">{title}</a> ");
+    }
+    page.push_str("</nav>\n");
+    page.push_str(&summary(findings));
+    for (id, title, html) in &sections {
+        let _ = write!(
+            page,
+            "<section id=\"report-{id}\">\n<h2>{title}</h2>\n{html}</section>\n"
+        );
+    }
+    page.push_str("</main>\n<script>\n");
+    page.push_str(include_str!("page.js"));
+    page.push_str("</script>\n</body>\n</html>\n");
+    Ok(page)
+}
+
+/// What stands between two marks; empty if they are missing.
+fn between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
+    let inner = text
+        .split_once(from)
+        .and_then(|(_, rest)| rest.split_once(to));
+    inner.map_or("", |(inner, _)| inner)
+}
+
+fn summary(findings: &Findings) -> String {
+    let diagnosis = &findings.diagnosis;
+    let (class, word) = match diagnosis.verdict {
+        Verdict::Adequate => ("adequate", "adequate"),
+        Verdict::MissingEffect => ("missing", "an effect is missing"),
+        Verdict::Unexplained => ("unexplained", "unexplained"),
+    };
+    let says = words::verdict(diagnosis, &findings.before.model.drives(), findings.judged);
+    let mut tiles = vec![("verdict", word.to_owned())];
+    if let (Some(first), Some(last)) = (diagnosis.ladder.first(), diagnosis.ladder.last()) {
+        tiles.push(("error as it is", percent(Some(first.check))));
+        if diagnosis.ladder.len() > 1 {
+            tiles.push(("with the effects", percent(Some(last.check))));
+        }
+    }
+    tiles.push(("noise", percent(Some(diagnosis.noise_floor))));
+    let tiles: Vec<String> = tiles
+        .iter()
+        .map(|(name, value)| format!("<div><dt>{name}</dt><dd>{}</dd></div>", escape(value)))
+        .collect();
+    format!(
+        "<p class=\"verdict {class}\">{}</p>\n<dl class=\"tiles\">{}</dl>\n",
+        escape(&says),
+        tiles.join("")
+    )
+}
+
+fn the_ladder(findings: &Findings) -> String {
+    let diagnosis = &findings.diagnosis;
+    format!(
+        "<figure class=\"still\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
+         <span class=\"key c-after\">{}</span></figcaption>\n{}</figure>\n{}\n\
+         <p>An error is the root of the squared difference of measured and calculated forces over the squared measured ones. \
+         Steps were judged {}.</p>\n{}",
+        findings.judged.words(),
+        ladder::picture(&diagnosis.ladder, diagnosis.noise_floor, findings.judged),
+        tables::ladder(findings),
+        findings.judged.words(),
+        tables::drives(findings)
+    )
+}
+
+fn found(findings: &Findings, spelling: &dyn Spelling) -> String {
+    if findings.entries.is_empty() {
+        let says = match findings.diagnosis.verdict {
+            Verdict::Adequate => {
+                "Nothing needs to be added. The parameters below are those that the recordings ask for."
+            }
+            _ => {
+                "No effect of the library may be added in good faith. Below it says where the error lives; a kind of your own \
+                 can be given in the model file or a library (<code>modelmill help diagnose</code>)."
+            }
+        };
+        return format!("<p>{says}</p>\n");
+    }
+    let mut html = tables::effects(findings);
+    if let Err(says) = &findings.after {
+        let _ = writeln!(
+            html,
+            "<p class=\"alias\">The model with these effects could not be made: {}</p>",
+            escape(says)
+        );
+    }
+    let model = &findings.before.model;
+    let mut commands: Vec<String> = findings
+        .entries
+        .iter()
+        .map(|entry| spelling.add(model, entry))
+        .collect();
+    commands.push(spelling.identify(model));
+    let _ = writeln!(
+        html,
+        "<p>Add it to the model file, which keeps its comments, and identify again:</p>\n<pre class=\"commands\"><code>{}</code></pre>",
+        escape(&commands.join("\n"))
+    );
+    html
+}
+
+fn the_curves(findings: &Findings) -> String {
+    format!(
+        "<p class=\"script-only\">Turn the wheel over a picture to zoom, drag to move, drag with Shift to mark a stretch, double \
+         click for the whole. With the keyboard: + and −, arrows, 0. A click on a name hides its curve.</p>\n{}",
+        curves::section(&findings.before, findings.after.as_ref().ok())
+    )
+}
+
+fn location(findings: &Findings) -> String {
+    let after = findings.after.as_ref().ok();
+    let mut html = String::new();
+    html.push_str(&sentences(
+        &findings.places,
+        "The error of the model as it is",
+    ));
+    if !findings.places.regions.is_empty() {
+        let _ = writeln!(
+            html,
+            "<p>Each picture shows mean and standard deviation of the error over its variable, the region shaded. {}</p>",
+            keys(after.is_some())
+        );
+        html.push_str(&regions::figures(
+            &findings.places.regions,
+            &findings.before,
+            after,
+            &findings.variables,
+        ));
+    }
+    if let Some(left) = &findings.left {
+        html.push_str("<h3>What is left with the effects</h3>\n");
+        html.push_str(&sentences(left, "What is left"));
+        if !left.regions.is_empty() {
+            html.push_str("<ul>\n");
+            for region in &left.regions {
+                let _ = writeln!(
+                    html,
+                    "<li>{}.</li>",
+                    escape(&regions::sentence(region, &findings.before.model))
+                );
+            }
+            html.push_str("</ul>\n");
+        }
+    }
+    html.push_str("<h3>Error maps</h3>\n");
+    html.push_str(&maps::figures(&findings.before, after, &findings.variables));
+    html
+}
+
+/// What there is to say where there is no region.
+fn sentences(places: &Places, what: &str) -> String {
+    let mut html = String::new();
+    if !places.rounding.is_empty() {
+        let _ = writeln!(
+            html,
+            "<p>{what} of {} is rounding of the numbers in the recording: there is nothing to find.</p>",
+            escape(&places.rounding.join(", "))
+        );
+    } else if places.regions.is_empty() {
+        let _ = writeln!(
+            html,
+            "<p>No region of coordinates, rates, loads or time stands out in {}.</p>",
+            what.to_lowercase()
+        );
+    }
+    html
+}
+
+fn candidates(findings: &Findings) -> String {
+    format!(
+        "<p>Every kind of the library at every place that it fits. The first share is of the squared error of the model as it is; \
+         the gain is of what is left beside the effects that were found, for a found one what would be lost without it.\
+         <span class=\"script-only\"> A click on a head sorts.</span></p>\n{}",
+        tables::candidates(findings)
+    )
+}
+
+fn parameters(findings: &Findings) -> String {
+    if findings.before.identified.is_none() {
+        return tables::parameters(&findings.before);
+    }
+    let mut html = String::new();
+    match &findings.after {
+        Ok(after) => {
+            html.push_str("<p>Base parameters of the model with the effects, identified from the recordings of the fit with drives weighted by their residuals. Deviations allow for residuals that resemble their neighbours.</p>\n");
+            html.push_str(&tables::parameters(after));
+            let _ = writeln!(
+                html,
+                "<details>\n<summary>The same without the effects</summary>\n{}</details>",
+                tables::parameters(&findings.before)
+            );
+        }
+        Err(_) => {
+            html.push_str("<p>Base parameters, identified from the recordings of the fit with drives weighted by their residuals. Deviations allow for residuals that resemble their neighbours.</p>\n");
+            html.push_str(&tables::parameters(&findings.before));
+        }
+    }
+    html
+}
+
+/// The page of equations within this one: names of places on it get a prefix, headings go down two steps.
+fn embedded(findings: &Findings, page: &str) -> String {
+    let inner = between(page, "<main>", "</main>")
+        .replace(" id=\"", " id=\"equations-")
+        .replace("href=\"#", "href=\"#equations-");
+    let mut inner = inner;
+    for (from, to) in [("h3", "h5"), ("h2", "h4"), ("h1", "h3")] {
+        inner = inner
+            .replace(&format!("<{from} "), &format!("<{to} "))
+            .replace(&format!("<{from}>"), &format!("<{to}>"))
+            .replace(&format!("</{from}>"), &format!("</{to}>"));
+    }
+    let what = if findings.after.is_ok() {
+        "The model with the effects"
+    } else {
+        "The model"
+    };
+    format!(
+        "<details class=\"embedded\">\n<summary>{what}: how it was derived, p_g, dependences, p_min, programs</summary>\n{inner}</details>\n",
+    )
+}

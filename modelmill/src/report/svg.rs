@@ -1,0 +1,179 @@
+//! Figures as SVG files: panels of curves over one axis, one below the other.
+
+use std::fmt::Write as _;
+
+const WIDTH: f64 = 900.0;
+const PANEL: f64 = 150.0;
+const GAP: f64 = 34.0;
+const LEFT: f64 = 80.0;
+const RIGHT: f64 = 16.0;
+const TOP: f64 = 44.0;
+/// Points of a curve; more would not be seen.
+const POINTS: usize = 820;
+const COLOURS: [&str; 3] = ["#1f5fa8", "#c2452d", "#2f7d4f"];
+
+/// How a panel looks, beyond what its curves say.
+#[derive(Default)]
+pub struct Look<'a> {
+    /// Largest magnitude that is shown, what is beyond is cut off; that of the curves if absent.
+    pub limit: Option<f64>,
+    /// Times of vertical lines, s.
+    pub marks: &'a [f64],
+}
+
+/// A figure as it grows.
+pub struct Figure<'a> {
+    title: String,
+    time: &'a [f64],
+    body: String,
+    panels: usize,
+}
+
+impl<'a> Figure<'a> {
+    /// A figure over the given times, s.
+    pub fn new(title: &str, time: &'a [f64]) -> Self {
+        Self {
+            title: escape(title),
+            time,
+            body: String::new(),
+            panels: 0,
+        }
+    }
+
+    /// Adds a panel with its curves, one value for each time.
+    pub fn panel(&mut self, title: &str, curves: &[(&str, &[f64])]) {
+        self.panel_with(title, curves, &Look::default());
+    }
+
+    /// The same with a scale of its own or marks.
+    pub fn panel_with(&mut self, title: &str, curves: &[(&str, &[f64])], look: &Look<'_>) {
+        let top = TOP + GAP + self.panels as f64 * (PANEL + GAP);
+        let largest = curves
+            .iter()
+            .flat_map(|(_, values)| values.iter())
+            .fold(0.0_f64, |m, v| m.max(v.abs()));
+        let limit = look.limit.unwrap_or(largest).max(f64::MIN_POSITIVE);
+        let plot_width = WIDTH - LEFT - RIGHT;
+        let y = |value: f64| top + PANEL * (0.5 - 0.5 * (value / limit).clamp(-1.0, 1.0));
+        let body = &mut self.body;
+        let _ = writeln!(
+            body,
+            r##"<rect x="{LEFT}" y="{top}" width="{plot_width}" height="{PANEL}" fill="none" stroke="#bbb"/>
+<line x1="{LEFT}" x2="{:.1}" y1="{1:.1}" y2="{1:.1}" stroke="#ddd"/>
+<text x="{LEFT}" y="{2:.1}">{3}</text>"##,
+            WIDTH - RIGHT,
+            y(0.0),
+            top - 8.0,
+            escape(title)
+        );
+        let (first, last) = (
+            self.time.first().copied().unwrap_or(0.0),
+            self.time.last().copied().unwrap_or(0.0),
+        );
+        for mark in look.marks {
+            let share = (mark - first) / (last - first).max(f64::MIN_POSITIVE);
+            let _ = writeln!(
+                body,
+                r##"<line x1="{0:.1}" x2="{0:.1}" y1="{top:.1}" y2="{1:.1}" stroke="#888" stroke-dasharray="3 3"/>"##,
+                LEFT + plot_width * share,
+                top + PANEL
+            );
+        }
+        // A scale that was asked for is a round number.
+        let text = |value: f64| match look.limit {
+            Some(_) => value.to_string(),
+            None => format!("{value:.4}"),
+        };
+        for (value, label) in [
+            (limit, text(limit)),
+            (0.0, "0".to_owned()),
+            (-limit, text(-limit)),
+        ] {
+            let label = if label.len() > 9 {
+                format!("{value:.2e}")
+            } else {
+                label
+            };
+            let _ = writeln!(
+                body,
+                r#"<text x="{:.1}" y="{:.1}" text-anchor="end" class="scale">{label}</text>"#,
+                LEFT - 6.0,
+                y(value) + 4.0
+            );
+        }
+        // Names stand side by side, the last at the right end.
+        let width = |name: &str| (6.5 * name.chars().count() as f64 + 15.0).max(80.0);
+        for (k, (name, values)) in curves.iter().enumerate() {
+            let behind: f64 = curves[k + 1..].iter().map(|(name, _)| width(name)).sum();
+            let colour = COLOURS[k % COLOURS.len()];
+            let n = values.len().max(2) - 1;
+            let mut points = String::new();
+            for (i, value) in thinned(values, POINTS) {
+                let x = LEFT + plot_width * i as f64 / n as f64;
+                let _ = write!(points, "{x:.1},{:.1} ", y(value));
+            }
+            let _ = writeln!(
+                body,
+                r#"<polyline points="{}" fill="none" stroke="{colour}" stroke-width="1.2"/>
+<text x="{:.1}" y="{:.1}" text-anchor="end" fill="{colour}">{}</text>"#,
+                points.trim_end(),
+                WIDTH - RIGHT - behind,
+                top - 8.0,
+                escape(name)
+            );
+        }
+        self.panels += 1;
+    }
+
+    /// The file's text.
+    pub fn finish(self) -> String {
+        let bottom = TOP + GAP + self.panels as f64 * (PANEL + GAP);
+        let height = bottom + 10.0;
+        let (first, last) = (
+            self.time.first().copied().unwrap_or(0.0),
+            self.time.last().copied().unwrap_or(0.0),
+        );
+        format!(
+            r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" font-family="sans-serif" font-size="13">
+<style>.scale {{ font-size: 11px; fill: #555 }}</style>
+<rect width="{WIDTH}" height="{height}" fill="#fff"/>
+<text x="{LEFT}" y="26" font-size="17">{}</text>
+{}<text x="{LEFT}" y="{:.1}" class="scale">{first} s</text>
+<text x="{:.1}" y="{:.1}" text-anchor="end" class="scale">{last} s</text>
+</svg>
+"##,
+            self.title,
+            self.body,
+            bottom - GAP + 16.0,
+            WIDTH - RIGHT,
+            bottom - GAP + 16.0,
+        )
+    }
+}
+
+/// Least and largest value of each of half as many stretches as points are wanted, with their places; all values where
+/// they are few enough.
+pub fn thinned(values: &[f64], wanted: usize) -> Vec<(usize, f64)> {
+    if values.len() <= wanted {
+        return values.iter().copied().enumerate().collect();
+    }
+    let stretch = values.len().div_ceil((wanted / 2).max(1));
+    let mut points = Vec::with_capacity(wanted + 2);
+    for (k, span) in values.chunks(stretch).enumerate() {
+        let at = |i: usize| (k * stretch + i, span[i]);
+        let by = |a: &usize, b: &usize| span[*a].total_cmp(&span[*b]);
+        let low = (0..span.len()).min_by(by).unwrap_or(0);
+        let high = (0..span.len()).max_by(by).unwrap_or(0);
+        points.push(at(low.min(high)));
+        if low != high {
+            points.push(at(low.max(high)));
+        }
+    }
+    points
+}
+
+pub fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+}

@@ -1,0 +1,382 @@
+//! Tables of the page: steps, effects, candidates, parameters, remarks on the recordings.
+
+use std::fmt::Write as _;
+
+use modelmill_identify::diagnose::Considered;
+use modelmill_identify::{FitParameter, Severity, Status};
+
+use super::draw::attribute;
+use super::units::{force_unit, pretty};
+use super::{Findings, Version, words};
+use crate::report::svg::escape;
+use crate::text::table::{percent, significant};
+
+/// Candidates that are shown at once.
+const FIRST: usize = 20;
+
+/// A cell: its text, and the number by which it is sorted.
+pub struct Cell(String, Option<f64>);
+
+impl Cell {
+    fn text(text: &str) -> Self {
+        Self(escape(text), None)
+    }
+
+    fn number(text: &str, value: f64) -> Self {
+        Self(escape(text), Some(value))
+    }
+
+    fn html(html: String) -> Self {
+        Self(html, None)
+    }
+}
+
+/// A table; columns that begin with `#` hold numbers.
+pub fn table(class: &str, head: &[&str], rows: &[Vec<Cell>]) -> String {
+    let mut html = format!("<div class=\"wide\"><table class=\"{class}\">\n<thead><tr>");
+    for name in head {
+        let (class, name) = match name.strip_prefix('#') {
+            Some(name) => (" class=\"number\"", name),
+            None => ("", *name),
+        };
+        let _ = write!(html, "<th scope=\"col\"{class}>{}</th>", escape(name));
+    }
+    html.push_str("</tr></thead>\n<tbody>\n");
+    for row in rows {
+        html.push_str("<tr>");
+        for (k, Cell(text, value)) in row.iter().enumerate() {
+            let number = head.get(k).is_some_and(|name| name.starts_with('#'));
+            let class = if number { " class=\"number\"" } else { "" };
+            let value = value.map_or_else(String::new, |v| format!(" data-value=\"{v:e}\""));
+            let _ = write!(html, "<td{class}{value}>{text}</td>");
+        }
+        html.push_str("</tr>\n");
+    }
+    html.push_str("</tbody>\n</table></div>\n");
+    html
+}
+
+/// The steps of the ladder with what spoke for them.
+pub fn ladder(findings: &Findings) -> String {
+    let diagnosis = &findings.diagnosis;
+    let rows: Vec<Vec<Cell>> = diagnosis
+        .ladder
+        .iter()
+        .map(|rung| {
+            let percents = |v: f64| Cell::number(&percent(Some(v)), v);
+            let evidence = rung.evidence;
+            let of = |f: &dyn Fn() -> Option<(String, f64)>| match f() {
+                Some((text, value)) => Cell::number(&text, value),
+                None => Cell::text(""),
+            };
+            vec![
+                Cell::text(&words::rung(rung)),
+                percents(rung.fit),
+                percents(rung.check),
+                of(&|| evidence.map(|e| (percent(Some(e.gain)), e.gain))),
+                of(&|| evidence.map(|e| (significant(e.blocks_t.min(999.0), 2), e.blocks_t))),
+                of(&|| {
+                    evidence.map(|e| (format!("{:.0}", e.effective_samples), e.effective_samples))
+                }),
+            ]
+        })
+        .collect();
+    let check = format!("#error, {}", findings.judged.short());
+    table(
+        "",
+        &[
+            "step",
+            "#error, fit",
+            &check,
+            "#squared error that goes",
+            "#deviations above zero",
+            "#independent samples",
+        ],
+        &rows,
+    )
+}
+
+/// Errors of each drive before and after, beside the noise.
+pub fn drives(findings: &Findings) -> String {
+    let nrms = |version: &Version, d: usize| -> f64 {
+        let runs = version.judged();
+        let error = version.errors(&runs, d);
+        let force = runs.iter().flat_map(|k| &version.runs[*k].measured[d]);
+        let size: f64 = force.map(|f| f * f).sum();
+        let squares: f64 = error.iter().map(|e| e * e).sum();
+        if size > 0.0 {
+            (squares / size).sqrt()
+        } else {
+            0.0
+        }
+    };
+    let before = &findings.before;
+    let rows: Vec<Vec<Cell>> = before
+        .model
+        .drives()
+        .iter()
+        .enumerate()
+        .map(|(d, drive)| {
+            let unit = force_unit(&before.model, d);
+            let noise = findings.answer.problem.noise[d];
+            let mut row = vec![Cell::text(drive)];
+            let first = nrms(before, d);
+            row.push(Cell::number(&percent(Some(first)), first));
+            if let Ok(after) = &findings.after {
+                let last = nrms(after, d);
+                row.push(Cell::number(&percent(Some(last)), last));
+            }
+            row.push(Cell::number(
+                &format!("{} {unit}", significant(noise, 2)),
+                noise,
+            ));
+            row
+        })
+        .collect();
+    let mut head = vec!["drive", "#error as it is"];
+    if findings.after.is_ok() {
+        head.push("#with the effects");
+    }
+    head.push("#noise of the force");
+    table("", &head, &rows)
+}
+
+/// What was found: values, what cannot be told from it, what it is.
+pub fn effects(findings: &Findings) -> String {
+    let answer = &findings.answer;
+    let mut html = String::new();
+    for found in &answer.diagnosis.effects {
+        let _ = writeln!(
+            html,
+            "<h3>{}</h3>",
+            escape(&capital(&words::effect(&found.effect)))
+        );
+        let kind = answer
+            .candidates
+            .kinds
+            .iter()
+            .find(|k| k.name == found.effect.kind);
+        if let Some(kind) = kind {
+            let _ = writeln!(html, "<p>{}</p>", escape(&kind.says));
+        }
+        let parameters = &answer.problem.candidates[found.candidate].parameters;
+        let values = parameters.iter().zip(&found.estimates).map(|(p, value)| {
+            format!(
+                "<code>{}</code> = {} {}",
+                escape(&p.symbol),
+                significant(*value, 4),
+                escape(&pretty(&p.unit))
+            )
+        });
+        let constants = found.constants.iter().map(|(name, value)| {
+            format!(
+                "<code>{}</code> = {} (searched for)",
+                escape(name),
+                significant(*value, 3)
+            )
+        });
+        let all: Vec<String> = values.chain(constants).collect();
+        if !all.is_empty() {
+            let _ = writeln!(html, "<p>{}</p>", all.join(", "));
+        }
+        if !found.indistinguishable_from.is_empty() {
+            let _ = writeln!(
+                html,
+                "<p class=\"alias\">These recordings cannot tell it from: {}.</p>",
+                escape(
+                    &found
+                        .indistinguishable_from
+                        .iter()
+                        .map(words::effect)
+                        .collect::<Vec<_>>()
+                        .join("; ")
+                )
+            );
+        }
+        if let Some(kind) = kind {
+            let texts = [&kind.explains, &kind.doubles];
+            let texts: Vec<String> = texts
+                .iter()
+                .filter(|text| !text.is_empty())
+                .map(|text| format!("<p>{}</p>", escape(text)))
+                .collect();
+            if !texts.is_empty() {
+                let _ = writeln!(
+                    html,
+                    "<details>\n<summary>What it is, and how to tell it from its doubles</summary>\n{}\n</details>",
+                    texts.join("\n")
+                );
+            }
+        }
+    }
+    html
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
+}
+
+/// What became of the candidates; those behind the first are folded.
+pub fn candidates(findings: &Findings) -> String {
+    let all = &findings.diagnosis.candidates;
+    let head = [
+        "kind",
+        "places",
+        "#explains alone",
+        "#gain beside what was found",
+        "verdict",
+    ];
+    let row = |c: &Considered| -> Vec<Cell> {
+        let verdict = match &c.refused {
+            None => Cell::html("<b>found</b>".to_owned()),
+            Some(why) => Cell::text(why),
+        };
+        vec![
+            Cell::text(&words::kind(&c.effect.kind)),
+            Cell::text(&c.effect.at.join(", ")),
+            share(c.explained),
+            share(c.gain),
+            verdict,
+        ]
+    };
+    let rows: Vec<Vec<Cell>> = all.iter().map(row).collect();
+    let split = FIRST.min(rows.len());
+    let mut html = table("sortable", &head, &rows[..split]);
+    if split < rows.len() {
+        let _ = writeln!(
+            html,
+            "<details>\n<summary>{} more</summary>\n{}</details>",
+            rows.len() - split,
+            table("sortable", &head, &rows[split..])
+        );
+    }
+    html
+}
+
+/// A share in per cent, of which less than a tenth is nothing.
+fn share(value: f64) -> Cell {
+    let percents = 100.0 * value;
+    let text = if percents.abs() < 0.05 {
+        "0 %".to_owned()
+    } else if percents.abs() < 10.0 {
+        format!("{percents:.1} %")
+    } else {
+        format!("{percents:.0} %")
+    };
+    Cell::number(&text.replace('-', "−"), value)
+}
+
+/// Identified parameters beside nominal ones.
+pub fn parameters(version: &Version) -> String {
+    let Some(result) = &version.identified else {
+        return "<p>All parameters are held at their nominal values.</p>\n".to_owned();
+    };
+    let row = |(k, p): (usize, &FitParameter)| -> Vec<Cell> {
+        // The nominal value of an effect that was just added is its estimate.
+        let nominal = p
+            .nominal
+            .filter(|_| !version.model.is_effect(k) && version.model.has_nominal(k));
+        let number = |v: f64| Cell::number(&significant(v, 4), v);
+        let none = || Cell::text("");
+        let std = p.std.filter(|_| p.status == Status::Identified);
+        let off = match (nominal, std) {
+            (Some(nominal), Some(std)) if std > 0.0 => Some((p.value - nominal).abs() / std),
+            _ => None,
+        };
+        vec![
+            Cell::text(&p.name),
+            Cell::html(format!(
+                "<code class=\"expression\" title=\"{}\">{}</code>",
+                attribute(&p.expression),
+                escape(&p.expression)
+            )),
+            nominal.map_or_else(none, number),
+            number(p.value),
+            match (p.status, std) {
+                (Status::Identified, Some(std)) => {
+                    Cell::number(&format!("± {}", significant(std, 2)), std)
+                }
+                (Status::Known, _) => Cell::text("known"),
+                (Status::Undetermined, _) => Cell::text("not determined"),
+                _ => none(),
+            },
+            Cell::text(&pretty(&p.unit)),
+            off.map_or_else(none, |off| {
+                let text = if off >= 1000.0 {
+                    "> 1000".to_owned()
+                } else {
+                    significant(off, 2)
+                };
+                Cell::number(&text, off)
+            }),
+        ]
+    };
+    let rows: Vec<Vec<Cell>> = result.fit.parameters.iter().enumerate().map(row).collect();
+    table(
+        "sortable",
+        &[
+            "name",
+            "expression",
+            "#nominal",
+            "#identified",
+            "#deviation",
+            "unit",
+            "#deviations off nominal",
+        ],
+        &rows,
+    )
+}
+
+/// Recordings and what was done to them.
+pub fn data(findings: &Findings) -> String {
+    let rows: Vec<Vec<Cell>> = findings
+        .before
+        .runs
+        .iter()
+        .map(|run| {
+            let n = run.time.len();
+            let span = match (run.time.first(), run.time.last()) {
+                (Some(first), Some(last)) => last - first,
+                _ => 0.0,
+            };
+            let rate = if span > 0.0 {
+                (n.max(2) - 1) as f64 / span
+            } else {
+                0.0
+            };
+            vec![
+                Cell::text(&run.name),
+                Cell::text(if run.is_check { "check" } else { "fit" }),
+                Cell::number(&n.to_string(), n as f64),
+                Cell::number(&format!("{} s", significant(span, 3)), span),
+                Cell::number(&format!("{} Hz", significant(rate, 4)), rate),
+            ]
+        })
+        .collect();
+    let mut html = table(
+        "",
+        &["recording", "for", "#samples", "#length", "#rate"],
+        &rows,
+    );
+    if findings.notes.is_empty() {
+        html.push_str("<p>Nothing was changed, and nothing looked odd.</p>\n");
+        return html;
+    }
+    html.push_str("<ul class=\"notes\">\n");
+    for note in &findings.notes {
+        let (class, word) = match note.severity {
+            Severity::Warning => ("warning", "Warning: "),
+            Severity::Info => ("info", ""),
+        };
+        let _ = writeln!(
+            html,
+            "<li class=\"{class}\">{word}{}</li>",
+            escape(&note.says)
+        );
+    }
+    html.push_str("</ul>\n");
+    html
+}

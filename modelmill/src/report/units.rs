@@ -1,0 +1,44 @@
+//! Units of what a model's recordings hold.
+
+use modelmill_spec::{DriveKind, Motion};
+
+use crate::model::Model;
+
+/// Unit of a drive's force.
+pub fn force_unit(model: &Model, drive: usize) -> &'static str {
+    let mechanism = &model.derivation.mechanism;
+    match mechanism.drives[drive].kind {
+        DriveKind::Joint(i) if mechanism.coordinates[i.0].motion == Motion::Revolute => "N m",
+        _ => "N",
+    }
+}
+
+/// Unit of a variable by its name: a coordinate or the length of a drive, their rates and accelerations, a force, the time.
+pub fn variable_unit(model: &Model, name: &str) -> String {
+    let mechanism = &model.derivation.mechanism;
+    if name == modelmill_identify::TIME_COLUMN {
+        return "s".to_owned();
+    }
+    if let Some(d) = mechanism.drives.iter().position(|d| d.name == name) {
+        return force_unit(model, d).to_owned();
+    }
+    let (of, per) = if let Some(of) = name.strip_suffix("_dd") {
+        (of, "/s²")
+    } else if let Some(of) = name.strip_suffix("_d") {
+        (of, "/s")
+    } else {
+        (name, "")
+    };
+    let of = of.strip_suffix("_length").unwrap_or(of);
+    let coordinate = mechanism.coordinates.iter().find(|c| c.name == of);
+    let unit = match coordinate {
+        Some(c) if c.motion == Motion::Revolute => "rad",
+        _ => "m",
+    };
+    format!("{unit}{per}")
+}
+
+/// A unit as it is written by hand: `kg m^2` as `kg m²`.
+pub fn pretty(unit: &str) -> String {
+    unit.replace("^2", "²").replace("^3", "³")
+}

@@ -1,0 +1,189 @@
+//! `simulate`: a rig driven along a trajectory, as a recording.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use modelmill_identify::{ReadOptions, Recording};
+use modelmill_rig::{Rig, Run, Samples, SimulationError, Trajectory, TrajectoryError};
+
+use crate::error::{Error, Outcome};
+use crate::host::Host;
+
+/// A run of a rig.
+pub struct Simulated {
+    /// The rig's name.
+    pub rig: String,
+    /// Names of its drives.
+    pub drives: Vec<String>,
+    /// What its sensors read: the columns by name, all of one length.
+    pub run: Run,
+    /// The seed of its noise.
+    pub seed: u64,
+    /// Remarks on the trajectory and the run.
+    pub notes: Vec<String>,
+}
+
+impl Simulated {
+    /// Samples of the run.
+    pub fn samples(&self) -> usize {
+        self.run.columns.first().map_or(0, |(_, time)| time.len())
+    }
+
+    /// The run as a recording (CSV).
+    pub fn csv(&self) -> String {
+        csv(&self.run)
+    }
+}
+
+impl Host {
+    /// Reads a rig file.
+    ///
+    /// Fails with every finding about it, each with its place.
+    pub fn rig(&self, path: &Path) -> Outcome<modelmill_rig::Loaded> {
+        if path.is_dir() {
+            return Err(Error::input(format!(
+                "{} is a folder; a rig file (TOML) is expected, such as those in model-spec/rigs",
+                path.display()
+            )));
+        }
+        modelmill_rig::load_file(path).map_err(|failure| {
+            if self.load(path).is_ok() {
+                return Error::input(format!(
+                    "{} is a model file; a rig file is expected, which describes the whole machine (rig/README.md; \
+                     model-spec/rigs holds some). Forces of a model along a motion come from `evaluate`",
+                    path.display()
+                ));
+            }
+            failure.into()
+        })
+    }
+
+    /// Drives a rig along a trajectory, a recording with its coordinates, and records what its sensors read; `columns` are
+    /// pairs of our names and the trajectory's.
+    ///
+    /// Fails when the trajectory lacks a coordinate, or leads where the rig cannot follow.
+    pub fn simulate(
+        &self,
+        path: &Path,
+        trajectory: &Path,
+        columns: &[(String, String)],
+        seed: Option<u64>,
+    ) -> Outcome<Simulated> {
+        let rig = self.rig(path)?.rig;
+        let recording = Recording::read_with(
+            trajectory,
+            &ReadOptions {
+                renames: columns.to_vec(),
+                ..ReadOptions::default()
+            },
+        )?;
+        let mut notes = Vec::new();
+        let trajectory = self::trajectory(&rig, &recording, &mut notes)?;
+        let steps = modelmill_rig::n_instants(&rig, &trajectory);
+        let run = self
+            .watched(&format!("simulating {}", rig.name), steps, |job| {
+                modelmill_rig::simulate(&rig, &trajectory, seed, || job.add(1))
+            })?
+            .map_err(|error| refusal(&rig, path, &recording, &trajectory, &error))?;
+        notes.extend(run.notes.iter().cloned());
+        Ok(Simulated {
+            drives: rig.drives.iter().map(|drive| drive.name.clone()).collect(),
+            seed: seed.unwrap_or(rig.seed),
+            rig: rig.name,
+            run,
+            notes,
+        })
+    }
+}
+
+/// The columns `t` and, per coordinate, its values and what there is of its derivatives.
+fn trajectory(rig: &Rig, recording: &Recording, notes: &mut Vec<String>) -> Outcome<Trajectory> {
+    let given = |name: String| -> Outcome<Option<Vec<f64>>> {
+        if recording.has(&name) {
+            Ok(Some(recording.column(&name)?.to_vec()))
+        } else {
+            Ok(None)
+        }
+    };
+    let mut samples = Vec::new();
+    let mut found = Vec::new();
+    for coordinate in &rig.coordinates {
+        let name = &coordinate.name;
+        let one = Samples {
+            q: recording.column(name)?.to_vec(),
+            qd: given(format!("{name}_d"))?,
+            qdd: given(format!("{name}_dd"))?,
+        };
+        if one.qd.is_none() || one.qdd.is_none() {
+            found.push(name.as_str());
+        }
+        samples.push(one);
+    }
+    if !found.is_empty() {
+        notes.push(format!(
+            "derivatives of {} are differences over five samples: noise or rounding of the positions would show in \
+             the forces; give the columns with _d and _dd where they are known",
+            found.join(", ")
+        ));
+    }
+    let names: Vec<&str> = rig.coordinates.iter().map(|c| c.name.as_str()).collect();
+    Trajectory::new(recording.column("t")?.to_vec(), samples).map_err(|error| {
+        let file = recording.file();
+        Error::input(match &error {
+            TrajectoryError::TimeGoesBack { sample } => {
+                format!(
+                    "{file}, line {}, column `t`: {error}",
+                    recording.line(*sample).unwrap_or(0)
+                )
+            }
+            TrajectoryError::Faulty { coordinate } => {
+                format!(
+                    "{file}, column `{}`: {error}",
+                    names.get(*coordinate).unwrap_or(&"")
+                )
+            }
+            TrajectoryError::Empty | TrajectoryError::TooShort => format!("{file}: {error}"),
+        })
+    })
+}
+
+/// Why there is no run: with the line of the trajectory where the rig could not follow.
+fn refusal(
+    rig: &Rig,
+    path: &Path,
+    recording: &Recording,
+    trajectory: &Trajectory,
+    error: &SimulationError,
+) -> Error {
+    let SimulationError::Pose { time, .. } = error else {
+        return Error::input(format!("{}: {error}", path.display()));
+    };
+    let after = trajectory.time().partition_point(|t| t <= time);
+    let line = recording.line(after.saturating_sub(1)).unwrap_or(0);
+    let state = trajectory.at(*time);
+    let pose: Vec<String> = rig
+        .coordinates
+        .iter()
+        .zip(&state.q)
+        .map(|(coordinate, q)| format!("{} = {q:.6}", coordinate.name))
+        .collect();
+    Error::input(format!(
+        "{}, line {line} ({}): {error}; check units (rad, m) and signs, and which column is which coordinate",
+        recording.file(),
+        pose.join(", ")
+    ))
+}
+
+fn csv(made: &Run) -> String {
+    let names: Vec<&str> = made.columns.iter().map(|(name, _)| name.as_str()).collect();
+    let mut text = names.join(",");
+    text.push('\n');
+    let samples = made.columns.first().map_or(0, |(_, time)| time.len());
+    for i in 0..samples {
+        for (k, (_, values)) in made.columns.iter().enumerate() {
+            let _ = write!(text, "{}{}", if k == 0 { "" } else { "," }, values[i]);
+        }
+        text.push('\n');
+    }
+    text
+}

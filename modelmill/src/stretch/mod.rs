@@ -1,0 +1,168 @@
+//! One stretch of a recording between gaps in time, ready for a model: shown block by block; faults name the time and the
+//! line of the recording.
+
+pub mod variances;
+
+use modelmill_codegen::{PoseFault, PoseReason, States};
+use modelmill_identify::decimate_time;
+use modelmill_identify::{Note, Run, place_word};
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+
+/// States that are evaluated at once: progress moves on, and memory stays small.
+pub const BLOCK: usize = 4096;
+
+/// A stretch of a recording that is ready for a model.
+#[derive(Clone)]
+pub struct Stretch {
+    /// The states and forces.
+    pub run: Run,
+    /// Variances of the forces, `[drive][sample]`, where the recording has the columns `DRIVE_var`.
+    pub variance: Option<Vec<Vec<f64>>>,
+    /// What each equation counts beside the estimator's weights, interleaved per kept sample; all the same if there are
+    /// none.
+    pub weights: Option<Vec<f64>>,
+    /// What the drives carry, `[drive][sample]`, for effects that depend on it; the measured forces if there are none.
+    pub load: Option<Vec<Vec<f64>>>,
+    /// The options that would read all angles in degrees; empty where no file stands behind.
+    pub maps_from_degrees: String,
+}
+
+impl From<Run> for Stretch {
+    /// A run without variances whose equations count all the same.
+    fn from(run: Run) -> Self {
+        Self {
+            run,
+            variance: None,
+            weights: None,
+            load: None,
+            maps_from_degrees: String::new(),
+        }
+    }
+}
+
+impl Stretch {
+    /// Samples before decimation.
+    pub fn samples(&self) -> usize {
+        self.run.samples()
+    }
+
+    /// Every how many samples one is kept.
+    pub fn decimation(&self) -> usize {
+        self.run.prepared.decimate.max(1)
+    }
+
+    /// Times of the samples that are kept.
+    pub fn time(&self) -> Vec<f64> {
+        decimate_time(&self.run.time, self.decimation())
+    }
+
+    /// Keeps a remark, and passes it on to whoever watches.
+    pub(crate) fn note(&mut self, model: &Model, note: Note) {
+        model.host().note(&note);
+        self.run.notes.push(note);
+    }
+
+    /// Whether both hold the same numbers.
+    pub(crate) fn is_twin_of(&self, other: &Self) -> bool {
+        let (a, b) = (&self.run, &other.run);
+        a.time == b.time && a.q == b.q && a.qd == b.qd && a.qdd == b.qdd && a.force == b.force
+    }
+
+    /// Remarks, for the JSON.
+    pub fn notes(&self) -> &[Note] {
+        &self.run.notes
+    }
+
+    /// Calls `visit` with one block of states after the other; `visit` may find a pose without answer.
+    pub fn for_each_block<E: From<Error>>(
+        &self,
+        model: &Model,
+        mut visit: impl FnMut(&States<'_>) -> Result<Result<(), PoseFault>, E>,
+    ) -> Result<(), E> {
+        self.check_load(model)?;
+        let n = self.samples();
+        let mut start = 0;
+        while start < n {
+            let end = (start + BLOCK).min(n);
+            let states = self.states(start, end);
+            visit(&states)?.map_err(|fault| self.fault(model, fault, start))?;
+            start = end;
+        }
+        Ok(())
+    }
+
+    /// Some of the states.
+    pub fn states(&self, start: usize, end: usize) -> States<'_> {
+        States {
+            q: slices(&self.run.q, start, end),
+            qd: slices(&self.run.qd, start, end),
+            qdd: slices(&self.run.qdd, start, end),
+            load: slices(self.loads(), start, end),
+        }
+    }
+
+    fn loads(&self) -> &[Vec<f64>] {
+        let loads = self.load.as_deref().or(self.run.force.as_deref());
+        loads.unwrap_or(&[])
+    }
+
+    fn check_load(&self, model: &Model) -> Outcome {
+        let effects = model.load_dependent();
+        if effects.is_empty() || self.run.force.is_some() {
+            return Ok(());
+        }
+        Err(Error::input(format!(
+            "{}: {} depends on the load that the drives carry, but the recording lacks the measured force of {}; \
+             record it, or name its column with --map",
+            self.run.file,
+            effects.join(", "),
+            self.run.missing_force.join(", ")
+        )))
+    }
+
+    /// A pose without answer, with its place in the recording.
+    pub fn fault(&self, model: &Model, fault: PoseFault, start: usize) -> Error {
+        let sample = start + fault.sample;
+        let time = self.run.time.get(sample).copied().unwrap_or(f64::NAN);
+        let line = self.run.lines.get(sample).copied().unwrap_or(0);
+        let place = place_word(&self.run.file);
+        let pose: Vec<String> = model
+            .active()
+            .iter()
+            .zip(&self.run.q)
+            .map(|(name, q)| format!("{name} = {:.6}", q.get(sample).copied().unwrap_or(f64::NAN)))
+            .collect();
+        let (what, todo) = match fault.reason {
+            PoseReason::NotFinite { input } => {
+                return Error::input(format!(
+                    "{}, {place} {line} (t = {time} s): `{input}` is no finite number",
+                    self.run.file
+                ));
+            }
+            PoseReason::OutOfReach => (
+                "the loops cannot close at this pose",
+                "check the units (rad, m) and the signs of the positions, which column is which \
+                 coordinate (--map), and the lengths in the model file",
+            ),
+            PoseReason::Undefined => (
+                "a term of the model has no finite value at this state",
+                "look at the effects whose expressions hold quotients, roots or exponentials",
+            ),
+            PoseReason::Singular => (
+                "the mechanism is singular at this pose, so that forces are not determined",
+                "leave the poses around it out of the recording, and check which column is which coordinate (--map)",
+            ),
+        };
+        Error::input(format!(
+            "{}, {place} {line} (t = {time} s): {what} ({}); {todo}",
+            self.run.file,
+            pose.join(", ")
+        ))
+    }
+}
+
+fn slices(columns: &[Vec<f64>], start: usize, end: usize) -> Vec<&[f64]> {
+    columns.iter().map(|column| &column[start..end]).collect()
+}

@@ -1,0 +1,71 @@
+//! Variances of the measured forces, where a recording has them: columns `DRIVE_var`, as the mean of many periods leaves
+//! them beside it.
+
+use modelmill_identify::{Recording, Run, place_word};
+
+use crate::error::{Error, Outcome};
+
+/// The column with the variance of a drive's force.
+pub fn column(drive: &str) -> String {
+    format!("{drive}_var")
+}
+
+/// Variances for the samples of a run, `[drive][sample]`; nothing unless all drives have them.
+pub fn of(recording: &Recording, run: &Run, drives: &[String]) -> Outcome<Option<Vec<Vec<f64>>>> {
+    if drives.is_empty() || !drives.iter().all(|drive| recording.has(&column(drive))) {
+        return Ok(None);
+    }
+    // A run may have lost samples at its ends and at gaps; lines of the file tell which are left.
+    let lines: Vec<u64> = (0..recording.samples())
+        .filter_map(|i| recording.line(i))
+        .collect();
+    let places: Option<Vec<usize>> = run
+        .lines
+        .iter()
+        .map(|line| lines.binary_search(line).ok())
+        .collect();
+    let Some(places) = places else {
+        return Err(Error::input(format!(
+            "{}: the variances cannot be matched with the samples that are left after preparation; leave out --weights \
+             variance",
+            run.file
+        )));
+    };
+    let column_of = |drive: &String| -> Outcome<Vec<f64>> {
+        let values = recording.column(&column(drive))?;
+        Ok(places.iter().map(|at| values[*at]).collect())
+    };
+    drives
+        .iter()
+        .map(column_of)
+        .collect::<Outcome<Vec<_>>>()
+        .map(Some)
+}
+
+/// What rows are multiplied by: one over the standard deviation, interleaved per sample; every `every`-th sample.
+pub fn factors(
+    variance: &[Vec<f64>],
+    run: &Run,
+    drives: &[String],
+    every: usize,
+) -> Outcome<Vec<f64>> {
+    let samples = variance.first().map_or(0, Vec::len);
+    let mut factors = Vec::with_capacity(samples.div_ceil(every) * drives.len());
+    for sample in (0..samples).step_by(every) {
+        for (drive, values) in drives.iter().zip(variance) {
+            let value = values[sample];
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(Error::input(format!(
+                    "{}, {} {}: {} = {value}, but a variance must be a positive number for --weights variance; leave such \
+                     samples out of the recording",
+                    run.file,
+                    place_word(&run.file),
+                    run.lines.get(sample).copied().unwrap_or(0),
+                    column(drive)
+                )));
+            }
+            factors.push(value.sqrt().recip());
+        }
+    }
+    Ok(factors)
+}

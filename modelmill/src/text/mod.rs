@@ -1,0 +1,6 @@
+//! Text for people: tables, numbers, marks for a terminal.
+
+pub mod style;
+pub mod table;
+
+pub use style::Style;

@@ -1,0 +1,119 @@
+//! Tables and numbers in text.
+
+/// How a column stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Align {
+    /// Text.
+    Left,
+    /// Numbers.
+    Right,
+}
+
+/// Lays out rows under a head, two blanks between columns, `indent` blanks in front; no trailing blanks.
+pub fn table(indent: usize, columns: &[(&str, Align)], rows: &[Vec<String>]) -> Vec<String> {
+    let head: Vec<String> = columns.iter().map(|(name, _)| (*name).to_owned()).collect();
+    let all: Vec<&Vec<String>> = std::iter::once(&head).chain(rows).collect();
+    let widths: Vec<usize> = (0..columns.len())
+        .map(|j| {
+            all.iter()
+                .filter_map(|row| row.get(j))
+                .map(|cell| cell.chars().count())
+                .max()
+                .unwrap_or(0)
+        })
+        .collect();
+    all.iter()
+        .map(|row| {
+            let mut line = " ".repeat(indent);
+            for (j, (_, align)) in columns.iter().enumerate() {
+                let cell = row.get(j).map_or("", String::as_str);
+                let fill = " ".repeat(widths[j] - cell.chars().count());
+                let parts = match align {
+                    Align::Left => [cell, &fill],
+                    Align::Right => [&fill, cell],
+                };
+                line.extend(parts);
+                line.push_str("  ");
+            }
+            line.trim_end().to_owned()
+        })
+        .collect()
+}
+
+/// A number with six significant digits, without needless zeros.
+pub fn number(value: f64) -> String {
+    significant(value, 6)
+}
+
+/// A number with some significant digits; very large and very small ones with an exponent.
+pub fn significant(value: f64, digits: usize) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    if !value.is_finite() {
+        return value.to_string();
+    }
+    let scientific = format!("{value:.*e}", digits.saturating_sub(1));
+    let exponent: i32 = scientific
+        .split_once('e')
+        .and_then(|(_, e)| e.parse().ok())
+        .unwrap_or(0);
+    if !(-4..9).contains(&exponent) {
+        return scientific;
+    }
+    let decimals = usize::try_from(i32::try_from(digits).unwrap_or(6) - 1 - exponent).unwrap_or(0);
+    format!("{value:.decimals$}")
+}
+
+/// A relative figure in per cent: `11.3 %`, `6.28e-5 %`.
+pub fn percent(value: Option<f64>) -> String {
+    match value {
+        None => "-".to_owned(),
+        Some(0.0) => "0 %".to_owned(),
+        Some(value) => format!("{} %", short(100.0 * value)),
+    }
+}
+
+/// Three significant digits, with an exponent below a thousandth.
+fn short(value: f64) -> String {
+    if value.abs() < 1e-3 {
+        format!("{value:.2e}")
+    } else {
+        significant(value, 3)
+    }
+}
+
+/// `1 loop`, `2 loops`.
+pub fn count(n: usize, one: &str, many: &str) -> String {
+    if n == 1 {
+        format!("1 {one}")
+    } else {
+        format!("{n} {many}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_their_significant_digits() {
+        assert_eq!(number(95.108_912_3), "95.1089");
+        assert_eq!(number(-0.001_234_567), "-0.00123457");
+        assert_eq!(number(7_290_000.0), "7290000");
+        assert_eq!(number(1.5e-9), "1.50000e-9");
+        assert_eq!(number(999_999.9), "1000000");
+        assert_eq!(percent(Some(0.112_85)), "11.3 %");
+        assert_eq!(percent(None), "-");
+    }
+
+    #[test]
+    fn columns_line_up() {
+        let rows = [
+            vec!["a".to_owned(), "1".to_owned()],
+            vec!["long".to_owned(), "10".to_owned()],
+        ];
+        let lines = table(2, &[("name", Align::Left), ("n", Align::Right)], &rows);
+        assert_eq!(lines, ["  name   n", "  a      1", "  long  10"]);
+    }
+}
