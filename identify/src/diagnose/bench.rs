@@ -5,10 +5,11 @@ use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::column::Column;
 use super::factored::Factored;
 use super::noise::effective_samples;
 use super::pool::{On, Pool, dot, solve};
-use super::problem::{Candidate, Choice, Column, EffectParameter, Problem, Sign, Source, Supply};
+use super::problem::{Candidate, Choice, EffectParameter, Problem, Sign, Source, Supply};
 
 /// A column of which the others leave a smaller share of squares than this says nothing new.
 const SAID: f64 = 1e-6;

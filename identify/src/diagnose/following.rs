@@ -5,8 +5,9 @@ use std::collections::HashMap;
 use nalgebra::DVector;
 
 use super::bench::{Bench, Pick};
+use super::column::Column;
 use super::pool::{On, solve};
-use super::problem::{Candidate, Column, Source};
+use super::problem::{Candidate, Source};
 
 impl Bench<'_> {
     /// Candidates that depend on what the drives carry, with the columns that a fit gives them.

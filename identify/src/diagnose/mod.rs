@@ -12,6 +12,7 @@
 
 mod aliases;
 mod bench;
+mod column;
 mod delays;
 mod evidence;
 mod factored;
@@ -27,11 +28,12 @@ mod tuning;
 
 use serde::Serialize;
 
+pub use column::Column;
 pub use evidence::Evidence;
 pub use noise::{effective_samples, white_noise};
 pub use problem::{
-    Candidate, Choice, Column, Effect, EffectParameter, Layout, NoSupply, Problem, Sign, Source,
-    Stretch, Supply,
+    Candidate, Choice, Effect, EffectParameter, Layout, NoSupply, Problem, Sign, Source, Stretch,
+    Supply,
 };
 pub use tilt::{Sensitivity, Tilt};
 

@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::problem::{Column, Layout};
+use super::column::Column;
+use super::problem::Layout;
 
 /// Columns with their inner products.
 pub(crate) struct Pool {

@@ -1,6 +1,6 @@
 //! A base that does not stand level: gravity in its frame is turned, and forces are linear in gravity.
 
-use super::problem::Column;
+use super::column::Column;
 
 /// Angles below this are taken for none, rad.
 const STRAIGHT: f64 = 1e-9;

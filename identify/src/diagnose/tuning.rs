@@ -1,9 +1,10 @@
 //! Constants of effects that no linear fit finds: the best of a grid beside the rest of a set, and between its values.
 
 use super::bench::{Bench, Pick};
+use super::column::Column;
 use super::factored::Factored;
 use super::pool::On;
-use super::problem::{Choice, Column, Source};
+use super::problem::{Choice, Source};
 
 impl Bench<'_> {
     /// Chooses the constants of each effect of a set anew, beside those of the others.

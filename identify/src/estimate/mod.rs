@@ -30,6 +30,7 @@ mod rows;
 mod solution;
 mod triangle;
 mod undetermined;
+mod weighted_rows;
 
 pub use body_matrices::{BodyMatrix, MatrixMap, planar_pseudo_inertia, pseudo_inertia};
 pub use deviations::{Deviations, FEWEST_ROWS, autocorrelated_deviations};
@@ -43,10 +44,11 @@ pub use numeric_rank::{
 };
 pub use physical::{NOMINAL_WEIGHT, PhysicalParameters, physical_parameters};
 pub use prior::{Belief, with_prior};
-pub use reweighted::{Estimate, EstimateOptions, HUBER_BOUND, Weighting, estimate};
+pub use reweighted::{Estimate, EstimateOptions, HUBER_BOUND, estimate};
 pub use rows::Visit;
 pub use solution::{RANK_TOLERANCE, Solution};
 pub use triangle::Triangle;
 pub use undetermined::Direction;
+pub use weighted_rows::Weighting;
 
 pub(crate) use undetermined::null_directions;

@@ -12,10 +12,12 @@
 use crate::estimate::deviations::{Deviations, autocorrelated_deviations};
 use crate::estimate::error::LeastSquaresError;
 use crate::estimate::least_squares::LeastSquares;
-use crate::estimate::magnitudes::Magnitudes;
-use crate::estimate::rows::{Visit, is_left_out};
+use crate::estimate::rows::Visit;
 use crate::estimate::solution::Solution;
 use crate::estimate::triangle::Triangle;
+use crate::estimate::weighted_rows::{
+    WeightedRows, Weighting, outliers, reweighted, scales, show_weighted,
+};
 
 /// Huber's bound for 95 % efficiency under normal residuals, in standard deviations.
 pub const HUBER_BOUND: f64 = 1.345;
@@ -42,23 +44,6 @@ impl Default for EstimateOptions {
             iterations: 50,
         }
     }
-}
-
-/// What each row was multiplied by in the end.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Weighting {
-    /// For each channel the scale of its residuals, in the units of the measured value (as shown).
-    pub scales: Vec<f64>,
-    /// Whether rows were divided by it.
-    pub by_channel: bool,
-    /// Huber's bound in scales.
-    pub huber: Option<f64>,
-    /// Share of the rows whose residual was beyond the bound.
-    pub outliers: f64,
-    /// Solutions that were made.
-    pub iterations: usize,
-    /// Whether the last two agreed.
-    pub settled: bool,
 }
 
 /// A solution, what it is worth, and how it came about.
@@ -119,7 +104,7 @@ pub fn estimate<E: From<LeastSquaresError>>(
                 &before.values,
                 channels,
                 &weighting,
-                Rows::Weighted,
+                WeightedRows::Weighted,
                 &mut show,
             )?;
             solution = regression.solve_near(nominal)?;
@@ -138,7 +123,7 @@ pub fn estimate<E: From<LeastSquaresError>>(
             &solution.values,
             channels,
             &weighting,
-            Rows::Curvature,
+            WeightedRows::Curvature,
             &mut show,
         )?;
         solution.take_inverse_of(curvature.solve_near(nominal)?);
@@ -150,7 +135,7 @@ pub fn estimate<E: From<LeastSquaresError>>(
             &values,
             channels,
             &weighting,
-            Rows::Weighted,
+            WeightedRows::Weighted,
             &mut show,
             visit,
         )
@@ -163,165 +148,13 @@ pub fn estimate<E: From<LeastSquaresError>>(
     })
 }
 
-/// Which rows a reweighting makes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Rows {
-    /// Regressor and measured value times the root of the weight: their gradient is that of Huber's function.
-    Weighted,
-    /// Rows within the bound only, with the residual that Huber's function sees: the second derivatives.
-    Curvature,
-}
-
-/// The scale of each channel's residuals: standard deviation, or median magnitude for robust estimates.
-fn scales<E: From<LeastSquaresError>>(
-    solution: &Solution,
-    weighting: &Weighting,
-    show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
-) -> Result<Vec<f64>, E> {
-    let channels = weighting.scales.len();
-    let n = solution.values.len();
-    let mut squares = vec![0.0; channels];
-    let mut medians: Vec<Magnitudes> = match weighting.huber {
-        Some(_) => vec![Magnitudes::new(); channels],
-        None => Vec::new(),
-    };
-    let mut size = vec![0.0; channels];
-    let mut counts = vec![0_usize; channels];
-    let mut rows = 0_usize;
-    show(&mut |regressor, measured| {
-        for (row, y) in regressor.chunks_exact(n).zip(measured) {
-            let channel = rows % channels;
-            rows += 1;
-            if is_left_out(row, *y) {
-                continue;
-            }
-            counts[channel] += 1;
-            let error = y - dot(row, &solution.values);
-            squares[channel] += error * error;
-            size[channel] += y * y;
-            if let Some(median) = medians.get_mut(channel) {
-                median.add(error.abs());
-            }
-        }
-        Ok(())
-    })?;
-    Ok((0..channels)
-        .map(|channel| {
-            let samples = counts[channel].max(1) as f64;
-            let freedom = (samples - solution.rank as f64 / channels as f64).max(1.0);
-            let spread = (squares[channel] / freedom).sqrt();
-            let scale = medians.get(channel).map_or(spread, |m| 1.4826 * m.median());
-            // A channel without any residual must not get all the weight there is.
-            let least = 1e-12 * (size[channel] / samples).sqrt();
-            if scale > least {
-                scale
-            } else {
-                spread.max(least).max(f64::MIN_POSITIVE.sqrt())
-            }
-        })
-        .collect())
-}
-
-/// The regression of reweighted rows.
-fn reweighted<E: From<LeastSquaresError>>(
-    values: &[f64],
-    channels: usize,
-    weighting: &Weighting,
-    rows: Rows,
-    show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
-) -> Result<LeastSquares, E> {
-    let mut regression = LeastSquares::with_channels(values.len(), channels);
-    show_weighted(values, channels, weighting, rows, show, &mut |w, y| {
-        regression.add_rows(w, y)
-    })?;
-    Ok(regression)
-}
-
-/// The share of rows beyond Huber's bound.
-fn outliers<E: From<LeastSquaresError>>(
-    values: &[f64],
-    channels: usize,
-    weighting: &Weighting,
-    show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
-) -> Result<f64, E> {
-    let bound = weighting.huber.unwrap_or(f64::INFINITY);
-    let (mut beyond, mut rows, mut counted) = (0_usize, 0_usize, 0_usize);
-    show(&mut |w, y| {
-        for (row, y) in w.chunks_exact(values.len()).zip(y) {
-            let scale = weighting.scales[rows % channels];
-            rows += 1;
-            counted += usize::from(!is_left_out(row, *y));
-            beyond += usize::from((y - dot(row, values)).abs() > bound * scale);
-        }
-        Ok(())
-    })?;
-    Ok(beyond as f64 / counted.max(1) as f64)
-}
-
-/// Shows weighted rows for residuals at `values`.
-fn show_weighted<E: From<LeastSquaresError>>(
-    values: &[f64],
-    channels: usize,
-    weighting: &Weighting,
-    rows: Rows,
-    show: &mut impl FnMut(&mut Visit<'_>) -> Result<(), E>,
-    visit: &mut Visit<'_>,
-) -> Result<(), E> {
-    if !weighting.by_channel && weighting.huber.is_none() {
-        return show(visit);
-    }
-    let n = values.len();
-    let (mut scaled, mut right) = (Vec::new(), Vec::new());
-    let mut at = 0_usize;
-    show(&mut |regressor, measured| {
-        scaled.clear();
-        right.clear();
-        for (row, y) in regressor.chunks_exact(n).zip(measured) {
-            let scale = weighting.scales[at % channels];
-            at += 1;
-            let error = y - dot(row, values);
-            let inside = weighting
-                .huber
-                .is_none_or(|bound| error.abs() <= bound * scale);
-            let root = match (weighting.huber, rows) {
-                (Some(bound), Rows::Weighted) if !inside => (bound * scale / error.abs()).sqrt(),
-                (Some(_), Rows::Curvature) if !inside => 0.0,
-                _ => 1.0,
-            };
-            let factor = if weighting.by_channel {
-                root / scale
-            } else {
-                root
-            };
-            scaled.extend(row.iter().map(|w| factor * w));
-            right.push(match (weighting.huber, rows) {
-                // What Huber's function sees of the residual keeps the variance of its gradient.
-                (Some(bound), Rows::Curvature) => {
-                    let seen = error.clamp(-bound * scale, bound * scale);
-                    let unit = if weighting.by_channel {
-                        seen / scale
-                    } else {
-                        seen
-                    };
-                    factor * dot(row, values) + unit
-                }
-                _ => factor * y,
-            });
-        }
-        visit(&scaled, &right)
-    })
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::{DMatrix, DVector};
 
     use super::*;
     use crate::estimate::prior::{Belief, with_prior};
+    use crate::estimate::weighted_rows::dot;
     use crate::test_noise::Noise;
 
     const TRUTH: [f64; 3] = [4.0, -2.0, 1.0];

@@ -1,7 +1,6 @@
 //! The result of an identification as a file: what `identify --json` prints, and what
 //! `--parameters FIT.json` reads back.
 
-use std::fmt;
 use std::path::Path;
 
 use indexmap::IndexMap;
@@ -10,8 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::estimate::{Deviations, Solution};
 use crate::figures::Figures;
+use crate::figures::fit_error::{FitFault, FitFileError};
 use crate::recording::Note;
-use crate::words::{list, nearest};
+use crate::words::nearest;
 
 /// A base parameter as the model describes it.
 #[derive(Debug, Clone, PartialEq)]
@@ -110,148 +110,6 @@ pub struct FitFile {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub data: Vec<Note>,
 }
-
-/// Why a fit file cannot be used.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FitFileError {
-    /// The file as the user named it.
-    pub file: String,
-    /// What is wrong.
-    pub fault: FitFault,
-}
-
-/// The kinds of faults of a fit file.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub enum FitFault {
-    /// The file cannot be opened or read.
-    Unreadable {
-        /// The operating system's words.
-        reason: String,
-    },
-    /// The text is not the JSON of `identify`.
-    NotAFit {
-        /// Line of the fault.
-        line: usize,
-        /// Column of the fault.
-        column: usize,
-        /// What is wrong there.
-        reason: String,
-    },
-    /// The text does not begin as JSON does: a recording or a model file, perhaps.
-    NoJson,
-    /// A parameter of the model is not in the file.
-    MissingParameter {
-        /// The parameter.
-        name: String,
-        /// The closest name in the file.
-        nearest: Option<String>,
-        /// The names in the file.
-        present: Vec<String>,
-    },
-    /// The file holds parameters that the model does not have.
-    UnknownParameters {
-        /// Those parameters.
-        names: Vec<String>,
-    },
-    /// The file holds a parameter twice.
-    DuplicateParameter {
-        /// The parameter.
-        name: String,
-    },
-    /// A constant that an expression of the base parameters holds has another value.
-    OtherConstant {
-        /// The constant.
-        name: String,
-        /// Its value in the file.
-        file: f64,
-        /// Its value in the model.
-        model: f64,
-    },
-    /// A parameter has the same name but stands for another expression.
-    OtherExpression {
-        /// The parameter.
-        name: String,
-        /// The expression in the file.
-        file: String,
-        /// The expression of the model.
-        model: String,
-    },
-}
-
-impl fmt::Display for FitFileError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let file = &self.file;
-        match &self.fault {
-            FitFault::Unreadable { reason } => {
-                write!(
-                    f,
-                    "{file}: the fit cannot be read: {reason}; make it with `modelmill identify ... --json > {file}`"
-                )
-            }
-            FitFault::NotAFit {
-                line,
-                column,
-                reason,
-            } => write!(
-                f,
-                "{file}, line {line}, column {column}: this is not the JSON that `modelmill identify --json` prints: \
-                 {reason}"
-            ),
-            FitFault::NoJson => write!(
-                f,
-                "{file} is no fit: the JSON that `modelmill identify ... --out FIT.json` writes is expected; recordings go \
-                 to --data, the model file comes first"
-            ),
-            FitFault::MissingParameter {
-                name,
-                nearest,
-                present,
-            } => {
-                write!(
-                    f,
-                    "{file}: the model's parameter `{name}` is not in the fit"
-                )?;
-                if let Some(nearest) = nearest {
-                    write!(f, " (the closest is `{nearest}`)")?;
-                }
-                write!(
-                    f,
-                    ", which holds {}; identify this model again",
-                    list(present)
-                )
-            }
-            FitFault::UnknownParameters { names } => write!(
-                f,
-                "{file}: the fit holds {}, which the model does not have; identify this model again",
-                list(names)
-            ),
-            FitFault::DuplicateParameter { name } => {
-                write!(f, "{file}: the fit holds `{name}` twice; remove one")
-            }
-            FitFault::OtherConstant {
-                name,
-                file: theirs,
-                model,
-            } => write!(
-                f,
-                "{file}: the fit was made with {name} = {theirs}, but the model has {name} = {model}, and base parameters \
-                 depend on it: identify again"
-            ),
-            FitFault::OtherExpression {
-                name,
-                file: theirs,
-                model,
-            } => write!(
-                f,
-                "{file}: `{name}` is `{theirs}` in the fit but `{model}` in the model; \
-                 the fit belongs to another model or to an earlier state of it: identify again"
-            ),
-        }
-    }
-}
-
-impl std::error::Error for FitFileError {}
 
 /// The parameters of a fit file from the model's description, the solution and its deviations,
 /// all in the order of the regressor's columns (asserted to be of one length).

@@ -6,6 +6,7 @@
 //! peaks where the measured force passes through zero are the reason to read `nrms` beside it.
 //! `abs_ratio` is `sum |error| / sum |measured|`, as Volkmann et al. (IEEE ICMA 2020) give it.
 
+mod fit_error;
 mod fit_file;
 mod locate;
 
@@ -14,9 +15,8 @@ use std::fmt;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-pub use fit_file::{
-    FitFault, FitFile, FitFileError, FitParameter, ParameterInfo, Status, fit_parameters,
-};
+pub use fit_error::{FitFault, FitFileError};
+pub use fit_file::{FitFile, FitParameter, ParameterInfo, Status, fit_parameters};
 pub use locate::{LocateOptions, Region, TIME_COLUMN, locate};
 
 /// Error figures of a comparison.

@@ -1,0 +1,42 @@
+//! What an effect adds to the forces along all recordings.
+
+/// Numbers along all recordings, for each channel one for every sample: recordings of the fit first, then those of the
+/// check; `None` for a channel on which the column is zero throughout.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Column(pub Vec<Option<Vec<f64>>>);
+
+impl Column {
+    /// A column from all of its channels; those that are zero throughout are left out.
+    pub fn new(channels: Vec<Vec<f64>>) -> Self {
+        let sparse = |values: Vec<f64>| values.iter().any(|x| *x != 0.0).then_some(values);
+        Self(channels.into_iter().map(sparse).collect())
+    }
+
+    /// Adds a multiple of another column.
+    pub fn add(&mut self, factor: f64, other: &Self) {
+        for (slot, values) in self.0.iter_mut().zip(&other.0) {
+            let Some(values) = values else { continue };
+            match slot {
+                Some(sum) => {
+                    for (s, x) in sum.iter_mut().zip(values) {
+                        *s += factor * x;
+                    }
+                }
+                None => *slot = Some(values.iter().map(|x| factor * x).collect()),
+            }
+        }
+    }
+
+    /// Channels on which it is not zero.
+    pub fn channels(&self) -> impl Iterator<Item = usize> + '_ {
+        self.0
+            .iter()
+            .enumerate()
+            .filter_map(|(d, values)| values.as_ref().map(|_| d))
+    }
+
+    /// Whether it is zero everywhere.
+    pub fn is_zero(&self) -> bool {
+        self.0.iter().all(Option::is_none)
+    }
+}
