@@ -72,6 +72,15 @@ pub enum DeriveError {
         /// What to do about it.
         todo: &'static str,
     },
+    /// At the file's values retained columns all but coincide, so that forces from p_min have lost their digits.
+    DigitsLost {
+        /// Error of the forces, relative to their size.
+        lost: String,
+        /// Retained products whose columns all but coincide.
+        retained: Vec<String>,
+        /// Products that are written by these with huge factors.
+        dependent: Vec<String>,
+    },
     /// A factor of eq. (6) is no rational function of reasonable size.
     FactorNotRecovered {
         /// The eliminated product.
@@ -137,12 +146,12 @@ impl fmt::Display for DeriveError {
             }
             Self::LoopsNotSampled { loops } => write!(
                 f,
-                "the loops {} cannot be sampled exactly: they are not planar, or no two coordinates of each can be solved for in turn",
+                "the loops {} cannot be solved in symbols: they are not planar, or no two coordinates of each can be solved for in turn",
                 loops.join(", ")
             ),
             Self::BranchesNotSeparated { loops } => write!(
                 f,
-                "the loops {} cannot be sampled exactly: their assembly modes meet, or depend on each other, so that square roots cannot tell them apart",
+                "the loops {} cannot be solved in symbols: their assembly modes meet, or depend on each other, so that square roots cannot tell them apart",
                 loops.join(", ")
             ),
             Self::NoPointFound { draws } => {
@@ -153,6 +162,23 @@ impl fmt::Display for DeriveError {
             }
             Self::NotFinite { what, todo } => {
                 write!(f, "{what} is no finite number; {todo}")
+            }
+            Self::DigitsLost {
+                lost,
+                retained,
+                dependent,
+            } => {
+                let quoted: Vec<String> = dependent.iter().map(|p| format!("\"{p}\"")).collect();
+                write!(
+                    f,
+                    "with the file's values the columns of {} all but depend on each other, though for general values they do \
+                     not: {} would be written by them with factors so large that forces from the base parameters are wrong by \
+                     {lost} of their size; retain other products (`retain = [{}]` at the head of the file), or change the \
+                     constants that make them coincide",
+                    retained.join(", "),
+                    dependent.join(", "),
+                    quoted.join(", ")
+                )
             }
             Self::FactorNotRecovered { product, retained } => write!(
                 f,
@@ -171,7 +197,7 @@ impl fmt::Display for DeriveError {
                 "the rank differs between random constants",
             ),
             Self::NotConfirmed => {
-                f.write_str("what was found in exact arithmetic does not hold at other poses")
+                f.write_str("what was found in symbols does not hold at other poses")
             }
         }
     }

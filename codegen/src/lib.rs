@@ -16,7 +16,7 @@ pub mod review;
 mod tree;
 
 pub use derive::base::BaseParameter;
-pub use derive::{Derivation, derive, derive_columns};
+pub use derive::{Derivation, derive_columns};
 pub use emit::{Emitted, EmittedFile, emit, emit_c, emit_python, emit_with_dynamics, module_name};
 pub use error::DeriveError;
 pub use evaluate::{Evaluator, PoseFault, PoseReason, States};
@@ -28,3 +28,14 @@ pub use on_request::reactions::{JointReaction, LoopReaction, Reactions};
 pub use programs::{LoopPrograms, PassivePosition, Programs};
 pub use reduce::{Dependency, Method, Polynomial, Powers, RationalFunction, Reduction, Variable};
 pub use tree::expressions::Monomial;
+
+use modelmill_spec::Mechanism;
+
+/// Derives the inverse dynamics of a mechanism and reduces it to base parameters, exactly where that can be done.
+///
+/// A base whose columns all but depend on each other at the file's values, so that its forces are wrong, is refused.
+pub fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
+    let derivation = derive::derive(mechanism)?;
+    evaluate::lost_digits::check(&derivation)?;
+    Ok(derivation)
+}

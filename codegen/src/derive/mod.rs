@@ -43,8 +43,9 @@ pub struct Derivation {
     pub(crate) equations: Equations,
 }
 
-/// Derives the inverse dynamics of a mechanism and reduces it to base parameters, exactly.
-pub fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
+/// Derives the inverse dynamics of a mechanism and reduces it to base parameters, whatever these are worth at the file's
+/// values.
+pub(crate) fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
     checks::check_values(mechanism)?;
     let mut graph = Graph::new();
     let equations = regressor::equations(&mut graph, mechanism)?;

@@ -1,6 +1,7 @@
 //! The block evaluator: runs a program over many states inside the process, so that a changed model file can be tried
 //! on a recording at once, without a compiler.
 
+pub(crate) mod lost_digits;
 mod machine;
 
 use std::fmt;
@@ -136,6 +137,22 @@ impl<'a> Evaluator<'a> {
             passive: projection.passive.clone(),
             constants,
         }
+    }
+
+    /// The same with the parameters of another mechanism, which has the same entries.
+    pub(crate) fn with_parameters(mut self, mechanism: &'a Mechanism) -> Self {
+        self.mechanism = mechanism;
+        self
+    }
+
+    /// p_min for the mechanism's parameters, as emitted code computes it.
+    pub(crate) fn base_parameters(&self) -> Vec<f64> {
+        let program = &self.programs.base_parameters;
+        let machine = Machine::new(program, |atom| self.fixed(atom, &[]));
+        Scalar::new(machine).run(
+            |_| unreachable!("base parameters do not depend on the state"),
+            |output| (0..program.outputs.len()).map(output).collect(),
+        )
     }
 
     /// H_min, one matrix row per state and drive (states outermost), one column per base parameter.

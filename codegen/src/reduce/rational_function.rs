@@ -8,6 +8,9 @@ use num_traits::{ToPrimitive, Zero};
 use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Rational};
 use modelmill_algebra::field::Element;
 
+/// What is left of a sum's terms, relative to their sizes, below which it is added up exactly.
+const CANCELLED: f64 = 1e-3;
+
 /// What a factor may depend on: a constant, or the cosine or sine of a constant angle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Variable {
@@ -31,6 +34,16 @@ impl Variable {
             Self::Root(n) => {
                 crate::expr::Domain::unary(point, crate::expr::Unary::Sqrt, &Element::from_i64(n))
             }
+        }
+    }
+
+    /// Its value for constants in floating point, by index.
+    fn value_f64(self, constants: &[f64]) -> f64 {
+        match self {
+            Self::Constant(i) => constants[i],
+            Self::Cos(i) => constants[i].cos(),
+            Self::Sin(i) => constants[i].sin(),
+            Self::Root(n) => (n as f64).sqrt(),
         }
     }
 
@@ -154,48 +167,33 @@ impl RationalFunction {
         Some(polynomial_value(&self.numerator, point)? * denominator)
     }
 
-    /// Its value for constants in floating point, by index.
+    /// Its value for constants in floating point, by index. Sums whose terms all but cancel are added up exactly: quotients
+    /// of them are large, and would have lost their digits twice over.
     pub fn value_f64(&self, constants: &[f64]) -> f64 {
         let evaluate = |p: &Polynomial| -> f64 {
-            p.iter()
-                .map(|(powers, k)| {
-                    powers.iter().fold(k.to_f64(), |product, (v, n)| {
-                        let value = match v {
-                            Variable::Constant(i) => constants[*i],
-                            Variable::Cos(i) => constants[*i].cos(),
-                            Variable::Sin(i) => constants[*i].sin(),
-                            Variable::Root(r) => (*r as f64).sqrt(),
-                        };
-                        product * value.powi(i32::try_from(*n).unwrap_or(i32::MAX))
-                    })
-                })
-                .sum()
+            let (mut sum, mut size) = (0.0, 0.0);
+            for (powers, k) in p {
+                let term = powers.iter().fold(k.to_f64(), |product, (v, n)| {
+                    product
+                        * v.value_f64(constants)
+                            .powi(i32::try_from(*n).unwrap_or(i32::MAX))
+                });
+                sum += term;
+                size += term.abs();
+            }
+            if sum.abs() < CANCELLED * size && size.is_finite() {
+                let exact: Vec<BigRational> = constants.iter().map(|c| from_f64(*c)).collect();
+                return polynomial_exact(p, &exact).to_f64().unwrap_or(f64::NAN);
+            }
+            sum
         };
         evaluate(&self.numerator) / evaluate(&self.denominator)
     }
 
     /// Its exact value for exact constants, by index; sines, cosines and roots are those of floating point.
     pub fn value_exact(&self, constants: &[BigRational]) -> BigRational {
-        let float = |value: f64| BigRational::from_float(value).unwrap_or_else(BigRational::zero);
-        let evaluate = |p: &Polynomial| -> BigRational {
-            let mut sum = BigRational::zero();
-            for (powers, k) in p {
-                let mut product = k.to_big();
-                for (v, n) in powers {
-                    let angle = |i: &usize| constants[*i].to_f64().unwrap_or(f64::NAN);
-                    let value = match v {
-                        Variable::Constant(i) => constants[*i].clone(),
-                        Variable::Cos(i) => float(angle(i).cos()),
-                        Variable::Sin(i) => float(angle(i).sin()),
-                        Variable::Root(r) => float((*r as f64).sqrt()),
-                    };
-                    product *= num_traits::pow(value, *n as usize);
-                }
-                sum += product;
-            }
-            sum
-        };
-        evaluate(&self.numerator) / evaluate(&self.denominator)
+        polynomial_exact(&self.numerator, constants)
+            / polynomial_exact(&self.denominator, constants)
     }
 
     /// As an expression of the graph.
@@ -221,6 +219,31 @@ impl RationalFunction {
         let (n, d) = (build(&self.numerator), build(&self.denominator));
         graph.div(n, d)
     }
+}
+
+/// The number that a float is; zero for what is none.
+fn from_f64(value: f64) -> BigRational {
+    BigRational::from_float(value).unwrap_or_else(BigRational::zero)
+}
+
+/// The exact value of a polynomial for exact constants; sines, cosines and roots are those of floating point.
+fn polynomial_exact(p: &Polynomial, constants: &[BigRational]) -> BigRational {
+    let mut sum = BigRational::zero();
+    for (powers, k) in p {
+        let mut product = k.to_big();
+        for (v, n) in powers {
+            let angle = |i: &usize| constants[*i].to_f64().unwrap_or(f64::NAN);
+            let value = match v {
+                Variable::Constant(i) => constants[*i].clone(),
+                Variable::Cos(i) => from_f64(angle(i).cos()),
+                Variable::Sin(i) => from_f64(angle(i).sin()),
+                Variable::Root(r) => from_f64((*r as f64).sqrt()),
+            };
+            product *= num_traits::pow(value, *n as usize);
+        }
+        sum += product;
+    }
+    sum
 }
 
 /// The same polynomial with even powers of a cosine as powers of the sine where that has fewer terms:

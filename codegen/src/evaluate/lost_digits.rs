@@ -1,0 +1,466 @@
+//! How many digits the base leaves: forces from p_min go beside those from p_g, both in floating point and on the model
+//! file's own values. They are equal in exact arithmetic.
+//!
+//! Retained columns are independent for general constants. At the file's values they may all but coincide; factors of
+//! eq. (6) then grow without bound, and what the forces have in common is lost when huge terms cancel. With growth `g` of the
+//! terms beside their sum the relative error of the forces is about `g` roundings of 1.1e-16 (N. J. Higham, "Accuracy and
+//! Stability of Numerical Algorithms", 2nd ed. 2002, 4.2).
+
+use modelmill_spec::{Mechanism, Motion};
+use nalgebra::DMatrix;
+
+use super::{Evaluator, States};
+use crate::field::Stream;
+use crate::loops::numeric_poses::symmetric;
+use crate::{Derivation, DeriveError};
+
+/// Error of a drive's force, relative to the sum of what its products add to it, beyond which a base is refused. Errors of a
+/// millionth count as rounding of a recording's numbers elsewhere; ten of sixteen digits may be lost up to there.
+const MOST_LOST: f64 = 1e-6;
+
+/// At how many states forces are held beside each other, and how many are tried.
+const STATES: usize = 8;
+const TRIES: usize = 100;
+
+/// How far states lie from the nominal pose, in rad and relative to the nominal length; by what it shrinks where the
+/// mechanism cannot stand.
+const REACH: f64 = 0.5;
+const SHRINKING: f64 = 0.8;
+
+/// Dependent products whose factors are nearly as large as the largest ones are named as well.
+const NEARLY: f64 = 1e-3;
+
+/// That forces from p_min agree with those from p_g. Where no state is found at which the mechanism can stand, nothing is
+/// refused.
+pub(crate) fn check(derivation: &Derivation) -> Result<(), DeriveError> {
+    match lost(derivation)? {
+        // What is no number has lost all digits.
+        Some(lost) if lost.error.is_nan() || lost.error > MOST_LOST => {
+            Err(culprits(derivation, &lost))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What the drive loses that loses most.
+struct Lost {
+    /// Error of its force, relative to the sum of what its products add to it.
+    error: f64,
+    /// Its row of H, state by state.
+    h: DMatrix<f64>,
+    /// Values of the products.
+    values: Vec<f64>,
+}
+
+/// Holds forces from p_min against those from p_g; `None` where nothing is regrouped or no state is found.
+fn lost(derivation: &Derivation) -> Result<Option<Lost>, DeriveError> {
+    if derivation.reduction.dependencies.is_empty() {
+        return Ok(None);
+    }
+    let mechanism = with_all_parameters(&derivation.mechanism);
+    let parameters: Vec<f64> = mechanism.parameters.iter().map(|p| p.nominal).collect();
+    let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
+    let products = &derivation.reduction.products;
+    let values: Vec<f64> = products.iter().map(|p| p.value(&parameters)).collect();
+    let evaluator = Evaluator::new(derivation).with_parameters(&mechanism);
+    // Evaluator and emitted code add up eq. (7) in different orders.
+    let both = [
+        derivation.base_values(&parameters, &constants),
+        evaluator.base_parameters(),
+    ];
+    let Some(sampled) = Sampled::new(&mechanism, &evaluator, &both)? else {
+        return Ok(None);
+    };
+    let n_drives = mechanism.drives.len();
+    let errors = (0..n_drives).map(|d| (d, sampled.error(d, n_drives, &values)));
+    let worst = errors.max_by(|a, b| a.1.total_cmp(&b.1));
+    Ok(worst.map(|(drive, error)| Lost {
+        error,
+        h: DMatrix::from_fn(sampled.n_states(), products.len(), |s, k| {
+            sampled.full[(s * n_drives + drive, k)]
+        }),
+        values,
+    }))
+}
+
+/// The mechanism with a value for every parameter: where the file gives none, the largest of the same unit stands in, or 1.
+fn with_all_parameters(mechanism: &Mechanism) -> Mechanism {
+    let mut all = mechanism.clone();
+    for parameter in all.parameters.iter_mut().filter(|p| p.nominal == 0.0) {
+        let alike = mechanism
+            .parameters
+            .iter()
+            .filter(|p| p.unit == parameter.unit);
+        let largest = alike.map(|p| p.nominal.abs()).fold(0.0, f64::max);
+        parameter.nominal = if largest > 0.0 { largest } else { 1.0 };
+    }
+    all
+}
+
+/// H and forces at some states around the nominal pose.
+struct Sampled {
+    /// H, drives within states.
+    full: DMatrix<f64>,
+    /// Forces from p_min, `[way of adding up p_min][drive][state]`.
+    forces: [Vec<Vec<f64>>; 2],
+}
+
+impl Sampled {
+    /// `None` where no state is found; an error where forces are no finite numbers at any.
+    fn new(
+        mechanism: &Mechanism,
+        evaluator: &Evaluator<'_>,
+        base: &[Vec<f64>; 2],
+    ) -> Result<Option<Self>, DeriveError> {
+        let mut stream = Stream::new(0x6C6F_7374);
+        let n_drives = mechanism.drives.len();
+        let mut rows: Vec<f64> = Vec::new();
+        let mut forces = [vec![Vec::new(); n_drives], vec![Vec::new(); n_drives]];
+        let (mut n_states, mut n_infinite, mut reach) = (0, 0, REACH);
+        for _ in 0..TRIES {
+            if n_states == STATES {
+                break;
+            }
+            let state = State::random(mechanism, reach, &mut stream);
+            let states = state.states();
+            let found = evaluator.full_regressor(&states).and_then(|h| {
+                let [a, b] = base;
+                let forces = [
+                    evaluator.inverse_dynamics(&states, a)?,
+                    evaluator.inverse_dynamics(&states, b)?,
+                ];
+                Ok((h, forces))
+            });
+            let Ok((h, found)) = found else {
+                reach *= SHRINKING;
+                continue;
+            };
+            if h.iter().any(|x| !x.is_finite()) {
+                n_infinite += 1;
+                continue;
+            }
+            rows.extend(
+                h.row_iter()
+                    .flat_map(|row| row.iter().copied().collect::<Vec<_>>()),
+            );
+            for (all, found) in forces.iter_mut().zip(found) {
+                for (all, found) in all.iter_mut().zip(found) {
+                    all.extend(found);
+                }
+            }
+            n_states += 1;
+        }
+        if n_states == 0 {
+            return if n_infinite == 0 {
+                Ok(None)
+            } else {
+                Err(DeriveError::NotFinite {
+                    what: "with the model file's values, the force of a drive".to_owned(),
+                    todo: "look for constants that are too large to be squared, such as lengths beyond 1e150",
+                })
+            };
+        }
+        let n_rows = n_states * n_drives;
+        let full = DMatrix::from_row_slice(n_rows, rows.len() / n_rows, &rows);
+        Ok(Some(Self { full, forces }))
+    }
+
+    fn n_states(&self) -> usize {
+        self.forces[0].first().map_or(0, Vec::len)
+    }
+
+    /// Error of a drive's force, relative to the sum of what its products add to it.
+    fn error(&self, drive: usize, n_drives: usize, values: &[f64]) -> f64 {
+        let (mut errors, mut size) = ([0.0; 2], 0.0);
+        for state in 0..self.n_states() {
+            let row = self.full.row(state * n_drives + drive);
+            let terms = row.iter().zip(values).map(|(h, p)| h * p);
+            let (sum, sizes) = terms.fold((0.0, 0.0), |(sum, size), term| {
+                (sum + term, size + term.abs())
+            });
+            size += sizes * sizes;
+            for (error, forces) in errors.iter_mut().zip(&self.forces) {
+                *error += (forces[drive][state] - sum).powi(2);
+            }
+        }
+        let [a, b] = errors;
+        // `max` would pass over what is no number.
+        let worst = if a > b || a.is_nan() { a } else { b };
+        if worst == 0.0 {
+            return 0.0;
+        }
+        (worst / size).sqrt()
+    }
+}
+
+/// A state near the nominal pose.
+struct State {
+    q: Vec<f64>,
+    qd: Vec<f64>,
+    qdd: Vec<f64>,
+    load: Vec<f64>,
+}
+
+impl State {
+    fn random(mechanism: &Mechanism, reach: f64, stream: &mut Stream) -> Self {
+        let active: Vec<_> = (mechanism.coordinates.iter())
+            .filter(|c| !c.passive)
+            .collect();
+        let q = active.iter().map(|c| {
+            let one = match c.motion {
+                Motion::Prismatic if c.nominal != 0.0 => c.nominal.abs(),
+                _ => 1.0,
+            };
+            c.nominal + reach * one * symmetric(stream)
+        });
+        let q = q.collect();
+        let mut moving = |n: usize, most: f64| (0..n).map(|_| most * symmetric(stream)).collect();
+        Self {
+            q,
+            qd: moving(active.len(), 2.0),
+            qdd: moving(active.len(), 5.0),
+            load: moving(mechanism.drives.len(), 100.0),
+        }
+    }
+
+    fn states(&self) -> States<'_> {
+        States {
+            q: self.q.chunks(1).collect(),
+            qd: self.qd.chunks(1).collect(),
+            qdd: self.qdd.chunks(1).collect(),
+            load: self.load.chunks(1).collect(),
+        }
+    }
+}
+
+/// Which products lose the digits.
+fn culprits(derivation: &Derivation, found: &Lost) -> DeriveError {
+    let constants = derivation.mechanism.constants.iter();
+    let constants: Vec<f64> = constants.map(|c| c.value).collect();
+    let reduction = &derivation.reduction;
+    let name = |product: usize| reduction.products[product].text(&derivation.mechanism);
+    let norm = |product: usize| found.h.column(product).norm();
+    // Terms of each dependent product, by retained column.
+    let lines: Vec<(usize, Vec<(usize, f64)>)> = reduction
+        .dependencies
+        .iter()
+        .map(|line| {
+            let terms = line.equals.iter().map(|(k, factor)| {
+                let retained = reduction.retained[*k];
+                let term =
+                    factor.value_f64(&constants) * found.values[line.product] * norm(retained);
+                // What is no number is larger than any.
+                (
+                    retained,
+                    if term.is_nan() {
+                        f64::INFINITY
+                    } else {
+                        term.abs()
+                    },
+                )
+            });
+            (line.product, terms.collect())
+        })
+        .collect();
+    let largest = |terms: &[(usize, f64)]| terms.iter().map(|t| t.1).fold(0.0, f64::max);
+    let all = lines
+        .iter()
+        .map(|(_, terms)| largest(terms))
+        .fold(0.0, f64::max);
+    let worst = lines
+        .iter()
+        .filter(|(_, terms)| largest(terms) >= NEARLY * all);
+    let dependent: Vec<String> = worst.clone().map(|(product, _)| name(*product)).collect();
+    let mut retained: Vec<usize> = worst
+        .flat_map(|(_, terms)| terms)
+        .filter(|(_, term)| *term >= NEARLY * all)
+        .map(|(retained, _)| *retained)
+        .collect();
+    retained.sort_unstable();
+    retained.dedup();
+    DeriveError::DigitsLost {
+        lost: format!("{:.0e}", found.error),
+        retained: retained.into_iter().map(name).collect(),
+        dependent,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::derive;
+
+    fn model(name: &str) -> Mechanism {
+        let folder = env!("CARGO_MANIFEST_DIR");
+        let path = format!("{folder}/../model-spec/models/{name}.toml");
+        let loaded = modelmill_spec::load_file(path.as_ref());
+        loaded
+            .unwrap_or_else(|failure| panic!("{failure}"))
+            .mechanism
+    }
+
+    /// A pendulum whose masses at `a` and `a + gap` are declared before the body that carries them, so that they are
+    /// retained and the body's products written by them.
+    fn pendulum(gap: f64, head: &str) -> Mechanism {
+        let a = 0.3;
+        let text = format!(
+            r#"
+            schema = 1
+            name = "pendulum"
+            gravity = [0, "-g", 0]
+            {head}
+            [constants]
+            a = {{ value = {a:?}, unit = "m" }}
+            b = {{ value = {b:?}, unit = "m" }}
+            g = {{ value = 9.81, unit = "m/s^2" }}
+            [parameters]
+            m1 = {{ nominal = 1.0, unit = "kg" }}
+            m2 = {{ nominal = 2.0, unit = "kg" }}
+            [coordinates]
+            q = {{ nominal = 0.4 }}
+            [[frame]]
+            name = "arm"
+            on = "base"
+            modified_dh = {{ theta = "q" }}
+            [[lumped_mass]]
+            mass = "m1"
+            on = "arm"
+            at = ["a", 0, 0]
+            [[lumped_mass]]
+            mass = "m2"
+            on = "arm"
+            at = ["b", 0, 0]
+            [[part]]
+            on = "arm"
+            linear = {{ planar = 1, nominal = {{ ZZ = 0.35, MX = 1.05, MY = 0.2, M = 4.2 }} }}
+            [[drive]]
+            name = "motor"
+            joint = "q"
+            "#,
+            b = a + gap,
+        );
+        let loaded = modelmill_spec::load("pendulum.toml", &text, &mut |_| unreachable!());
+        loaded
+            .unwrap_or_else(|failure| panic!("{failure}"))
+            .mechanism
+    }
+
+    /// Error of the pendulum's torque by p_min beside the formula of a textbook, relative to its size; p_min as the evaluator
+    /// and as emitted code adds it up.
+    fn errors_by_hand(derivation: &Derivation) -> [f64; 2] {
+        let [a, b] = [0, 1].map(|k| derivation.mechanism.constants[k].value);
+        let evaluator = Evaluator::new(derivation);
+        [
+            derivation.nominal_base_values(),
+            evaluator.base_parameters(),
+        ]
+        .map(|base| {
+            let (mut error, mut size) = (0.0_f64, 0.0_f64);
+            for k in 0..40 {
+                let (q, qdd) = (0.13 * f64::from(k), 3.0 - 0.4 * f64::from(k % 17));
+                let state = State {
+                    q: vec![q],
+                    qd: vec![0.7],
+                    qdd: vec![qdd],
+                    load: vec![0.0],
+                };
+                let found = evaluator.inverse_dynamics(&state.states(), &base).unwrap()[0][0];
+                let inertia = a * a + 2.0 * b * b + 0.35;
+                let moment = a + 2.0 * b + 1.05;
+                let expected = inertia * qdd + 9.81 * (moment * q.cos() - 0.2 * q.sin());
+                error = error.max((found - expected).abs());
+                size = size.max(expected.abs());
+            }
+            error / size
+        })
+    }
+
+    /// From gaps that cost nothing to gaps that leave nothing: refused is what loses more than a millionth, by a formula
+    /// that knows nothing of the reduction.
+    #[test]
+    fn a_base_is_refused_where_its_forces_are_wrong_and_only_there() {
+        for exponent in 1..=16 {
+            let mechanism = pendulum(10_f64.powi(-exponent), "");
+            match derive(&mechanism) {
+                Ok(derivation) => {
+                    let [error, emitted] = errors_by_hand(&derivation);
+                    assert!(error < 10.0 * MOST_LOST, "1e-{exponent}: {error:e}");
+                    assert!(emitted < 10.0 * MOST_LOST, "1e-{exponent}: {emitted:e}");
+                    assert!(exponent <= 9, "1e-{exponent} leaves too few digits");
+                }
+                Err(DeriveError::DigitsLost { .. }) => {
+                    let derivation = crate::derive::derive(&mechanism).unwrap();
+                    let [error, emitted] = errors_by_hand(&derivation);
+                    let worst = error.max(emitted);
+                    assert!(worst > 0.1 * MOST_LOST, "1e-{exponent}: {worst:e}");
+                    assert!(exponent >= 6, "1e-{exponent} leaves enough digits");
+                }
+                // Equal to rounding: a denominator is zero.
+                Err(DeriveError::NotFinite { .. }) => assert!(exponent >= 16),
+                Err(error) => panic!("1e-{exponent}: {error}"),
+            }
+        }
+    }
+
+    /// The evaluator's base parameters lose one rounding per growth of the factors, not two: the differences that they are
+    /// divided by are exact.
+    #[test]
+    fn differences_in_denominators_are_exact() {
+        for exponent in [4, 6, 8] {
+            let derivation =
+                crate::derive::derive(&pendulum(10_f64.powi(-exponent), "")).unwrap();
+            let [error, _] = errors_by_hand(&derivation);
+            assert!(
+                error < 10_f64.powi(exponent - 15),
+                "1e-{exponent}: {error:e}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_refusal_names_products_whose_retention_mends_it() {
+        let mechanism = pendulum(1e-14, "");
+        let Err(DeriveError::DigitsLost {
+            retained,
+            dependent,
+            ..
+        }) = derive(&mechanism)
+        else {
+            panic!("refused");
+        };
+        assert_eq!(retained, ["m1", "m2"]);
+        assert_eq!(dependent, ["ZZ1", "MX1"]);
+        let mended = derive(&pendulum(1e-14, "retain = [\"ZZ1\", \"MX1\"]")).unwrap();
+        assert!(errors_by_hand(&mended).iter().all(|error| *error < 1e-12));
+    }
+
+    /// What parameters are worth does not hide what factors lose.
+    #[test]
+    fn parameters_without_values_stand_for_those_of_their_unit() {
+        let mut mechanism = pendulum(1e-14, "");
+        for parameter in &mut mechanism.parameters {
+            parameter.nominal = 0.0;
+        }
+        let found = derive(&mechanism).map(|_| ());
+        assert!(
+            matches!(found, Err(DeriveError::DigitsLost { .. })),
+            "{found:?}"
+        );
+    }
+
+    /// Numbers in, digits out: sound models lose next to none.
+    #[test]
+    fn sound_models_are_far_from_the_threshold() {
+        for name in [
+            "two_link",
+            "spidermill-paper",
+            "four_bar",
+            "stanford",
+            "tx40",
+        ] {
+            let derivation = derive(&model(name)).unwrap();
+            let lost = lost(&derivation).unwrap().unwrap().error;
+            assert!(lost < 1e-11, "{name}: {lost:e}");
+        }
+    }
+}
