@@ -141,28 +141,13 @@ pub fn decimated(columns: Vec<Vec<f64>>, data: &Stretch) -> Outcome<Vec<Vec<f64>
         .collect())
 }
 
-/// Rates of the drives, `[drive][sample]`, before decimation.
+/// Rates of the drives, `[drive][sample]`, before decimation: from the drives' Jacobian, since a drive may act along a rod
+/// or on a passive coordinate.
 pub fn drive_rates(model: &Model, data: &Stretch) -> Outcome<Vec<Vec<f64>>> {
-    let mechanism = &model.derivation.mechanism;
-    let active = model.active();
-    let is_linear = |kind: &DriveKind| matches!(kind, DriveKind::Linear { .. });
-    let lengths = if mechanism.drives.iter().any(|drive| is_linear(&drive.kind)) {
-        let evaluator = Evaluator::new(&model.derivation);
-        columns(model, data, |states| evaluator.drives(states))?
-    } else {
-        Vec::new()
-    };
-    let n = mechanism.drives.len();
-    let rates = mechanism.drives.iter().enumerate().map(|(d, drive)| {
-        let rate = match &drive.kind {
-            DriveKind::Joint(coordinate) => {
-                let name = &mechanism.coordinates[coordinate.0].name;
-                let place = active.iter().position(|other| other == name);
-                place.and_then(|place| data.run.qd.get(place))
-            }
-            DriveKind::Linear { .. } => lengths.get(n + d),
-        };
-        rate.cloned().unwrap_or_default()
-    });
-    Ok(rates.collect())
+    let evaluator = Evaluator::new(&model.derivation);
+    let mut positions = columns(model, data, |states| evaluator.drives(states))?;
+    // Positions come first, rates behind them, the Jacobian last.
+    let mut rates = positions.split_off(model.derivation.mechanism.drives.len());
+    rates.truncate(positions.len());
+    Ok(rates)
 }
