@@ -1,6 +1,6 @@
 //! A model along a recording: its forces and reactions, the measured ones, and variables on which an error may depend.
 
-use modelmill_codegen::{Evaluator, Reactions, States};
+use modelmill_codegen::{Evaluator, PoseFault, PoseReason, Reactions, States};
 use modelmill_identify::decimate_columns;
 use modelmill_spec::DriveKind;
 
@@ -89,7 +89,7 @@ pub fn variables(model: &Model, data: &Stretch) -> Outcome<Vec<(String, Vec<f64>
 pub fn columns(
     model: &Model,
     data: &Stretch,
-    mut evaluate: impl FnMut(&States<'_>) -> Result<Vec<Vec<f64>>, modelmill_codegen::PoseFault>,
+    mut evaluate: impl FnMut(&States<'_>) -> Result<Vec<Vec<f64>>, PoseFault>,
 ) -> Outcome<Vec<Vec<f64>>> {
     let mut columns: Vec<Vec<f64>> = Vec::new();
     model.host().watched(
@@ -98,7 +98,7 @@ pub fn columns(
         |job| {
             data.for_each_block(model, |states| {
                 job.step(states.len())?;
-                Ok::<_, Error>(evaluate(states).map(|block| {
+                Ok::<_, Error>(evaluate(states).and_then(finite).map(|block| {
                     if columns.is_empty() {
                         columns = block;
                     } else {
@@ -111,6 +111,20 @@ pub fn columns(
         },
     )??;
     Ok(columns)
+}
+
+/// Columns without numbers that are infinite or none, as values too large to be multiplied make them.
+fn finite(block: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, PoseFault> {
+    let first = block
+        .iter()
+        .filter_map(|column| column.iter().position(|x| !x.is_finite()));
+    match first.min() {
+        Some(sample) => Err(PoseFault {
+            sample,
+            reason: PoseReason::Undefined,
+        }),
+        None => Ok(block),
+    }
 }
 
 /// The parallel filter, on every column; one of zeros stays one.

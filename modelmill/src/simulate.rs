@@ -155,7 +155,13 @@ fn refusal(
     trajectory: &Trajectory,
     error: &SimulationError,
 ) -> Error {
-    let SimulationError::Pose { time, .. } = error else {
+    let (SimulationError::Pose { time, .. }
+    | SimulationError::NotFinite {
+        time,
+        largest: None,
+        ..
+    }) = error
+    else {
         return Error::input(format!("{}: {error}", path.display()));
     };
     let after = trajectory.time().partition_point(|t| t <= time);

@@ -50,6 +50,15 @@ pub enum SimulationError {
         /// Why.
         reason: PoseError,
     },
+    /// A force or a reading is infinite or no number.
+    NotFinite {
+        /// When, s.
+        time: f64,
+        /// The column that it belongs to.
+        column: String,
+        /// The body with the largest number, by name, and what is so large there.
+        largest: Option<String>,
+    },
     /// No sample is left: the delay is longer than the trajectory.
     NothingLeft {
         /// The longest delay, s.
@@ -71,6 +80,19 @@ impl fmt::Display for SimulationError {
             ),
             Self::Nominal(reason) => write!(f, "in the nominal configuration {reason}"),
             Self::Pose { time, reason } => write!(f, "at t = {time} s {reason}"),
+            Self::NotFinite {
+                time,
+                column,
+                largest,
+            } => {
+                write!(f, "at t = {time} s `{column}` is no finite number; ")?;
+                match largest {
+                    Some(largest) => write!(f, "look at {largest}, which is too large to reckon with"),
+                    None => f.write_str(
+                        "look for numbers in the rig and in the trajectory that are too large to be multiplied",
+                    ),
+                }
+            }
             Self::NothingLeft { delay } => write!(
                 f,
                 "a sensor lags by {delay} s, longer than the whole trajectory; shorten the delay"
@@ -231,7 +253,41 @@ pub fn simulate(
         let read = values.map(|instant| sensor.read(instant.forces[d], &mut noise));
         columns.push((drive.name.clone(), read.collect()));
     }
+    check_finite(rig, &columns)?;
     Ok(Run { columns, notes })
+}
+
+/// That a recording holds numbers only.
+fn check_finite(rig: &Rig, columns: &[(String, Vec<f64>)]) -> Result<(), SimulationError> {
+    let first = columns.iter().filter_map(|(name, values)| {
+        let at = values.iter().position(|value| !value.is_finite())?;
+        Some((at, name))
+    });
+    let Some((at, column)) = first.min_by_key(|(at, _)| *at) else {
+        return Ok(());
+    };
+    Err(SimulationError::NotFinite {
+        time: columns[0].1[at],
+        column: column.clone(),
+        largest: largest_number(rig),
+    })
+}
+
+/// The number of a body that makes forces overflow, in words, if there is one.
+fn largest_number(rig: &Rig) -> Option<String> {
+    /// Forces multiply masses by squares of lengths, of rates and more.
+    const TOO_LARGE: f64 = 1e60;
+    let numbers = rig.bodies.iter().flat_map(|body| {
+        [
+            ("mass", body.mass.abs()),
+            ("centre", body.centre.amax()),
+            ("inertia", body.inertia.amax()),
+            ("place", body.nominal.p_WB_W.amax()),
+        ]
+        .map(|(what, value)| (body, what, value))
+    });
+    let (body, what, value) = numbers.max_by(|a, b| a.2.total_cmp(&b.2))?;
+    (value > TOO_LARGE).then(|| format!("the {what} of the body `{}` ({value:e})", body.name))
 }
 
 /// Times of the samples: those of the trajectory, or evenly spaced; from where every delayed reading lies
