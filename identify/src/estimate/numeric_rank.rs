@@ -87,6 +87,21 @@ pub fn numeric_rank(w: &DMatrix<f64>) -> Result<RegressorRank, LeastSquaresError
     })
 }
 
+/// Ratio of the largest to the least singular value of a matrix as it is, in its units; `None` where the least one is at
+/// the level of rounding, so that the columns depend on each other.
+/// Fails when an entry is not finite or there are no columns.
+pub fn condition_number(w: &DMatrix<f64>) -> Result<Option<f64>, LeastSquaresError> {
+    // Columns of unlike units are no sign of dependence: that is looked for once they are scaled.
+    let (scaled, _) = scale(w)?;
+    let scaled = singular_values(&scaled)?;
+    let floor = scaled[0] * f64::EPSILON * w.nrows().max(w.ncols()) as f64;
+    if scaled[scaled.len() - 1] <= floor {
+        return Ok(None);
+    }
+    let plain = singular_values(w)?;
+    Ok(Some(plain[0] / plain[plain.len() - 1]).filter(|c| c.is_finite()))
+}
+
 /// Which `rank` columns to keep, by QR with column pivoting on columns of norm 1, and the numeric
 /// factors of the others: the fallback where no exact reduction is at hand.
 /// Fails when an entry is not finite or there are no columns; `rank` is cut to what there is.
@@ -225,6 +240,21 @@ mod tests {
         assert_eq!(full.rank, 3);
         assert!(full.gap > 1e10);
         assert!((full.condition_number / 1e7 - 1.0).abs() < 0.5);
+    }
+
+    /// The last column that counts is not where a condition number ends: a column that depends on others has none.
+    #[test]
+    fn the_condition_is_that_of_all_columns() {
+        let free = sample().columns(0, 3).into_owned();
+        let condition = condition_number(&free).unwrap().unwrap();
+        assert!((condition / 1e7 - 1.0).abs() < 0.5, "{condition:e}");
+        assert_eq!(condition_number(&sample()).unwrap(), None);
+        let mut near = free.columns(0, 2).into_owned();
+        near.column_mut(1).copy_from(&free.column(0));
+        assert_eq!(condition_number(&near).unwrap(), None);
+        near[(0, 1)] += 1e-6;
+        let condition = condition_number(&near).unwrap().unwrap();
+        assert!(condition > 1e6 && condition < 1e9, "{condition:e}");
     }
 
     #[test]
