@@ -40,7 +40,10 @@ impl Model {
             files: data.iter().map(|one| one.run.file.clone()).collect(),
             figures: figures(&self.drives(), pairs)?,
             places: places(self, &data, &measured, &forces)?,
-            notes: data.iter().flat_map(Stretch::notes).cloned().collect(),
+            notes: {
+                let notes = data.iter().flat_map(Stretch::notes).cloned();
+                self.caution().into_iter().chain(notes).collect()
+            },
         })
     }
 }

@@ -14,6 +14,12 @@ pub(crate) fn run(host: &Host, args: &CheckArgs) -> Outcome {
             terminal::print_json(&print::faults(&faults))?;
             return Err(Failure::Library(Error::Model(faults)));
         }
+        Err(Failure::Library(Error::Derivation { model, error })) if args.json => {
+            let fault = Error::Derivation { model, error };
+            let path = args.model.display().to_string();
+            terminal::print_json(&print::refusal(&fault.to_string(), &path))?;
+            return Err(Failure::Library(fault));
+        }
         model => model?,
     };
     let checked = model.check()?;

@@ -42,6 +42,10 @@ pub(super) fn module_doc(derivation: &Derivation) -> String {
     line(String::new());
     line("# Dependent columns".to_owned());
     line(String::new());
+    if let Some(caution) = derivation.reduction.method.caution() {
+        line(format!("Beware: {caution}."));
+        line(String::new());
+    }
     for text in derivation.dependency_texts() {
         line(format!("- `{text}`"));
     }

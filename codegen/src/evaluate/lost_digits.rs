@@ -407,8 +407,7 @@ mod tests {
     #[test]
     fn differences_in_denominators_are_exact() {
         for exponent in [4, 6, 8] {
-            let derivation =
-                crate::derive::derive(&pendulum(10_f64.powi(-exponent), "")).unwrap();
+            let derivation = crate::derive::derive(&pendulum(10_f64.powi(-exponent), "")).unwrap();
             let [error, _] = errors_by_hand(&derivation);
             assert!(
                 error < 10_f64.powi(exponent - 15),

@@ -78,6 +78,19 @@ pub enum Method {
     },
 }
 
+impl Method {
+    /// What a reader of a numeric reduction must know, in words; `None` where the reduction holds for general values.
+    pub fn caution(&self) -> Option<String> {
+        match self {
+            Self::Exact { .. } | Self::Unreduced => None,
+            Self::Numeric { because, .. } => Some(format!(
+                "the base parameters were found numerically, on the values of this file: {because}; factors are rounded, and \
+                 base and factors hold for these values alone"
+            )),
+        }
+    }
+}
+
 /// One line of eq. (6): `h_j = sum of a_k h_k`.
 #[derive(Clone, Debug)]
 pub struct Dependency {

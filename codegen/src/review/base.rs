@@ -171,9 +171,12 @@ pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
     } = derivation;
     page.heading("Dependent columns");
     if reduction.dependencies.is_empty() {
-        page.paragraph([text(
-            "All columns are linearly independent; nothing needs to be regrouped.",
-        )]);
+        let mut says =
+            "All columns are linearly independent; nothing needs to be regrouped.".to_owned();
+        if let Some(caution) = reduction.method.caution() {
+            says.push_str(&format!(" Beware: {caution}."));
+        }
+        page.paragraph([text(says)]);
         return;
     }
     page.paragraph([text(match &reduction.method {
@@ -184,7 +187,7 @@ pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
         Method::Unreduced => "Columns are not reduced.".to_owned(),
         Method::Numeric { least_kept, most_dropped, because } => format!(
             "Columns that are constant combinations of retained ones, eq. (6), found numerically on the values of this file: \
-             {because}. The factors are rounded. \
+             {because}. The factors are rounded, and base and factors hold for these values alone. \
              Of every retained column the others leave at least {least_kept:.1e}, of every dependent one at most {most_dropped:.1e}."
         ),
     })]);

@@ -4,7 +4,7 @@ use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
 use super::base::{base_expression, factor_text};
-use crate::{Derivation, OperationCount, Stage};
+use crate::{Derivation, Method, OperationCount, Reduction, Stage};
 
 /// Rank of the regressor on the file's values, found numerically.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,14 +58,53 @@ pub struct BaseLine {
 }
 
 /// Ranks.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Rank {
-    /// By exact reduction, for any geometry but special ones.
-    pub exact: usize,
+    /// By exact reduction, for any geometry but special ones; none where columns were reduced numerically.
+    pub exact: Option<usize>,
     /// Of eq. (9) on the file's values.
     pub numeric: Option<usize>,
     /// States of which eq. (9) was made.
     pub samples: Option<usize>,
+    /// How columns were reduced where that was done numerically.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub method: Option<NumericMethod>,
+}
+
+/// A reduction on the file's values, in floating point.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NumericMethod {
+    /// `numeric`.
+    pub name: &'static str,
+    /// How many columns are retained.
+    pub rank: usize,
+    /// Why columns could not be reduced in symbols.
+    pub because: String,
+    /// What the others leave of the retained column that is nearest to being dependent, relative to its size.
+    pub least_kept: f64,
+    /// The same for the dependent column that is furthest from it.
+    pub most_dropped: f64,
+}
+
+impl NumericMethod {
+    /// The method of a reduction, if it is numeric.
+    pub fn of(reduction: &Reduction) -> Option<Self> {
+        let Method::Numeric {
+            least_kept,
+            most_dropped,
+            because,
+        } = &reduction.method
+        else {
+            return None;
+        };
+        Some(Self {
+            name: "numeric",
+            rank: reduction.retained.len(),
+            because: because.to_string(),
+            least_kept: *least_kept,
+            most_dropped: *most_dropped,
+        })
+    }
 }
 
 /// Operation counts per state.
@@ -127,9 +166,11 @@ impl Equations {
                 })
                 .collect(),
             rank: Rank {
-                exact: reduction.retained.len(),
+                exact: matches!(reduction.method, Method::Exact { .. })
+                    .then_some(reduction.retained.len()),
                 numeric: numeric.map(|n| n.rank),
                 samples: numeric.map(|n| n.samples),
+                method: NumericMethod::of(reduction),
             },
             operations: Operations {
                 regressor: programs.regressor.count(Stage::State),

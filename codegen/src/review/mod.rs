@@ -22,7 +22,9 @@ mod render_text;
 pub(crate) mod tests;
 
 pub use base::{base_expression, base_grouped};
-pub use equations::{BaseLine, DependencyLine, Equations, NumericRank, Operations, Rank};
+pub use equations::{
+    BaseLine, DependencyLine, Equations, NumericMethod, NumericRank, Operations, Rank,
+};
 
 use crate::Derivation;
 use document::Document;

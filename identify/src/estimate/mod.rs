@@ -40,7 +40,7 @@ pub use essential::{Dropped, Essential, EssentialOptions, essential};
 pub use instruments::{Instrumented, instrumental};
 pub use least_squares::LeastSquares;
 pub use numeric_rank::{
-    Dependency, NumericReduction, RegressorRank, numeric_rank, reduce_numerically,
+    Dependency, NumericReduction, RegressorRank, condition_number, numeric_rank, reduce_numerically,
 };
 pub use physical::{NOMINAL_WEIGHT, PhysicalParameters, physical_parameters};
 pub use prior::{Belief, with_prior};

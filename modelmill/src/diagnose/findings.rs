@@ -156,7 +156,7 @@ impl Model {
             Judged::Check
         };
         let notes = fit_data.iter().chain(&check_data).flat_map(Stretch::notes);
-        let notes = notes.cloned().collect();
+        let notes = self.caution().into_iter().chain(notes.cloned()).collect();
         let entries = added::entries(&answer);
         let (edited, after) = if entries.is_empty() {
             (None, Err(String::new()))

@@ -119,7 +119,8 @@ pub fn identify(
         (Some(identified), Some(nominal))
     };
     let finite = |value: f64| value.is_finite().then_some(value);
-    let mut all_notes: Vec<Note> = recordings.flat_map(Stretch::notes).cloned().collect();
+    let of_recordings = recordings.flat_map(Stretch::notes).cloned();
+    let mut all_notes: Vec<Note> = model.caution().into_iter().chain(of_recordings).collect();
     all_notes.extend(notes.iter().cloned());
     let constants = &model.derivation.mechanism.constants;
     Ok(Identification {

@@ -91,6 +91,7 @@ impl Host {
             })?
             .map_err(|error| Error::derivation(path, error))?;
         let mut notes = Vec::new();
+        notes.extend(caution(&derivation, path));
         for (k, says) in retained_in_vain(&derivation) {
             let place = loaded.retain.get(k).map(|span| {
                 let (line, column) = loaded.sources.line_and_column(*span);
@@ -126,6 +127,12 @@ fn base(derivation: &Derivation) -> Vec<BaseParameter> {
         one.expression = base_expression(derivation, k).text();
     }
     base
+}
+
+/// What must be known of a base that holds for one geometry only.
+fn caution(derivation: &Derivation, path: &str) -> Option<Note> {
+    let says = derivation.reduction.method.caution()?;
+    Some(Note::warning(format!("{path}: {says}")))
 }
 
 /// What `retain` asks for that cannot be, in words, by its place in the list.
@@ -219,6 +226,11 @@ impl Model {
     /// The files that it was read from.
     pub fn files(&self) -> impl Iterator<Item = &Path> {
         self.loaded.sources.paths()
+    }
+
+    /// What must be known of base parameters that were found numerically, for this geometry only.
+    pub fn caution(&self) -> Option<Note> {
+        caution(&self.derivation, &self.path)
     }
 
     /// Gravity in the frame of the base with the constants of the file, m/s^2.

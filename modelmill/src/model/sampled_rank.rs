@@ -5,8 +5,8 @@
 use std::cmp::Ordering;
 
 use modelmill_codegen::review::NumericRank;
-use modelmill_codegen::{Evaluator, PoseFault, PoseReason, States};
-use modelmill_identify::estimate::numeric_rank;
+use modelmill_codegen::{Evaluator, Method, PoseFault, PoseReason, States};
+use modelmill_identify::estimate::{condition_number, numeric_rank};
 use modelmill_spec::Motion;
 use nalgebra::DMatrix;
 
@@ -54,9 +54,10 @@ impl SampledRank {
             n => format!(" ({n} more left out, where the model is singular or undefined)"),
         };
         let condition = self.shown.condition;
-        let condition = condition.map_or_else(String::new, |c| {
-            format!(", condition number {}", significant(c, 3))
-        });
+        let condition = condition.map_or_else(
+            || ", condition number infinite to rounding".to_owned(),
+            |c| format!(", condition number {}", significant(c, 3)),
+        );
         format!(
             "{} over {}{left_out}{condition}, {}",
             self.shown.rank,
@@ -103,17 +104,28 @@ pub fn judged_rank(model: &Model) -> Outcome<Judged> {
             });
         }
     };
-    let exact = model.base.len();
+    let retained = model.base.len();
     let rank = found.shown.rank;
+    let is_exact = matches!(model.derivation.reduction.method, Method::Exact { .. });
     let mut warnings = Vec::new();
-    match rank.cmp(&exact) {
-        Ordering::Less => warnings.push(format!(
-            "with the file's values the numeric rank is {rank}, below the exact {exact} for general values; special values \
+    let undetermined = || count(retained - rank, "direction", "directions");
+    match rank.cmp(&retained) {
+        Ordering::Less if is_exact => warnings.push(format!(
+            "with the file's values the numeric rank is {rank}, below the exact {retained} for general values; special values \
              make columns vanish or coincide, so identification will find {} undetermined",
-            count(exact - rank, "direction", "directions")
+            undetermined()
+        )),
+        Ordering::Greater if is_exact => warnings.push(format!(
+            "the numeric rank is {rank}, above the exact {retained}; please report this model, one of them is wrong",
+        )),
+        Ordering::Less => warnings.push(format!(
+            "{rank} of the {retained} columns that were retained numerically stand out at random states; identification will \
+             find {} hardly determined",
+            undetermined()
         )),
         Ordering::Greater => warnings.push(format!(
-            "the numeric rank is {rank}, above the exact {exact}; please report this model, one of them is wrong",
+            "the numeric rank is {rank} at random states, but {retained} columns were retained numerically around the nominal \
+             pose; forces away from it may lack what the others add",
         )),
         Ordering::Equal => {}
     }
@@ -146,14 +158,14 @@ fn sampled_rank(model: &Model) -> Result<SampledRank, String> {
         Err(fault) if is_of_the_pose(&fault) => one_by_one(&evaluator, &mut sampling, wanted)?,
         Err(fault) => return Err(fault.to_string()),
     };
-    let rank_of = |matrix| numeric_rank(matrix).map_err(|error| error.to_string());
-    let found = rank_of(&full)?;
-    let condition = rank_of(&retained)?.condition_number;
+    let found = numeric_rank(&full).map_err(|error| error.to_string())?;
+    // Of the base as it is printed, also where its columns are fewer in truth.
+    let condition = condition_number(&retained).map_err(|error| error.to_string())?;
     Ok(SampledRank {
         shown: NumericRank {
             rank: found.rank,
             samples: wanted,
-            condition: Some(condition).filter(|c| c.is_finite()),
+            condition,
         },
         gap: found.gap,
         left_out: sampling.left_out,

@@ -1,5 +1,6 @@
 //! What a variant changes, as JSON and for people.
 
+use modelmill_codegen::review::NumericMethod;
 use serde_json::{Value, json};
 
 use crate::model::{Change, Changes, Model};
@@ -31,9 +32,16 @@ impl Changes {
                 )
             })
             .collect();
+        let side = |model: &Model| {
+            let mut side = json!({ "model": model.name, "base": base(model) });
+            if let Some(method) = NumericMethod::of(&model.derivation.reduction) {
+                side["reduction"] = json!(method);
+            }
+            side
+        };
         json!({
-            "before": { "model": before.name, "base": base(before) },
-            "after": { "model": after.name, "base": base(after) },
+            "before": side(before),
+            "after": side(after),
             "entries": list(&self.entries),
             "parameters": list(&self.products),
             "dependencies": list(&self.dependencies),
@@ -45,6 +53,11 @@ impl Changes {
     /// The same for people.
     pub fn text(&self, before: &Model, after: &Model, style: Style) -> String {
         let mut lines = vec![style.bold(&format!("{} -> {}", before.path, after.path))];
+        for model in [before, after] {
+            if let Some(caution) = model.derivation.reduction.method.caution() {
+                lines.push(format!("  {}: {caution}", model.path));
+            }
+        }
         let mut section = |title: &str, none: &str, changes: &[Change]| {
             lines.push(String::new());
             lines.push(style.bold(title));

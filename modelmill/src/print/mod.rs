@@ -15,4 +15,4 @@ mod summary;
 pub mod tables;
 
 pub use spelling::{Spelling, Words};
-pub use summary::faults;
+pub use summary::{faults, refusal};

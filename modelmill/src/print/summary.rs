@@ -1,6 +1,7 @@
 //! What a model file holds, as JSON and for people; and what is wrong with one that has no meaning, as JSON.
 
-use modelmill_codegen::{Derivation, module_name};
+use modelmill_codegen::review::NumericMethod;
+use modelmill_codegen::{Derivation, Reduction, module_name};
 use modelmill_spec::{Diagnostic, DriveKind, Failure, Mechanism, Motion, Severity, Sources};
 use serde_json::{Value, json};
 
@@ -26,7 +27,8 @@ impl Checked {
                 "column": place.map(|p| p.1),
             })
         }));
-        let judged = self.warnings.iter();
+        let caution = model.derivation.reduction.method.caution();
+        let judged = caution.iter().chain(&self.warnings);
         warnings.extend(
             judged.map(|says| json!({ "severity": "warning", "says": says, "file": model.path })),
         );
@@ -41,6 +43,14 @@ impl Checked {
         self.summary
             .text(&model.name, &model.derivation, self.rank.as_ref(), style)
     }
+}
+
+/// Why a model that has a meaning cannot be used, as one JSON object.
+pub fn refusal(says: &str, path: &str) -> Value {
+    json!({
+        "valid": false,
+        "diagnostics": [{ "severity": "error", "says": says, "file": path }],
+    })
 }
 
 /// What is wrong with a file that has no meaning, as one JSON object.
@@ -93,6 +103,7 @@ impl Summary {
             "parameters": self.parameters,
             "products": derivation.reduction.products.len(),
             "base_parameters": derivation.reduction.retained.len(),
+            "reduction": reduction(&derivation.reduction),
             "diagnostics": warnings,
         })
     }
@@ -163,10 +174,24 @@ impl Summary {
                 ),
             ),
         );
+        if reduction.method.caution().is_some() {
+            line(
+                "reduced",
+                "numerically, on the values of this file".to_owned(),
+            );
+        }
         if let Some(rank) = rank {
             line("numeric rank", rank.text());
         }
         lines.join("\n")
+    }
+}
+
+/// How columns were reduced to a base.
+fn reduction(reduction: &Reduction) -> Value {
+    match NumericMethod::of(reduction) {
+        Some(method) => json!(method),
+        None => json!({ "name": "exact" }),
     }
 }
 
