@@ -43,7 +43,7 @@ fn oddity(measured: &[f64], nominal: &[f64]) -> Option<Oddity> {
 
 /// Sentences about drives whose measured forces are not those of the nominal values by their sign or unit; forces are
 /// `[drive][sample]`.
-pub fn oddities(
+pub(crate) fn oddities(
     mechanism: &Mechanism,
     measured: &[Vec<f64>],
     nominal: &[Vec<f64>],

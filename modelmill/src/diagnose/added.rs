@@ -22,7 +22,7 @@ pub struct Added {
 }
 
 /// The effects that were found, as entries with the estimates for nominal values.
-pub fn entries(answer: &Answer) -> Vec<NewEffect> {
+pub(crate) fn entries(answer: &Answer) -> Vec<NewEffect> {
     let found = answer.diagnosis.effects.iter();
     let entries = found.filter_map(|found| {
         let kinds = &answer.candidates.kinds;
@@ -133,7 +133,7 @@ fn rounded(value: f64) -> f64 {
 }
 
 /// Adds entries to the text of a model's file, one after the other.
-pub fn add(model: &Model, effects: &[NewEffect]) -> Outcome<Added> {
+pub(crate) fn add(model: &Model, effects: &[NewEffect]) -> Outcome<Added> {
     let mut text = model.text().to_owned();
     let mut last = None;
     for effect in effects {

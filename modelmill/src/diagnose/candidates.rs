@@ -20,7 +20,7 @@ const RATES: usize = 14;
 const WAVES: usize = 120;
 
 /// An effect as one entry of a model file.
-pub struct Single {
+pub(crate) struct Single {
     pub kind: usize,
     pub spots: Vec<Spot>,
     pub sort: Sort,
@@ -33,18 +33,18 @@ pub struct Single {
 }
 
 /// A candidate: entries whose columns add up, since they share their parameters.
-pub struct Entry {
+pub(crate) struct Entry {
     pub singles: Vec<usize>,
 }
 
 /// A kind that is a change of the model rather than columns of its own.
-pub struct Change {
+pub(crate) struct Change {
     pub kind: usize,
     pub spot: Spot,
 }
 
 /// All candidates of a model, derived.
-pub struct Candidates {
+pub(crate) struct Candidates {
     pub kinds: Vec<EffectKind>,
     pub singles: Vec<Single>,
     pub entries: Vec<Entry>,
@@ -62,7 +62,7 @@ pub struct Candidates {
 
 /// How often the columns of an effect are evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sort {
+pub(crate) enum Sort {
     /// Once.
     Known,
     /// For every value of a constant.
@@ -72,7 +72,7 @@ pub enum Sort {
 }
 
 /// Writes down and derives all candidates of a model.
-pub fn candidates(model: &Model) -> Outcome<Candidates> {
+pub(crate) fn candidates(model: &Model) -> Outcome<Candidates> {
     let loaded = &model.loaded;
     let mechanism = &loaded.mechanism;
     let all = spots(mechanism);
@@ -156,7 +156,7 @@ fn has(mechanism: &Mechanism, kind: &EffectKind, spots: &[&Spot]) -> bool {
 }
 
 /// A kind at its places; constants that are given are not searched for.
-pub fn single(
+pub(crate) fn single(
     k: usize,
     kind: &EffectKind,
     spots: &[&Spot],
@@ -188,7 +188,7 @@ pub fn single(
 }
 
 /// Whether the expression of a kind names the load of its place.
-pub fn uses_load(kind: &EffectKind) -> bool {
+pub(crate) fn uses_load(kind: &EffectKind) -> bool {
     let mut words = kind
         .expression
         .split(|c: char| !c.is_alphanumeric() && c != '_');
@@ -196,7 +196,7 @@ pub fn uses_load(kind: &EffectKind) -> bool {
 }
 
 /// A variant of the model that has effects besides, as text.
-pub struct Variant {
+pub(crate) struct Variant {
     text: String,
     constants: String,
     /// Which candidates it holds, in order.
@@ -204,7 +204,7 @@ pub struct Variant {
 }
 
 impl Variant {
-    pub fn new(model: &Model) -> Outcome<Self> {
+    pub(crate) fn new(model: &Model) -> Outcome<Self> {
         Ok(Self {
             text: header(model)?,
             constants: String::new(),
@@ -212,7 +212,7 @@ impl Variant {
         })
     }
 
-    pub fn write(&mut self, kind: &EffectKind, single: &Single, number: usize) {
+    pub(crate) fn write(&mut self, kind: &EffectKind, single: &Single, number: usize) {
         self.singles.push(number);
         let places: Vec<String> = single
             .spots
@@ -254,7 +254,7 @@ impl Variant {
     }
 
     /// Derives the columns of its effects alone; `own` effects of the model come before them.
-    pub fn derive(
+    pub(crate) fn derive(
         mut self,
         model: &Model,
         own: usize,
@@ -281,7 +281,7 @@ impl Variant {
 }
 
 /// The base columns of a model as functions of a tilt of its base.
-pub fn tilted(model: &Model) -> Outcome<Derivation> {
+pub(crate) fn tilted(model: &Model) -> Outcome<Derivation> {
     let mut text = header(model)?;
     let names = ["tx", "ty", "tz"].map(|t| (t, format!("candidate_{t}")));
     let given: Vec<String> = names
@@ -325,7 +325,7 @@ fn header(model: &Model) -> Outcome<String> {
 
 /// Values that are tried for the constant that a candidate searches for, given the largest rate and the travel of its place;
 /// one where there is none.
-pub fn grid(single: &Single, [rate, travel]: [f64; 2]) -> Vec<f64> {
+pub(crate) fn grid(single: &Single, [rate, travel]: [f64; 2]) -> Vec<f64> {
     for (_, _, search) in &single.constants {
         let Search::Range { from, to, of } = *search else {
             continue;
@@ -362,7 +362,7 @@ pub fn grid(single: &Single, [rate, travel]: [f64; 2]) -> Vec<f64> {
 }
 
 /// The sign of a kind's parameter, as the search knows it.
-pub fn sign(sign: Sign) -> modelmill_identify::diagnose::Sign {
+pub(crate) fn sign(sign: Sign) -> modelmill_identify::diagnose::Sign {
     use modelmill_identify::diagnose::Sign as Known;
     match sign {
         Sign::Positive => Known::Positive,

@@ -16,20 +16,26 @@ use super::places::{Spot, spots};
 /// An effect by its name, with values of its parameters and constants.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Named {
+    /// Kind and places.
     pub effect: Effect,
+    /// Values by the symbols of the kind, SI units.
     pub values: Vec<(String, f64)>,
 }
 
 /// Whether constants of an effect that have no given value are searched for or have their usual one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Constants {
+pub(crate) enum Constants {
+    /// Searched for.
     Searched,
+    /// The library's usual value.
     Usual,
 }
 
 /// A derived effect.
-pub struct Chosen {
+pub(crate) struct Chosen {
+    /// What the user named.
     pub named: Named,
+    /// Its kind.
     pub kind: EffectKind,
     candidates: Candidates,
 }
@@ -37,7 +43,7 @@ pub struct Chosen {
 /// Derives a named effect.
 ///
 /// Fails, as `add` would, if kind, place or value is unknown or the model has the effect already.
-pub fn choose(model: &Model, named: &Named, constants: Constants) -> Outcome<Chosen> {
+pub(crate) fn choose(model: &Model, named: &Named, constants: Constants) -> Outcome<Chosen> {
     let loaded = &model.loaded;
     check(model, named)?;
     let mechanism = &loaded.mechanism;
@@ -206,7 +212,7 @@ fn given(kind: &EffectKind, named: &Named, constants: Constants) -> Outcome<Vec<
 impl Chosen {
     /// The effect along recordings, with its columns for each value of a constant that is searched for; `None` if it has no
     /// effect. `load` is what the drives carry.
-    pub fn candidate(
+    pub(crate) fn candidate(
         &self,
         model: &Model,
         all: &Runs<'_>,
@@ -249,13 +255,13 @@ impl Chosen {
     }
 
     /// Whether its force follows from the model's nominal values.
-    pub fn needs_nominal(&self) -> bool {
+    pub(crate) fn needs_nominal(&self) -> bool {
         self.candidates.tilt.is_some() || uses_load(&self.kind)
     }
 }
 
 /// Columns of the base that are to be found, what the bodies of the nominal model carry, and the force of what is known.
-pub fn base(model: &Model, all: &Runs<'_>) -> Outcome<(Vec<Column>, Column, Column)> {
+pub(crate) fn base(model: &Model, all: &Runs<'_>) -> Outcome<(Vec<Column>, Column, Column)> {
     let every = regressor(all, &Evaluator::new(&model.derivation), model)?;
     let none = Column(vec![None; model.drives().len()]);
     let (mut load, mut known) = (none.clone(), none);

@@ -16,7 +16,7 @@ use super::numbers::{Motions, Runs, regressor_of};
 use super::tilt::{TILTS, tilt};
 
 /// Candidates with their columns; where each comes from is said in the same order.
-pub fn columns(
+pub(crate) fn columns(
     candidates: &Candidates,
     model: &Model,
     all: &Runs<'_>,
@@ -124,7 +124,7 @@ fn shared_scales(candidates: &Candidates, motions: &Motions) -> Vec<[f64; 2]> {
 
 /// Where a candidate comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Origin {
+pub(crate) enum Origin {
     /// An entry of the candidates, and which of its parameters have an effect.
     Entry(usize, Vec<bool>),
     /// A tilt of the base.
@@ -323,7 +323,7 @@ fn bears(kind: &EffectKind) -> bool {
 }
 
 /// Columns of all candidates that depend on what the drives carry, for loads that are stacked and decimated like the forces.
-pub fn carried(
+pub(crate) fn carried(
     candidates: &Candidates,
     model: &Model,
     all: &Runs<'_>,
@@ -386,7 +386,7 @@ fn between(kept: &[f64], factor: usize, samples: usize) -> Vec<f64> {
 }
 
 /// Columns of an entry for another value of the constant that is searched for.
-pub fn finer(
+pub(crate) fn finer(
     candidates: &Candidates,
     model: &Model,
     all: &Runs<'_>,

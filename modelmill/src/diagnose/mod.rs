@@ -17,9 +17,11 @@ mod tilt;
 mod versions;
 pub mod words;
 
-pub use candidates::sign;
-pub use chosen::{Chosen, Constants, Named, base, choose};
+pub(crate) use candidates::sign;
+pub(crate) use chosen::{Chosen, Constants, base, choose};
+pub use chosen::Named;
 pub use findings::{Estimate, Findings, Missing, OffNominal, Question, Separation, WithNominal};
 pub use modelmill_identify::diagnose::{Diagnosis, Effect, Rung, Verdict};
-pub use problem::{Held, ROUNDING};
+pub use problem::Held;
+pub(crate) use problem::ROUNDING;
 pub use versions::{Along, Version};

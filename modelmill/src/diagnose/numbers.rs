@@ -10,10 +10,10 @@ use crate::model::Model;
 use crate::stretch::Stretch;
 
 /// Recordings of the fit, then those of the check.
-pub type Runs<'a> = [(&'a Stretch, bool)];
+pub(crate) type Runs<'a> = [(&'a Stretch, bool)];
 
 /// Names of the channels and lengths of the stretches.
-pub fn layout(model: &Model, all: &Runs<'_>) -> Layout {
+pub(crate) fn layout(model: &Model, all: &Runs<'_>) -> Layout {
     let stretch = |(one, is_check): &(&Stretch, bool)| {
         let time = one.time();
         let mean = |time: &[f64]| match time {
@@ -35,7 +35,7 @@ pub fn layout(model: &Model, all: &Runs<'_>) -> Layout {
 }
 
 /// Channels of all recordings one after the other, decimated like the forces.
-pub fn stack(
+pub(crate) fn stack(
     all: &Runs<'_>,
     mut of: impl FnMut(&Stretch) -> Outcome<Vec<Vec<f64>>>,
 ) -> Outcome<Vec<Vec<f64>>> {
@@ -51,12 +51,12 @@ pub fn stack(
 }
 
 /// Columns of a regressor along all recordings.
-pub fn regressor(all: &Runs<'_>, evaluator: &Evaluator<'_>, model: &Model) -> Outcome<Vec<Column>> {
+pub(crate) fn regressor(all: &Runs<'_>, evaluator: &Evaluator<'_>, model: &Model) -> Outcome<Vec<Column>> {
     regressor_of(all, evaluator, model, &|_| true)
 }
 
 /// The same of some columns only; the others are zero.
-pub fn regressor_of(
+pub(crate) fn regressor_of(
     all: &Runs<'_>,
     evaluator: &Evaluator<'_>,
     model: &Model,
@@ -121,7 +121,7 @@ fn moving(
 }
 
 /// Variables on which an unknown force may depend.
-pub fn variables(model: &Model, all: &Runs<'_>) -> Vec<(String, Vec<f64>)> {
+pub(crate) fn variables(model: &Model, all: &Runs<'_>) -> Vec<(String, Vec<f64>)> {
     let mut variables = Vec::new();
     for (i, name) in model.active().into_iter().enumerate() {
         for (suffix, order) in [("", 0), ("_d", 1), ("_dd", 2)] {
@@ -142,7 +142,7 @@ pub fn variables(model: &Model, all: &Runs<'_>) -> Vec<(String, Vec<f64>)> {
 }
 
 /// Largest rate and travel of a place; zero where it has none.
-pub struct Motions {
+pub(crate) struct Motions {
     drives: Vec<Vec<f64>>,
     active: Vec<usize>,
     active_motion: Vec<[Vec<f64>; 2]>,
@@ -151,7 +151,7 @@ pub struct Motions {
 }
 
 impl Motions {
-    pub fn new(model: &Model, all: &Runs<'_>) -> Outcome<Self> {
+    pub(crate) fn new(model: &Model, all: &Runs<'_>) -> Outcome<Self> {
         let evaluator = Evaluator::new(&model.derivation);
         let (active, passive) = model.derivation.coordinates();
         let drives = states(all, model, |states| evaluator.drives(states))?;
@@ -176,7 +176,7 @@ impl Motions {
     }
 
     /// Largest rate and travel.
-    pub fn scale(&self, place: Place) -> [f64; 2] {
+    pub(crate) fn scale(&self, place: Place) -> [f64; 2] {
         let n = self.drives.len() / (2 + self.active.len()).max(1);
         let found = match place {
             Place::Drive(d) => Some((&self.drives[n + d.0], &self.drives[d.0])),

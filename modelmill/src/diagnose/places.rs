@@ -7,7 +7,7 @@ use modelmill_spec::{
 
 /// A place with its name and what it carries.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Spot {
+pub(crate) struct Spot {
     pub name: String,
     pub carries: Carries,
     pub sort: ActsOn,
@@ -15,7 +15,7 @@ pub struct Spot {
 }
 
 /// All places of a mechanism.
-pub fn spots(mechanism: &Mechanism) -> Vec<Spot> {
+pub(crate) fn spots(mechanism: &Mechanism) -> Vec<Spot> {
     let carries = |motion: Motion| match motion {
         Motion::Revolute => Carries::Torque,
         Motion::Prismatic => Carries::Force,
@@ -69,7 +69,7 @@ pub fn spots(mechanism: &Mechanism) -> Vec<Spot> {
 }
 
 /// Whether a kind may act at a place and could say something there.
-pub fn fits(mechanism: &Mechanism, kind: &EffectKind, spot: &Spot) -> bool {
+pub(crate) fn fits(mechanism: &Mechanism, kind: &EffectKind, spot: &Spot) -> bool {
     let has_unit = |units: &[(Carries, String)]| units.iter().any(|(c, _)| *c == spot.carries);
     let has_units = kind.parameters.iter().all(|p| has_unit(&p.units));
     if !kind.on.contains(&spot.sort) {
@@ -94,7 +94,7 @@ pub fn fits(mechanism: &Mechanism, kind: &EffectKind, spot: &Spot) -> bool {
 }
 
 /// Whether a kind repeats itself along the travel of its place.
-pub fn is_wave(kind: &EffectKind) -> bool {
+pub(crate) fn is_wave(kind: &EffectKind) -> bool {
     use modelmill_spec::{Scale, Search};
     kind.constants.iter().any(|c| {
         matches!(
@@ -147,7 +147,7 @@ fn is_tied(mechanism: &Mechanism, part: PartIdx) -> bool {
 ///
 /// Each place alone; pairs for kinds that need two; and in machines with loops, whose sides are often alike, all drives, all
 /// passive joints and all active ones.
-pub fn sets<'a>(
+pub(crate) fn sets<'a>(
     mechanism: &Mechanism,
     kind: &EffectKind,
     spots: &[&'a Spot],

@@ -17,7 +17,7 @@ use super::columns::{Origin, carried, columns, finer};
 use super::numbers::{Runs, layout, regressor, stack, variables};
 
 /// Errors below this share of a force are rounding, of the recording or of whatever simulated it.
-pub const ROUNDING: f64 = 3e-6;
+pub(crate) const ROUNDING: f64 = 3e-6;
 
 /// Which parameters keep their nominal values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,14 +32,14 @@ pub enum Held {
 const FEWEST: usize = 60;
 
 /// What was asked and what was found.
-pub struct Answer {
+pub(crate) struct Answer {
     pub problem: Problem,
     pub diagnosis: Diagnosis,
     pub candidates: Candidates,
 }
 
 /// Finds what a model lacks.
-pub fn find(model: &Model, fit: &[Stretch], check: &[Stretch], held: Held) -> Outcome<Answer> {
+pub(crate) fn find(model: &Model, fit: &[Stretch], check: &[Stretch], held: Held) -> Outcome<Answer> {
     let candidates = model
         .host()
         .watched("writing down what may be missing", 0, |_| candidates(model))??;

@@ -10,11 +10,11 @@ use crate::model::Model;
 use super::numbers::{Runs, regressor};
 
 /// Constants of a tilt, about x, y and z.
-pub const TILTS: [&str; 3] = ["tx", "ty", "tz"];
+pub(crate) const TILTS: [&str; 3] = ["tx", "ty", "tz"];
 
 /// What each base column changes by with gravity along each axis of the base, those of known parameters included, and the
 /// axes about which a tilt is felt. Gravity is turned into each axis, both ways: forces are linear in it.
-pub fn tilt(derivation: &Derivation, model: &Model, all: &Runs<'_>) -> Outcome<Tilt> {
+pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &Runs<'_>) -> Outcome<Tilt> {
     let mechanism = &derivation.mechanism;
     let usual: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     let gravity = model.gravity();

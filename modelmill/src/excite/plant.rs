@@ -42,6 +42,7 @@ pub struct ModelPlant<'a> {
 }
 
 impl<'a> ModelPlant<'a> {
+    /// A model with the limits that its motion keeps.
     pub fn new(model: &'a Model, limits: &'a Limits) -> Self {
         let mechanism = &model.derivation.mechanism;
         let (active, passive) = model.derivation.coordinates();

@@ -17,7 +17,7 @@ use crate::model::Model;
 use crate::stretch::Stretch;
 
 /// What is to be told apart, derived.
-pub struct Pair {
+pub(crate) struct Pair {
     /// The effect with its constants.
     truth: Chosen,
     /// The effect as it would be fitted, where constants of it are searched for.
@@ -33,14 +33,14 @@ pub struct Pair {
 }
 
 /// What an effect may be taken for.
-pub struct Rival {
+pub(crate) struct Rival {
     chosen: Chosen,
     /// Whether the effect holds it as a special case, so that nothing tells when the rival is true.
     pub is_held: bool,
 }
 
 impl Rival {
-    pub fn effect(&self) -> &Effect {
+    pub(crate) fn effect(&self) -> &Effect {
         &self.chosen.named.effect
     }
 }
@@ -58,7 +58,7 @@ pub struct Apart {
 
 impl Pair {
     /// Derives what the command line names.
-    pub fn new(model: &Model, separate: &Named, from: &[Named], beside: &[Named]) -> Outcome<Self> {
+    pub(crate) fn new(model: &Model, separate: &Named, from: &[Named], beside: &[Named]) -> Outcome<Self> {
         let all: Vec<&Named> = std::iter::once(separate)
             .chain(from)
             .chain(beside)
@@ -128,34 +128,34 @@ impl Pair {
     }
 
     /// The effect that is to be told from the others.
-    pub fn effect(&self) -> &Effect {
+    pub(crate) fn effect(&self) -> &Effect {
         &self.truth.named.effect
     }
 
     /// Values of its parameters; none if they are not known.
-    pub fn sizes(&self) -> &[(String, f64)] {
+    pub(crate) fn sizes(&self) -> &[(String, f64)] {
         &self.sizes
     }
 
     /// Effects that are there in either case.
-    pub fn beside(&self) -> impl Iterator<Item = &Effect> {
+    pub(crate) fn beside(&self) -> impl Iterator<Item = &Effect> {
         self.beside.iter().map(|one| &one.named.effect)
     }
 
     /// One noise for all drives.
-    pub fn set_noise(&mut self, size: f64, drives: usize) {
+    pub(crate) fn set_noise(&mut self, size: f64, drives: usize) {
         self.noise = Some(vec![size; drives]);
     }
 
     /// Noise of all drives together, if it is known.
-    pub fn noise(&self) -> Option<f64> {
+    pub(crate) fn noise(&self) -> Option<f64> {
         let noise = self.noise.as_ref()?;
         let squares: f64 = noise.iter().map(|n| n * n).sum();
         Some((squares / noise.len().max(1) as f64).sqrt())
     }
 
     /// Takes from recordings what is not known: the noise, and the size of the effect by a fit beside the base.
-    pub fn learn(&mut self, model: &Model, data: &[Stretch]) -> Outcome {
+    pub(crate) fn learn(&mut self, model: &Model, data: &[Stretch]) -> Outcome {
         let mut measured: Vec<Vec<f64>> = Vec::new();
         for one in data {
             let forces = crate::along::measured(one)?;
@@ -233,7 +233,7 @@ impl Pair {
 
     /// How far the effects are apart along recordings, from the rivals of some positions; `None` if the effect has no force
     /// there.
-    pub fn along(
+    pub(crate) fn along(
         &self,
         model: &Model,
         data: &[Stretch],
@@ -313,7 +313,7 @@ impl Pair {
     }
 
     /// Parameters whose values are of a sign that makes no sense.
-    pub fn wrong_signs(&self) -> Vec<&str> {
+    pub(crate) fn wrong_signs(&self) -> Vec<&str> {
         let wrong = |symbol: &str, value: f64| {
             let parameter = self.truth.kind.parameters.iter();
             let sign = parameter
@@ -334,7 +334,7 @@ impl Pair {
     }
 
     /// Whether any force of an effect follows from nominal values.
-    pub fn needs_nominal(&self) -> bool {
+    pub(crate) fn needs_nominal(&self) -> bool {
         let rivals = self.rivals.iter().map(|rival| &rival.chosen);
         std::iter::once(&self.truth)
             .chain(rivals)
@@ -381,7 +381,7 @@ fn matrix(columns: &[Column], weights: &[f64], samples: usize) -> DMatrix<f64> {
 }
 
 /// A model with limits whose motion tells effects apart.
-pub struct SeparatingPlant<'a> {
+pub(crate) struct SeparatingPlant<'a> {
     pub inner: &'a ModelPlant<'a>,
     pub model: &'a Model,
     pub pair: &'a Pair,
@@ -391,7 +391,7 @@ pub struct SeparatingPlant<'a> {
 
 impl SeparatingPlant<'_> {
     /// How far the effects are apart along a motion.
-    pub fn along(&self, motion: &Motion, which: &[usize]) -> Option<Apart> {
+    pub(crate) fn along(&self, motion: &Motion, which: &[usize]) -> Option<Apart> {
         let data = [recording(self.inner, motion)?];
         self.pair.along(self.model, &data, which).ok()?
     }

@@ -153,7 +153,7 @@ pub(crate) fn ask(
 
 impl Asked {
     /// The plant for the search.
-    pub fn plant<'a>(&'a self, inner: &'a ModelPlant<'a>, model: &'a Model) -> SeparatingPlant<'a> {
+    pub(crate) fn plant<'a>(&'a self, inner: &'a ModelPlant<'a>, model: &'a Model) -> SeparatingPlant<'a> {
         SeparatingPlant {
             inner,
             model,
@@ -163,7 +163,7 @@ impl Asked {
     }
 
     /// How far the effects are apart along the recordings.
-    pub fn before(&self, model: &Model) -> Outcome<Option<Apart>> {
+    pub(crate) fn before(&self, model: &Model) -> Outcome<Option<Apart>> {
         if self.data.is_empty() {
             return Ok(None);
         }
@@ -181,7 +181,7 @@ impl Asked {
     }
 
     /// Both sides in words.
-    pub fn words(&self) -> String {
+    pub(crate) fn words(&self) -> String {
         format!(
             "{} from {}",
             words::effect(self.pair.effect()),
@@ -191,7 +191,7 @@ impl Asked {
 }
 
 /// What forces of a model are measured in.
-pub fn unit(model: &Model) -> &'static str {
+pub(crate) fn unit(model: &Model) -> &'static str {
     let mechanism = &model.derivation.mechanism;
     let is_force = |drive: &modelmill_spec::Drive| match drive.kind {
         modelmill_spec::DriveKind::Joint(i) => {
@@ -225,6 +225,7 @@ impl Separated {
         Some((PLAIN / one).powi(2).ceil().max(1.0))
     }
 
+    /// All of it as one JSON object.
     pub fn json(&self) -> Value {
         let pair = &self.asked.pair;
         let one = |apart: &Apart, samples: usize| {

@@ -13,7 +13,7 @@ use crate::error::{Error, Outcome};
 use crate::model::Model;
 
 /// Physical parameters that bodies can have, with the names of the bodies.
-pub fn find(
+pub(crate) fn find(
     model: &Model,
     triangle: &Triangle,
     solution: &Solution,

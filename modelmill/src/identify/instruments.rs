@@ -20,7 +20,7 @@ pub enum Instruments<'a> {
 }
 
 /// One stretch of instruments for each of `data`; none if none are asked for.
-pub fn along(
+pub(crate) fn along(
     data: &[Stretch],
     instruments: &Instruments<'_>,
     options: &Estimation,

@@ -12,7 +12,7 @@ use crate::text::table::count;
 /// Gives equations at standstill the weight 0, and says how many there are.
 ///
 /// `part` is the share of a drive's fastest rate below which it stands still.
-pub fn leave_out(model: &Model, data: &mut [Stretch], part: f64) -> Outcome {
+pub(crate) fn leave_out(model: &Model, data: &mut [Stretch], part: f64) -> Outcome {
     let drives = model.drives();
     let rates: Vec<Vec<Vec<f64>>> = data
         .iter()

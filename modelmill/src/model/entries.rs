@@ -23,7 +23,7 @@ impl Entries {
 }
 
 /// All entries in the order of the file, each named by its table and its own name.
-pub fn entries(m: &Mechanism) -> Vec<(String, String)> {
+pub(crate) fn entries(m: &Mechanism) -> Vec<(String, String)> {
     let mut entries = Entries::default();
     quantities(m, &mut entries);
     geometry(m, &mut entries);

@@ -39,7 +39,7 @@ pub struct SampledRank {
 }
 
 /// The numeric rank, and what is to be said about it.
-pub struct Judged {
+pub(crate) struct Judged {
     /// The rank, if one was found.
     pub found: Option<SampledRank>,
     /// Where it says something else than exact reduction, or nothing that one can rely on.
@@ -92,7 +92,7 @@ impl SampledRank {
 }
 
 /// The rank of H on the file's values, and in words where it says something else than exact reduction.
-pub fn judged_rank(model: &Model) -> Outcome<Judged> {
+pub(crate) fn judged_rank(model: &Model) -> Outcome<Judged> {
     let message = format!("sampling {}", model.name);
     let found = match model.host().watched(&message, 0, |_| sampled_rank(model))? {
         Ok(found) => found,

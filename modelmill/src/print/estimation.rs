@@ -24,7 +24,7 @@ fn effective_samples(found: &Identified) -> Option<f64> {
 }
 
 /// What `identify --json` holds under `estimator`.
-pub fn json(model: &Model, found: &Identified, args: &Estimation) -> Value {
+pub(crate) fn json(model: &Model, found: &Identified, args: &Estimation) -> Value {
     let drives = model.drives();
     let by_drive = |values: &[f64]| -> Value {
         drives
@@ -110,7 +110,7 @@ pub fn json(model: &Model, found: &Identified, args: &Estimation) -> Value {
 }
 
 /// The same for people, line by line.
-pub fn text(model: &Model, found: &Identified, infos: &[ParameterInfo]) -> Vec<String> {
+pub(crate) fn text(model: &Model, found: &Identified, infos: &[ParameterInfo]) -> Vec<String> {
     let mut lines = Vec::new();
     let deviations = &found.deviations;
     if let Some(effective) = effective_samples(found) {

@@ -10,7 +10,7 @@ use crate::model::Model;
 
 /// How a recording whose columns are called `header` is read; `file` is what messages call it.
 /// Fails when a mapping makes no sense for this model, or asks for columns that are not there.
-pub fn read_options(
+pub(crate) fn read_options(
     model: &Model,
     args: &Reading,
     header: &[String],

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::error::{Error, Outcome};
 
 /// The bytes of what is no ordinary file; `None` for files and folders, which can be opened again.
-pub fn piped(path: &Path) -> Outcome<Option<Vec<u8>>> {
+pub(crate) fn piped(path: &Path) -> Outcome<Option<Vec<u8>>> {
     match std::fs::metadata(path) {
         Ok(found) if !found.is_file() && !found.is_dir() => {
             let bytes = std::fs::read(path).map_err(|error| {

@@ -20,7 +20,7 @@ const LEAST: usize = 1200;
 /// Points of a curve in the picture that stands by itself.
 const STILL: usize = 600;
 /// Recordings of which curves are shown.
-pub const MOST_RUNS: usize = 6;
+pub(crate) const MOST_RUNS: usize = 6;
 /// Height of a panel.
 const HEIGHT: f64 = 190.0;
 
@@ -32,7 +32,7 @@ struct Curve<'a> {
 }
 
 /// Curves of all recordings, those of the check first and open.
-pub fn section(before: &Version, after: Option<&Version>) -> String {
+pub(crate) fn section(before: &Version, after: Option<&Version>) -> String {
     let mut order: Vec<usize> = (0..before.runs.len()).collect();
     order.sort_by_key(|k| !before.runs[*k].is_check);
     let shown = order.len().min(MOST_RUNS);

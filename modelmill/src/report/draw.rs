@@ -5,15 +5,15 @@ use std::fmt::Write as _;
 use crate::report::svg::{escape, thinned};
 
 /// Width of a picture in its own units.
-pub const WIDTH: f64 = 860.0;
+pub(crate) const WIDTH: f64 = 860.0;
 /// Room for the ticks at the left.
-pub const LEFT: f64 = 66.0;
+pub(crate) const LEFT: f64 = 66.0;
 /// Room at the right.
-pub const RIGHT: f64 = 14.0;
+pub(crate) const RIGHT: f64 = 14.0;
 
 /// An axis from one value to another over a stretch of the picture.
 #[derive(Clone, Copy, Debug)]
-pub struct Axis {
+pub(crate) struct Axis {
     pub from: f64,
     pub to: f64,
     pub start: f64,
@@ -24,7 +24,7 @@ pub struct Axis {
 
 impl Axis {
     /// An axis; one that has no length gets some.
-    pub fn new(range: [f64; 2], pixels: [f64; 2]) -> Self {
+    pub(crate) fn new(range: [f64; 2], pixels: [f64; 2]) -> Self {
         let [mut from, mut to] = range;
         if !(from.is_finite() && to.is_finite()) {
             (from, to) = (0.0, 1.0);
@@ -43,7 +43,7 @@ impl Axis {
     }
 
     /// An axis of decades; values must be positive.
-    pub fn decades(range: [f64; 2], pixels: [f64; 2]) -> Self {
+    pub(crate) fn decades(range: [f64; 2], pixels: [f64; 2]) -> Self {
         let from = range[0].max(1e-300);
         let to = range[1].max(from * 1.5);
         Self {
@@ -53,7 +53,7 @@ impl Axis {
     }
 
     /// Where a value lies, kept within the axis.
-    pub fn at(&self, value: f64) -> f64 {
+    pub(crate) fn at(&self, value: f64) -> f64 {
         let share = if self.log {
             (value.max(1e-300) / self.from).ln() / (self.to / self.from).ln()
         } else {
@@ -63,7 +63,7 @@ impl Axis {
     }
 
     /// Round values along the axis with their labels, about `most` of them.
-    pub fn ticks(&self, most: usize) -> Vec<(f64, String)> {
+    pub(crate) fn ticks(&self, most: usize) -> Vec<(f64, String)> {
         if most == 0 {
             return Vec::new();
         }
@@ -142,7 +142,7 @@ fn label(value: f64, step: f64) -> String {
 }
 
 /// A picture as it grows.
-pub struct Picture {
+pub(crate) struct Picture {
     body: String,
     width: f64,
     height: f64,
@@ -150,7 +150,7 @@ pub struct Picture {
 
 impl Picture {
     /// An empty one.
-    pub fn new(width: f64, height: f64) -> Self {
+    pub(crate) fn new(width: f64, height: f64) -> Self {
         Self {
             body: String::new(),
             width,
@@ -159,7 +159,7 @@ impl Picture {
     }
 
     /// Grid, ticks and a frame around a pair of axes; `x` may be without labels.
-    pub fn frame(&mut self, x: &Axis, y: &Axis, title: &str, n_ticks: [usize; 2]) {
+    pub(crate) fn frame(&mut self, x: &Axis, y: &Axis, title: &str, n_ticks: [usize; 2]) {
         let (left, right) = (x.start, x.end);
         let (bottom, top) = (y.start, y.end);
         for (value, label) in x.ticks(n_ticks[0]) {
@@ -194,12 +194,12 @@ impl Picture {
     }
 
     /// A path with a class.
-    pub fn path(&mut self, class: &str, d: &str) {
+    pub(crate) fn path(&mut self, class: &str, d: &str) {
         let _ = write!(self.body, r#"<path class="{class}" d="{d}"/>"#);
     }
 
     /// Text at a place; `anchor` as SVG has it.
-    pub fn text(&mut self, class: &str, at: [f64; 2], anchor: &str, text: &str) {
+    pub(crate) fn text(&mut self, class: &str, at: [f64; 2], anchor: &str, text: &str) {
         let _ = write!(
             self.body,
             r#"<text class="{class}" x="{:.1}" y="{:.1}" text-anchor="{anchor}">{}</text>"#,
@@ -210,7 +210,7 @@ impl Picture {
     }
 
     /// A rectangle from one corner to the opposite one.
-    pub fn rect(&mut self, class: &str, a: [f64; 2], b: [f64; 2]) {
+    pub(crate) fn rect(&mut self, class: &str, a: [f64; 2], b: [f64; 2]) {
         let _ = write!(
             self.body,
             r#"<rect class="{class}" x="{:.1}" y="{:.1}" width="{:.1}" height="{:.1}"/>"#,
@@ -222,7 +222,7 @@ impl Picture {
     }
 
     /// A dot.
-    pub fn dot(&mut self, class: &str, at: [f64; 2], radius: f64) {
+    pub(crate) fn dot(&mut self, class: &str, at: [f64; 2], radius: f64) {
         let _ = write!(
             self.body,
             r#"<circle class="{class}" cx="{:.1}" cy="{:.1}" r="{radius}"/>"#,
@@ -231,7 +231,7 @@ impl Picture {
     }
 
     /// The picture's text; `says` is what it shows, for those who cannot see it.
-    pub fn finish(self, says: &str) -> String {
+    pub(crate) fn finish(self, says: &str) -> String {
         format!(
             r#"<svg role="img" aria-label="{}" viewBox="0 0 {:.0} {:.0}">{}</svg>"#,
             attribute(says),
@@ -243,12 +243,12 @@ impl Picture {
 }
 
 /// Text within an attribute.
-pub fn attribute(text: &str) -> String {
+pub(crate) fn attribute(text: &str) -> String {
     escape(text).replace('"', "&quot;")
 }
 
 /// A curve over an axis, thinned to what can be seen; values that are no numbers are gaps.
-pub fn line(values: &[f64], x: &Axis, span: [f64; 2], y: &Axis, points: usize) -> String {
+pub(crate) fn line(values: &[f64], x: &Axis, span: [f64; 2], y: &Axis, points: usize) -> String {
     let last = values.len().max(2) - 1;
     let mut d = String::new();
     let mut pen = 'M';
@@ -265,7 +265,7 @@ pub fn line(values: &[f64], x: &Axis, span: [f64; 2], y: &Axis, points: usize) -
 }
 
 /// Least and largest of all finite values.
-pub fn range<'a>(values: impl IntoIterator<Item = &'a f64>) -> [f64; 2] {
+pub(crate) fn range<'a>(values: impl IntoIterator<Item = &'a f64>) -> [f64; 2] {
     let finite = values.into_iter().filter(|v| v.is_finite());
     finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
         [low.min(*v), high.max(*v)]
@@ -273,7 +273,7 @@ pub fn range<'a>(values: impl IntoIterator<Item = &'a f64>) -> [f64; 2] {
 }
 
 /// The range with some room at both ends.
-pub fn with_room([low, high]: [f64; 2], share: f64) -> [f64; 2] {
+pub(crate) fn with_room([low, high]: [f64; 2], share: f64) -> [f64; 2] {
     let room = share * (high - low);
     [low - room, high + room]
 }

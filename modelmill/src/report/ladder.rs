@@ -15,7 +15,7 @@ const LEFT: f64 = 290.0;
 const LETTERS: usize = 38;
 
 /// The picture.
-pub fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
+pub(crate) fn picture(ladder: &[Rung], noise: f64, judged: Judged) -> String {
     let errors = ladder.iter().flat_map(|rung| [rung.fit, rung.check]);
     let all: Vec<f64> = errors.chain([noise]).filter(|e| *e > 0.0).collect();
     let low = all.iter().copied().fold(f64::INFINITY, f64::min);

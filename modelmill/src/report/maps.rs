@@ -17,7 +17,7 @@ const SHADES: usize = 9;
 const LEAST: usize = 2;
 
 /// A variable along the recordings that are judged.
-pub type Variable = (String, Vec<f64>);
+pub(crate) type Variable = (String, Vec<f64>);
 
 /// Where each sample lies in a map; the cells of both variables.
 struct Grid {
@@ -102,7 +102,7 @@ fn pairs(variables: &[Variable]) -> Vec<(usize, usize)> {
 }
 
 /// A figure for each drive.
-pub fn figures(before: &Version, after: Option<&Version>, variables: &[Variable]) -> String {
+pub(crate) fn figures(before: &Version, after: Option<&Version>, variables: &[Variable]) -> String {
     let judged = before.judged();
     let mut html = String::new();
     for (d, drive) in before.model.drives().iter().enumerate() {

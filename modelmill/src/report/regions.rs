@@ -19,7 +19,7 @@ const HEIGHT: f64 = 190.0;
 const LEFT: f64 = 58.0;
 
 /// A figure for each region of the error of the model as it is.
-pub fn figures(
+pub(crate) fn figures(
     regions: &[Region],
     before: &Version,
     after: Option<&Version>,
@@ -39,7 +39,7 @@ pub fn figures(
 }
 
 /// A region in one sentence; every number has its unit.
-pub fn sentence(region: &Region, model: &Model) -> String {
+pub(crate) fn sentence(region: &Region, model: &Model) -> String {
     let unit = variable_unit(model, &region.variable);
     let [low, high] = region.range;
     let name = if region.variable == TIME_COLUMN {

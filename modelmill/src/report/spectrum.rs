@@ -15,7 +15,7 @@ const SEGMENT: usize = 2048;
 const FREQUENCIES: usize = 140;
 
 /// Density of a signal at some frequencies, unit^2/Hz: `(frequency in Hz, density)`.
-pub fn density(signal: &[f64], rate: f64) -> Vec<(f64, f64)> {
+pub(crate) fn density(signal: &[f64], rate: f64) -> Vec<(f64, f64)> {
     let n = SEGMENT.min(signal.len());
     if n < 32 || !(rate > 0.0 && rate.is_finite()) {
         return Vec::new();
@@ -69,7 +69,7 @@ fn goertzel(values: &[f64], bin: usize) -> f64 {
 }
 
 /// A figure for each drive: what is left over frequency, before and after.
-pub fn figures(before: &Version, after: Option<&Version>) -> String {
+pub(crate) fn figures(before: &Version, after: Option<&Version>) -> String {
     let mut html = String::new();
     for (d, drive) in before.model.drives().iter().enumerate() {
         let of = |version: &Version| -> Vec<(f64, f64)> {

@@ -172,6 +172,7 @@ pub fn thinned(values: &[f64], wanted: usize) -> Vec<(usize, f64)> {
     points
 }
 
+/// Text as HTML and SVG take it.
 pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")

@@ -15,7 +15,7 @@ use crate::text::table::{percent, significant};
 const FIRST: usize = 20;
 
 /// A cell: its text, and the number by which it is sorted.
-pub struct Cell(String, Option<f64>);
+pub(crate) struct Cell(String, Option<f64>);
 
 impl Cell {
     fn text(text: &str) -> Self {
@@ -32,7 +32,7 @@ impl Cell {
 }
 
 /// A table; columns that begin with `#` hold numbers.
-pub fn table(class: &str, head: &[&str], rows: &[Vec<Cell>]) -> String {
+pub(crate) fn table(class: &str, head: &[&str], rows: &[Vec<Cell>]) -> String {
     let mut html = format!("<div class=\"wide\"><table class=\"{class}\">\n<thead><tr>");
     for name in head {
         let (class, name) = match name.strip_prefix('#') {
@@ -57,7 +57,7 @@ pub fn table(class: &str, head: &[&str], rows: &[Vec<Cell>]) -> String {
 }
 
 /// The steps of the ladder with what spoke for them.
-pub fn ladder(findings: &Findings) -> String {
+pub(crate) fn ladder(findings: &Findings) -> String {
     let diagnosis = &findings.diagnosis;
     let rows: Vec<Vec<Cell>> = diagnosis
         .ladder
@@ -97,7 +97,7 @@ pub fn ladder(findings: &Findings) -> String {
 }
 
 /// Errors of each drive before and after, beside the noise.
-pub fn drives(findings: &Findings) -> String {
+pub(crate) fn drives(findings: &Findings) -> String {
     let nrms = |version: &Version, d: usize| -> f64 {
         let runs = version.judged();
         let error = version.errors(&runs, d);
@@ -142,7 +142,7 @@ pub fn drives(findings: &Findings) -> String {
 }
 
 /// What was found: values, what cannot be told from it, what it is.
-pub fn effects(findings: &Findings) -> String {
+pub(crate) fn effects(findings: &Findings) -> String {
     let answer = &findings.answer;
     let mut html = String::new();
     for found in &answer.diagnosis.effects {
@@ -220,7 +220,7 @@ fn capital(text: &str) -> String {
 }
 
 /// What became of the candidates; those behind the first are folded.
-pub fn candidates(findings: &Findings) -> String {
+pub(crate) fn candidates(findings: &Findings) -> String {
     let all = &findings.diagnosis.candidates;
     let head = [
         "kind",
@@ -270,7 +270,7 @@ fn share(value: f64) -> Cell {
 }
 
 /// Identified parameters beside nominal ones.
-pub fn parameters(version: &Version) -> String {
+pub(crate) fn parameters(version: &Version) -> String {
     let Some(result) = &version.identified else {
         return "<p>All parameters are held at their nominal values.</p>\n".to_owned();
     };
@@ -331,7 +331,7 @@ pub fn parameters(version: &Version) -> String {
 }
 
 /// Recordings and what was done to them.
-pub fn data(findings: &Findings) -> String {
+pub(crate) fn data(findings: &Findings) -> String {
     let rows: Vec<Vec<Cell>> = findings
         .before
         .runs

@@ -5,7 +5,7 @@ use modelmill_spec::{DriveKind, Motion};
 use crate::model::Model;
 
 /// Unit of a drive's force.
-pub fn force_unit(model: &Model, drive: usize) -> &'static str {
+pub(crate) fn force_unit(model: &Model, drive: usize) -> &'static str {
     let mechanism = &model.derivation.mechanism;
     match mechanism.drives[drive].kind {
         DriveKind::Joint(i) if mechanism.coordinates[i.0].motion == Motion::Revolute => "N m",
@@ -14,7 +14,7 @@ pub fn force_unit(model: &Model, drive: usize) -> &'static str {
 }
 
 /// Unit of a variable by its name: a coordinate or the length of a drive, their rates and accelerations, a force, the time.
-pub fn variable_unit(model: &Model, name: &str) -> String {
+pub(crate) fn variable_unit(model: &Model, name: &str) -> String {
     let mechanism = &model.derivation.mechanism;
     if name == modelmill_identify::TIME_COLUMN {
         return "s".to_owned();
@@ -39,6 +39,6 @@ pub fn variable_unit(model: &Model, name: &str) -> String {
 }
 
 /// A unit as it is written by hand: `kg m^2` as `kg m²`.
-pub fn pretty(unit: &str) -> String {
+pub(crate) fn pretty(unit: &str) -> String {
     unit.replace("^2", "²").replace("^3", "³")
 }
