@@ -6,7 +6,7 @@ use crate::Experiment;
 use crate::lengths::Length;
 use crate::runs::Periodic;
 use crate::study::{Along, Columns};
-use modelmill::report::svg::{Figure, Look};
+use modelmill::text::svg::{Figure, Look};
 
 /// Largest relative error that is drawn.
 const RELATIVE: f64 = 1.0;

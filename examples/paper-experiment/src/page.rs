@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::Experiment;
-use modelmill::report::svg::escape;
+use modelmill::text::svg::escape;
 
 /// The page's text.
 pub(crate) fn render(experiment: &Experiment) -> String {

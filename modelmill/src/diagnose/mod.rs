@@ -18,8 +18,8 @@ mod versions;
 pub mod words;
 
 pub(crate) use candidates::sign;
-pub(crate) use chosen::{Chosen, Constants, base, choose};
 pub use chosen::Named;
+pub(crate) use chosen::{Chosen, Constants, base, choose};
 pub use findings::{Estimate, Findings, Missing, OffNominal, Question, Separation, WithNominal};
 pub use modelmill_identify::diagnose::{Diagnosis, Effect, Rung, Verdict};
 pub use problem::Held;

@@ -51,7 +51,11 @@ pub(crate) fn stack(
 }
 
 /// Columns of a regressor along all recordings.
-pub(crate) fn regressor(all: &Runs<'_>, evaluator: &Evaluator<'_>, model: &Model) -> Outcome<Vec<Column>> {
+pub(crate) fn regressor(
+    all: &Runs<'_>,
+    evaluator: &Evaluator<'_>,
+    model: &Model,
+) -> Outcome<Vec<Column>> {
     regressor_of(all, evaluator, model, &|_| true)
 }
 

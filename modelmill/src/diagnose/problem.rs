@@ -39,7 +39,12 @@ pub(crate) struct Answer {
 }
 
 /// Finds what a model lacks.
-pub(crate) fn find(model: &Model, fit: &[Stretch], check: &[Stretch], held: Held) -> Outcome<Answer> {
+pub(crate) fn find(
+    model: &Model,
+    fit: &[Stretch],
+    check: &[Stretch],
+    held: Held,
+) -> Outcome<Answer> {
     let candidates = model
         .host()
         .watched("writing down what may be missing", 0, |_| candidates(model))??;

@@ -17,7 +17,7 @@ use crate::diagnose::Named;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::Recording;
-use crate::report::svg::Figure;
+use crate::text::svg::Figure;
 use crate::text::table::significant;
 
 pub use limits::Limit;

@@ -58,7 +58,12 @@ pub struct Apart {
 
 impl Pair {
     /// Derives what the command line names.
-    pub(crate) fn new(model: &Model, separate: &Named, from: &[Named], beside: &[Named]) -> Outcome<Self> {
+    pub(crate) fn new(
+        model: &Model,
+        separate: &Named,
+        from: &[Named],
+        beside: &[Named],
+    ) -> Outcome<Self> {
         let all: Vec<&Named> = std::iter::once(separate)
             .chain(from)
             .chain(beside)

@@ -153,7 +153,11 @@ pub(crate) fn ask(
 
 impl Asked {
     /// The plant for the search.
-    pub(crate) fn plant<'a>(&'a self, inner: &'a ModelPlant<'a>, model: &'a Model) -> SeparatingPlant<'a> {
+    pub(crate) fn plant<'a>(
+        &'a self,
+        inner: &'a ModelPlant<'a>,
+        model: &'a Model,
+    ) -> SeparatingPlant<'a> {
         SeparatingPlant {
             inner,
             model,

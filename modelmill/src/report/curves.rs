@@ -11,7 +11,7 @@ use serde_json::json;
 use super::draw::{Axis, LEFT, Picture, RIGHT, WIDTH, attribute, line, range, with_room};
 use super::units::force_unit;
 use crate::diagnose::{Along, Version};
-use crate::report::svg::{escape, thinned};
+use crate::text::svg::{escape, thinned};
 
 /// Values that all curves of a page may have together.
 const BUDGET: usize = 420_000;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::report::svg::{escape, thinned};
+use crate::text::svg::{escape, thinned};
 
 /// Width of a picture in its own units.
 pub(crate) const WIDTH: f64 = 860.0;

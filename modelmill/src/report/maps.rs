@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use super::draw::{Axis, Picture, range};
 use super::units::{force_unit, variable_unit};
 use crate::diagnose::Version;
-use crate::report::svg::escape;
+use crate::text::svg::escape;
 use crate::text::table::significant;
 
 const COLUMNS: usize = 22;

@@ -10,7 +10,6 @@ mod maps;
 mod page;
 mod regions;
 mod spectrum;
-pub mod svg;
 mod tables;
 mod units;
 

@@ -9,7 +9,7 @@ use super::{Findings, curves, keys, ladder, maps, regions, spectrum, tables, wor
 use crate::compare::Places;
 use crate::error::Outcome;
 use crate::print::Spelling;
-use crate::report::svg::escape;
+use crate::text::svg::escape;
 use crate::text::table::percent;
 
 /// The page's text; `spelling` says how its reader asks for what it advises.

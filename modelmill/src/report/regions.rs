@@ -10,7 +10,7 @@ use super::maps::Variable;
 use super::units::{force_unit, variable_unit};
 use crate::diagnose::Version;
 use crate::model::Model;
-use crate::report::svg::escape;
+use crate::text::svg::escape;
 use crate::text::table::significant;
 
 const BINS: usize = 44;

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use super::draw::{Axis, LEFT, Picture, RIGHT, WIDTH, range};
 use super::units::force_unit;
 use crate::diagnose::Version;
-use crate::report::svg::escape;
+use crate::text::svg::escape;
 
 const HEIGHT: f64 = 170.0;
 /// Samples of a segment.

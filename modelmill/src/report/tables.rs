@@ -8,7 +8,7 @@ use modelmill_identify::{FitParameter, Severity, Status};
 use super::draw::attribute;
 use super::units::{force_unit, pretty};
 use super::{Findings, Version, words};
-use crate::report::svg::escape;
+use crate::text::svg::escape;
 use crate::text::table::{percent, significant};
 
 /// Candidates that are shown at once.

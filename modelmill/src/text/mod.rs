@@ -1,6 +1,7 @@
-//! Text for people: tables, numbers, marks for a terminal.
+//! Text for people: tables, numbers, marks for a terminal, pictures.
 
 pub mod style;
+pub mod svg;
 pub mod table;
 
 pub use style::Style;
