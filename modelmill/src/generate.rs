@@ -54,14 +54,14 @@ impl Model {
         self.host().watched(&what, 0, |_| match code.language {
             Language::Rust => Ok(vec![EmittedFile {
                 path: format!("{}.rs", module_name(&self.derivation.mechanism.name)),
-                text: self.module(code)?,
+                text: self.module(*code)?,
             }]),
             Language::C => Ok(with_runtime(emit_c(&self.derivation))),
             Language::Python => Ok(with_runtime(emit_python(&self.derivation))),
         })?
     }
 
-    fn module(&self, code: &Code) -> Outcome<String> {
+    fn module(&self, code: Code) -> Outcome<String> {
         let derivation = &self.derivation;
         let fault = |error| Error::derivation(&self.path, error);
         let mut emitted = emit(derivation);

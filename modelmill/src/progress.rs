@@ -134,10 +134,7 @@ mod tests {
             stops: "long",
             ..Listener::default()
         };
-        assert!(matches!(
-            watched(&listener, "short", 2, |job| job.done()),
-            Ok(0)
-        ));
+        assert!(matches!(watched(&listener, "short", 2, Job::done), Ok(0)));
         let found = watched(&listener, "long", 0, |_| unreachable!("it was cancelled"));
         assert!(matches!(found, Err::<(), _>(Error::Cancelled)));
         assert_eq!(
