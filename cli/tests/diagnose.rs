@@ -398,7 +398,7 @@ fn friction_and_a_drive_inertia_of_a_real_arm_are_found() {
 #[test]
 #[cfg_attr(
     debug_assertions,
-    ignore = "minutes without optimisation: cargo test --release -p modelmill --test diagnose, or -- --ignored"
+    ignore = "minutes without optimisation: cargo test --release -p modelmill-cli diagnose, or -- --ignored"
 )]
 fn friction_and_the_coupled_wrist_of_a_real_arm_are_found() {
     let Some([fit]) = recordings("tx40", ["tx40_motor_5kHz.csv"]) else {

@@ -1,7 +1,7 @@
 //! Hidden effects: recordings with something hidden in them, made by the rig from a seed; `diagnose` looks for it, and
 //! the score says how often it was right.
 //!
-//! `cargo bench -p modelmill --bench hidden_effects -- [--count 240] [--seed 1] [--only one|two|none|outside]
+//! `cargo bench -p modelmill-cli --bench hidden_effects -- [--count 240] [--seed 1] [--only one|two|none|outside]
 //! [--keep DIR] [--list] [--program PATH] [--no-diagnosis]`. Figures go to standard output, progress to standard error;
 //! the same seed gives the same cases on every machine. `--keep` leaves the recordings in a folder, with `truth.json`;
 //! `--list` says what is hidden and makes no recordings; `--program` asks another build of modelmill, `--no-diagnosis`
@@ -38,7 +38,7 @@ use table::Score;
 
 /// Cases that run at the same time.
 const WORKERS: usize = 2;
-const USAGE: &str = "cargo bench -p modelmill --bench hidden_effects -- [--count 240] [--seed 1] \
+const USAGE: &str = "cargo bench -p modelmill-cli --bench hidden_effects -- [--count 240] [--seed 1] \
                      [--only one|two|none|outside] [--keep DIR] [--list] [--program PATH] [--no-diagnosis]";
 
 /// What the command line asks for.
