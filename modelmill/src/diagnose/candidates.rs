@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use modelmill_codegen::{Derivation, Monomial};
+use modelmill_codegen::{Derivation, Guard, Monomial};
 use modelmill_spec::{Effect, EffectKind, Loaded, Mechanics, Mechanism, Scale, Search, Sign};
 
 use crate::error::{Error, Outcome};
@@ -275,8 +275,12 @@ impl Variant {
         }
         let is_wanted =
             |product: &Monomial| product.0.iter().any(|(p, n)| *n == 1 && wanted.contains(p));
-        modelmill_codegen::derive_columns(mechanism, &is_wanted)
-            .map_err(|error| Error::derivation(&model.path, error))
+        let mut derivation = modelmill_codegen::derive_columns(mechanism, &is_wanted)
+            .map_err(|error| Error::derivation(&model.path, error))?;
+        // One candidate without a finite value somewhere must not stop the others: who looks at the columns leaves it out.
+        let guards = &mut derivation.programs.regressor.guards;
+        guards.retain(|guard| !matches!(guard, Guard::Finite(_)));
+        Ok(derivation)
     }
 }
 

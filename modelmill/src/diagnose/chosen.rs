@@ -218,8 +218,16 @@ impl Chosen {
         all: &Runs<'_>,
         load: &Column,
     ) -> Outcome<Option<(Candidate, Vec<Choice>)>> {
-        let (made, _) = columns(&self.candidates, model, all)?;
-        let Some(candidate) = made.into_iter().next() else {
+        let made = columns(&self.candidates, model, all)?;
+        if let Some(effect) = made.undefined.first() {
+            return Err(Error::input(format!(
+                "`{}` at {} has no finite value somewhere along the motion; look at the quotients, roots and exponentials \
+                 of its expression",
+                effect.kind,
+                effect.at.join(", ")
+            )));
+        }
+        let Some(candidate) = made.candidates.into_iter().next() else {
             return Ok(None);
         };
         let only = |columns: Vec<Column>| {

@@ -16,11 +16,7 @@ use super::numbers::{Motions, Runs, regressor_of};
 use super::tilt::{TILTS, tilt};
 
 /// Candidates with their columns; where each comes from is said in the same order.
-pub(crate) fn columns(
-    candidates: &Candidates,
-    model: &Model,
-    all: &Runs<'_>,
-) -> Outcome<(Vec<Candidate>, Vec<Origin>)> {
+pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) -> Outcome<Made> {
     let is_known = |single: &Single| single.sort == Sort::Known;
     let is_linear = |single: &Single| single.constants.iter().any(|c| c.2 == Search::Linear);
     let grids: Vec<Vec<f64>> = if candidates.singles.iter().all(is_known) {
@@ -70,11 +66,17 @@ pub(crate) fn columns(
             found[*k].push(columns);
         }
     }
-    let (mut made, mut origins) = (Vec::new(), Vec::new());
+    let (mut made, mut origins, mut undefined) = (Vec::new(), Vec::new(), Vec::new());
     for (k, entry) in candidates.entries.iter().enumerate() {
         if let Some((candidate, felt)) = candidate(candidates, entry, &found, &grids) {
             made.push(candidate);
             origins.push(Origin::Entry(k, felt));
+        } else if entry
+            .singles
+            .iter()
+            .any(|k| !found[*k].iter().flatten().all(is_finite))
+        {
+            undefined.push(effect(candidates, entry));
         }
     }
     if let Some((change, derivation)) = &candidates.tilt {
@@ -99,7 +101,28 @@ pub(crate) fn columns(
         made.push(changed(candidates, change, vec![parameter], Source::Delay));
         origins.push(Origin::Delay);
     }
-    Ok((made, origins))
+    Ok(Made {
+        candidates: made,
+        origins,
+        undefined,
+    })
+}
+
+/// Whether a column holds numbers only.
+fn is_finite(column: &Column) -> bool {
+    let mut values = column.0.iter().flatten().flatten();
+    values.all(|x| x.is_finite())
+}
+
+/// What an entry would add, and where.
+fn effect(candidates: &Candidates, entry: &Entry) -> Effect {
+    let first = &candidates.singles[entry.singles[0]];
+    let singles = entry.singles.iter().map(|k| &candidates.singles[*k]);
+    let places = singles.flat_map(|single| &single.spots);
+    Effect {
+        kind: candidates.kinds[first.kind].name.clone(),
+        at: places.map(|spot| spot.name.clone()).collect(),
+    }
 }
 
 /// Largest rate and travel of the place of each single candidate. Places that may share a constant look for it on one grid,
@@ -120,6 +143,16 @@ fn shared_scales(candidates: &Candidates, motions: &Motions) -> Vec<[f64; 2]> {
             return scales;
         }
     }
+}
+
+/// Candidates in numbers.
+pub(crate) struct Made {
+    /// Those that have columns.
+    pub(crate) candidates: Vec<Candidate>,
+    /// Where each comes from, in the same order.
+    pub(crate) origins: Vec<Origin>,
+    /// Effects whose expressions have no finite value somewhere along the recordings.
+    pub(crate) undefined: Vec<Effect>,
 }
 
 /// Where a candidate comes from.
@@ -230,14 +263,7 @@ fn candidate(
             })
         })
         .collect();
-    let places = entry
-        .singles
-        .iter()
-        .flat_map(|k| &candidates.singles[*k].spots);
-    let effect = Effect {
-        kind: kind.name.clone(),
-        at: places.map(|spot| spot.name.clone()).collect(),
-    };
+    let effect = effect(candidates, entry);
     if first.sort == Sort::Carried {
         let felt = vec![true; parameters.len()];
         let candidate = Candidate {
@@ -288,6 +314,10 @@ fn candidate(
             });
             choices[0].columns.push(shift);
         }
+    }
+    choices.retain(|choice| choice.columns.iter().all(is_finite));
+    if choices.is_empty() {
+        return None;
     }
     // Parameters without any effect, such as a mass on the base, are none.
     let felt: Vec<bool> = (0..parameters.len())
@@ -369,6 +399,10 @@ pub(crate) fn carried(
                 column.add(1.0, more);
             }
         }
+        // Along these loads it says nothing.
+        if !columns.iter().all(is_finite) {
+            columns.fill(Column(vec![None; model.drives().len()]));
+        }
         made.push((k, columns));
     }
     Ok(made)
@@ -413,5 +447,5 @@ pub(crate) fn finer(
             column.add(1.0, more);
         }
     }
-    Some(columns)
+    columns.iter().all(is_finite).then_some(columns)
 }

@@ -72,10 +72,22 @@ pub(crate) fn regressor_of(
     for (one, _) in all {
         let columns = moving(one, evaluator, model, wanted)?;
         stacked.resize(columns.len(), None);
-        let (slots, columns): (Vec<_>, Vec<_>) = (stacked.iter_mut().zip(columns))
+        let (slots, mut columns): (Vec<_>, Vec<_>) = (stacked.iter_mut().zip(columns))
             .filter_map(|(slot, column)| Some((slot, column?)))
             .unzip();
-        for (slot, column) in slots.into_iter().zip(decimated(columns, one)?) {
+        // A column without a finite value somewhere has none at all once it is filtered.
+        let mut is_none = vec![false; columns.len()];
+        for (column, is_none) in columns.iter_mut().zip(&mut is_none) {
+            if column.iter().any(|x| !x.is_finite()) {
+                column.fill(0.0);
+                *is_none = true;
+            }
+        }
+        let columns = decimated(columns, one)?.into_iter().zip(is_none);
+        for (slot, (mut column, is_none)) in slots.into_iter().zip(columns) {
+            if is_none {
+                column.fill(f64::NAN);
+            }
             slot.get_or_insert_with(|| vec![0.0; before]).extend(column);
         }
         before += one.samples().div_ceil(one.decimation());

@@ -2,7 +2,7 @@
 
 use modelmill_codegen::Evaluator;
 use modelmill_identify::diagnose::{
-    Column, Diagnosis, Problem, Source, Supply, diagnose, white_noise,
+    Column, Considered, Diagnosis, Effect, Problem, Source, Supply, diagnose, white_noise,
 };
 
 use crate::along::drive_rates;
@@ -51,7 +51,7 @@ pub(crate) fn find(
     let all: Vec<(&Stretch, bool)> = (fit.iter().map(|one| (one, false)))
         .chain(check.iter().map(|one| (one, true)))
         .collect();
-    let (mut problem, origins) =
+    let (mut problem, origins, undefined) =
         model
             .host()
             .watched("computing what each would add", 0, |_| {
@@ -64,11 +64,19 @@ pub(crate) fn find(
         model,
         all: &all,
     };
-    let diagnosis = model
+    let mut diagnosis = model
         .host()
         .watched("looking for what is missing", 0, |_| {
             diagnose(&problem, &supply)
         })?;
+    diagnosis
+        .candidates
+        .extend(undefined.into_iter().map(|effect| Considered {
+            effect,
+            explained: 0.0,
+            gain: 0.0,
+            refused: Some("no finite value somewhere along the recordings".to_owned()),
+        }));
     Ok(Answer {
         problem,
         diagnosis,
@@ -113,7 +121,7 @@ fn problem(
     candidates: &Candidates,
     model: &Model,
     all: &Runs<'_>,
-) -> Outcome<(Problem, Vec<Origin>)> {
+) -> Outcome<(Problem, Vec<Origin>, Vec<Effect>)> {
     let measured = stack(all, |one| Ok(one.run.measured()?.to_vec()))?;
     if measured.iter().flatten().all(|force| *force == 0.0) {
         let file = all.first().map(|(one, _)| one.run.file.as_str());
@@ -132,19 +140,19 @@ fn problem(
             )));
         }
     }
-    let (columns, origins) = columns(candidates, model, all)?;
+    let made = columns(candidates, model, all)?;
     let problem = Problem {
         layout: layout(model, all),
         noise: measured.iter().map(|force| noise(force)).collect(),
         measured: Column::new(measured),
         base: regressor(all, &Evaluator::new(&model.derivation), model)?,
-        candidates: columns,
+        candidates: made.candidates,
         base_bears: (0..model.base.len()).map(|k| !model.is_effect(k)).collect(),
         friction: friction(model, all)?,
         variables: variables(model, all),
         held: None,
     };
-    Ok((problem, origins))
+    Ok((problem, made.origins, made.undefined))
 }
 
 /// Takes what is not free off the measured forces.
