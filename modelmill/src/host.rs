@@ -8,6 +8,7 @@ use modelmill_spec::edit::{EditFailure, Edited, NewEffect, add_to_model};
 use modelmill_spec::{EffectKind, Loaded};
 
 use crate::error::{Error, Outcome};
+use crate::kinds_of_files;
 use crate::progress::{Job, Progress, Silent, watched};
 
 /// Where files come from, which kinds of effects there are besides the library's, and who hears what goes on.
@@ -72,7 +73,18 @@ impl Host {
             0,
             |_| modelmill_spec::load_file_with(path, &self.libraries),
         )?
-        .map_err(Into::into)
+        .map_err(|failure| match kinds_of_files::kind(self, path) {
+            Some(kind) => Error::input(format!(
+                "{} is {kind}; a model file (TOML) is expected, such as those in model-spec/models{}",
+                path.display(),
+                if kind.contains("rig") {
+                    ". `reduce` makes one of a rig and a plan"
+                } else {
+                    ""
+                }
+            )),
+            None => failure.into(),
+        })
     }
 
     /// Validates the text of a model file; `path` is what messages call it, and where the paths in it start.

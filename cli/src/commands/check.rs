@@ -9,15 +9,13 @@ use crate::{commands, terminal};
 /// Validates and derives the model, and prints a summary.
 pub(crate) fn run(host: &Host, args: &CheckArgs) -> Outcome {
     let model = match commands::model(host, &args.model) {
-        Err(Failure::Library(Error::Model(faults))) if args.json => {
+        Err(Failure::Library(fault)) if args.json && !matches!(fault, Error::Cancelled) => {
             // What is wrong goes to standard output as well, for editors.
-            terminal::print_json(&print::faults(&faults))?;
-            return Err(Failure::Library(Error::Model(faults)));
-        }
-        Err(Failure::Library(Error::Derivation { model, error })) if args.json => {
-            let fault = Error::Derivation { model, error };
-            let path = args.model.display().to_string();
-            terminal::print_json(&print::refusal(&fault.to_string(), &path))?;
+            let told = match &fault {
+                Error::Model(faults) => print::faults(faults),
+                fault => print::refusal(&fault.to_string(), &args.model.display().to_string()),
+            };
+            terminal::print_json(&told)?;
             return Err(Failure::Library(fault));
         }
         model => model?,

@@ -12,6 +12,7 @@ use modelmill_identify::{Note, Recording as Raw, Run, name_of_bytes};
 
 use crate::audit;
 use crate::error::{Error, Outcome};
+use crate::kinds_of_files;
 use crate::model::Model;
 use crate::stretch::{Stretch, variances};
 
@@ -202,7 +203,16 @@ impl Model {
     ///
     /// Fails with place and remedy when a column is missing or holds no number, or time stands still.
     pub fn recording(&self, path: impl AsRef<Path>, reading: &Reading) -> Outcome<Recording> {
-        let raw = read_raw(self, path.as_ref(), reading)?;
+        let path = path.as_ref();
+        let raw = read_raw(self, path, reading).map_err(|failure| {
+            kinds_of_files::kind(self.host(), path).map_or(failure, |kind| {
+                Error::input(format!(
+                    "{} is {kind}; a recording is expected (CSV, Parquet or MATLAB), with a column `t` and one for each \
+                     coordinate and drive",
+                    path.display()
+                ))
+            })
+        })?;
         Recording::new(self, raw, reading)
     }
 }

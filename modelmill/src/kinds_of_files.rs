@@ -1,0 +1,33 @@
+//! What a file is that was given in place of another one, so that a refusal can say so.
+
+use std::path::Path;
+
+use crate::host::Host;
+
+/// What kind of file of ours this is, in words with an article; `None` where it is none.
+pub(crate) fn kind(host: &Host, path: &Path) -> Option<&'static str> {
+    // Anything else may be a pipe, which cannot be read twice, or too large to be one of these.
+    let is_small = std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() < 1 << 24);
+    if !is_small {
+        return None;
+    }
+    let starts_as_json = || {
+        let text = std::fs::read_to_string(path).ok()?;
+        Some(text.trim_start().starts_with('{'))
+    };
+    if path.extension().is_some_and(|e| e == "toml") {
+        if modelmill_spec::load_file_with(path, host.libraries()).is_ok() {
+            Some("a model file")
+        } else if modelmill_rig::load_file(path).is_ok() {
+            Some("a rig file, which describes the whole machine")
+        } else if modelmill_reduction::plan_file(path).is_ok() {
+            Some("a plan of a reduction")
+        } else {
+            None
+        }
+    } else if starts_as_json() == Some(true) && host.fit(path).is_ok() {
+        Some("a fit, as `identify` writes it")
+    } else {
+        None
+    }
+}
