@@ -5,13 +5,13 @@
 
 use std::iter::repeat;
 
-use crate::case::{COARSE, Case, RATE};
-use crate::columns::{columns, constants, must_be_positive};
-use crate::hidden::{Hidden, choices};
-use crate::judge::{Class, SAME};
-use crate::placed::{Atom, HOLDS, Placed, atoms};
-use crate::plant::Plant;
-use crate::span::{Span, norm, rms};
+use super::case::{COARSE, Case, RATE};
+use super::columns::{columns, constants, must_be_positive};
+use super::hidden::{Hidden, choices};
+use super::judge::{Class, SAME};
+use super::placed::{Atom, HOLDS, Placed, atoms};
+use super::plant::Plant;
+use super::span::{Span, norm, rms};
 
 impl Case {
     /// The squared error, in units of the noise's variance, that claimed effects leave of the true forces on both

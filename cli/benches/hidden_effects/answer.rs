@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::placed::Placed;
+use super::placed::Placed;
 
 /// An answer.
 #[derive(Clone, Debug, Default, PartialEq)]

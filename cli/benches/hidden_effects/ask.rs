@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use crate::answer::Answer;
+use super::answer::Answer;
 
 /// Runs `PROGRAM diagnose MODEL --data FIT --check CHECK --json`; the answer, or why there is none, and how long it took.
 pub(crate) fn diagnose(

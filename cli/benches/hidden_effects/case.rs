@@ -3,15 +3,15 @@
 use modelmill_rig::{Effect, Rig};
 use serde_json::{Value, json};
 
-use crate::columns::{columns, delay_column, library};
-use crate::course::{Course, Repeats};
-use crate::hidden::{Choice, Hidden, choices, largest};
-use crate::judge::Class;
-use crate::outside::{Law, Outside};
-use crate::placed::Placed;
-use crate::plant::{Along, Plant};
-use crate::random::{Random, three_digits};
-use crate::span::{Span, rms};
+use super::columns::{columns, delay_column, library};
+use super::course::{Course, Repeats};
+use super::hidden::{Choice, Hidden, choices, largest};
+use super::judge::Class;
+use super::outside::{Law, Outside};
+use super::placed::Placed;
+use super::plant::{Along, Plant};
+use super::random::{Random, three_digits};
+use super::span::{Span, rms};
 
 /// Samples per second at which sizes are worked out and alternatives are compared.
 pub(crate) const COARSE: f64 = 50.0;

@@ -2,10 +2,10 @@
 
 use modelmill_rig::Effect;
 
-use crate::course::Course;
-use crate::hidden::effect;
-use crate::placed::Placed;
-use crate::plant::{Along, DRIVES};
+use super::course::Course;
+use super::hidden::effect;
+use super::placed::Placed;
+use super::plant::{Along, DRIVES};
 
 /// A delay of this size stands for small ones, s.
 const DELAY: f64 = 0.005;

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use modelmill_rig::State;
 use modelmill_spec::Limits;
 
-use crate::random::Random;
+use super::random::Random;
 
 /// Period of the paper's trajectories, s.
 const PERIOD: f64 = 7.29;

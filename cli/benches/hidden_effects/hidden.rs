@@ -2,8 +2,8 @@
 
 use modelmill_rig::{Effect, Rig};
 
-use crate::placed::Placed;
-use crate::random::{Random, three_digits};
+use super::placed::Placed;
+use super::random::{Random, three_digits};
 
 /// An effect with values.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use crate::answer::Answer;
-use crate::placed::{Atom, HOLDS, Placed, atoms};
+use super::answer::Answer;
+use super::placed::{Atom, HOLDS, Placed, atoms};
 
 /// Two explanations whose squared errors differ by less, in units of the noise's variance, cannot be told apart: three
 /// standard deviations.

@@ -4,8 +4,8 @@
 
 use std::f64::consts::PI;
 
-use crate::plant::{Along, DRIVES};
-use crate::random::{Random, three_digits};
+use super::plant::{Along, DRIVES};
+use super::random::{Random, three_digits};
 
 /// A law of one drive, the other being number `1 - at`.
 #[derive(Clone, Debug, PartialEq)]

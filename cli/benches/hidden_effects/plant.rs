@@ -6,7 +6,7 @@ use modelmill_codegen::{Derivation, Evaluator, States};
 use modelmill_rig::{Effect, Measured, Motion, Place, Rig, State, Tracker};
 use modelmill_spec::Limits;
 
-use crate::course::Course;
+use super::course::Course;
 
 /// The rig of the bundled recordings with the angles of the couplers against the cranks, which the model calls gamma1
 /// and gamma2, and the points of the model that the rig calls otherwise. Joints may be redundant.

@@ -3,10 +3,10 @@
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-use crate::case::{Case, RATE};
-use crate::plant::{Along, DRIVES};
-use crate::random::Random;
-use crate::span::norm;
+use super::case::{Case, RATE};
+use super::plant::{Along, DRIVES};
+use super::random::Random;
+use super::span::norm;
 
 /// Steps of an encoder per turn.
 const STEPS: f64 = 1_048_576.0;

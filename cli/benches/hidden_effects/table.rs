@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use crate::answer::Answer;
-use crate::judge::{Class, FALL, Mark};
+use super::answer::Answer;
+use super::judge::{Class, FALL, Mark};
 
 /// A case with its mark.
 pub(crate) struct Score {

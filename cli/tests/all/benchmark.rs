@@ -1,0 +1,32 @@
+//! The modules of the benchmark of hidden effects, which has tests of its own.
+
+#[path = "../../benches/hidden_effects/alternatives.rs"]
+pub(crate) mod alternatives;
+#[path = "../../benches/hidden_effects/answer.rs"]
+pub(crate) mod answer;
+#[path = "../../benches/hidden_effects/ask.rs"]
+pub(crate) mod ask;
+#[path = "../../benches/hidden_effects/case.rs"]
+pub(crate) mod case;
+#[path = "../../benches/hidden_effects/columns.rs"]
+pub(crate) mod columns;
+#[path = "../../benches/hidden_effects/course.rs"]
+pub(crate) mod course;
+#[path = "../../benches/hidden_effects/hidden.rs"]
+pub(crate) mod hidden;
+#[path = "../../benches/hidden_effects/judge.rs"]
+pub(crate) mod judge;
+#[path = "../../benches/hidden_effects/outside.rs"]
+pub(crate) mod outside;
+#[path = "../../benches/hidden_effects/placed.rs"]
+pub(crate) mod placed;
+#[path = "../../benches/hidden_effects/plant.rs"]
+pub(crate) mod plant;
+#[path = "../../benches/hidden_effects/random.rs"]
+pub(crate) mod random;
+#[path = "../../benches/hidden_effects/record.rs"]
+pub(crate) mod record;
+#[path = "../../benches/hidden_effects/span.rs"]
+pub(crate) mod span;
+#[path = "../../benches/hidden_effects/table.rs"]
+pub(crate) mod table;

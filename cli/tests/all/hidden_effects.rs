@@ -1,0 +1,314 @@
+//! The benchmark of hidden effects marks answers as it says: made-up answers, each with the mark it must get.
+
+use crate::benchmark::answer::Answer;
+use crate::benchmark::judge::{Class, Mark, SAME, aliases, judge};
+use crate::benchmark::placed::Placed;
+use crate::benchmark::table::{Score, report};
+use serde_json::{Value, json};
+
+const LEFT: &str = "spindle_left";
+const RIGHT: &str = "spindle_right";
+
+/// An answer in the form of `cli.md`: effects as `(kind, places, aliases)`.
+fn said(verdict: &str, effects: &[(&str, &[&str], &[Placed])]) -> Value {
+    let effects: Vec<Value> = effects
+        .iter()
+        .map(|(kind, at, aliases)| {
+            let aliases: Vec<Value> = aliases
+                .iter()
+                .map(|alias| json!({ "kind": alias.kind, "at": alias.at }))
+                .collect();
+            json!({ "kind": kind, "at": at, "estimates": [], "indistinguishable_from": aliases,
+                    "separate_by": "" })
+        })
+        .collect();
+    json!({
+        "verdict": verdict,
+        "noise_floor": 0.004,
+        "steps": [{ "added": null, "fit": 0.1, "check": 0.11 },
+                  { "added": { "kind": "viscous_friction", "at": [LEFT] }, "fit": 0.004, "check": 0.0041 }],
+        "effects": effects,
+        "candidates": [],
+        "parameters_off_nominal": [],
+        "data": [],
+        "where": [{ "channel": LEFT, "in": "t", "range": [0, 1], "share": 0.6, "says": "" }],
+    })
+}
+
+/// The mark of an answer where claims leave `excess` of the true forces.
+fn mark(class: Class, hidden: &[(&str, &[&str])], answer: &Value, excess: f64) -> Mark {
+    let hidden: Vec<Placed> = hidden.iter().map(|(k, at)| Placed::new(k, at)).collect();
+    let answer = Answer::read(&answer.to_string()).expect("the form of cli.md");
+    judge(class, &hidden, &answer, &mut |_| excess)
+}
+
+/// The mark where anything else than the truth is told apart with ease.
+fn plainly(class: Class, hidden: &[(&str, &[&str])], answer: &Value) -> Mark {
+    mark(class, hidden, answer, 1e4)
+}
+
+#[test]
+fn the_truth_is_right_and_only_with_its_verdict() {
+    let hidden: &[(&str, &[&str])] = &[("viscous_friction", &[LEFT])];
+    let effects: &[(&str, &[&str], &[Placed])] = &[("viscous_friction", &[LEFT], &[])];
+    let answer = |verdict| plainly(Class::One, hidden, &said(verdict, effects));
+    assert_eq!(answer("missing_effect"), Mark::Right);
+    assert_eq!(answer("unexplained"), Mark::WrongVerdict);
+}
+
+#[test]
+fn what_is_wrong_is_told_apart() {
+    let hidden: &[(&str, &[&str])] = &[("viscous_friction", &[LEFT])];
+    let answer = |effects| plainly(Class::One, hidden, &said("missing_effect", effects));
+    assert_eq!(answer(&[]), Mark::Missed);
+    assert_eq!(
+        answer(&[("viscous_friction", &[RIGHT], &[])]),
+        Mark::WrongPlace
+    );
+    assert_eq!(
+        answer(&[("coulomb_friction", &[LEFT], &[])]),
+        Mark::WrongKind
+    );
+    assert_eq!(
+        answer(&[("viscous_friction", &[LEFT, RIGHT], &[])]),
+        Mark::Extra
+    );
+    let two: &[(&str, &[&str])] = &[("viscous_friction", &[LEFT]), ("point_mass", &["R2m"])];
+    let part = said("missing_effect", &[("point_mass", &["R2m"], &[])]);
+    assert_eq!(plainly(Class::Two, two, &part), Mark::Partly);
+}
+
+#[test]
+fn shared_and_separate_are_alike() {
+    let separate: &[(&str, &[&str])] = &[
+        ("coulomb_friction", &[LEFT]),
+        ("coulomb_friction", &[RIGHT]),
+    ];
+    let shared = said(
+        "missing_effect",
+        &[("coulomb_friction", &[RIGHT, LEFT], &[])],
+    );
+    assert_eq!(plainly(Class::One, separate, &shared), Mark::Right);
+    let both: &[(&str, &[&str])] = &[("coulomb_friction", &[LEFT, RIGHT])];
+    let apart = said(
+        "missing_effect",
+        &[
+            ("coulomb_friction", &[LEFT], &[]),
+            ("coulomb_friction", &[RIGHT], &[]),
+        ],
+    );
+    assert_eq!(plainly(Class::One, both, &apart), Mark::Right);
+}
+
+#[test]
+fn the_same_columns_by_other_names_are_alike() {
+    let alike = |hidden: &[(&str, &[&str])], effects| {
+        plainly(Class::One, hidden, &said("missing_effect", effects)) == Mark::Right
+    };
+    assert!(alike(
+        &[("directional_coulomb_friction", &[LEFT])],
+        &[
+            ("coulomb_friction", &[LEFT], &[]),
+            ("force_offset", &[LEFT], &[])
+        ]
+    ));
+    assert!(alike(
+        &[("directional_viscous_friction", &[LEFT])],
+        &[
+            ("viscous_friction", &[LEFT], &[]),
+            ("directional_viscous_friction", &[LEFT], &[])
+        ]
+    ));
+    assert!(alike(
+        &[("spring", &[LEFT])],
+        &[("spring", &[LEFT], &[]), ("force_offset", &[LEFT], &[])]
+    ));
+    // The offset of the other drive is none of the spring's rest, and one half of a double is not the whole.
+    assert!(!alike(
+        &[("spring", &[LEFT])],
+        &[("spring", &[LEFT], &[]), ("force_offset", &[RIGHT], &[])]
+    ));
+    assert!(!alike(
+        &[("coulomb_friction", &[LEFT])],
+        &[("directional_coulomb_friction", &[LEFT], &[])]
+    ));
+}
+
+#[test]
+fn an_alias_counts_where_it_is_named_and_nobody_could_do_better() {
+    let hidden: &[(&str, &[&str])] = &[("point_mass", &["R2m"])];
+    let names_truth: &[Placed] = &[Placed::new("point_mass", &["R2m"])];
+    let names_other: &[Placed] = &[Placed::new("spring", &[LEFT])];
+    let answer = |aliases, excess| {
+        let said = said("missing_effect", &[("point_mass", &["A_left"], aliases)]);
+        mark(Class::One, hidden, &said, excess)
+    };
+    assert_eq!(answer(names_truth, 0.5 * SAME), Mark::Alias);
+    assert_eq!(answer(names_truth, 2.0 * SAME), Mark::WrongPlace);
+    assert_eq!(answer(names_other, 0.5 * SAME), Mark::WrongPlace);
+    assert_eq!(answer(&[], 0.0), Mark::WrongPlace);
+    // A spring that is as good as an offset is the less simple answer.
+    let offset: &[(&str, &[&str])] = &[("force_offset", &[LEFT])];
+    let spring = said(
+        "missing_effect",
+        &[("spring", &[LEFT], &[Placed::new("force_offset", &[LEFT])])],
+    );
+    assert_eq!(mark(Class::One, offset, &spring, 0.0), Mark::WrongKind);
+    // A stand-in does not excuse what stands beside it.
+    let more = said(
+        "missing_effect",
+        &[
+            ("point_mass", &["A_left"], names_truth),
+            ("force_offset", &[RIGHT], &[]),
+        ],
+    );
+    assert_eq!(mark(Class::One, hidden, &more, 0.0), Mark::WrongKind);
+}
+
+#[test]
+fn nothing_and_what_is_outside_have_one_right_verdict_each() {
+    let nothing = |verdict| said(verdict, &[]);
+    let effect = said("missing_effect", &[("spring", &[LEFT], &[])]);
+    let adequate_with_effect = said("adequate", &[("spring", &[LEFT], &[])]);
+    let of = |class, answer: &Value| plainly(class, &[], answer);
+    assert_eq!(of(Class::None, &nothing("adequate")), Mark::Right);
+    assert_eq!(of(Class::None, &nothing("unexplained")), Mark::FalseAlarm);
+    assert_eq!(of(Class::None, &effect), Mark::FalseAlarm);
+    assert_eq!(of(Class::None, &adequate_with_effect), Mark::FalseAlarm);
+    assert_eq!(of(Class::Outside, &nothing("unexplained")), Mark::Right);
+    assert_eq!(of(Class::Outside, &nothing("adequate")), Mark::Overlooked);
+    assert_eq!(of(Class::Outside, &effect), Mark::Guess);
+}
+
+#[test]
+fn aliases_are_counted_by_what_they_leave() {
+    let named: &[Placed] = &[
+        Placed::new("spring", &[LEFT]),
+        Placed::new("force_offset", &[LEFT]),
+    ];
+    let answer = said("missing_effect", &[("drive_inertia", &[LEFT], named)]);
+    let answer = Answer::read(&answer.to_string()).expect("the form of cli.md");
+    let mut excess = |claims: &[Placed]| match claims[0].kind.as_str() {
+        "drive_inertia" => 1.0,
+        "spring" => 1.0 + 0.5 * SAME,
+        _ => 1.0 + 2.0 * SAME,
+    };
+    assert_eq!(aliases(&answer, &mut excess), [2, 1]);
+}
+
+#[test]
+fn the_report_counts_what_is_right_and_lists_what_is_not() {
+    let score = |number, class, mark, check: f64, floor| {
+        let mut answer = said("missing_effect", &[("viscous_friction", &[LEFT], &[])]);
+        answer["steps"][1]["check"] = json!(check);
+        Score {
+            number,
+            class,
+            label: "viscous_friction".to_owned(),
+            truth: format!("truth {number}"),
+            recording: "two periods".to_owned(),
+            drive: (class == Class::Outside).then_some(LEFT),
+            errors: [0.1, 0.1],
+            floor,
+            answer: Some(Answer::read(&answer.to_string()).expect("the form of cli.md")),
+            mark,
+            aliases: [1, 0],
+            took: std::time::Duration::from_millis(number),
+        }
+    };
+    let mut failed = score(
+        4,
+        Class::None,
+        Mark::Failed("no such column".to_owned()),
+        0.01,
+        0.01,
+    );
+    failed.answer = None;
+    let scores = [
+        score(1, Class::One, Mark::Right, 0.0129, 0.01),
+        score(2, Class::One, Mark::Alias, 0.0131, 0.01),
+        score(3, Class::One, Mark::WrongPlace, 0.01, 0.01),
+        failed,
+        score(5, Class::Outside, Mark::Guess, 0.01, 0.01),
+        score(6, Class::Outside, Mark::Right, 0.01, 0.01),
+    ];
+    let text = report(&scores, 7);
+    for line in [
+        "one       66.7 % right, 2 of 3; target 95 %",
+        "none       0.0 % right, 0 of 1; target 98 %",
+        "outside   50.0 % right, 1 of 2; target 90 %",
+        "located  1 of 1 unexplained ones first of all in the drive that feels them",
+        "fall      50.0 % of 2 found within 1.3 of the noise floor on the check run; target 100 %",
+        "- seed 7 case 2 (one): the check error stays 1.31 times the noise floor",
+        "- seed 7 case 3 (one): wrong place",
+        "- seed 7 case 4 (none): failed: no such column",
+        "- seed 7 case 5 (outside): a guess dressed as a finding",
+    ] {
+        assert!(
+            text.lines().any(|l| l == line),
+            "no line `{line}` in\n{text}"
+        );
+    }
+    assert!(!text.contains("case 1 ("), "{text}");
+}
+
+#[test]
+fn json_that_departs_from_the_contract_is_refused() {
+    let mut answer = said("missing_effect", &[("spring", &[LEFT], &[])]);
+    assert!(Answer::read(&answer.to_string()).is_ok());
+    answer["effects"][0]["at"] = json!(LEFT);
+    assert!(Answer::read(&answer.to_string()).is_err());
+    let mut answer = said("perhaps", &[]);
+    assert!(Answer::read(&answer.to_string()).is_err());
+    answer["verdict"] = json!("adequate");
+    answer["steps"][0]["check"] = Value::Null;
+    assert!(Answer::read(&answer.to_string()).is_err());
+}
+
+/// A program that prints what it was told to stands in for modelmill.
+#[cfg(unix)]
+#[test]
+fn the_program_is_asked_as_the_contract_says() {
+    use std::os::unix::fs::PermissionsExt;
+    use std::path::Path;
+
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("hidden_effects");
+    std::fs::create_dir_all(&folder).expect("a folder for the test");
+    let program = folder.join("program");
+    let asked = folder.join("asked");
+    let answer = said("adequate", &[]).to_string();
+    let make = |script: &str| {
+        std::fs::write(&program, script).expect("the script is written");
+        std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755))
+            .expect("the script may run");
+    };
+    let ask = || {
+        crate::benchmark::ask::diagnose(
+            program.as_os_str(),
+            Path::new("model.toml"),
+            Path::new("fit.csv"),
+            Path::new("check.csv"),
+        )
+        .0
+    };
+    make(&format!(
+        "#!/bin/sh\necho \"$@\" > '{}'\necho progress >&2\nprintf '%s' '{answer}'\n",
+        asked.display()
+    ));
+    let read = ask().expect("an answer");
+    assert_eq!(read.verdict, "adequate");
+    assert_eq!(read.steps.len(), 2);
+    assert_eq!(
+        read.steps[1].added,
+        Some(Placed::new("viscous_friction", &[LEFT]))
+    );
+    assert!((read.steps[1].check - 0.0041).abs() < 1e-15);
+    let words = std::fs::read_to_string(&asked).expect("the script ran");
+    assert_eq!(
+        words.trim(),
+        "diagnose model.toml --data fit.csv --check check.csv --json"
+    );
+    make("#!/bin/sh\necho 'error: no such column' >&2\nexit 1\n");
+    let refused = ask().expect_err("the program failed");
+    assert!(refused.contains("no such column"), "{refused}");
+}

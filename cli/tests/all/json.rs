@@ -1,0 +1,244 @@
+//! The JSON of every command has the shape that scripts rely on.
+
+use crate::common::{json, model, number, printed, run, scratch};
+use serde_json::{Value, json as value};
+
+#[track_caller]
+fn keys(object: &Value) -> Vec<&str> {
+    let map = object.as_object().expect("an object");
+    map.keys().map(String::as_str).collect()
+}
+
+#[test]
+fn check_summarises_the_model() {
+    let summary = json(&["check", &model("spidermill-paper.toml"), "--json"]);
+    assert_eq!(summary["model"], "spidermill-paper");
+    assert_eq!(summary["valid"], true);
+    assert_eq!(summary["bodies"], 4);
+    assert_eq!(
+        summary["joints"],
+        value!({ "active": ["theta1", "theta2"], "passive": ["gamma1", "gamma2"] })
+    );
+    assert_eq!(
+        summary["actuators"],
+        value!(["spindle_left", "spindle_right"])
+    );
+    assert_eq!(summary["degrees_of_freedom"], 2);
+    assert_eq!(summary["parameters"].as_array().map(Vec::len), Some(8));
+    let text = printed(&["check", &model("spidermill-paper.toml")]);
+    assert!(
+        text.contains("11 products with an effect on the actuators, 5 base parameters"),
+        "{text}"
+    );
+}
+
+#[test]
+fn equations_are_those_of_the_paper() {
+    let equations = json(&[
+        "equations",
+        &model("spidermill-paper.toml"),
+        "--format",
+        "json",
+    ]);
+    assert_eq!(
+        keys(&equations),
+        [
+            "model",
+            "parameters",
+            "without_effect",
+            "dependencies",
+            "base",
+            "rank",
+            "operations"
+        ]
+    );
+    assert_eq!(equations["model"], "spidermill-paper");
+    assert_eq!(
+        equations["parameters"],
+        value!([
+            "m1*dc1", "m1*dc1^2", "m2", "m3", "m3*dc3", "m3*dc3^2", "m4", "m4*dc3", "m4*dc3^2",
+            "Ic12", "Ic32"
+        ])
+    );
+    assert_eq!(equations["without_effect"], value!(["m1"]));
+    assert_eq!(
+        equations["dependencies"][0],
+        value!({ "parameter": "m2", "equals": { "m1*dc1": "d1", "m1*dc1^2": "d1^2" } })
+    );
+    assert_eq!(
+        keys(&equations["base"][0]),
+        ["name", "retained", "expression"]
+    );
+    assert_eq!(
+        equations["rank"],
+        value!({ "exact": 5, "numeric": 5, "samples": 40 })
+    );
+    for program in ["regressor", "inverse_dynamics"] {
+        for operation in ["add", "mul", "div", "sqrt", "sincos"] {
+            assert!(equations["operations"][program][operation].is_u64());
+        }
+    }
+    assert_eq!(
+        equations,
+        json(&["equations", &model("spidermill-paper.toml"), "--json"])
+    );
+}
+
+#[test]
+fn every_bundled_model_has_equal_ranks_and_pages_in_all_formats() {
+    for name in [
+        "spidermill",
+        "two_link",
+        "four_bar",
+        "three_rrr",
+        "scara",
+        "emps",
+    ] {
+        let file = model(&format!("{name}.toml"));
+        let equations = json(&["equations", &file, "--json"]);
+        assert_eq!(
+            equations["rank"]["exact"], equations["rank"]["numeric"],
+            "{name}"
+        );
+        assert_eq!(
+            equations["base"].as_array().map(Vec::len),
+            equations["rank"]["exact"]
+                .as_u64()
+                .map(|n| usize::try_from(n).expect("small"))
+        );
+        for (format, mark) in [
+            ("text", "p1_min"),
+            ("markdown", "# "),
+            ("latex", "\\documentclass"),
+            ("html", "<math"),
+        ] {
+            let page = printed(&["equations", &file, "--format", format]);
+            assert!(page.contains(mark), "{name} as {format}");
+        }
+    }
+    let out = scratch("scara.html");
+    assert_eq!(
+        printed(&[
+            "equations",
+            &model("scara.toml"),
+            "--format",
+            "html",
+            "--out",
+            &out
+        ]),
+        ""
+    );
+    let page = std::fs::read_to_string(out).expect("the page");
+    assert!(page.starts_with("<!DOCTYPE html>") && !page.contains("<script src"));
+}
+
+#[test]
+fn diff_says_what_the_papers_treatment_changes() {
+    let diff = json(&[
+        "diff",
+        &model("spidermill.toml"),
+        &model("spidermill-paper.toml"),
+        "--json",
+    ]);
+    assert_eq!(diff["before"]["base"].as_array().map(Vec::len), Some(4));
+    assert_eq!(diff["after"]["base"].as_array().map(Vec::len), Some(5));
+    let names = |key: &str| -> Vec<String> {
+        let list = diff[key].as_array().expect("a list");
+        list.iter()
+            .filter_map(|c| c["name"].as_str().map(str::to_owned))
+            .collect()
+    };
+    assert_eq!(
+        names("entries"),
+        ["lumped mass on S3", "lumped mass on S5", "retain"]
+    );
+    assert_eq!(names("parameters"), ["m4*dc3", "m4*dc3^2"]);
+    assert!(names("dependencies").contains(&"h[m4*dc3]".to_owned()));
+    assert_eq!(names("base").len(), 6);
+    assert!(diff["operations"]["inverse_dynamics"]["after"]["mul"].is_u64());
+    let same = json(&["diff", &model("scara.toml"), &model("scara.toml"), "--json"]);
+    for key in ["entries", "parameters", "dependencies", "base"] {
+        assert_eq!(same[key], value!([]));
+    }
+    let text = printed(&[
+        "diff",
+        &model("spidermill.toml"),
+        &model("spidermill-paper.toml"),
+    ]);
+    assert!(
+        text.contains("9 -> 11 products") && text.contains("+ m4: m4 - m4*dc3/d3"),
+        "{text}"
+    );
+}
+
+#[test]
+fn identify_and_compare_give_figures_by_channel() {
+    let fit = json(&[
+        "identify",
+        &model("spidermill.toml"),
+        "--data",
+        &run("with-rods-fit.csv"),
+        "--data",
+        &run("with-rods-check.csv"),
+        "--json",
+    ]);
+    assert_eq!(fit["model"], "spidermill");
+    assert_eq!(fit["samples"], 7190);
+    assert_eq!(fit["check"], Value::Null);
+    let parameter = &fit["parameters"][0];
+    for key in ["name", "expression", "value", "std", "unit", "nominal"] {
+        assert!(!parameter[key].is_null(), "{key} in {parameter}");
+    }
+    assert_eq!(parameter["unit"], "kg m");
+    let compared = json(&[
+        "compare",
+        &model("spidermill.toml"),
+        "--data",
+        &run("with-rods-check.csv"),
+        "--json",
+    ]);
+    for figures in [&fit["fit"], &compared] {
+        assert!(number(figures, "/nrms") > 0.0);
+        for channel in ["spindle_left", "spindle_right"] {
+            for figure in ["nrms", "mean_relative", "max_abs"] {
+                assert!(number(figures, &format!("/channels/{channel}/{figure}")) > 0.0);
+            }
+        }
+    }
+    assert_eq!(compared["parameters"], "nominal");
+    let regions = compared["where"].as_array().expect("regions");
+    assert!(!regions.is_empty());
+    for region in regions {
+        for key in ["channel", "in", "says"] {
+            assert!(region[key].is_string(), "{region}");
+        }
+        assert!(number(region, "/range/0") < number(region, "/range/1"));
+        assert!((0.0..=1.0).contains(&number(region, "/share")));
+    }
+}
+
+#[test]
+fn generate_prints_rust_and_completions_name_the_commands() {
+    let source = printed(&["generate", &model("two_link.toml")]);
+    assert!(
+        source.contains("p1_min") && source.contains("pub fn"),
+        "{}",
+        &source[..400]
+    );
+    assert!(!source.contains("pub fn mass_matrix"), "made on demand");
+    let with_dynamics = printed(&["generate", &model("two_link.toml"), "--dynamics"]);
+    assert!(with_dynamics.contains("pub fn mass_matrix"));
+    let both = ["--reactions", "--self-test"];
+    let asked = printed(&["generate", &model("two_link.toml"), both[0], both[1]]);
+    assert!(asked.contains("pub fn transmitted") && asked.contains("pub fn self_test"));
+    let out = scratch("two_link.rs");
+    printed(&["generate", &model("two_link.toml"), "--out", &out]);
+    assert_eq!(std::fs::read_to_string(out).expect("the source"), source);
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = printed(&["completions", shell]);
+        assert!(
+            script.contains("identify") && script.contains("tour"),
+            "{shell}"
+        );
+    }
+}

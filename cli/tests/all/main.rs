@@ -1,0 +1,34 @@
+//! The program as its users meet it: every command run as a process of its own, its text, its JSON and its files.
+//!
+//! One target for all of them, since each target links the whole program anew.
+
+#[allow(dead_code, reason = "what only the run of the benchmark calls")]
+mod benchmark;
+mod cloos;
+mod common;
+mod diagnose;
+mod diagnose_made;
+mod effects;
+mod emps;
+mod estimators;
+mod excite;
+mod excited_rig;
+mod experiment;
+mod faulty_recordings;
+mod figures;
+mod hidden_cases;
+mod hidden_effects;
+mod interpret;
+mod json;
+mod languages;
+mod plausible;
+mod preparation;
+mod readme;
+mod recordings;
+mod reduce;
+mod report;
+mod separate;
+mod simulate;
+mod tx40;
+mod usage;
+mod weights;

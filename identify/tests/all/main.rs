@@ -1,0 +1,10 @@
+//! Recordings, filters, estimators and the search for effects, by themselves.
+
+mod diagnose;
+mod emps;
+mod filters;
+mod formats;
+mod preparation;
+mod recordings;
+mod separate;
+mod synthetic;

@@ -1,0 +1,7 @@
+//! Model files: what is read, what is refused and with which words, and what is written back.
+
+mod edit;
+mod faulty;
+mod fuzz;
+mod json_schema;
+mod models;

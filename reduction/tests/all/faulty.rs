@@ -1,0 +1,47 @@
+//! Faulty plans for the whole robot: each fixture's whole message is a snapshot, so that every change of a message is
+//! seen.
+
+use std::path::{Path, PathBuf};
+
+use modelmill_reduction::{plan, plan_file, reduce};
+
+fn here(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+#[test]
+fn messages() {
+    let rig = modelmill_rig::load_file(&here("../model-spec/rigs/spidermill-full.toml"))
+        .expect("a rig")
+        .rig;
+    let mut names: Vec<String> = std::fs::read_dir(here("tests/faulty"))
+        .expect("fixtures")
+        .map(|entry| {
+            entry
+                .expect("a file")
+                .file_name()
+                .to_string_lossy()
+                .into_owned()
+        })
+        .collect();
+    names.sort();
+    assert!(names.len() >= 15);
+    insta::with_settings!({ snapshot_path => "../snapshots", prepend_module_to_snapshot => false, omit_expression => true }, {
+        for name in names {
+            let text = std::fs::read_to_string(here("tests/faulty").join(&name)).expect("a fixture");
+            let outcome = plan(&name, &text).and_then(|plan| reduce(&rig, &plan));
+            let failure = outcome.map(|_| ()).expect_err(&name);
+            insta::assert_snapshot!(name.trim_end_matches(".toml").to_owned(), failure.render(false));
+        }
+    });
+}
+
+#[test]
+fn a_plan_that_cannot_be_read() {
+    let failure = plan_file(Path::new("no/such/plan.toml")).expect_err("no file");
+    assert!(
+        failure
+            .render(false)
+            .contains("cannot read `no/such/plan.toml`")
+    );
+}

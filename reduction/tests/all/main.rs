@@ -1,0 +1,6 @@
+//! From a rig and a plan, or from a URDF, to a model file.
+
+mod approximations;
+mod faulty;
+mod spidermill;
+mod urdf;

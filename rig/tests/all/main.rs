@@ -1,0 +1,9 @@
+//! Rigs against formulas by hand, another program's numbers, and themselves.
+
+mod common;
+mod effects;
+mod faulty;
+mod hand;
+mod plant;
+mod sensors;
+mod spidermill;
