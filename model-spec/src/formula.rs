@@ -80,6 +80,7 @@ impl Read for Formula {
     }
 }
 
+#[cfg(any(test, feature = "schema"))]
 impl schemars::JsonSchema for Formula {
     fn schema_name() -> Cow<'static, str> {
         "Expression".into()

@@ -9,7 +9,10 @@ mod column;
 mod diagnostic;
 mod document;
 pub mod edit;
+#[cfg(any(test, feature = "schema"))]
 mod editor;
+#[cfg(test)]
+mod editor_tests;
 mod exact;
 #[cfg(test)]
 mod exact_tests;
@@ -53,4 +56,5 @@ pub use mechanism::*;
 pub use motion::{Kinematics, Poses};
 pub use unit::unit_product;
 
+#[cfg(any(test, feature = "schema"))]
 pub use editor::json_schema;

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+#[cfg(any(test, feature = "schema"))]
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
 use crate::diagnostic::{Diagnostic, Log, Span};
@@ -54,6 +55,7 @@ impl Read for Range {
     }
 }
 
+#[cfg(any(test, feature = "schema"))]
 impl JsonSchema for Range {
     fn schema_name() -> Cow<'static, str> {
         "Range".into()

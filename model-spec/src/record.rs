@@ -5,6 +5,7 @@
 
 use std::borrow::Cow;
 
+#[cfg(any(test, feature = "schema"))]
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
 use crate::diagnostic::{Diagnostic, Log, Span};
@@ -97,6 +98,7 @@ macro_rules! record {
             }
         }
 
+        #[cfg(any(test, feature = "schema"))]
         impl schemars::JsonSchema for $name {
             fn schema_name() -> std::borrow::Cow<'static, str> {
                 stringify!($name).trim_end_matches("Entry").to_owned().into()
@@ -186,6 +188,7 @@ pub(crate) fn check_keys(table: &Table, known: &[&str], title: &str, log: &mut L
 }
 
 /// Adds a description to a schema, also to a reference.
+#[cfg(any(test, feature = "schema"))]
 pub(crate) fn described(mut schema: Schema, text: &str) -> serde_json::Value {
     if !text.trim().is_empty() {
         schema.insert("description".to_owned(), tidy(text).into());
@@ -194,6 +197,7 @@ pub(crate) fn described(mut schema: Schema, text: &str) -> serde_json::Value {
 }
 
 /// Joins the lines of a doc comment.
+#[cfg(any(test, feature = "schema"))]
 pub(crate) fn tidy(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
@@ -248,6 +252,7 @@ fn too_many(n: usize, span: Span, log: &mut Log) -> bool {
     n > MOST_ENTRIES
 }
 
+#[cfg(any(test, feature = "schema"))]
 impl<T: JsonSchema> JsonSchema for List<T> {
     fn inline_schema() -> bool {
         true
@@ -288,6 +293,7 @@ impl<T: Read> Read for OneOrMany<T> {
     }
 }
 
+#[cfg(any(test, feature = "schema"))]
 impl<T: JsonSchema> JsonSchema for OneOrMany<T> {
     fn inline_schema() -> bool {
         true
@@ -337,6 +343,7 @@ impl<T: Read> Read for Named<T> {
     }
 }
 
+#[cfg(any(test, feature = "schema"))]
 impl<T: JsonSchema> JsonSchema for Named<T> {
     fn inline_schema() -> bool {
         true

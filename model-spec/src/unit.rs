@@ -213,6 +213,7 @@ impl Read for Unit {
     }
 }
 
+#[cfg(any(test, feature = "schema"))]
 impl schemars::JsonSchema for Unit {
     fn schema_name() -> Cow<'static, str> {
         "Unit".into()

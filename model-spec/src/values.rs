@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+#[cfg(any(test, feature = "schema"))]
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
 use crate::diagnostic::{Diagnostic, Log, Span};
@@ -88,6 +89,7 @@ pub(crate) fn check_not_reserved(text: &str, span: Span, log: &mut Log) -> bool 
     !reserved
 }
 
+#[cfg(any(test, feature = "schema"))]
 impl JsonSchema for Name {
     fn schema_name() -> Cow<'static, str> {
         "Name".into()
@@ -132,6 +134,7 @@ impl Read for Text {
     }
 }
 
+#[cfg(any(test, feature = "schema"))]
 impl JsonSchema for Text {
     fn inline_schema() -> bool {
         true
@@ -178,6 +181,7 @@ impl Read for Number {
     }
 }
 
+#[cfg(any(test, feature = "schema"))]
 impl JsonSchema for Number {
     fn inline_schema() -> bool {
         true
@@ -208,6 +212,7 @@ impl Read for Flag {
     }
 }
 
+#[cfg(any(test, feature = "schema"))]
 impl JsonSchema for Flag {
     fn inline_schema() -> bool {
         true
@@ -261,6 +266,7 @@ impl Read for UnitByPlace {
     }
 }
 
+#[cfg(any(test, feature = "schema"))]
 impl JsonSchema for UnitByPlace {
     fn inline_schema() -> bool {
         true
@@ -303,6 +309,7 @@ impl Read for Version {
     }
 }
 
+#[cfg(any(test, feature = "schema"))]
 impl JsonSchema for Version {
     fn inline_schema() -> bool {
         true
@@ -357,6 +364,7 @@ impl Read for Vector {
     }
 }
 
+#[cfg(any(test, feature = "schema"))]
 impl JsonSchema for Vector {
     fn schema_name() -> Cow<'static, str> {
         "Vector".into()
@@ -404,6 +412,7 @@ impl Read for Spot {
     }
 }
 
+#[cfg(any(test, feature = "schema"))]
 impl JsonSchema for Spot {
     fn inline_schema() -> bool {
         true
@@ -458,6 +467,7 @@ impl Read for Suffix {
     }
 }
 
+#[cfg(any(test, feature = "schema"))]
 impl JsonSchema for Suffix {
     fn schema_name() -> Cow<'static, str> {
         "Suffix".into()
@@ -506,6 +516,7 @@ macro_rules! words {
             }
         }
 
+        #[cfg(any(test, feature = "schema"))]
         impl JsonSchema for $name {
             fn schema_name() -> Cow<'static, str> {
                 stringify!($name).into()
@@ -576,6 +587,7 @@ impl Read for Search {
     }
 }
 
+#[cfg(any(test, feature = "schema"))]
 impl JsonSchema for Search {
     fn inline_schema() -> bool {
         true

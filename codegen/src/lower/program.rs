@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+#[cfg(any(test, feature = "json"))]
 use serde::Serialize;
 
 use crate::expr::{Atom, Rational, Unary};
@@ -146,7 +147,8 @@ pub struct Program {
 }
 
 /// Operations per call. Negations, and what is computed once per geometry, are not counted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(any(test, feature = "json"), derive(Serialize))]
 pub struct OperationCount {
     /// Additions and subtractions.
     pub add: usize,
@@ -159,10 +161,11 @@ pub struct OperationCount {
     /// Pairs of sine and cosine of the same angle, and arc tangents.
     pub sincos: usize,
     /// Signs, absolute values, exponentials.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[cfg_attr(any(test, feature = "json"), serde(skip_serializing_if = "is_zero"))]
     pub other: usize,
 }
 
+#[cfg(any(test, feature = "json"))]
 #[expect(
     clippy::trivially_copy_pass_by_ref,
     reason = "serde asks for a reference"

@@ -1,7 +1,7 @@
 //! The equations as data, in the form that `modelmill equations --format json` prints.
 
-use serde::ser::SerializeMap;
-use serde::{Serialize, Serializer};
+#[cfg(any(test, feature = "json"))]
+use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use super::base::{base_expression, factor_text};
 use crate::{Derivation, Method, OperationCount, Reduction, Stage};
@@ -18,7 +18,8 @@ pub struct NumericRank {
 }
 
 /// Everything that reduction says about a model.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
+#[cfg_attr(any(test, feature = "json"), derive(Serialize))]
 pub struct Equations {
     /// Name of the model, as its file calls it.
     pub model: String,
@@ -37,17 +38,19 @@ pub struct Equations {
 }
 
 /// One line of eq. (6): a column as a combination of retained ones.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
+#[cfg_attr(any(test, feature = "json"), derive(Serialize))]
 pub struct DependencyLine {
     /// The product whose column it is.
     pub parameter: String,
     /// Retained products with their factors.
-    #[serde(serialize_with = "as_map")]
+    #[cfg_attr(any(test, feature = "json"), serde(serialize_with = "as_map"))]
     pub equals: Vec<(String, String)>,
 }
 
 /// One line of eq. (16).
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
+#[cfg_attr(any(test, feature = "json"), derive(Serialize))]
 pub struct BaseLine {
     /// `p1_min`, `p2_min`, ...
     pub name: String,
@@ -58,7 +61,8 @@ pub struct BaseLine {
 }
 
 /// Ranks.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(any(test, feature = "json"), derive(Serialize))]
 pub struct Rank {
     /// By exact reduction, for any geometry but special ones; none where columns were reduced numerically.
     pub exact: Option<usize>,
@@ -67,12 +71,13 @@ pub struct Rank {
     /// States of which eq. (9) was made.
     pub samples: Option<usize>,
     /// How columns were reduced where that was done numerically.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(any(test, feature = "json"), serde(skip_serializing_if = "Option::is_none"))]
     pub method: Option<NumericMethod>,
 }
 
 /// A reduction on the file's values, in floating point.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(any(test, feature = "json"), derive(Serialize))]
 pub struct NumericMethod {
     /// `numeric`.
     pub name: &'static str,
@@ -108,7 +113,8 @@ impl NumericMethod {
 }
 
 /// Operation counts per state.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(any(test, feature = "json"), derive(Serialize))]
 pub struct Operations {
     /// H_min.
     pub regressor: OperationCount,
@@ -116,6 +122,7 @@ pub struct Operations {
     pub inverse_dynamics: OperationCount,
 }
 
+#[cfg(any(test, feature = "json"))]
 fn as_map<S: Serializer>(pairs: &[(String, String)], serializer: S) -> Result<S::Ok, S::Error> {
     let mut map = serializer.serialize_map(Some(pairs.len()))?;
     for (key, value) in pairs {
@@ -180,7 +187,8 @@ impl Equations {
         }
     }
 
-    /// As indented JSON with a line feed at the end.
+    /// As indented JSON with a line feed at the end; needs the feature `json`.
+    #[cfg(any(test, feature = "json"))]
     pub fn json(&self) -> String {
         let mut text =
             serde_json::to_string_pretty(self).expect("strings and counts always make JSON");

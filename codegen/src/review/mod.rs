@@ -40,7 +40,8 @@ pub enum Format {
     Latex,
     /// One self-contained HTML file with MathML.
     Html,
-    /// [`Equations`] as JSON.
+    /// [`Equations`] as JSON; needs the feature `json`.
+    #[cfg(any(test, feature = "json"))]
     Json,
 }
 
@@ -54,6 +55,7 @@ pub fn page(derivation: &Derivation, format: Format, numeric: Option<&NumericRan
         Format::Markdown => render_markdown::render(&document()),
         Format::Latex => render_latex::render(&document()),
         Format::Html => render_html::render(&document()),
+        #[cfg(any(test, feature = "json"))]
         Format::Json => Equations::new(derivation, numeric).json(),
     }
 }

@@ -3,5 +3,4 @@
 mod edit;
 mod faulty;
 mod fuzz;
-mod json_schema;
 mod models;

@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use crate::json_schema;
+
 fn folder(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
@@ -17,7 +19,7 @@ fn to_json(path: &Path) -> Value {
 #[test]
 fn is_up_to_date() {
     let path = folder("schema/modelmill.schema.json");
-    let mut now = serde_json::to_string_pretty(&modelmill_spec::json_schema()).unwrap();
+    let mut now = serde_json::to_string_pretty(&json_schema()).unwrap();
     now.push('\n');
     if std::env::var_os("UPDATE_SCHEMA").is_some() {
         std::fs::write(&path, &now).unwrap();
@@ -31,7 +33,7 @@ fn is_up_to_date() {
 
 #[test]
 fn fits_every_model() {
-    let schema = modelmill_spec::json_schema();
+    let schema = json_schema();
     assert!(jsonschema::meta::is_valid(&schema));
     let validator = jsonschema::validator_for(&schema).unwrap();
     let mut n = 0;
@@ -54,7 +56,7 @@ fn fits_every_model() {
 
 #[test]
 fn refuses_what_the_loader_refuses() {
-    let validator = jsonschema::validator_for(&modelmill_spec::json_schema()).unwrap();
+    let validator = jsonschema::validator_for(&json_schema()).unwrap();
     for name in [
         "unknown_keys",
         "wrong_types",
