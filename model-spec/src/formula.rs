@@ -1,5 +1,6 @@
 //! Expressions of a model file before their names are looked up: trees whose every node knows its place.
 
+#[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
 
 use num_rational::BigRational;

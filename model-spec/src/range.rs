@@ -1,5 +1,6 @@
 //! Ranges of values: `2.5` for what may reach 2.5 either way, `[-1, 2.5]` for two ends.
 
+#[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
 
 #[cfg(any(test, feature = "schema"))]

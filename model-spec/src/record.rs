@@ -3,6 +3,7 @@
 //! One declaration by [`record!`] gives the struct, its reader (which reports every fault and goes on)
 //! and its JSON Schema, so that the three cannot drift apart.
 
+#[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
 
 #[cfg(any(test, feature = "schema"))]

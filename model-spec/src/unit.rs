@@ -2,6 +2,7 @@
 //!
 //! Only coherent SI units are known, so that no factor ever enters; rad counts as 1.
 
+#[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
 
 use crate::diagnostic::{Diagnostic, Log, Span};

@@ -1,5 +1,6 @@
 //! The small values of a model file: names, texts, numbers, vectors, and words from a fixed choice.
 
+#[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
 
 #[cfg(any(test, feature = "schema"))]

@@ -24,6 +24,7 @@ mod reduce_parts;
 mod report;
 mod samples;
 mod urdf;
+mod urdf_file;
 mod urdf_geometry;
 mod write;
 

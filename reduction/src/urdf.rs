@@ -10,8 +10,8 @@ use std::fmt;
 use std::fmt::Write as _;
 
 use nalgebra::{Matrix3, Vector3};
-use urdf_rs::{Joint, JointType, Link, Robot};
 
+use crate::urdf_file::{Joint, Link, Robot, read};
 use crate::urdf_geometry::{Placed, axis, roll_pitch_yaw, twelfths};
 use crate::write::{digits, float, quoted};
 
@@ -52,7 +52,7 @@ pub fn import_urdf(text: &str) -> Result<Imported, UrdfError> {
             "this file is too large for a robot description".to_owned(),
         ));
     }
-    let robot = urdf_rs::read_from_string(text).map_err(|error| {
+    let robot = read(text).map_err(|error| {
         UrdfError(format!(
             "this is no URDF that can be read ({error}); expected <robot> with links and joints, with macros (xacro) \
              expanded"
@@ -83,7 +83,7 @@ fn root(robot: &Robot) -> Result<&str, UrdfError> {
         }
     }
     for joint in &robot.joints {
-        for end in [&joint.parent.link, &joint.child.link] {
+        for end in [&joint.parent, &joint.child] {
             if robot.links.iter().all(|link| &link.name != end) {
                 return error(format!(
                     "the joint `{}` names the link `{end}`, which does not exist",
@@ -92,12 +92,7 @@ fn root(robot: &Robot) -> Result<&str, UrdfError> {
             }
         }
     }
-    let is_child = |link: &&Link| {
-        robot
-            .joints
-            .iter()
-            .any(|joint| joint.child.link == link.name)
-    };
+    let is_child = |link: &&Link| robot.joints.iter().any(|joint| joint.child == link.name);
     let mut roots = robot.links.iter().filter(|link| !is_child(link));
     match (roots.next(), roots.next()) {
         (Some(root), None) => Ok(&root.name),
@@ -141,22 +136,18 @@ impl Import {
             let children: Vec<&Joint> = robot
                 .joints
                 .iter()
-                .filter(|joint| joint.parent.link == parent)
+                .filter(|joint| joint.parent == parent)
                 .collect();
             for joint in &children {
-                if self
-                    .links
-                    .iter()
-                    .any(|(name, _, _)| name == &joint.child.link)
-                {
+                if self.links.iter().any(|(name, _, _)| name == &joint.child) {
                     return Err(UrdfError(format!(
                         "the link `{}` hangs on two joints; URDF describes trees only",
-                        joint.child.link
+                        joint.child
                     )));
                 }
                 self.joint(robot, joint)?;
             }
-            waiting.extend(children.iter().rev().map(|joint| joint.child.link.as_str()));
+            waiting.extend(children.iter().rev().map(|joint| joint.child.as_str()));
         }
         match robot
             .links
@@ -173,10 +164,7 @@ impl Import {
 
     /// Adds a joint and the link behind it.
     fn joint(&mut self, robot: &Robot, joint: &Joint) -> Result<(), UrdfError> {
-        let parent = self
-            .links
-            .iter()
-            .find(|(name, _, _)| name == &joint.parent.link);
+        let parent = self.links.iter().find(|(name, _, _)| name == &joint.parent);
         let (frame, carried) = parent.map_or((None, Placed::identity()), |(_, frame, placed)| {
             (frame.clone(), *placed)
         });
@@ -184,7 +172,7 @@ impl Import {
         let numbers = origin
             .p
             .iter()
-            .chain(joint.axis.xyz.iter())
+            .chain(joint.axis.iter())
             .chain(joint.origin.rpy.iter());
         if !numbers.copied().all(f64::is_finite) {
             return Err(UrdfError(format!(
@@ -193,22 +181,21 @@ impl Import {
             )));
         }
         let at = carried.then(&origin);
-        let kind = match joint.joint_type {
-            JointType::Fixed => return self.link(robot, &joint.child.link, frame, &at),
-            JointType::Revolute | JointType::Continuous => "revolute",
-            JointType::Prismatic => "prismatic",
-            ref other => {
+        let kind = match joint.kind.as_str() {
+            "fixed" => return self.link(robot, &joint.child, frame, &at),
+            "revolute" | "continuous" => "revolute",
+            "prismatic" => "prismatic",
+            other => {
                 return Err(UrdfError(format!(
-                    "the joint `{}` is {}; models have revolute, continuous, prismatic and fixed joints: write it as \
+                    "the joint `{}` is {other}; models have revolute, continuous, prismatic and fixed joints: write it as \
                      several of these",
-                    joint.name,
-                    format!("{other:?}").to_lowercase()
+                    joint.name
                 )));
             }
         };
         let coordinate = self.name(&joint.name);
-        let own = self.name(&joint.child.link);
-        let (axis, turned) = axis(&Vector3::from(*joint.axis.xyz)).ok_or_else(|| {
+        let own = self.name(&joint.child);
+        let (axis, turned) = axis(&joint.axis).ok_or_else(|| {
             UrdfError(format!(
                 "the axis of the joint `{}` has no direction",
                 joint.name
@@ -219,7 +206,7 @@ impl Import {
             r: at.r * turned,
         };
         let given = if carried.r == Matrix3::identity() && turned == Matrix3::identity() {
-            *joint.origin.rpy
+            joint.origin.rpy
         } else {
             roll_pitch_yaw(&at.r)
         };
@@ -254,7 +241,7 @@ impl Import {
         self.moves(joint, &coordinate);
         self.link(
             robot,
-            &joint.child.link,
+            &joint.child,
             Some(own),
             &Placed {
                 p: Vector3::zeros(),
@@ -265,8 +252,8 @@ impl Import {
 
     /// Coordinate, drive and effects of a joint.
     fn moves(&mut self, joint: &Joint, coordinate: &str) {
-        let (lower, upper) = (joint.limit.lower, joint.limit.upper);
-        let is_limited = !matches!(joint.joint_type, JointType::Continuous) && lower < upper;
+        let (lower, upper) = (joint.lower, joint.upper);
+        let is_limited = joint.kind != "continuous" && lower < upper;
         let nominal = if is_limited && !(lower..=upper).contains(&0.0) {
             0.5 * (lower + upper)
         } else {
@@ -280,18 +267,15 @@ impl Import {
         self.drives.push(format!(
             "\n[[drive]]\nname = \"{drive}\"\njoint = \"{coordinate}\"\n"
         ));
-        if joint.mimic.is_some() {
+        if joint.is_mimic {
             self.remarks.push(format!(
                 "`{}` follows another joint in the description; here it has a drive of its own",
                 joint.name
             ));
         }
-        let Some(dynamics) = &joint.dynamics else {
-            return;
-        };
         for (kind, symbol, value) in [
-            ("viscous_friction", "Fv", dynamics.damping),
-            ("coulomb_friction", "Fc", dynamics.friction),
+            ("viscous_friction", "Fv", joint.damping),
+            ("coulomb_friction", "Fc", joint.friction),
         ] {
             if value != 0.0 && value.is_finite() {
                 self.effects.push(format!(
@@ -314,13 +298,8 @@ impl Import {
         let Some(link) = robot.links.iter().find(|link| link.name == name) else {
             return Ok(());
         };
-        let inertial = &link.inertial;
-        let mass = inertial.mass.value;
-        let i = &inertial.inertia;
-        let matrix = Matrix3::new(
-            i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz,
-        );
-        let placed = at.then(&Placed::of(&inertial.origin));
+        let (mass, matrix) = (link.mass, link.inertia);
+        let placed = at.then(&Placed::of(&link.origin));
         if !(mass.is_finite()
             && mass >= 0.0
             && matrix

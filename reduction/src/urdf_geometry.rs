@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::urdf_file::Pose;
+
 /// Where something is in a frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placed {
@@ -17,10 +19,10 @@ impl Placed {
         }
     }
 
-    pub(crate) fn of(pose: &urdf_rs::Pose) -> Self {
+    pub(crate) fn of(pose: &Pose) -> Self {
         Self {
-            p: Vector3::from(*pose.xyz),
-            r: rotation(*pose.rpy),
+            p: pose.xyz,
+            r: rotation(pose.rpy),
         }
     }
 

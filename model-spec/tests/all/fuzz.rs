@@ -1,6 +1,6 @@
 //! Mutilated model files: whatever the bytes, the loader answers soon, without a panic, and says where a fault is.
 //!
-//! `MODELMILL_FUZZ_SECONDS=600 cargo test --release -p modelmill-spec --test fuzz` runs for as long as that;
+//! `MODELMILL_FUZZ_SECONDS=600 cargo test --release -p modelmill-spec fuzz` runs for as long as that;
 //! `MODELMILL_FUZZ_SEED` starts elsewhere. A failing input is printed and written to the temporary folder.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
