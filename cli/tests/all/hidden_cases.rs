@@ -7,6 +7,7 @@ use crate::benchmark::case::{Case, class_of};
 use crate::benchmark::judge::{Class, FALL, SAME, judge};
 use crate::benchmark::plant::{Along, DRIVES, Plant};
 use crate::benchmark::span::{Span, norm};
+use crate::benchmark::{columns, placed, record, span};
 
 const SEED: u64 = 3;
 
