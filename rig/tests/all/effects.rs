@@ -243,8 +243,8 @@ fn masses_and_gravity() {
 /// A rod as an effect is the rod as a body: the whole robot, whose rods a third party's code has as bodies.
 #[test]
 fn rods_as_effects_are_rods_as_bodies() {
-    let whole = common::load("spidermill-with-rods");
-    let mut plain = common::load("spidermill-full");
+    let whole = crate::common::load("spidermill-with-rods");
+    let mut plain = crate::common::load("spidermill-full");
     for drive in ["spindle_left", "spindle_right"] {
         let values = [("m", 8.0), ("c", 0.45), ("I", 8.0 * 0.81 / 12.0)];
         plain.effects.push(
@@ -253,8 +253,8 @@ fn rods_as_effects_are_rods_as_bodies() {
                 .expect("a rod"),
         );
     }
-    let run = common::shortened(&common::bundled("with-rods-fit"), 300);
-    let trajectory = common::trajectory(&run, &["theta1", "theta2"]);
+    let run = crate::common::shortened(&crate::common::bundled("with-rods-fit"), 300);
+    let trajectory = crate::common::trajectory(&run, &["theta1", "theta2"]);
     let along = |rig: &Rig| {
         let instants = forces_along(rig, &trajectory, trajectory.time(), || {}).expect("forces");
         let forces: Vec<f64> = instants
@@ -263,7 +263,7 @@ fn rods_as_effects_are_rods_as_bodies() {
             .collect();
         forces
     };
-    let error = common::relative_rms(&along(&plain), &along(&whole));
+    let error = crate::common::relative_rms(&along(&plain), &along(&whole));
     assert!(error < 1e-9, "{error:.1e}");
 }
 
@@ -283,7 +283,7 @@ fn a_delay_shifts_the_forces_alone() {
     };
     let trajectory = Trajectory::from_function(time, z).expect("a trajectory");
     let run = simulate(&rig, &trajectory, None, || {}).expect("a run");
-    let column = |name: &str| common::column(&run.columns, name).to_vec();
+    let column = |name: &str| crate::common::column(&run.columns, name).to_vec();
     let (t, q, f) = (column("t"), column("z"), column("screw"));
     assert_eq!(t.len(), 196);
     for i in 0..t.len() {

@@ -144,7 +144,7 @@ fn a_cylindrical_joint_has_two_freedoms() {
 /// and a tilted base.
 #[test]
 fn power_balances_energy() {
-    let mut rig = common::load("spidermill-with-rods");
+    let mut rig = crate::common::load("spidermill-with-rods");
     let motion = |t: f64| {
         let wave = |a: f64, w: f64| {
             [
@@ -214,7 +214,7 @@ fn power_balances_energy() {
 /// start ends.
 #[test]
 fn the_past_of_a_tracker_does_not_show() {
-    let rig = common::load("spidermill-with-rods");
+    let rig = crate::common::load("spidermill-with-rods");
     let fresh = Tracker::new(&rig).expect("a pose");
     let mut used = fresh.clone();
     for (i, draw) in states(2, 40).into_iter().enumerate() {

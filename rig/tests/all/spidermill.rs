@@ -91,8 +91,8 @@ fn a_run_has_the_columns_of_a_recording() {
     let rig = load("spidermill-full");
     let run = bundled("plain-fit");
     let trajectory = trajectory(&run, &["theta1", "theta2"]);
-    let short = common::shortened(&run, 20);
-    let short = common::trajectory(&short, &["theta1", "theta2"]);
+    let short = crate::common::shortened(&run, 20);
+    let short = crate::common::trajectory(&short, &["theta1", "theta2"]);
     let made = simulate(&rig, &short, None, || {}).expect("inside the workspace");
     let names: Vec<&str> = made.columns.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(
