@@ -16,7 +16,7 @@ mod stream;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use modelmill_codegen::{Derivation, Op};
+use modelmill_codegen::Derivation;
 use modelmill_spec::Mechanism;
 use random::Matter;
 
@@ -108,18 +108,10 @@ fn asked_models() -> String {
 
 /// Takes the last term off the first base parameter that is a sum.
 fn without_a_term(derivation: &mut Derivation) {
-    let program = &mut derivation.programs.base_parameters;
-    let shorter =
-        program
-            .outputs
-            .iter()
-            .enumerate()
-            .find_map(|(k, v)| match program.ops[v.index()] {
-                Op::Add(rest, _) => Some((k, rest)),
-                _ => None,
-            });
-    let (k, rest) = shorter.expect("a base parameter that is a sum");
-    program.outputs[k] = rest;
+    let dependencies = &mut derivation.reduction.dependencies;
+    let line = dependencies.iter_mut().rfind(|line| !line.equals.is_empty());
+    let line = line.expect("a base parameter that is a sum");
+    line.equals.pop();
 }
 
 fn derived(mechanism: &Mechanism) -> Derivation {

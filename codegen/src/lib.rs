@@ -17,7 +17,10 @@ mod tree;
 
 pub use derive::base::BaseParameter;
 pub use derive::{Derivation, derive_columns};
-pub use emit::{Emitted, EmittedFile, emit, emit_c, emit_python, emit_with_dynamics, module_name};
+pub use emit::{
+    C99, Emitted, EmittedFile, LANGUAGES, Language, RustModule, Source, emit, emit_c, emit_python,
+    emit_with_dynamics, module_name,
+};
 pub use error::DeriveError;
 pub use evaluate::{Evaluator, PoseFault, PoseReason, States};
 pub use lower::{Guard, Op, OperationCount, Program, Stage, ValueId};

@@ -7,12 +7,12 @@
 
 use core::fmt;
 
-use crate::{One, Outputs, PoseError, Real, check_finite};
+use crate::{One, Outputs, PoseError, Real, Var, check_finite};
 
 /// A straight-line program of a model, for states given as `INPUTS` numbers each.
 pub trait Program<T: Real, const INPUTS: usize, const OUTPUTS: usize> {
     /// Names of the inputs.
-    fn names(&self) -> [&'static str; INPUTS];
+    const NAMES: [&'static str; INPUTS];
 
     /// Runs the program for as many states as `numbers` holds in a value.
     ///
@@ -21,7 +21,7 @@ pub trait Program<T: Real, const INPUTS: usize, const OUTPUTS: usize> {
     fn run<N: crate::Numbers<Scalar = T>>(
         &self,
         numbers: &N,
-        inputs: &[N::Value; INPUTS],
+        inputs: [Var<N::Value>; INPUTS],
         outputs: &mut impl Outputs<N::Value>,
     ) -> Result<(), PoseError>;
 
@@ -336,7 +336,7 @@ pub fn columns_of<T, const OUTPUTS: usize>(
 /// # Errors
 /// Slices of different lengths: the first that is shorter than another.
 pub fn n_states<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
-    program: &P,
+    _program: &P,
     inputs: &[&[T]; INPUTS],
 ) -> Result<usize, BlockError>
 where
@@ -344,7 +344,7 @@ where
 {
     let n = inputs.iter().map(|i| i.len()).max().unwrap_or(0);
     let given = INPUTS.saturating_sub(P::COMPLETED);
-    for (input, array) in inputs.iter().zip(program.names()).take(given) {
+    for (input, array) in inputs.iter().zip(P::NAMES).take(given) {
         same_length(array, core::iter::once(input.len()), n)?;
     }
     Ok(n)
@@ -501,12 +501,11 @@ fn one_by_one<T: Blocks, P, const INPUTS: usize, const OUTPUTS: usize>(
 where
     P: Program<T, INPUTS, OUTPUTS>,
 {
-    let names = program.names();
     for k in 0..len {
         let state = state(inputs, at + k);
         let mut found = [T::from_f64(0.0); OUTPUTS];
-        check_finite(&state, &names)
-            .and_then(|()| program.run(&One::new(), &state, &mut found))
+        check_finite(&state, &P::NAMES)
+            .and_then(|()| program.run(&One::new(), state.map(Var), &mut found))
             .map_err(|reason| (k, reason))?;
         for (line, value) in outputs.iter_mut().zip(&found) {
             if let Some(to) = line.as_mut().get_mut(k) {

@@ -6,9 +6,8 @@
 //! to [`LARGEST_ANGLE`]; arrays with a larger one, or with one that is no finite number, go through
 //! [`Real::sin_cos`](crate::Real::sin_cos) one by one.
 
-use core::ops::{Add, Mul, Sub};
-
 use crate::Real;
+use crate::arithmetic::Value;
 
 /// Largest angle, rad, for which the reduction in three parts is exact enough: 2^16 quarters of a turn.
 pub const LARGEST_ANGLE: f64 = 102_943.0;
@@ -22,7 +21,7 @@ pub const LARGEST_ANGLE: f64 = 102_943.0;
 pub fn sin_cos_lanes<const N: usize>(angle: &[f64; N], sin: &mut [f64; N], cos: &mut [f64; N]) {
     let mut regular = true;
     for x in angle {
-        regular &= x.abs() < LARGEST_ANGLE;
+        regular &= Real::abs(*x) < LARGEST_ANGLE;
     }
     if regular {
         for k in 0..N {
@@ -46,7 +45,7 @@ pub(crate) fn sin_cos_each<const N: usize>(angles: [f64; N]) -> ([f64; N], [f64;
 /// Sine and cosine of one angle, rad; the same on every machine, and in constant time below [`LARGEST_ANGLE`].
 #[inline]
 pub(crate) fn sin_cos_once(angle: f64) -> (f64, f64) {
-    if angle.abs() < LARGEST_ANGLE {
+    if Real::abs(angle) < LARGEST_ANGLE {
         reduced_sin_cos(angle)
     } else {
         libm::sincos(angle)
@@ -54,36 +53,13 @@ pub(crate) fn sin_cos_once(angle: f64) -> (f64, f64) {
 }
 
 /// A number, or a vector of numbers, that the kernel below works on.
-pub(crate) trait Angle:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
-{
-    /// A number as a value like `self`.
-    fn like(self, x: f64) -> Self;
-    /// `self + a * b`, rounded once or twice.
-    fn plus_product(self, a: Self, b: Self) -> Self;
-    /// `self - a * b`, rounded once or twice.
-    fn less_product(self, a: Self, b: Self) -> Self;
+pub(crate) trait Angle: Value {
     /// Sine and cosine after as many quarter turns as stand in the lowest bits of `shifted`.
     fn turned(shifted: Self, sin: Self, cos: Self) -> (Self, Self);
 }
 
 #[allow(clippy::inline_always, reason = "as above")]
 impl Angle for f64 {
-    #[inline(always)]
-    fn like(self, x: f64) -> Self {
-        x
-    }
-
-    #[inline(always)]
-    fn plus_product(self, a: Self, b: Self) -> Self {
-        self + a * b
-    }
-
-    #[inline(always)]
-    fn less_product(self, a: Self, b: Self) -> Self {
-        self - a * b
-    }
-
     #[inline(always)]
     fn turned(shifted: Self, sin: Self, cos: Self) -> (Self, Self) {
         let quarter = shifted.to_bits();

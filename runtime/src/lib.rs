@@ -3,9 +3,11 @@
 //! There is no allocation and no unsafe code here, and without the feature `std` no standard library either.
 #![cfg_attr(not(feature = "std"), no_std)]
 
+mod arithmetic;
 pub mod blocks;
 mod lanes;
 mod loops;
+mod model;
 mod numbers;
 #[cfg(feature = "rayon")]
 mod parallel;
@@ -21,13 +23,26 @@ mod wide;
 use core::cmp::Ordering;
 use core::fmt;
 
+pub use arithmetic::{Product, Term, Value, Var};
 pub use lanes::{LARGEST_ANGLE, sin_cos_lanes};
 pub use loops::{Loops, Scales, correct, follow, settle};
-pub use numbers::{Numbers, One, Outputs};
+pub use model::{
+    Assembly, Drives, Followed, Linearised, LoadedState, Passive, Run, Running, State,
+    accelerations, at, check_base, plainly, ready,
+};
+pub use numbers::{Angles, Numbers, One, Outputs, Results};
 pub use reactions::{ClosedLoop, Joint, Wrench};
 pub use real::Real;
 pub use self_test::{Random, SelfTestError, ShowRows, self_test};
 pub use solve::solve;
+
+/// What emitted modules bring into scope.
+pub mod emitted {
+    pub use crate::{
+        Assembly, BaseParameter, Linearised, Loops, Numbers, One, PoseError, Quantity, Real, Run,
+        Scales, Term, Var, accelerations, at, check_base, check_finite, plainly, settle, values,
+    };
+}
 
 /// A pose for which a model has no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,6 +104,14 @@ pub struct Quantity {
     pub value: f64,
 }
 
+impl Quantity {
+    /// Name, SI unit and value.
+    #[must_use]
+    pub const fn new(name: &'static str, unit: &'static str, value: f64) -> Self {
+        Self { name, unit, value }
+    }
+}
+
 /// One base parameter: which product is retained, and what it gathers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BaseParameter {
@@ -100,4 +123,22 @@ pub struct BaseParameter {
     pub expression: &'static str,
     /// SI unit.
     pub unit: &'static str,
+}
+
+impl BaseParameter {
+    /// Name, retained product, SI unit, and expression.
+    #[must_use]
+    pub const fn new(
+        name: &'static str,
+        retained: &'static str,
+        unit: &'static str,
+        expression: &'static str,
+    ) -> Self {
+        Self {
+            name,
+            retained,
+            expression,
+            unit,
+        }
+    }
 }

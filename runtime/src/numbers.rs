@@ -4,92 +4,75 @@
 //! [`crate::blocks`] it runs over many states at once.
 
 use core::marker::PhantomData;
-use core::ops::{Add, Div, Mul, Neg, Sub};
 
+use crate::arithmetic::{Term, Value, Var};
 use crate::{PoseError, Real};
 
-/// Arithmetic of a program; whatever needs more than `+ - * /` is asked of `self`.
+/// Arithmetic of a program: whatever needs more than what its variables know themselves.
 pub trait Numbers {
     /// The numbers of the model: `f32` or `f64`.
     type Scalar: Real;
     /// What a variable of the program holds.
-    type Value: Copy
-        + Add<Output = Self::Value>
-        + Sub<Output = Self::Value>
-        + Mul<Output = Self::Value>
-        + Div<Output = Self::Value>
-        + Neg<Output = Self::Value>;
+    type Value: Value;
 
     /// A value that is the same at every state.
-    fn of(&self, x: Self::Scalar) -> Self::Value;
+    fn of(&self, x: Self::Scalar) -> Var<Self::Value>;
     /// A number that stands in the program.
-    fn number(&self, x: f64) -> Self::Value;
+    #[allow(clippy::inline_always, reason = "nothing at all")]
+    #[inline(always)]
+    fn number(&self, x: f64) -> Var<Self::Value> {
+        self.of(Self::Scalar::from_f64(x))
+    }
     /// Sine and cosine of an angle in rad.
-    fn sin_cos(&self, angle: Self::Value) -> (Self::Value, Self::Value);
+    fn sin_cos(&self, angle: impl Term<Self::Value>) -> (Var<Self::Value>, Var<Self::Value>);
     /// Angles in rad whose sines and cosines [`Self::sin_cos_of`] gives later. One number computes all of them here, which
     /// takes less time than one by one; vectors wait, since they lack the registers to hold the results, and look only
     /// whether one is too large.
     #[allow(clippy::inline_always, reason = "nothing at all")]
     #[inline(always)]
-    fn angles<const N: usize>(
-        &self,
-        angles: [Self::Value; N],
-    ) -> ([Self::Value; N], [Self::Value; N]) {
-        (angles, angles)
+    fn angles<const N: usize>(&self, angles: [Var<Self::Value>; N]) -> Angles<Self::Value, N> {
+        Angles {
+            sines: angles,
+            cosines: angles,
+        }
     }
-    /// Sine and cosine of one of [`Self::angles`], by what stands in both arrays.
+    /// Sine and cosine of one of [`Self::angles`].
     #[allow(clippy::inline_always, reason = "as for one")]
     #[inline(always)]
-    fn sin_cos_of(&self, angle: Self::Value, _: Self::Value) -> (Self::Value, Self::Value) {
-        self.sin_cos(angle)
-    }
-    /// Square root.
-    fn sqrt(&self, x: Self::Value) -> Self::Value;
-    /// Absolute value.
-    fn abs(&self, x: Self::Value) -> Self::Value;
-    /// -1, 0 or 1; what is no number stays what it is.
-    fn sign(&self, x: Self::Value) -> Self::Value;
-    /// Hyperbolic tangent.
-    fn tanh(&self, x: Self::Value) -> Self::Value;
-    /// Exponential.
-    fn exp(&self, x: Self::Value) -> Self::Value;
-    /// Angle of the point (`x`, `y`) in rad.
-    fn atan2(&self, y: Self::Value, x: Self::Value) -> Self::Value;
-
-    /// `a * b + c`, rounded once where the machine does so at no cost.
-    #[allow(clippy::inline_always, reason = "an instruction or two")]
-    #[inline(always)]
-    fn mul_add(&self, a: Self::Value, b: Self::Value, c: Self::Value) -> Self::Value {
-        a * b + c
-    }
-    /// `a * b - c`, as [`Self::mul_add`].
-    #[allow(clippy::inline_always, reason = "an instruction or two")]
-    #[inline(always)]
-    fn mul_sub(&self, a: Self::Value, b: Self::Value, c: Self::Value) -> Self::Value {
-        a * b - c
-    }
-    /// `c - a * b`, as [`Self::mul_add`].
-    #[allow(clippy::inline_always, reason = "an instruction or two")]
-    #[inline(always)]
-    fn sub_mul(&self, c: Self::Value, a: Self::Value, b: Self::Value) -> Self::Value {
-        c - a * b
+    fn sin_cos_of<const N: usize>(
+        &self,
+        angles: &Angles<Self::Value, N>,
+        k: usize,
+    ) -> (Var<Self::Value>, Var<Self::Value>) {
+        self.sin_cos(angles.sines[k])
     }
 
     /// Asks that a value is not negative.
     ///
     /// # Errors
     /// [`PoseError::OutOfReach`] for one number; a block remembers it and is looked at one by one.
-    fn reachable(&self, x: Self::Value) -> Result<(), PoseError>;
+    fn reachable(&self, x: impl Term<Self::Value>) -> Result<(), PoseError>;
     /// Asks that a determinant does not vanish beside the magnitude of its terms; see [`Real::singular`].
     ///
     /// # Errors
     /// [`PoseError::Singular`] for one number; a block remembers it and is looked at one by one.
-    fn regular(&self, x: Self::Value, size: Self::Scalar) -> Result<(), PoseError>;
+    fn regular(
+        &self,
+        x: impl Term<Self::Value>,
+        size: impl Term<Self::Value>,
+    ) -> Result<(), PoseError>;
     /// Asks that a value is a finite number.
     ///
     /// # Errors
     /// [`PoseError::Undefined`] for one number; a block remembers it and is looked at one by one.
-    fn finite(&self, x: Self::Value) -> Result<(), PoseError>;
+    fn finite(&self, x: impl Term<Self::Value>) -> Result<(), PoseError>;
+}
+
+/// Angles whose sines and cosines are asked for later: both, or the angles themselves where these are not computed yet.
+#[derive(Clone, Copy, Debug)]
+pub struct Angles<V, const N: usize> {
+    pub(crate) sines: [Var<V>; N],
+    pub(crate) cosines: [Var<V>; N],
 }
 
 /// One number at a time.
@@ -113,69 +96,46 @@ impl<T: Real> Numbers for One<T> {
     type Value = T;
 
     #[inline(always)]
-    fn of(&self, x: T) -> T {
-        x
+    fn of(&self, x: T) -> Var<T> {
+        Var(x)
     }
     #[inline(always)]
-    fn number(&self, x: f64) -> T {
-        T::from_f64(x)
+    fn sin_cos(&self, angle: impl Term<T>) -> (Var<T>, Var<T>) {
+        let (sin, cos) = angle.get().sin_cos();
+        (Var(sin), Var(cos))
     }
     #[inline(always)]
-    fn sin_cos(&self, angle: T) -> (T, T) {
-        angle.sin_cos()
+    fn angles<const N: usize>(&self, angles: [Var<T>; N]) -> Angles<T, N> {
+        let (sines, cosines) = T::sin_cos_all(angles.map(|angle| angle.0));
+        Angles {
+            sines: sines.map(Var),
+            cosines: cosines.map(Var),
+        }
     }
     #[inline(always)]
-    fn angles<const N: usize>(&self, angles: [T; N]) -> ([T; N], [T; N]) {
-        T::sin_cos_all(angles)
-    }
-    #[inline(always)]
-    fn sin_cos_of(&self, sin: T, cos: T) -> (T, T) {
-        (sin, cos)
-    }
-    #[inline(always)]
-    fn sqrt(&self, x: T) -> T {
-        x.sqrt()
-    }
-    #[inline(always)]
-    fn abs(&self, x: T) -> T {
-        x.abs()
-    }
-    #[inline(always)]
-    fn sign(&self, x: T) -> T {
-        x.sign()
-    }
-    #[inline(always)]
-    fn tanh(&self, x: T) -> T {
-        x.tanh()
-    }
-    #[inline(always)]
-    fn exp(&self, x: T) -> T {
-        x.exp()
-    }
-    #[inline(always)]
-    fn atan2(&self, y: T, x: T) -> T {
-        y.atan2(x)
+    fn sin_cos_of<const N: usize>(&self, angles: &Angles<T, N>, k: usize) -> (Var<T>, Var<T>) {
+        (angles.sines[k], angles.cosines[k])
     }
     // Each is written so that what is no number fails as well.
     #[inline(always)]
-    fn reachable(&self, x: T) -> Result<(), PoseError> {
-        if x >= T::from_f64(0.0) {
+    fn reachable(&self, x: impl Term<T>) -> Result<(), PoseError> {
+        if x.get() >= T::from_f64(0.0) {
             Ok(())
         } else {
             Err(PoseError::OutOfReach)
         }
     }
     #[inline(always)]
-    fn regular(&self, x: T, size: T) -> Result<(), PoseError> {
-        if x.abs() > T::singular() * size {
+    fn regular(&self, x: impl Term<T>, size: impl Term<T>) -> Result<(), PoseError> {
+        if Real::abs(x.get()) > T::singular() * size.get() {
             Ok(())
         } else {
             Err(PoseError::Singular)
         }
     }
     #[inline(always)]
-    fn finite(&self, x: T) -> Result<(), PoseError> {
-        if x.is_finite() {
+    fn finite(&self, x: impl Term<T>) -> Result<(), PoseError> {
+        if x.get().is_finite() {
             Ok(())
         } else {
             Err(PoseError::Undefined)
@@ -186,14 +146,20 @@ impl<T: Real> Numbers for One<T> {
 /// Where a program leaves its results.
 pub trait Outputs<V> {
     /// Takes output `k`.
-    fn put(&mut self, k: usize, value: V);
+    fn put(&mut self, k: usize, value: impl Term<V>);
+}
+
+/// Results that begin as zeros.
+pub trait Results<T>: Outputs<T> {
+    /// All of them zero.
+    fn zeros() -> Self;
 }
 
 #[allow(clippy::inline_always, reason = "as above")]
 impl<V, const N: usize> Outputs<V> for [V; N] {
     #[inline(always)]
-    fn put(&mut self, k: usize, value: V) {
-        self[k] = value;
+    fn put(&mut self, k: usize, value: impl Term<V>) {
+        self[k] = value.get();
     }
 }
 
@@ -201,8 +167,20 @@ impl<V, const N: usize> Outputs<V> for [V; N] {
 #[allow(clippy::inline_always, reason = "as above")]
 impl<V, const ROWS: usize, const COLUMNS: usize> Outputs<V> for [[V; COLUMNS]; ROWS] {
     #[inline(always)]
-    fn put(&mut self, k: usize, value: V) {
-        self[k / COLUMNS][k % COLUMNS] = value;
+    fn put(&mut self, k: usize, value: impl Term<V>) {
+        self[k / COLUMNS][k % COLUMNS] = value.get();
+    }
+}
+
+impl<T: Real, const N: usize> Results<T> for [T; N] {
+    fn zeros() -> Self {
+        [T::from_f64(0.0); N]
+    }
+}
+
+impl<T: Real, const ROWS: usize, const COLUMNS: usize> Results<T> for [[T; COLUMNS]; ROWS] {
+    fn zeros() -> Self {
+        [[T::from_f64(0.0); COLUMNS]; ROWS]
     }
 }
 
@@ -214,10 +192,10 @@ mod tests {
     /// below ten times what rounding leaves.
     #[test]
     fn singular_poses_are_told_by_the_digits_that_there_are() {
-        let double = |x| One::<f64>::new().regular(x, 100.0);
+        let double = |x| One::<f64>::new().regular(Var(x), Var(100.0));
         assert_eq!(double(0.9e-7), Err(PoseError::Singular));
         assert_eq!(double(-1.1e-7), Ok(()));
-        let single = |x| One::<f32>::new().regular(x, 100.0);
+        let single = |x| One::<f32>::new().regular(Var(x), Var(100.0));
         assert_eq!(single(1e-4), Err(PoseError::Singular));
         assert_eq!(single(-1.3e-4), Ok(()));
         assert_eq!(single(f32::NAN), Err(PoseError::Singular));

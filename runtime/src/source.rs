@@ -1,12 +1,14 @@
 //! This crate's own source, for crates that are handed on in a folder of their own.
 
 /// Place in the crate's folder and text of every file.
-pub const FILES: [(&str, &str); 13] = [
+pub const FILES: [(&str, &str); 15] = [
     ("Cargo.toml", MANIFEST),
+    ("src/arithmetic.rs", include_str!("arithmetic.rs")),
     ("src/blocks.rs", include_str!("blocks.rs")),
     ("src/lanes.rs", include_str!("lanes.rs")),
     ("src/lib.rs", include_str!("lib.rs")),
     ("src/loops.rs", include_str!("loops.rs")),
+    ("src/model.rs", include_str!("model.rs")),
     ("src/numbers.rs", include_str!("numbers.rs")),
     ("src/parallel.rs", include_str!("parallel.rs")),
     ("src/reactions.rs", include_str!("reactions.rs")),

@@ -14,8 +14,10 @@ use std::sync::OnceLock;
 
 use pulp::{Arch, Simd, WithSimd};
 
+use crate::arithmetic::{Term, Value, Var};
 use crate::blocks::{BlockError, Blocks, Job, Line, Line32, Line64, Program, Vectors};
-use crate::lanes::{Angle, LARGEST_ANGLE, reduced_sin_cos};
+use crate::lanes::{self, LARGEST_ANGLE, reduced_sin_cos};
+use crate::numbers::Angles;
 use crate::{Numbers, Outputs, PoseError, Real};
 
 /// The widest vectors of the machine, or narrower ones if the environment variable `MODELMILL_VECTORS` asks for `256` bits
@@ -94,19 +96,80 @@ macro_rules! wide {
                 let irregular = self.simd.$not(self.regular.get());
                 self.simd.$first(irregular) >= S::$lanes
             }
+        }
+
+        impl<S: Simd> $value<S> {
+            #[inline(always)]
+            fn with(self, v: S::$floats) -> Self {
+                Self { simd: self.simd, v }
+            }
 
             /// A function that has no vector form, lane by lane.
             #[inline(always)]
-            fn each(&self, x: $value<S>, f: impl Fn($float) -> $float) -> $value<S> {
+            fn each(self, f: impl Fn($float) -> $float) -> Self {
                 let mut line = [0.0; $line::LENGTH];
                 if let Some(to) = S::$of_slice_mut(&mut line).0.first_mut() {
-                    *to = x.v;
+                    *to = self.v;
                 }
                 for x in line.iter_mut().take(S::$lanes) {
                     *x = f(*x);
                 }
                 let first = S::$of_slice(&line).0.first();
-                first.map_or(x, |v| self.value(*v))
+                first.map_or(self, |v| self.with(*v))
+            }
+        }
+
+        impl<S: Simd> Value for $value<S> {
+            #[inline(always)]
+            fn like(self, x: f64) -> Self {
+                self.with(self.simd.$splat(<$float as Real>::from_f64(x)))
+            }
+            #[inline(always)]
+            fn plus_product(self, a: Self, b: Self) -> Self {
+                self.with(self.simd.$fused(a.v, b.v, self.v))
+            }
+            #[inline(always)]
+            fn from_product(self, a: Self, b: Self) -> Self {
+                self.with(self.simd.$fused(a.v, b.v, self.simd.$neg(self.v)))
+            }
+            #[inline(always)]
+            fn less_product(self, a: Self, b: Self) -> Self {
+                self.with(self.simd.$fused_less(a.v, b.v, self.v))
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                self.with(self.simd.$sqrt(self.v))
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                self.with(self.simd.$abs(self.v))
+            }
+            #[inline(always)]
+            fn sign(self) -> Self {
+                let simd = self.simd;
+                let (zero, one) = (simd.$splat(0.0), simd.$splat(1.0));
+                let below = simd.$select(simd.$less(self.v, zero), simd.$splat(-1.0), self.v);
+                self.with(simd.$select(simd.$greater(self.v, zero), one, below))
+            }
+            #[inline(always)]
+            fn tanh(self) -> Self {
+                self.each(Real::tanh)
+            }
+            #[inline(always)]
+            fn exp(self) -> Self {
+                self.each(Real::exp)
+            }
+            #[inline(always)]
+            fn atan2(self, x: Self) -> Self {
+                let mut line = [0.0; $line::LENGTH];
+                if let Some(to) = S::$of_slice_mut(&mut line).0.first_mut() {
+                    *to = x.v;
+                }
+                let at = Cell::new(0);
+                self.each(|y| {
+                    let k = at.replace(at.get() + 1);
+                    Real::atan2(y, line.get(k).copied().unwrap_or_default())
+                })
             }
         }
 
@@ -115,96 +178,53 @@ macro_rules! wide {
             type Value = $value<S>;
 
             #[inline(always)]
-            fn of(&self, x: $float) -> $value<S> {
-                self.value(self.simd.$splat(x))
+            fn of(&self, x: $float) -> Var<$value<S>> {
+                Var(self.value(self.simd.$splat(x)))
             }
             #[inline(always)]
-            fn number(&self, x: f64) -> $value<S> {
-                self.of(<$float as Real>::from_f64(x))
-            }
-            #[inline(always)]
-            fn sin_cos(&self, angle: $value<S>) -> ($value<S>, $value<S>) {
+            fn sin_cos(&self, angle: impl Term<$value<S>>) -> (Var<$value<S>>, Var<$value<S>>) {
+                let angle = angle.get();
                 let (simd, largest) = (self.simd, <$float as Real>::from_f64(LARGEST_ANGLE));
                 self.hold(simd.$less(simd.$abs(angle.v), simd.$splat(largest)));
-                angle.sin_cos()
+                let (sin, cos) = angle.sin_cos();
+                (Var(sin), Var(cos))
             }
             #[inline(always)]
-            fn angles<const N: usize>(&self, angles: [$value<S>; N]) -> ([$value<S>; N], [$value<S>; N]) {
+            fn angles<const N: usize>(&self, angles: [Var<$value<S>>; N]) -> Angles<$value<S>, N> {
                 let (simd, largest) = (self.simd, <$float as Real>::from_f64(LARGEST_ANGLE));
                 // What is no number may be lost in the larger of two; inputs are looked at before.
                 let mut size = simd.$splat(0.0);
                 for angle in angles {
-                    size = simd.$max(size, simd.$abs(angle.v));
+                    size = simd.$max(size, simd.$abs(angle.0.v));
                 }
                 self.hold(simd.$less(size, simd.$splat(largest)));
-                (angles, angles)
+                Angles { sines: angles, cosines: angles }
             }
             #[inline(always)]
-            fn sin_cos_of(&self, angle: $value<S>, _: $value<S>) -> ($value<S>, $value<S>) {
-                angle.sin_cos()
+            fn sin_cos_of<const N: usize>(
+                &self,
+                angles: &Angles<$value<S>, N>,
+                k: usize,
+            ) -> (Var<$value<S>>, Var<$value<S>>) {
+                let (sin, cos) = angles.sines[k].0.sin_cos();
+                (Var(sin), Var(cos))
             }
             #[inline(always)]
-            fn mul_add(&self, a: $value<S>, b: $value<S>, c: $value<S>) -> $value<S> {
-                self.value(self.simd.$fused(a.v, b.v, c.v))
-            }
-            #[inline(always)]
-            fn mul_sub(&self, a: $value<S>, b: $value<S>, c: $value<S>) -> $value<S> {
-                self.value(self.simd.$fused(a.v, b.v, self.simd.$neg(c.v)))
-            }
-            #[inline(always)]
-            fn sub_mul(&self, c: $value<S>, a: $value<S>, b: $value<S>) -> $value<S> {
-                self.value(self.simd.$fused_less(a.v, b.v, c.v))
-            }
-            #[inline(always)]
-            fn sqrt(&self, x: $value<S>) -> $value<S> {
-                self.value(self.simd.$sqrt(x.v))
-            }
-            #[inline(always)]
-            fn abs(&self, x: $value<S>) -> $value<S> {
-                self.value(self.simd.$abs(x.v))
-            }
-            #[inline(always)]
-            fn sign(&self, x: $value<S>) -> $value<S> {
-                let simd = self.simd;
-                let (zero, one) = (simd.$splat(0.0), simd.$splat(1.0));
-                let below = simd.$select(simd.$less(x.v, zero), simd.$splat(-1.0), x.v);
-                self.value(simd.$select(simd.$greater(x.v, zero), one, below))
-            }
-            #[inline(always)]
-            fn tanh(&self, x: $value<S>) -> $value<S> {
-                self.each(x, Real::tanh)
-            }
-            #[inline(always)]
-            fn exp(&self, x: $value<S>) -> $value<S> {
-                self.each(x, Real::exp)
-            }
-            #[inline(always)]
-            fn atan2(&self, y: $value<S>, x: $value<S>) -> $value<S> {
-                let mut line = [0.0; $line::LENGTH];
-                if let Some(to) = S::$of_slice_mut(&mut line).0.first_mut() {
-                    *to = x.v;
-                }
-                let at = Cell::new(0);
-                self.each(y, |y| {
-                    let k = at.replace(at.get() + 1);
-                    Real::atan2(y, line.get(k).copied().unwrap_or_default())
-                })
-            }
-            #[inline(always)]
-            fn reachable(&self, x: $value<S>) -> Result<(), PoseError> {
-                self.hold(self.simd.$at_least(x.v, self.simd.$splat(0.0)));
+            fn reachable(&self, x: impl Term<$value<S>>) -> Result<(), PoseError> {
+                self.hold(self.simd.$at_least(x.get().v, self.simd.$splat(0.0)));
                 Ok(())
             }
             #[inline(always)]
-            fn regular(&self, x: $value<S>, size: $float) -> Result<(), PoseError> {
-                let limit = self.of(<$float as Real>::singular() * size);
-                self.hold(self.simd.$greater(self.simd.$abs(x.v), limit.v));
+            fn regular(&self, x: impl Term<$value<S>>, size: impl Term<$value<S>>) -> Result<(), PoseError> {
+                let share = self.simd.$splat(<$float as Real>::singular());
+                let limit = self.simd.$mul(share, size.get().v);
+                self.hold(self.simd.$greater(self.simd.$abs(x.get().v), limit));
                 Ok(())
             }
             #[inline(always)]
-            fn finite(&self, x: $value<S>) -> Result<(), PoseError> {
+            fn finite(&self, x: impl Term<$value<S>>) -> Result<(), PoseError> {
                 let infinite = self.simd.$splat(<$float>::INFINITY);
-                self.hold(self.simd.$less(self.simd.$abs(x.v), infinite));
+                self.hold(self.simd.$less(self.simd.$abs(x.get().v), infinite));
                 Ok(())
             }
         }
@@ -218,10 +238,10 @@ macro_rules! wide {
 
         impl<S: Simd, const OUTPUTS: usize> Outputs<$value<S>> for $put<'_, S, OUTPUTS> {
             #[inline(always)]
-            fn put(&mut self, k: usize, value: $value<S>) {
+            fn put(&mut self, k: usize, value: impl Term<$value<S>>) {
                 let _ = self.simd;
                 if let Some(to) = S::$of_slice_mut(&mut self.lines[k].0).0.get_mut(self.part) {
-                    *to = value.v;
+                    *to = value.get().v;
                 }
             }
         }
@@ -246,7 +266,7 @@ macro_rules! wide {
                 for part in 0..$line::LENGTH / S::$lanes {
                     let numbers = $numbers::new(simd);
                     let zero = simd.$splat(0.0);
-                    let mut values = [numbers.value(zero); INPUTS];
+                    let mut values = [Var(numbers.value(zero)); INPUTS];
                     // The sum is small if all of them are.
                     let mut sum = zero;
                     for (to, input) in values.iter_mut().zip(inputs) {
@@ -254,14 +274,14 @@ macro_rules! wide {
                             return false;
                         };
                         if let Some(v) = S::$of_slice(line).0.get(part) {
-                            to.v = *v;
+                            to.0.v = *v;
                             sum = simd.$add(sum, simd.$abs(*v));
                         }
                     }
                     numbers.hold(simd.$less(sum, simd.$splat(<$float as Real>::largest())));
                     let lines = &mut *outputs;
                     let mut put = $put { lines, part, simd };
-                    regular &= program.run(&numbers, &values, &mut put).is_ok();
+                    regular &= program.run(&numbers, values, &mut put).is_ok();
                     regular &= numbers.all_regular();
                 }
                 regular
@@ -388,31 +408,7 @@ impl<S: Simd> Wide64<S> {
     }
 }
 
-impl<S: Simd> Angle for Wide64<S> {
-    #[inline(always)]
-    fn like(self, x: f64) -> Self {
-        Self {
-            simd: self.simd,
-            v: self.simd.splat_f64s(x),
-        }
-    }
-
-    #[inline(always)]
-    fn plus_product(self, a: Self, b: Self) -> Self {
-        Self {
-            simd: self.simd,
-            v: self.simd.mul_add_e_f64s(a.v, b.v, self.v),
-        }
-    }
-
-    #[inline(always)]
-    fn less_product(self, a: Self, b: Self) -> Self {
-        Self {
-            simd: self.simd,
-            v: self.simd.negate_mul_add_e_f64s(a.v, b.v, self.v),
-        }
-    }
-
+impl<S: Simd> lanes::Angle for Wide64<S> {
     #[inline(always)]
     fn turned(shifted: Self, sin: Self, cos: Self) -> (Self, Self) {
         let simd = shifted.simd;

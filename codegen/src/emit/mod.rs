@@ -1,125 +1,13 @@
-//! Emission: a derivation goes in, a Rust module comes out, as tokens printed by prettyplease.
+//! Emission: a derivation goes in, source comes out, in one language or another.
 //!
-//! The module depends on `modelmill-runtime` alone. It is `no_std`, allocates nothing, contains no unsafe code, and works
-//! for `f32` and `f64`.
+//! `tree` makes statements of the lowered programs, once for all languages; `language` prints them; `wrap` puts faces for
+//! other languages around the Rust that is printed.
 
-mod angles;
-mod blocks;
-mod body;
-mod c;
-mod dynamics;
-mod foreign;
-mod functions;
 mod identifier;
-mod items;
-mod newton;
-mod order;
-mod python;
-mod reactions;
-mod self_test;
+mod language;
+pub(crate) mod tree;
+mod wrap;
 
-pub use c::emit_c;
-pub use foreign::EmittedFile;
-pub use python::emit_python;
-
-use proc_macro2::TokenStream;
-use quote::quote;
-
-use crate::{Derivation, Dynamics, Reactions};
-
-/// Rust source of a module.
-#[derive(Clone, Debug)]
-pub struct Emitted {
-    /// Name of the module.
-    pub name: String,
-    /// Documentation of the module, in Markdown.
-    pub doc: String,
-    items: TokenStream,
-}
-
-/// Writes the module of a derivation: regressor and inverse dynamics.
-pub fn emit(derivation: &Derivation) -> Emitted {
-    Emitted {
-        name: derivation.mechanism.name.clone(),
-        doc: items::module_doc(derivation),
-        items: items::items(derivation),
-    }
-}
-
-/// Writes the module of a derivation with its equation of motion besides: mass matrix, forward dynamics and what belongs
-/// to them.
-pub fn emit_with_dynamics(derivation: &Derivation, dynamics: &Dynamics) -> Emitted {
-    emit(derivation).with_dynamics(derivation, dynamics)
-}
-
-impl Emitted {
-    /// The module with the equation of motion of the same derivation.
-    #[must_use]
-    pub fn with_dynamics(mut self, derivation: &Derivation, dynamics: &Dynamics) -> Self {
-        self.items.extend(dynamics::dynamics(derivation, dynamics));
-        self
-    }
-
-    /// The module with a test of its base parameters.
-    #[must_use]
-    pub fn with_self_test(mut self, derivation: &Derivation) -> Self {
-        self.items.extend(self_test::self_test(derivation));
-        self
-    }
-
-    /// The module with the reactions of the same derivation.
-    #[must_use]
-    pub fn with_reactions(mut self, derivation: &Derivation, reactions: &Reactions) -> Self {
-        self.items
-            .extend(reactions::reactions(derivation, reactions));
-        self
-    }
-
-    /// The source as a file of its own, to be declared with `mod`.
-    pub fn file(&self) -> String {
-        let (doc, items) = (doc_lines(&self.doc, true), &self.items);
-        print(&quote! { #doc #![allow(#LINTS)] #items })
-    }
-
-    /// The source as a `pub mod` that can be included anywhere.
-    pub fn module(&self) -> String {
-        let (doc, items) = (doc_lines(&self.doc, false), &self.items);
-        let name = identifier::of_module(&self.name);
-        print(&quote! { #doc #[allow(#LINTS)] pub mod #name { #items } })
-    }
-}
-
-/// The name of the module that is emitted for a model: its own, or one near it where Rust cannot have that.
-pub fn module_name(model: &str) -> String {
-    identifier::of_module(model).to_string()
-}
-
-/// Lints that emitted code does not keep to: names come from the model file, and code is in single assignments.
-struct Lints;
-const LINTS: Lints = Lints;
-
-impl quote::ToTokens for Lints {
-    fn to_tokens(&self, tokens: &mut TokenStream) {
-        tokens.extend(quote! {
-            non_snake_case, unused_parens, unused_variables, clippy::all, clippy::pedantic
-        });
-    }
-}
-
-fn doc_lines(doc: &str, inner: bool) -> TokenStream {
-    let lines = doc.lines().map(|line| {
-        let line = format!(" {line}");
-        if inner {
-            quote! { #![doc = #line] }
-        } else {
-            quote! { #[doc = #line] }
-        }
-    });
-    quote! { #(#lines)* }
-}
-
-fn print(tokens: &TokenStream) -> String {
-    let file = syn::parse2(tokens.clone())
-        .unwrap_or_else(|error| panic!("emitted tokens do not parse: {error}\n{tokens}"));
-    prettyplease::unparse(&file)
-}
+pub use language::rust::{Emitted, emit, emit_with_dynamics, module_name};
+pub use language::{C99, EmittedFile, LANGUAGES, Language, RustModule, Source};
+pub use wrap::{emit_c, emit_python};

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use modelmill_spec::Mechanism;
 
 use super::document::Equation;
-use super::names::Meaning;
+use crate::emit::tree::names::Meaning;
 use crate::expr::Rational;
 use crate::expr::print::{Formula, Function, Symbol, atom};
 use crate::lower::{Op, Program, Stage};

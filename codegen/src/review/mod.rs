@@ -10,7 +10,6 @@ mod equations;
 mod frames;
 mod listing;
 mod loops;
-mod names;
 mod parameters;
 mod programs;
 mod render_html;

@@ -7,7 +7,7 @@ use modelmill_spec::{Drive, DriveKind};
 use super::document::{Block, Document, Equation, Line, Table, cell, name, text};
 use super::equations::base_name;
 use super::listing::{self, Listing};
-use super::names::{Meaning, Meanings, reserved};
+use crate::emit::tree::names::{Meaning, Meanings, reserved};
 use crate::expr::print::{Formula, Symbol};
 use crate::lower::{OperationCount, Program, Stage};
 use crate::{Derivation, PassivePosition};

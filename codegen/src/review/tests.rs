@@ -6,8 +6,8 @@ use std::path::PathBuf;
 
 use modelmill_spec::Mechanism;
 
-use super::names::{Meanings, run};
 use super::{Equations, Format, NumericRank, base_expression, base_grouped, page, programs};
+use crate::emit::tree::names::{Meanings, run};
 use crate::expr::Atom;
 use crate::expr::print::parse::parse;
 use crate::expr::print::tests::{latex_is_balanced, markup_is_balanced};

@@ -2,23 +2,21 @@
 //!
 //! The face is the only code with `unsafe`; the module beside it is the one that [`super::emit`] makes.
 
+mod c_abi;
+mod python;
+
+pub use c_abi::emit_c;
+pub use python::emit_python;
+
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
-use super::identifier::{of_field, of_module};
-use super::items::uses_load;
-use super::{doc_lines, emit, print};
 use crate::Derivation;
+use crate::emit::identifier::{of_field, of_module};
+use crate::emit::language::EmittedFile;
+use crate::emit::language::rust::{doc_lines, emit, print};
+use crate::emit::tree::uses_load;
 use crate::programs::PassivePosition;
-
-/// A text file of an emitted crate.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct EmittedFile {
-    /// Its place in the crate's folder, with `/` between folders.
-    pub path: String,
-    /// What it holds.
-    pub text: String,
-}
 
 /// What faces of all languages need to know of a model.
 pub(super) struct Face<'a> {

@@ -3,7 +3,8 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::foreign::{EmittedFile, Face, source};
+use super::{Face, source};
+use crate::emit::language::EmittedFile;
 use crate::Derivation;
 
 /// Names that a module of Python cannot have, or must leave to the module whose arrays it takes.

@@ -4,38 +4,44 @@ use modelmill_spec::Motion;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
-use super::body::Body;
-use super::functions::{Kind, Method, reads_passive, rows};
-use super::identifier::of_field;
-use super::items::{input, nominal, scale, uses_load};
+use super::items::{nominal, scale};
+use super::program::{Function, Made, More, Owner, Told};
 use crate::Derivation;
+use crate::emit::identifier::of_field;
+use crate::emit::tree::{Scope, uses_load};
 use crate::derive::self_test::reaches;
 
 /// The function `self_test`, and the regressor of all products that it needs.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
-pub(super) fn self_test(derivation: &Derivation) -> TokenStream {
+pub(super) fn self_test(derivation: &Derivation, scope: &Scope) -> TokenStream {
     let mechanism = &derivation.mechanism;
     let products = &derivation.reduction.products;
-    let n_products = products.len();
+    let n_products = Literal::usize_unsuffixed(products.len());
     let program = &derivation.programs.full_regressor;
-    let input = input(derivation);
-    let body = Body::new(program, &input);
-    let (n_fixed, fixed) = (body.n_fixed(), body.fixed());
-    let result = rows(&body, 0, mechanism.drives.len(), n_products);
-    let needs_model = reads_passive(derivation, program);
-    let model_field = needs_model.then(|| quote! { model: Model<T>, });
-    let model_init = needs_model.then(|| quote! { model: Model::new(geometry), });
-    let method = Method {
-        name: "all_columns",
-        doc: "H: one row per drive, one column per product of parameters.",
+    let function = Function {
         program,
-        body: &body,
-        kind: Kind::Single(result),
-        fixed: quote! { self.fixed },
-        model: quote! { self.model },
-        output: quote! { [[T; N_PRODUCTS]; N_DRIVES] },
+        name: "all_columns",
+        item: "Columns",
+        doc: "H: one row per drive, one column per product of parameters.".to_owned(),
+        told: Told::Motion,
+        outputs: Vec::new(),
+        output: Some(quote! { [[T; N_PRODUCTS]; N_DRIVES] }),
+        results: None,
     };
-    let method = method.tokens(derivation);
+    let owner = Owner {
+        derivation,
+        scope,
+        name: "AllColumns",
+        doc: quote! {
+            /// H for all products of parameters, for the self-test.
+        },
+        prepares: "Prepares what depends on the geometry alone.",
+        is_public: false,
+        made: Made::OfGeometry,
+        functions: vec![function],
+        more: More::default(),
+    };
+    let owner = owner.tokens();
     let fields: Vec<_> = mechanism
         .parameters
         .iter()
@@ -50,7 +56,7 @@ pub(super) fn self_test(derivation: &Derivation) -> TokenStream {
         quote! { 1.0 #(#factors)* }
     });
     let (active, _) = derivation.coordinates();
-    let scale = scale(derivation);
+    let scale = scale(derivation, scope);
     let scaled = scale.as_ref().map(|_| quote! { scale });
     let nominal = nominal(derivation, &active, scaled.as_ref());
     let reach = active.iter().zip(reaches(derivation)).map(|(i, reach)| {
@@ -116,21 +122,6 @@ pub(super) fn self_test(derivation: &Derivation) -> TokenStream {
             })
         }
 
-        /// H for all products of parameters, for the self-test.
-        #[derive(Clone, Copy, Debug, PartialEq)]
-        struct AllColumns<T> {
-            /// What is wrong with the geometry.
-            input: Result<(), PoseError>,
-            fixed: [T; #n_fixed],
-            #model_field
-        }
-
-        impl<T: Real> AllColumns<T> {
-            fn new(geometry: &Geometry<T>) -> Self {
-                Self { input: geometry.check(), fixed: { #fixed }, #model_init }
-            }
-
-            #method
-        }
+        #owner
     }
 }

@@ -1,25 +1,25 @@
 //! What joints transmit, as a struct of its own.
 
-use proc_macro2::TokenStream;
+use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
-use super::body::Body;
-use super::functions::{Kind, Method, reads_passive};
-use super::identifier::of_field;
-use super::items::{count, input};
+use super::items::count;
+use super::program::{Function, Made, More, Owner, Results, Told};
+use crate::emit::tree::Scope;
 use crate::{Derivation, Reactions};
 
 /// The struct `Reactions` with its tables.
-pub(super) fn reactions(derivation: &Derivation, reactions: &Reactions) -> TokenStream {
-    let input = input(derivation);
+pub(super) fn reactions(
+    derivation: &Derivation,
+    scope: &Scope,
+    reactions: &Reactions,
+) -> TokenStream {
     let program = &reactions.program;
-    let body = Body::new(program, &input);
-    let (n_fixed, fixed) = (body.n_fixed(), body.fixed());
     let three = |places: &[Option<usize>; 3]| {
         let components = places.iter().map(|place| match place {
             Some(k) => {
-                let value = body.output(*k);
-                quote! { Some(#value) }
+                let k = Literal::usize_unsuffixed(*k);
+                quote! { Some(found[#k]) }
             }
             None => quote! { None },
         });
@@ -30,28 +30,43 @@ pub(super) fn reactions(derivation: &Derivation, reactions: &Reactions) -> Token
         quote! { ::modelmill_runtime::Wrench { force: #force, moment: #moment } }
     });
     let loops = reactions.loops.iter().map(|closed| three(&closed.force));
-    let result = quote! { Transmitted { joints: [#(#joints),*], loops: [#(#loops),*] } };
-    let model_field = reads_passive(derivation, program).then(|| quote! { model: Model<T>, });
-    let model_init =
-        reads_passive(derivation, program).then(|| quote! { model: Model::new(geometry), });
-    let method = Method {
+    let made = quote! { Transmitted { joints: [#(#joints),*], loops: [#(#loops),*] } };
+    let n_outputs = Literal::usize_unsuffixed(program.outputs.len());
+    let function = Function {
+        program,
         name: "transmitted",
-        doc: &format!(
+        item: "Wrenches",
+        doc: format!(
             "Forces and moments in all joints, and the forces that close the loops. {}.",
             count(program)
         ),
-        program,
-        body: &body,
-        kind: Kind::Single(result),
-        fixed: quote! { self.fixed },
-        model: quote! { self.model },
-        output: quote! { Transmitted<T> },
+        told: Told::Motion,
+        outputs: names(reactions),
+        output: Some(quote! { Transmitted<T> }),
+        results: Some(Results {
+            of: quote! { [T; #n_outputs] },
+            made,
+        }),
     };
-    let method = method.tokens(derivation);
     let tables = tables(reactions);
-    let parameters = &derivation.mechanism.parameters;
-    let names = parameters.iter().map(|p| p.name.as_str());
-    let fields = parameters.iter().map(|p| of_field(&p.name));
+    let owner = Owner {
+        derivation,
+        scope,
+        name: "Reactions",
+        doc: quote! {
+            /// What the joints transmit, for one geometry and one set of parameters: all of them, since bearings feel what no
+            /// drive feels and base parameters therefore do not hold.
+            ///
+            /// `None` is what equations of motion do not determine at the model file's geometry, because the mechanism is
+            /// held there more often than once, such as a planar loop across its plane.
+        },
+        prepares: "Prepares the recursion: what does not depend on the state is computed once.",
+        is_public: true,
+        made: Made::OfParameters,
+        functions: vec![function],
+        more: More::default(),
+    };
+    let owner = owner.tokens();
     quote! {
         #tables
 
@@ -66,35 +81,34 @@ pub(super) fn reactions(derivation: &Derivation, reactions: &Reactions) -> Token
             pub loops: [[Option<T>; 3]; N_LOOPS],
         }
 
-        /// What the joints transmit, for one geometry and one set of parameters: all of them, since bearings feel what no
-        /// drive feels and base parameters therefore do not hold.
-        ///
-        /// `None` is what equations of motion do not determine at the model file's geometry, because the mechanism is
-        /// held there more often than once, such as a planar loop across its plane.
-        #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct Reactions<T> {
-            /// What is wrong with the geometry or the parameters.
-            input: Result<(), PoseError>,
-            fixed: [T; #n_fixed],
-            #model_field
-        }
-
-        impl<T: Real> Reactions<T> {
-            /// Prepares the recursion: what does not depend on the state is computed once.
-            pub fn new(geometry: &Geometry<T>, parameters: &Parameters<T>) -> Self {
-                let input = geometry
-                    .check()
-                    .and(check_finite::<T>(&[#(parameters.#fields),*], &[#(#names),*]));
-                Self { input, fixed: { #fixed }, #model_init }
-            }
-
-            #method
-        }
+        #owner
     }
 }
 
+/// Names of the program's outputs: `F_upper_x`, `M_upper_z`, `F_loop_x`.
+fn names(reactions: &Reactions) -> Vec<String> {
+    let mut names = vec![String::new(); reactions.program.outputs.len()];
+    let mut name = |letter: &str, of: &str, places: &[Option<usize>; 3]| {
+        let of = of.replace(|c: char| !c.is_ascii_alphanumeric(), "_");
+        for (place, axis) in places.iter().zip(["x", "y", "z"]) {
+            if let Some(name) = place.and_then(|k| names.get_mut(k)) {
+                *name = format!("{letter}_{of}_{axis}");
+            }
+        }
+    };
+    for joint in &reactions.joints {
+        name("F", &joint.name, &joint.force);
+        name("M", &joint.name, &joint.moment);
+    }
+    for closed in &reactions.loops {
+        name("F", &closed.name, &closed.force);
+    }
+    names
+}
+
 fn tables(reactions: &Reactions) -> TokenStream {
-    let (n_joints, n_loops) = (reactions.joints.len(), reactions.loops.len());
+    let n_joints = Literal::usize_unsuffixed(reactions.joints.len());
+    let n_loops = Literal::usize_unsuffixed(reactions.loops.len());
     let joints = reactions.joints.iter().map(|joint| {
         let (name, coordinates) = (&joint.name, &joint.coordinates);
         let axis = ['x', 'y', 'z'][joint.axis as usize];

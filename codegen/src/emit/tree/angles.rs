@@ -1,14 +1,6 @@
 //! The angles of a program that come before everything else.
 
-use proc_macro2::Ident;
-use quote::format_ident;
-
 use crate::lower::{Op, Program, Stage};
-
-/// What stands for sine and cosine of angle `k` of those that come first.
-pub(super) fn both_of(k: usize) -> (Ident, Ident) {
-    (format_ident!("s{}", k), format_ident!("c{}", k))
-}
 
 /// Sines with their cosines whose angles need no other function, if there are several: they take much of the time of one
 /// state, and less if they are computed at once.

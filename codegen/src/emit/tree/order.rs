@@ -14,7 +14,7 @@ use crate::lower::{Op, Program, Stage};
 /// the regressor wait for memory, below 6 for results.
 const REGISTERS: usize = 8;
 
-/// Operations that are written as one: a sum with a product inside it, or a sine with its cosine.
+/// Operations that are written as one: a formula, or a sine with its cosine.
 #[derive(Default)]
 struct Statement {
     /// In order.
@@ -33,7 +33,7 @@ struct Statement {
 }
 
 /// The operations of a program in another order: those that are fixed as they were, then those of a state, with the ones
-/// in `first` before all others. `fused` says which products are written inside sums.
+/// in `first` before all others. `fused` says which ones are written inside others.
 pub(super) fn order(program: &Program, fused: &[bool], first: &[bool]) -> Vec<usize> {
     let of_state = |i: &usize| program.stages[*i] == Stage::State;
     let early = |i: &usize| !of_state(i) || first[*i];
@@ -69,12 +69,12 @@ fn statements(program: &Program, fused: &[bool], wanted: &dyn Fn(usize) -> bool)
             values: usize::from(!matches!(op, Op::Input(_))),
             ..Statement::default()
         };
-        // Operands of a product inside a sum are the sum's.
+        // Operands of what is written inside a formula are the formula's.
         let mut open = vec![i];
         while let Some(k) = open.pop() {
             statement.ops.push(k);
             program.ops[k].for_each_operand(|v| match v.index() {
-                v if fused[v] => open.push(v),
+                v if fused[v] && wanted(v) => open.push(v),
                 v if owner[v] != usize::MAX => statement.needs.push(owner[v]),
                 _ => {}
             });
@@ -100,8 +100,12 @@ fn statements(program: &Program, fused: &[bool], wanted: &dyn Fn(usize) -> bool)
     for k in (0..statements.len()).rev() {
         let longest = |users: &[usize]| users.iter().map(|u| statements[*u].height).max();
         let after = longest(&statements[k].users).unwrap_or(0);
-        let last = statements[k].ops.last();
-        statements[k].height = after + last.map_or(0, |i| latency(&program.ops[*i]));
+        let own = statements[k].ops.iter().map(|i| latency(&program.ops[*i]));
+        // Half of a formula's operations wait for the other half.
+        let own = own
+            .sum::<usize>()
+            .div_ceil(statements[k].ops.len().clamp(1, 2));
+        statements[k].height = after + own;
     }
     statements
 }

@@ -15,16 +15,17 @@ use crate::{Derivation, Evaluator, States};
 use modelmill_algebra::field::Stream;
 
 /// A state with all its atoms' values, and the quantities with a meaning there.
-pub(super) struct Meanings {
-    pub(super) atoms: BTreeMap<Atom, f64>,
+#[derive(Clone, Debug)]
+pub(crate) struct Meanings {
+    pub(crate) atoms: BTreeMap<Atom, f64>,
     known: Vec<(Symbol, f64)>,
 }
 
 /// What a value of a program is: a quantity with a name, or its negative.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Meaning {
-    pub(super) symbol: Symbol,
-    pub(super) negative: bool,
+pub(crate) struct Meaning {
+    pub(crate) symbol: Symbol,
+    pub(crate) negative: bool,
 }
 
 /// Relative agreement that counts as equality.
@@ -32,7 +33,7 @@ const AGREES: f64 = 1e-10;
 
 impl Meanings {
     /// Evaluates the quantities that have a meaning; none where no state is found.
-    pub(super) fn new(derivation: &Derivation) -> Self {
+    pub(crate) fn new(derivation: &Derivation) -> Self {
         let mut stream = Stream::new(0x6E61_6D65);
         for scale in [0.05, 0.02, 0.005, 0.001, 0.0002] {
             if let Some(atoms) = generic_state(derivation, scale, &mut stream) {
@@ -47,7 +48,7 @@ impl Meanings {
     }
 
     /// What a program's values are, by position; each name is given once.
-    pub(super) fn of(&self, program: &Program) -> BTreeMap<usize, Meaning> {
+    pub(crate) fn of(&self, program: &Program) -> BTreeMap<usize, Meaning> {
         let mut names = BTreeMap::new();
         if self.known.is_empty() {
             return names;
@@ -146,7 +147,7 @@ fn generic_state(
 }
 
 /// Values of all operations of a program at a state.
-pub(super) fn run(program: &Program, atoms: &BTreeMap<Atom, f64>) -> Vec<f64> {
+pub(crate) fn run(program: &Program, atoms: &BTreeMap<Atom, f64>) -> Vec<f64> {
     use crate::expr::{Domain, Unary};
     let mut values: Vec<f64> = Vec::with_capacity(program.ops.len());
     for op in &program.ops {
@@ -200,7 +201,7 @@ fn known(derivation: &Derivation, atoms: &BTreeMap<Atom, f64>) -> Vec<(Symbol, f
 }
 
 /// Names that the model file has taken.
-pub(super) fn reserved(mechanism: &Mechanism) -> BTreeSet<String> {
+pub(crate) fn reserved(mechanism: &Mechanism) -> BTreeSet<String> {
     let mut names: BTreeSet<String> = BTreeSet::new();
     names.extend(mechanism.constants.iter().map(|c| c.name.clone()));
     names.extend(mechanism.parameters.iter().map(|p| p.name.clone()));
@@ -233,7 +234,7 @@ fn sines(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
 }
 
 /// Name of a sine or cosine.
-pub(super) fn trigonometric(
+pub(crate) fn trigonometric(
     mechanism: &Mechanism,
     letter: &str,
     angle: &crate::expr::AngleSum,

@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
-use super::foreign::{EmittedFile, Face, source};
+use super::{Face, source};
+use crate::emit::language::EmittedFile;
 use crate::Derivation;
 
 /// What a function returns, with its name in the header after the prefix, and its meaning.
@@ -131,7 +132,8 @@ fn words(face: &Face<'_>) -> usize {
     }
     // The inverse dynamics may hold the model once more.
     let fixed: usize = all.iter().map(|p| p.ops.len().min(fixed_values(p))).sum();
-    2 * (fixed + face.n_passive()) + 32
+    let geometry = face.constants().len();
+    2 * (fixed + face.n_passive()) + 3 * geometry + face.n_base() + 32
 }
 
 fn fixed_values(program: &crate::Program) -> usize {
@@ -525,7 +527,7 @@ fn header(face: &Face<'_>) -> String {
         }
     };
     let identifier = |s: &str| {
-        super::identifier::of_field(s)
+        crate::emit::identifier::of_field(s)
             .to_string()
             .trim_start_matches("r#")
             .to_owned()

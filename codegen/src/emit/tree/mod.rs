@@ -1,0 +1,162 @@
+//! The statement tree: a lowered program with names and sections, as every language prints it.
+//!
+//! A [`Program`] goes in, a [`Routine`] comes out: what is computed once, and what is computed at every state. Values that are
+//! used once stand inside the formula that uses them, values with a meaning carry its name, the others are numbered: `k1`
+//! is computed once, `x1` at every state.
+
+mod angles;
+mod build;
+mod expression;
+pub(crate) mod names;
+mod once;
+mod order;
+mod scope;
+
+pub(in crate::emit) use expression::{Binding, Expression};
+pub(in crate::emit) use once::Once;
+pub(in crate::emit) use scope::Scope;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::Derivation;
+use crate::expr::Atom;
+use crate::lower::{Op, Program};
+use crate::programs::PassivePosition;
+
+/// A program as statements.
+#[derive(Clone, Debug)]
+pub(in crate::emit) struct Routine {
+    /// What is computed once for a geometry and its parameters.
+    pub(in crate::emit) once: Vec<Statement>,
+    /// Names of the values that are kept of it.
+    pub(in crate::emit) kept: Vec<String>,
+    /// What is computed at every state; outputs that are zero throughout are never put.
+    pub(in crate::emit) state: Vec<Statement>,
+    /// Inputs that are read once.
+    pub(in crate::emit) read_once: BTreeSet<Atom>,
+    /// Inputs that are read at every state.
+    pub(in crate::emit) read: BTreeSet<Atom>,
+    /// What the outputs are called after all statements, for programs without a state.
+    pub(in crate::emit) results: Vec<Expression>,
+    /// How many outputs there are.
+    pub(in crate::emit) n_outputs: usize,
+}
+
+/// One statement.
+#[derive(Clone, Debug)]
+pub(in crate::emit) enum Statement {
+    /// What follows, for the reader.
+    Section(String),
+    /// A value by its name.
+    Let {
+        name: String,
+        value: Expression,
+        /// What it is, for the reader.
+        note: Option<String>,
+    },
+    /// Angles whose sines and cosines are asked for later, by names.
+    Angles(Vec<Asked>),
+    /// Sine and cosine of an angle, or of one of [`Self::Angles`]; what is not needed has no name.
+    SinCos {
+        sine: Option<String>,
+        cosine: Option<String>,
+        angle: Expression,
+        /// Which of [`Self::Angles`] it is.
+        asked: Option<usize>,
+    },
+    /// What must hold for the model to have an answer.
+    Guard(Check),
+    /// A result.
+    Put { output: usize, value: Expression },
+    /// A part of a long program that hands on what later parts need.
+    Group {
+        statements: Vec<Statement>,
+        handed: Vec<String>,
+    },
+}
+
+/// An angle whose sine and cosine are asked for later.
+#[derive(Clone, Debug)]
+pub(in crate::emit) struct Asked {
+    /// The angle.
+    pub(in crate::emit) value: Expression,
+    /// Whether it is an input as it stands.
+    pub(in crate::emit) plain: bool,
+}
+
+/// What must hold at a pose.
+#[derive(Clone, Debug)]
+pub(in crate::emit) enum Check {
+    /// The value is not negative, or the pose is out of reach.
+    Reachable(Expression),
+    /// The value does not vanish beside the second one, or the pose is singular.
+    Regular(Expression, Expression),
+    /// The value is a finite number, or a term of the model is undefined.
+    Finite(Expression),
+}
+
+/// Whether forces depend on what drives carry, so that a state says it.
+pub(in crate::emit) fn uses_load(derivation: &Derivation) -> bool {
+    let programs = &derivation.programs;
+    [&programs.regressor, &programs.inverse_dynamics]
+        .iter()
+        .any(|p| {
+            p.ops
+                .iter()
+                .any(|op| matches!(op, Op::Input(Atom::Load(_))))
+        })
+}
+
+/// Inputs of a program in order: the state, then passive coordinates that are found first.
+pub(in crate::emit) fn inputs_of_state(derivation: &Derivation, with_passive: bool) -> Vec<Atom> {
+    let (active, passive) = derivation.coordinates();
+    let mut atoms: Vec<Atom> = active.iter().map(|i| Atom::Coordinate(*i)).collect();
+    atoms.extend(active.iter().map(|i| Atom::Rate(*i)));
+    atoms.extend(active.iter().map(|i| Atom::Acceleration(*i)));
+    if uses_load(derivation) {
+        atoms.extend((0..derivation.mechanism.drives.len()).map(Atom::Load));
+    }
+    if with_passive {
+        atoms.extend(passive.iter().map(|i| Atom::Coordinate(*i)));
+    }
+    atoms
+}
+
+/// Whether a program needs passive coordinates that Newton's method finds.
+pub(in crate::emit) fn reads_passive(derivation: &Derivation, program: &Program) -> bool {
+    let (_, passive) = derivation.coordinates();
+    matches!(
+        derivation.programs.passive_position,
+        PassivePosition::Newton(_)
+    ) && program
+        .ops
+        .iter()
+        .any(|op| matches!(op, Op::Input(Atom::Coordinate(i)) if passive.contains(i)))
+}
+
+/// Base parameters as eq. (16) gives them, term by term, and what they read.
+pub(in crate::emit) fn base_parameters(
+    derivation: &Derivation,
+    scope: &Scope,
+) -> (Vec<Expression>, BTreeSet<Atom>) {
+    let mechanism = &derivation.mechanism;
+    let constants = mechanism.constants.iter().enumerate();
+    let parameters = mechanism.parameters.iter().enumerate();
+    let atoms: BTreeMap<&str, Atom> = constants
+        .map(|(i, c)| (c.name.as_str(), Atom::Constant(i)))
+        .chain(parameters.map(|(i, p)| (p.name.as_str(), Atom::Parameter(i))))
+        .chain([("pi", Atom::Pi)])
+        .collect();
+    let called: BTreeMap<&str, Atom> = atoms.values().map(|a| (scope.name(*a), *a)).collect();
+    let mut read = BTreeSet::new();
+    let values = (0..derivation.reduction.retained.len()).map(|k| {
+        let formula = crate::review::base_expression(derivation, k);
+        let value = Expression::of_formula(&formula, &|name| match atoms.get(name) {
+            Some(atom) => scope.name(*atom).to_owned(),
+            None => name.to_owned(),
+        });
+        value.for_each_name(&mut |name| read.extend(called.get(name)));
+        value
+    });
+    (values.collect(), read)
+}

@@ -1,0 +1,204 @@
+//! Names of a module's variables: those of the model file where they can be, and none twice.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::names::Meanings;
+use modelmill_spec::DriveKind;
+
+use crate::Derivation;
+use crate::expr::{Atom, Graph};
+
+/// Words that stand in every routine, in whatever language, and names of modules that a variable would meet.
+const WORDS: [&str; 41] = [
+    "n",
+    "angles",
+    "outputs",
+    "inputs",
+    "passive",
+    "self",
+    "state",
+    "model",
+    "geometry",
+    "parameters",
+    "base",
+    "pi",
+    "PI",
+    "INPUTS",
+    "ACTIVE",
+    "PASSIVE",
+    "DRIVES",
+    "JOINTS",
+    "LOOPS",
+    "CONSTANTS",
+    "PARAMETERS",
+    "BASE_PARAMETERS",
+    "N_ACTIVE",
+    "N_PASSIVE",
+    "N_DRIVES",
+    "N_BASE",
+    "N_INPUTS",
+    "N_JOINTS",
+    "N_LOOPS",
+    "N_PRODUCTS",
+    "Var",
+    "Product",
+    "One",
+    "Angle",
+    "Followed",
+    "Some",
+    "None",
+    "Ok",
+    "Err",
+    "Real",
+    "T",
+];
+
+/// What the variables of a model are called.
+#[derive(Clone, Debug)]
+pub(in crate::emit) struct Scope {
+    atoms: BTreeMap<Atom, String>,
+    taken: BTreeSet<String>,
+    /// What values with names are, where there is something to say.
+    notes: BTreeMap<String, String>,
+    /// What values of programs mean.
+    pub(in crate::emit) meanings: Meanings,
+}
+
+impl Scope {
+    pub(in crate::emit) fn new(derivation: &Derivation) -> Self {
+        let mechanism = &derivation.mechanism;
+        let mut scope = Self {
+            atoms: BTreeMap::new(),
+            taken: WORDS.into_iter().map(str::to_owned).collect(),
+            notes: notes(derivation),
+            meanings: Meanings::new(derivation),
+        };
+        let coordinates = || mechanism.coordinates.iter().enumerate();
+        for (i, c) in mechanism.constants.iter().enumerate() {
+            scope.add(Atom::Constant(i), &c.name);
+        }
+        for (i, p) in mechanism.parameters.iter().enumerate() {
+            scope.add(Atom::Parameter(i), &p.name);
+        }
+        for (i, c) in coordinates() {
+            scope.add(Atom::Coordinate(i), &c.name);
+        }
+        for (i, c) in coordinates() {
+            scope.add(Atom::Rate(i), &format!("{}_d", c.name));
+            scope.add(Atom::Acceleration(i), &format!("{}_dd", c.name));
+        }
+        for k in 0..derivation.reduction.retained.len() {
+            scope.add(Atom::Base(k), &format!("p{}_min", k + 1));
+        }
+        for (d, drive) in mechanism.drives.iter().enumerate() {
+            scope.add(Atom::Load(d), &format!("load_{}", drive.name));
+        }
+        scope.atoms.insert(Atom::Pi, "pi".to_owned());
+        scope
+    }
+
+    fn add(&mut self, atom: Atom, name: &str) {
+        let name = unique(name, &mut self.taken);
+        self.atoms.insert(atom, name);
+    }
+
+    /// What an input is called.
+    pub(in crate::emit) fn name(&self, atom: Atom) -> &str {
+        self.atoms.get(&atom).map_or("", String::as_str)
+    }
+
+    /// Whether a name is that of a coordinate, rate or acceleration.
+    pub(super) fn is_input(&self, name: &str) -> bool {
+        self.atoms.iter().any(|(atom, other)| {
+            let of_state = matches!(
+                atom,
+                Atom::Coordinate(_) | Atom::Rate(_) | Atom::Acceleration(_)
+            );
+            of_state && other == name
+        })
+    }
+
+    /// What is said where loops are asked whether they close.
+    pub(super) fn loops(&self) -> Option<String> {
+        self.notes.get("").cloned()
+    }
+
+    /// What a value with a name is, for the reader.
+    pub(super) fn note(&self, name: &str) -> Option<String> {
+        self.notes.get(name.trim_start_matches("minus_")).cloned()
+    }
+
+    /// Names that are taken.
+    pub(super) fn taken(&self) -> &BTreeSet<String> {
+        &self.taken
+    }
+}
+
+/// Notes on values with a name: their numbered equations on the page of the model, and the links that they belong to.
+fn notes(derivation: &Derivation) -> BTreeMap<String, String> {
+    let mechanism = &derivation.mechanism;
+    let projection = &derivation.equations.projection;
+    let mut notes = BTreeMap::new();
+    let n_gaps: usize = projection.closures.iter().map(|c| c.residual.len()).sum();
+    let loops: Vec<String> = mechanism.loops.iter().map(|l| format!("`{}`", l.name)).collect();
+    match loops.as_slice() {
+        [] => {}
+        [one] => {
+            let text = format!("Loop {one}, eqs. (L1) to (L{n_gaps}), closes where this is not negative.");
+            notes.insert(String::new(), text);
+        }
+        _ => {
+            let text = format!("Loops, eqs. (L1) to (L{n_gaps}): one of them closes where this is not negative.");
+            notes.insert(String::new(), text);
+        }
+    }
+    for k in 0..projection.determinants.len() {
+        let tag = format!("eq. (L{})", n_gaps + k + 1);
+        notes.insert(format!("Delta_{}", k + 1), tag);
+    }
+    for frame in &mechanism.frames {
+        for axis in ["x", "y", "z"] {
+            let of = format!("link {}", frame.name);
+            notes.insert(
+                format!("omega_{}_{axis}", frame.name),
+                format!("{of} turns"),
+            );
+            notes.insert(
+                format!("omega_{}_{axis}_d", frame.name),
+                format!("{of} turns faster"),
+            );
+            notes.insert(
+                format!("a_{}_{axis}", frame.name),
+                format!("{of} accelerates, less gravity"),
+            );
+        }
+    }
+    let mut tag = 0;
+    for drive in &mechanism.drives {
+        if !matches!(drive.kind, DriveKind::Linear { .. }) {
+            continue;
+        }
+        tag += 1;
+        notes.insert(format!("l_{}", drive.name), format!("eq. (D{tag})"));
+        let (active, _) = derivation.coordinates();
+        let index = mechanism.drives.iter().position(|d| d.name == drive.name);
+        let slopes = index.and_then(|d| projection.drive_jacobian.get(d));
+        for (a, slope) in active.iter().zip(slopes.into_iter().flatten()) {
+            if *slope != Graph::ZERO {
+                tag += 1;
+                let name = format!("J_{}_{}", drive.name, mechanism.coordinates[*a].name);
+                notes.insert(name, format!("eq. (D{tag})"));
+            }
+        }
+    }
+    notes
+}
+
+/// A name near the wanted one that nothing else has.
+pub(super) fn unique(wanted: &str, taken: &mut BTreeSet<String>) -> String {
+    let mut name = wanted.to_owned();
+    while !taken.insert(name.clone()) {
+        name.push('_');
+    }
+    name
+}
