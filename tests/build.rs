@@ -109,7 +109,9 @@ fn asked_models() -> String {
 /// Takes the last term off the first base parameter that is a sum.
 fn without_a_term(derivation: &mut Derivation) {
     let dependencies = &mut derivation.reduction.dependencies;
-    let line = dependencies.iter_mut().rfind(|line| !line.equals.is_empty());
+    let line = dependencies
+        .iter_mut()
+        .rfind(|line| !line.equals.is_empty());
     let line = line.expect("a base parameter that is a sum");
     line.equals.pop();
 }

@@ -1,6 +1,6 @@
 //! `generate`: a model as code.
 
-use modelmill_codegen::{emit, emit_c, emit_python, module_name};
+use modelmill_codegen::{C99, Language as _, RustModule, Source, emit_c, emit_python};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -13,6 +13,8 @@ pub enum Language {
     /// One module for `no_std` and `std`.
     #[default]
     Rust,
+    /// A header and a source of plain C99, without a Rust toolchain.
+    C99,
     /// A crate that builds a static and a shared library, and their header.
     C,
     /// A crate that builds a Python module for numpy arrays.
@@ -44,39 +46,37 @@ impl Model {
             ("a self-test", code.self_test),
         ];
         if let Some((what, _)) = more.iter().find(|(_, asked)| *asked)
-            && code.language != Language::Rust
+            && !matches!(code.language, Language::Rust | Language::C99)
         {
             return Err(Error::options(format!(
-                "only the Rust module can have {what}"
+                "only the Rust module and C99 can have {what}"
             )));
         }
         let what = format!("writing the code of {}", self.name);
         self.host().watched(&what, 0, |_| match code.language {
-            Language::Rust => Ok(vec![EmittedFile {
-                path: format!("{}.rs", module_name(&self.derivation.mechanism.name)),
-                text: self.module(*code)?,
-            }]),
+            Language::Rust => self.written(&RustModule, *code),
+            Language::C99 => self.written(&C99, *code),
             Language::C => Ok(with_runtime(emit_c(&self.derivation))),
             Language::Python => Ok(with_runtime(emit_python(&self.derivation))),
         })?
     }
 
-    fn module(&self, code: Code) -> Outcome<String> {
+    fn written(
+        &self,
+        language: &dyn modelmill_codegen::Language,
+        code: Code,
+    ) -> Outcome<Vec<EmittedFile>> {
         let derivation = &self.derivation;
         let fault = |error| Error::derivation(&self.path, error);
-        let mut emitted = emit(derivation);
-        if code.dynamics {
-            let dynamics = derivation.dynamics().map_err(fault)?;
-            emitted = emitted.with_dynamics(derivation, &dynamics);
-        }
-        if code.reactions {
-            let reactions = derivation.reactions().map_err(fault)?;
-            emitted = emitted.with_reactions(derivation, &reactions);
-        }
-        if code.self_test {
-            emitted = emitted.with_self_test(derivation);
-        }
-        Ok(emitted.file())
+        let dynamics = code.dynamics.then(|| derivation.dynamics()).transpose();
+        let reactions = code.reactions.then(|| derivation.reactions()).transpose();
+        let (dynamics, reactions) = (dynamics.map_err(fault)?, reactions.map_err(fault)?);
+        Ok(language.write(&Source {
+            derivation,
+            dynamics: dynamics.as_ref(),
+            reactions: reactions.as_ref(),
+            self_test: code.self_test,
+        }))
     }
 }
 

@@ -79,6 +79,7 @@ pub(crate) enum Command {
     /// Write the model as Rust source, the same that `cargo build` makes, or as a crate for C or Python
     #[command(after_help = "Examples (from the project's root):\n  \
         modelmill generate model-spec/models/scara.toml --out scara.rs\n  \
+        modelmill generate model-spec/models/panda.toml --language c99 --out panda-c99\n  \
         modelmill generate model-spec/models/panda.toml --language c --out panda-c\n  \
         modelmill generate model-spec/models/panda.toml --language python --out panda-python")]
     Generate(GenerateArgs),
@@ -253,8 +254,8 @@ pub(crate) struct EquationsArgs {
 pub(crate) struct GenerateArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Write the source to this file instead of standard output; with --language c or python, a crate to this folder
-    #[arg(long, value_name = "FILE.rs|DIR", required_if_eq_any([("language", "c"), ("language", "python")]))]
+    /// Write the source to this file instead of standard output; with --language c99, c or python, files to this folder
+    #[arg(long, value_name = "FILE.rs|DIR", required_if_eq_any([("language", "c99"), ("language", "c"), ("language", "python")]))]
     pub(crate) out: Option<PathBuf>,
     /// With the equation of motion: mass matrix, velocity terms, gravity, forward dynamics
     #[arg(long)]
@@ -275,6 +276,8 @@ pub(crate) struct GenerateArgs {
 pub(crate) enum LanguageArg {
     /// A module for `no_std` and `std`
     Rust,
+    /// A header and a source of plain C99
+    C99,
     /// A static and a shared library, and a header
     C,
     /// A module for numpy arrays

@@ -19,10 +19,10 @@ pub(crate) fn run(host: &Host, args: &GenerateArgs) -> Outcome {
         ("--self-test", args.self_test),
     ];
     if let Some((flag, _)) = more.iter().find(|(_, asked)| *asked)
-        && args.language != LanguageArg::Rust
+        && !matches!(args.language, LanguageArg::Rust | LanguageArg::C99)
     {
         return Err(Failure::Usage(format!(
-            "{flag} goes with the Rust module only; leave it out, or leave --language out"
+            "{flag} goes with the Rust module and c99 only; leave it out, or leave --language out"
         )));
     }
     let model = commands::model(host, &args.model)?;
@@ -33,6 +33,7 @@ pub(crate) fn run(host: &Host, args: &GenerateArgs) -> Outcome {
     let files = model.generate(&Code {
         language: match args.language {
             LanguageArg::Rust => Language::Rust,
+            LanguageArg::C99 => Language::C99,
             LanguageArg::C => Language::C,
             LanguageArg::Python => Language::Python,
         },
@@ -42,6 +43,7 @@ pub(crate) fn run(host: &Host, args: &GenerateArgs) -> Outcome {
     })?;
     let what = match args.language {
         LanguageArg::Rust => return module(target.as_ref(), &files),
+        LanguageArg::C99 => return sources(args, &model.files().collect::<Vec<&Path>>(), &files),
         LanguageArg::C => "a C library and its header: build it there with `cargo build --release`",
         LanguageArg::Python => {
             "a Python module: build it there with `maturin build --release`, or `cargo build --release`"
@@ -71,6 +73,32 @@ fn module(target: Option<&Target>, files: &[EmittedFile]) -> Outcome {
             file.path.trim_end_matches(".rs")
         ));
     }
+    Ok(())
+}
+
+/// Writes source files into a folder.
+fn sources(args: &GenerateArgs, inputs: &[&Path], files: &[EmittedFile]) -> Outcome {
+    let Some(folder) = &args.out else {
+        return Err(Failure::Usage(
+            "--out names the folder of the sources".to_owned(),
+        ));
+    };
+    refuse_dash(folder)?;
+    std::fs::create_dir_all(folder).map_err(|error| {
+        Failure::Input(format!(
+            "folder {} cannot be made: {error}",
+            folder.display()
+        ))
+    })?;
+    for file in files {
+        Target::new(&folder.join(&file.path), inputs.iter().copied())?.write(&file.text)?;
+    }
+    let names = files.iter().map(|file| file.path.as_str());
+    terminal::note(&format!(
+        "{}: {}, for any compiler of C99",
+        folder.display(),
+        names.collect::<Vec<&str>>().join(" and ")
+    ));
     Ok(())
 }
 

@@ -266,7 +266,7 @@ fn what_only_rust_has_is_refused_with_a_word() {
     assert_eq!(output.status.code(), Some(2));
     let says = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
-        says.contains("--dynamics goes with the Rust module only"),
+        says.contains("--dynamics goes with the Rust module and c99 only"),
         "{says}"
     );
     assert!(!out.exists());

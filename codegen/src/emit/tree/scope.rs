@@ -140,15 +140,22 @@ fn notes(derivation: &Derivation) -> BTreeMap<String, String> {
     let projection = &derivation.equations.projection;
     let mut notes = BTreeMap::new();
     let n_gaps: usize = projection.closures.iter().map(|c| c.residual.len()).sum();
-    let loops: Vec<String> = mechanism.loops.iter().map(|l| format!("`{}`", l.name)).collect();
+    let loops: Vec<String> = mechanism
+        .loops
+        .iter()
+        .map(|l| format!("`{}`", l.name))
+        .collect();
     match loops.as_slice() {
         [] => {}
         [one] => {
-            let text = format!("Loop {one}, eqs. (L1) to (L{n_gaps}), closes where this is not negative.");
+            let text =
+                format!("Loop {one}, eqs. (L1) to (L{n_gaps}), closes where this is not negative.");
             notes.insert(String::new(), text);
         }
         _ => {
-            let text = format!("Loops, eqs. (L1) to (L{n_gaps}): one of them closes where this is not negative.");
+            let text = format!(
+                "Loops, eqs. (L1) to (L{n_gaps}): one of them closes where this is not negative."
+            );
             notes.insert(String::new(), text);
         }
     }

@@ -6,8 +6,8 @@ use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
 use super::{Face, source};
-use crate::emit::language::EmittedFile;
 use crate::Derivation;
+use crate::emit::language::EmittedFile;
 
 /// What a function returns, with its name in the header after the prefix, and its meaning.
 const STATUS: [(&str, &str); 8] = [

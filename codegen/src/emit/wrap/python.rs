@@ -4,8 +4,8 @@ use proc_macro2::TokenStream;
 use quote::quote;
 
 use super::{Face, source};
-use crate::emit::language::EmittedFile;
 use crate::Derivation;
+use crate::emit::language::EmittedFile;
 
 /// Names that a module of Python cannot have, or must leave to the module whose arrays it takes.
 const RESERVED: &[&str] = &[

@@ -9,10 +9,16 @@ use crate::emit::language::syntax::Syntax;
 /// What functions return, with its name after the prefix, and its meaning.
 const STATUS: [(&str, &str); 5] = [
     ("OK", "all is well"),
-    ("OUT_OF_REACH", "the loops cannot close: the pose is out of reach"),
+    (
+        "OUT_OF_REACH",
+        "the loops cannot close: the pose is out of reach",
+    ),
     ("SINGULAR", "the pose is singular"),
     ("UNDEFINED", "a term of the model has no finite value there"),
-    ("NOT_FINITE", "an input is no number, or too large to compute with"),
+    (
+        "NOT_FINITE",
+        "an input is no number, or too large to compute with",
+    ),
 ];
 
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
@@ -76,9 +82,21 @@ extern \"C\" {{
             _ = writeln!(text, "#define {upper}_{prefix}_{} {k}", c.name(place));
         }
     };
-    places("Coordinates", "COORDINATE", active.iter().map(coordinate).collect());
-    places("Passive coordinates", "PASSIVE", passive.iter().map(coordinate).collect());
-    places("Drives", "DRIVE", mechanism.drives.iter().map(|d| d.name.as_str()).collect());
+    places(
+        "Coordinates",
+        "COORDINATE",
+        active.iter().map(coordinate).collect(),
+    );
+    places(
+        "Passive coordinates",
+        "PASSIVE",
+        passive.iter().map(coordinate).collect(),
+    );
+    places(
+        "Drives",
+        "DRIVE",
+        mechanism.drives.iter().map(|d| d.name.as_str()).collect(),
+    );
     text.push_str("\n/* Base parameters, in order, eq. (16).\n");
     for base in derivation.base_parameters() {
         _ = writeln!(
@@ -96,19 +114,32 @@ extern \"C\" {{
             text.push_str("    double nothing;\n");
         }
         for (field, measure) in fields {
-            _ = writeln!(text, "    double {}; /* {} */", c.name(field), comment(measure));
+            _ = writeln!(
+                text,
+                "    double {}; /* {} */",
+                c.name(field),
+                comment(measure)
+            );
         }
         _ = writeln!(text, "}} {}_{name};", unit.name);
     };
     record(
         "Known quantities.",
         "geometry",
-        mechanism.constants.iter().map(|c| (c.name.as_str(), c.unit.as_str())).collect(),
+        mechanism
+            .constants
+            .iter()
+            .map(|c| (c.name.as_str(), c.unit.as_str()))
+            .collect(),
     );
     record(
         "Dynamic parameters.",
         "parameters",
-        mechanism.parameters.iter().map(|p| (p.name.as_str(), p.unit.as_str())).collect(),
+        mechanism
+            .parameters
+            .iter()
+            .map(|p| (p.name.as_str(), p.unit.as_str()))
+            .collect(),
     );
     _ = writeln!(
         text,
@@ -147,7 +178,12 @@ int {name}_passive_position_near(const {name}_dynamics *dynamics, const double *
         );
     }
     for function in unit.functions.iter().filter(|f| f.is_public) {
-        _ = writeln!(text, "\n/* {}. {}. */", function.doc, super::source::count(function));
+        _ = writeln!(
+            text,
+            "\n/* {}. {}. */",
+            function.doc,
+            super::source::count(function)
+        );
         _ = writeln!(text, "{};", signature(unit, function, "dynamics", false));
         if function.follows {
             text.push_str("/* The same from the passive coordinates of a pose near by, which become those of this state. */\n");
@@ -225,9 +261,18 @@ fn source_names(reactions: &crate::Reactions) -> Vec<String> {
 }
 
 /// How a function is declared.
-pub(super) fn signature(unit: &Unit<'_>, function: &Function<'_>, owner: &str, near: bool) -> String {
+pub(super) fn signature(
+    unit: &Unit<'_>,
+    function: &Function<'_>,
+    owner: &str,
+    near: bool,
+) -> String {
     let name = &unit.name;
-    let (suffix, passive) = if near { ("_near", ", double *passive") } else { ("", "") };
+    let (suffix, passive) = if near {
+        ("_near", ", double *passive")
+    } else {
+        ("", "")
+    };
     format!(
         "int {name}_{}{suffix}(const {name}_{owner} *{owner}, {}{passive}, double *{})",
         function.name,

@@ -16,10 +16,36 @@ use crate::programs::PassivePosition;
 
 /// Names whose headers the C library has itself, or that its sources include.
 const RESERVED: [&str; 30] = [
-    "assert", "complex", "ctype", "errno", "fenv", "float", "inttypes", "iso646", "limits",
-    "locale", "math", "setjmp", "signal", "stdalign", "stdarg", "stdatomic", "stdbool", "stddef",
-    "stdint", "stdio", "stdlib", "stdnoreturn", "string", "tgmath", "threads", "time", "uchar",
-    "wchar", "wctype", "main",
+    "assert",
+    "complex",
+    "ctype",
+    "errno",
+    "fenv",
+    "float",
+    "inttypes",
+    "iso646",
+    "limits",
+    "locale",
+    "math",
+    "setjmp",
+    "signal",
+    "stdalign",
+    "stdarg",
+    "stdatomic",
+    "stdbool",
+    "stddef",
+    "stdint",
+    "stdio",
+    "stdlib",
+    "stdnoreturn",
+    "string",
+    "tgmath",
+    "threads",
+    "time",
+    "uchar",
+    "wchar",
+    "wctype",
+    "main",
 ];
 
 /// The header and the source.
@@ -95,12 +121,18 @@ impl<'a> Unit<'a> {
         };
         let each = |letter: &str, suffix: &str| -> Vec<String> {
             let drives = mechanism.drives.iter();
-            drives.map(|d| format!("{letter}_{}{suffix}", d.name)).collect()
+            drives
+                .map(|d| format!("{letter}_{}{suffix}", d.name))
+                .collect()
         };
         let mut of_motion = each("l", "");
         of_motion.extend(each("l", "_d"));
         for drive in &mechanism.drives {
-            of_motion.extend(active.iter().map(|a| format!("J_{}_{}", drive.name, of_coordinate(a))));
+            of_motion.extend(
+                active
+                    .iter()
+                    .map(|a| format!("J_{}_{}", drive.name, of_coordinate(a))),
+            );
         }
         let mut functions = vec![
             function(
@@ -128,15 +160,15 @@ impl<'a> Unit<'a> {
         ];
         if !passive.is_empty() {
             let names = ["", "_d", "_dd"].iter();
-            let names = names.flat_map(|suffix| {
-                passive.iter().map(move |p| (p, suffix))
-            });
+            let names = names.flat_map(|suffix| passive.iter().map(move |p| (p, suffix)));
             functions.push(function(
                 &programs.passive,
                 "passive",
                 "Passive coordinates, then their rates, then their accelerations".to_owned(),
                 "motion",
-                names.map(|(p, suffix)| format!("{}{suffix}", of_coordinate(p))).collect(),
+                names
+                    .map(|(p, suffix)| format!("{}{suffix}", of_coordinate(p)))
+                    .collect(),
             ));
         }
         if let Some(dynamics) = source.dynamics {

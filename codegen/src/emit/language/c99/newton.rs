@@ -6,8 +6,8 @@ use modelmill_spec::Motion;
 
 use super::Unit;
 use super::source::{given, single};
-use crate::loops::closure::coordinates_of;
 use crate::emit::tree::Routine;
+use crate::loops::closure::coordinates_of;
 
 /// The nominal pose, Newton's method, and how it begins.
 pub(super) fn newton(unit: &Unit<'_>, text: &mut String) {

@@ -6,9 +6,9 @@ use modelmill_spec::Motion;
 
 use super::Unit;
 use super::source::{given, single};
+use crate::derive::self_test::reaches;
 use crate::emit::language::syntax::Syntax;
 use crate::emit::tree::Routine;
-use crate::derive::self_test::reaches;
 
 /// The function that draws states, and H for all products.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
@@ -52,7 +52,12 @@ typedef struct {{
     };
     let n_active = unit.n_active();
     let n_state: usize = unit.state().iter().map(|(_, n)| n).sum();
-    let n_inputs = n_state + if function.follows { unit.n_passive() } else { 0 };
+    let n_inputs = n_state
+        + if function.follows {
+            unit.n_passive()
+        } else {
+            0
+        };
     let mut lines = vec![
         format!("{name}_all_columns all;"),
         format!("{name}_parameters parameters;"),
@@ -65,10 +70,17 @@ typedef struct {{
             "double h[{upper}_N_DRIVES * {n_products}], h_min[{}], inputs[{n_inputs}];",
             (unit.n_drives() * unit.n_base()).max(1)
         ),
-        format!("double all_triangle[{n_products} * {n_products}], few_triangle[{0} * {0}];", unit.n_base().max(1)),
-        format!("double nominal[{n_active}], reach_of[{n_active}], unit_of[{n_active}], reach = 1.0;"),
+        format!(
+            "double all_triangle[{n_products} * {n_products}], few_triangle[{0} * {0}];",
+            unit.n_base().max(1)
+        ),
+        format!(
+            "double nominal[{n_active}], reach_of[{n_active}], unit_of[{n_active}], reach = 1.0;"
+        ),
         "uint64_t draw = 2, random = 1;".to_owned(),
-        format!("int halving, k, i, d, found = 0, worst = 0; const int needed = 2 * {n_products} + 20;"),
+        format!(
+            "int halving, k, i, d, found = 0, worst = 0; const int needed = 2 * {n_products} + 20;"
+        ),
     ];
     if let Some(program) = &derivation.programs.scale {
         let routine = Routine::new(program, &unit.scope, &[]);
@@ -102,16 +114,26 @@ typedef struct {{
         let mut value = "1.0".to_owned();
         for (p, n) in &product.0 {
             for _ in 0..*n {
-                _ = write!(value, " * parameters.{}", c.name(&mechanism.parameters[*p].name));
+                _ = write!(
+                    value,
+                    " * parameters.{}",
+                    c.name(&mechanism.parameters[*p].name)
+                );
             }
         }
         lines.push(format!("products[{k}] = {value};"));
     }
-    lines.push(format!("{name}_base_parameters(geometry, &parameters, base);"));
+    lines.push(format!(
+        "{name}_base_parameters(geometry, &parameters, base);"
+    ));
     lines.push(format!("(void){name}_prepare(&dynamics, geometry, base);"));
     lines.push(format!("{name}_prepare_columns(&all, geometry);"));
-    lines.push(format!("{name}_zero(all_triangle, {n_products} * {n_products});"));
-    lines.push(format!("{name}_zero(few_triangle, {upper}_N_BASE * {upper}_N_BASE);"));
+    lines.push(format!(
+        "{name}_zero(all_triangle, {n_products} * {n_products});"
+    ));
+    lines.push(format!(
+        "{name}_zero(few_triangle, {upper}_N_BASE * {upper}_N_BASE);"
+    ));
     let mut at = 0;
     let mut parts = Vec::new();
     for (part, n) in unit.state() {
@@ -134,7 +156,10 @@ typedef struct {{
     } else {
         String::new()
     };
-    _ = writeln!(text, "\nint {name}_self_test(const {name}_geometry *geometry)\n{{");
+    _ = writeln!(
+        text,
+        "\nint {name}_self_test(const {name}_geometry *geometry)\n{{"
+    );
     super::source::body(&lines, text);
     _ = writeln!(
         text,

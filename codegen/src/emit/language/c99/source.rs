@@ -84,7 +84,9 @@ fn uses(unit: &Unit<'_>, what: &str) -> bool {
     for function in &unit.functions {
         c.statements(&function.routine.state, &mut lines);
     }
-    lines.iter().any(|line| line.contains(&format!("{}{what}", unit.name)))
+    lines
+        .iter()
+        .any(|line| line.contains(&format!("{}{what}", unit.name)))
 }
 
 impl Unit<'_> {
@@ -100,8 +102,14 @@ impl Unit<'_> {
 fn records(unit: &Unit<'_>, text: &mut String) {
     let (name, c) = (&unit.name, unit.syntax());
     let mechanism = &unit.source.derivation.mechanism;
-    let constants = mechanism.constants.iter().map(|x| (x.name.as_str(), x.value));
-    let parameters = mechanism.parameters.iter().map(|x| (x.name.as_str(), x.nominal));
+    let constants = mechanism
+        .constants
+        .iter()
+        .map(|x| (x.name.as_str(), x.value));
+    let parameters = mechanism
+        .parameters
+        .iter()
+        .map(|x| (x.name.as_str(), x.nominal));
     let mut record = |function: &str, of: &str, values: Vec<(&str, f64)>| {
         _ = writeln!(text, "\nvoid {name}_{function}({name}_{of} *{of})\n{{");
         for (field, value) in &values {
@@ -164,7 +172,10 @@ pub(super) fn given(
             Atom::Pi => format!("{:?}", std::f64::consts::PI),
             _ => continue,
         };
-        lines.push(format!("const double {} = {value};", c.name(unit.scope.name(*atom))));
+        lines.push(format!(
+            "const double {} = {value};",
+            c.name(unit.scope.name(*atom))
+        ));
     }
 }
 
@@ -175,7 +186,13 @@ pub(super) fn body(lines: &[String], text: &mut String) {
 }
 
 /// A program: outputs begin as zeros.
-pub(super) fn program(unit: &Unit<'_>, function: &Function<'_>, once: &Once, owner: &str, text: &mut String) {
+pub(super) fn program(
+    unit: &Unit<'_>,
+    function: &Function<'_>,
+    once: &Once,
+    owner: &str,
+    text: &mut String,
+) {
     let (name, c) = (&unit.name, unit.syntax());
     let routine = &function.routine;
     _ = writeln!(
@@ -184,7 +201,11 @@ pub(super) fn program(unit: &Unit<'_>, function: &Function<'_>, once: &Once, own
         function.name
     );
     let mut lines = Vec::new();
-    let within = if owner == "reactions" { "dynamics." } else { "" };
+    let within = if owner == "reactions" {
+        "dynamics."
+    } else {
+        ""
+    };
     given(
         unit,
         &routine.read,
@@ -201,7 +222,11 @@ pub(super) fn program(unit: &Unit<'_>, function: &Function<'_>, once: &Once, own
     let derivation = unit.source.derivation;
     let inputs = if function.name == "gaps" || function.name == "scales" {
         let (active, passive) = derivation.coordinates();
-        active.into_iter().chain(passive).map(Atom::Coordinate).collect()
+        active
+            .into_iter()
+            .chain(passive)
+            .map(Atom::Coordinate)
+            .collect()
     } else {
         inputs_of_state(derivation, function.follows)
     };
@@ -304,14 +329,35 @@ fn state(unit: &Unit<'_>, text: &mut String) {
 fn public(unit: &Unit<'_>, function: &Function<'_>, owner: &str, text: &mut String) {
     let Unit { name, upper, .. } = unit;
     let n_state: usize = unit.state().iter().map(|(_, n)| n).sum();
-    let n_inputs = n_state + if function.follows { unit.n_passive() } else { 0 };
+    let n_inputs = n_state
+        + if function.follows {
+            unit.n_passive()
+        } else {
+            0
+        };
     let n_outputs = function.routine.n_outputs;
-    let model = if owner == "reactions" { "&reactions->dynamics" } else { "dynamics" };
-    let input = if owner == "reactions" { "reactions->dynamics.input" } else { "dynamics->input" };
-    let ways: &[bool] = if function.follows { &[false, true] } else { &[false] };
+    let model = if owner == "reactions" {
+        "&reactions->dynamics"
+    } else {
+        "dynamics"
+    };
+    let input = if owner == "reactions" {
+        "reactions->dynamics.input"
+    } else {
+        "dynamics->input"
+    };
+    let ways: &[bool] = if function.follows {
+        &[false, true]
+    } else {
+        &[false]
+    };
     for near in ways {
         let mut lines = vec![
-            format!("double inputs[{}], outputs[{}];", n_inputs.max(1), n_outputs.max(1)),
+            format!(
+                "double inputs[{}], outputs[{}];",
+                n_inputs.max(1),
+                n_outputs.max(1)
+            ),
             format!("int status = {input};"),
         ];
         if *near {
@@ -345,7 +391,9 @@ fn public(unit: &Unit<'_>, function: &Function<'_>, owner: &str, text: &mut Stri
         ));
         lines.push(format!("if (status != {upper}_OK) return status;"));
         if *near {
-            lines.push(format!("for (i = 0; i < {upper}_N_PASSIVE; i++) passive[i] = found[i];"));
+            lines.push(format!(
+                "for (i = 0; i < {upper}_N_PASSIVE; i++) passive[i] = found[i];"
+            ));
         }
         lines.push(format!(
             "memcpy({}, outputs, {n_outputs} * sizeof(double));",
@@ -408,8 +456,12 @@ int {name}_prepare_reactions({name}_reactions *reactions, const {name}_geometry 
         unit.n_base().max(1)
     );
     let mut lines = once_lines(unit, once, "geometry->", "parameters->", "base");
-    lines.push(format!("{name}_base_parameters(geometry, parameters, base);"));
-    lines.push(format!("(void){name}_prepare(&self->dynamics, geometry, base);"));
+    lines.push(format!(
+        "{name}_base_parameters(geometry, parameters, base);"
+    ));
+    lines.push(format!(
+        "(void){name}_prepare(&self->dynamics, geometry, base);"
+    ));
     lines.push("self->parameters = *parameters;".to_owned());
     for parameter in &unit.source.derivation.mechanism.parameters {
         lines.push(format!(

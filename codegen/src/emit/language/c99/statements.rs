@@ -13,14 +13,84 @@ pub(super) struct C<'a> {
 
 /// Words of C, of its headers, and of the functions that are written.
 const TAKEN: [&str; 78] = [
-    "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum",
-    "extern", "float", "for", "goto", "if", "inline", "int", "long", "register", "restrict",
-    "return", "short", "signed", "sizeof", "static", "struct", "switch", "typedef", "union",
-    "unsigned", "void", "volatile", "while", "asm", "typeof", "unix", "linux", "i386", "sin", "cos",
-    "sqrt", "fabs", "tanh", "exp", "atan2", "isnan", "isinf", "isfinite", "NAN", "INFINITY",
-    "HUGE_VAL", "NULL", "memcpy", "memset", "size_t", "errno", "self", "status", "k", "bool", "true",
-    "false", "and", "or", "not", "xor", "class", "new", "delete", "this", "template", "private",
-    "public", "protected", "namespace", "try", "catch",
+    "auto",
+    "break",
+    "case",
+    "char",
+    "const",
+    "continue",
+    "default",
+    "do",
+    "double",
+    "else",
+    "enum",
+    "extern",
+    "float",
+    "for",
+    "goto",
+    "if",
+    "inline",
+    "int",
+    "long",
+    "register",
+    "restrict",
+    "return",
+    "short",
+    "signed",
+    "sizeof",
+    "static",
+    "struct",
+    "switch",
+    "typedef",
+    "union",
+    "unsigned",
+    "void",
+    "volatile",
+    "while",
+    "asm",
+    "typeof",
+    "unix",
+    "linux",
+    "i386",
+    "sin",
+    "cos",
+    "sqrt",
+    "fabs",
+    "tanh",
+    "exp",
+    "atan2",
+    "isnan",
+    "isinf",
+    "isfinite",
+    "NAN",
+    "INFINITY",
+    "HUGE_VAL",
+    "NULL",
+    "memcpy",
+    "memset",
+    "size_t",
+    "errno",
+    "self",
+    "status",
+    "k",
+    "bool",
+    "true",
+    "false",
+    "and",
+    "or",
+    "not",
+    "xor",
+    "class",
+    "new",
+    "delete",
+    "this",
+    "template",
+    "private",
+    "public",
+    "protected",
+    "namespace",
+    "try",
+    "catch",
 ];
 
 /// Whether a name means something else in C or C++.
@@ -112,7 +182,9 @@ impl C<'_> {
         match statement {
             Statement::Section(text) => lines.push(format!("/* {} */", comment(text))),
             Statement::Let { name, value, note } => {
-                let note = note.as_ref().map_or(String::new(), |note| format!(" /* {} */", comment(note)));
+                let note = note
+                    .as_ref()
+                    .map_or(String::new(), |note| format!(" /* {} */", comment(note)));
                 lines.push(format!(
                     "const double {} = {};{note}",
                     self.name(name),
@@ -128,10 +200,11 @@ impl C<'_> {
                 ..
             } => {
                 let place = lines.len();
-                let [sine, cosine] = [(sine, "s"), (cosine, "c")].map(|(name, letter)| match name {
-                    Some(name) => self.name(name),
-                    None => format!("unused_{letter}{place}"),
-                });
+                let [sine, cosine] =
+                    [(sine, "s"), (cosine, "c")].map(|(name, letter)| match name {
+                        Some(name) => self.name(name),
+                        None => format!("unused_{letter}{place}"),
+                    });
                 lines.push(format!("double {sine}, {cosine};"));
                 lines.push(format!(
                     "{}_sin_cos({}, &{sine}, &{cosine});",

@@ -6,8 +6,8 @@ use quote::quote;
 use super::items::count;
 use super::program::{Function, Made, More, Owner, Results, Told};
 use crate::Derivation;
-use crate::on_request::dynamics::Dynamics;
 use crate::emit::tree::{Scope, reads_passive};
+use crate::on_request::dynamics::Dynamics;
 
 /// The struct `Dynamics`.
 pub(super) fn dynamics(derivation: &Derivation, scope: &Scope, dynamics: &Dynamics) -> TokenStream {

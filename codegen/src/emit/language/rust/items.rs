@@ -8,11 +8,11 @@ use super::functions::{inverse_dynamics, is_newton, model};
 use super::program::single;
 use super::statements::{Rust, lines, number as signed, verbatim};
 use crate::Derivation;
-use crate::loops::closure::coordinates_of;
 use crate::emit::identifier::of_field;
 use crate::emit::language::syntax::Syntax;
 use crate::emit::tree::{Expression, Scope, inputs_of_state, uses_load};
 use crate::expr::Atom;
+use crate::loops::closure::coordinates_of;
 use crate::lower::{OperationCount, Program, Stage};
 
 /// What the module says of itself.

@@ -7,9 +7,9 @@ use quote::quote;
 use super::items::{nominal, scale};
 use super::program::{Function, Made, More, Owner, Told};
 use crate::Derivation;
+use crate::derive::self_test::reaches;
 use crate::emit::identifier::of_field;
 use crate::emit::tree::{Scope, uses_load};
-use crate::derive::self_test::reaches;
 
 /// The function `self_test`, and the regressor of all products that it needs.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
