@@ -1,6 +1,6 @@
 //! `generate`: a model as code.
 
-use modelmill_codegen::{C99, Language as _, RustModule, Source, emit_c, emit_python};
+use modelmill_codegen::{C99, RustModule, Source, emit_c, emit_python};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;

@@ -95,6 +95,104 @@ fn the_c_library_gives_the_torques_of_the_table() {
     }
 }
 
+/// Writes the C99 of a bundled model with all that it can have.
+fn c99(model: &str) -> PathBuf {
+    let out = folder(&format!("{model}-c99"));
+    run(Command::new(env!("CARGO_BIN_EXE_modelmill"))
+        .arg("generate")
+        .arg(project().join(format!("model-spec/models/{model}.toml")))
+        .args([
+            "--language",
+            "c99",
+            "--dynamics",
+            "--reactions",
+            "--self-test",
+            "--out",
+        ])
+        .arg(&out));
+    out
+}
+
+/// What every compiler must take without a word.
+const STRICT: [&str; 6] = [
+    "-std=c99",
+    "-O2",
+    "-Wall",
+    "-Wextra",
+    "-pedantic",
+    "-Werror",
+];
+
+#[test]
+fn c99_gives_the_numbers_of_the_tables() {
+    if !there("cc") {
+        println!("skipped: there is no C compiler `cc` on this machine");
+        return;
+    }
+    // The second target computes in numbers of another length, where its libraries are installed.
+    for target in ["-m64", "-m32"] {
+        for (model, name, test) in [
+            ("panda", "panda", "panda_c99"),
+            ("spidermill-paper", "spidermill_paper", "spidermill_c99"),
+        ] {
+            let out = c99(model);
+            let program = folder(&format!("{test}{target}"));
+            let built = Command::new("cc")
+                .args(STRICT)
+                .arg(target)
+                .arg("-I")
+                .arg(&out)
+                .arg(project().join(format!("cli/tests/languages/{test}.c")))
+                .arg(out.join(format!("{name}.c")))
+                .args(["-lm", "-o"])
+                .arg(&program)
+                .output()
+                .expect("the compiler runs");
+            if target == "-m32" && !built.status.success() {
+                println!("skipped: this compiler cannot build for {target}");
+                continue;
+            }
+            assert!(
+                built.status.success(),
+                "{}",
+                String::from_utf8_lossy(&built.stderr)
+            );
+            assert_eq!(run(Command::new(program).arg(tables())), "agrees\n");
+        }
+    }
+}
+
+/// Loops by Newton's method, and in space: the self-test holds everything against everything.
+#[test]
+fn c99_of_other_mechanisms_holds_its_own_test() {
+    if !there("cc") {
+        println!("skipped: there is no C compiler `cc` on this machine");
+        return;
+    }
+    for name in ["three_rrr", "slider_crank", "delta_tied", "emps"] {
+        let out = c99(name);
+        let main = folder(&format!("{name}-c99.c"));
+        std::fs::write(
+            &main,
+            format!(
+                "#include \"{name}.h\"\nint main(void) {{\n  {name}_geometry geometry;\n  \
+                 {name}_default_geometry(&geometry);\n  return {name}_self_test(&geometry);\n}}\n"
+            ),
+        )
+        .unwrap();
+        let program = folder(&format!("{name}-c99-test"));
+        run(Command::new("cc")
+            .args(STRICT)
+            .arg("-I")
+            .arg(&out)
+            .arg(&main)
+            .arg(out.join(format!("{name}.c")))
+            .args(["-lm", "-o"])
+            .arg(&program));
+        run(&mut Command::new(program));
+    }
+}
+
 /// Symbols of a library that panicking needs.
 fn panics(library: &str) -> Vec<String> {
     let output = Command::new("nm")

@@ -5,6 +5,8 @@ use std::fmt::Write as _;
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
+use modelmill_boundary::text::comment;
+
 use super::{Face, source};
 use crate::Derivation;
 use crate::emit::language::EmittedFile;
@@ -464,7 +466,7 @@ fn header(face: &Face<'_>) -> String {
         text.push_str(s);
         text.push('\n');
     };
-    let plain = |s: &str| s.replace("*/", "* /");
+    let plain = |s: &str| comment(s);
     line(&format!(
         "/* {}: {}.",
         name,

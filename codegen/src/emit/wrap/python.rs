@@ -77,7 +77,7 @@ fn items(face: &Face<'_>) -> TokenStream {
         "{}.\n\nInverse dynamics tau = H_min(q, q', q'') p_min. Arrays of one state have one number per coordinate; arrays \
          of n states have shape (coordinates, n) and are read as they lie in memory, and so are results: forces (drives, n), \
          regressor (drives, base parameters, n).",
-        mechanism.title.as_deref().unwrap_or(&mechanism.name)
+        modelmill_boundary::text::comment(mechanism.title.as_deref().unwrap_or(&mechanism.name))
     );
     let (constants, parameters) = (face.constants(), face.parameters());
     let (n_active, n_drives, n_base) = (face.n_active(), face.n_drives(), face.n_base());
