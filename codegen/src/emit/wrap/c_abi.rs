@@ -466,7 +466,7 @@ fn header(face: &Face<'_>) -> String {
         text.push_str(s);
         text.push('\n');
     };
-    let plain = |s: &str| comment(s);
+    let plain = |s: &str| comment(s).into_owned();
     line(&format!(
         "/* {}: {}.",
         name,
@@ -566,7 +566,7 @@ fn header(face: &Face<'_>) -> String {
     for base in face.derivation.base_parameters() {
         line(&plain(&format!(
             " * {} = {} ({})",
-            base.name, base.expression, base.unit
+            base.name, base.expression, comment(&base.unit)
         )));
     }
     line(" */\n\n#ifdef __cplusplus\nextern \"C\" {\n#endif\n");
