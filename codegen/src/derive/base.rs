@@ -1,13 +1,12 @@
 //! What a derivation says about its base parameters: names, expressions, units and values.
 
-use modelmill_spec::Mechanism;
 use num_rational::BigRational;
 use num_traits::One;
 
 use crate::Derivation;
+use crate::expr::Rational;
 use crate::expr::print::Formula;
-use crate::expr::{Atom, ExprId, Graph, Rational};
-use crate::reduce::Reduction;
+use crate::reduce::base;
 use crate::tree::expressions::Monomial;
 
 /// One base parameter, for people and programs.
@@ -27,8 +26,8 @@ impl Derivation {
     /// Indices of the active and of the passive coordinates.
     pub fn coordinates(&self) -> (Vec<usize>, Vec<usize>) {
         (
-            self.equations.projection.active.clone(),
-            self.equations.projection.passive.clone(),
+            self.equations.projection.loops.active.clone(),
+            self.equations.projection.loops.passive.clone(),
         )
     }
 
@@ -39,10 +38,10 @@ impl Derivation {
             .map(|k| {
                 let product = &reduction.products[reduction.retained[k]];
                 BaseParameter {
-                    name: format!("p{}_min", k + 1),
+                    name: base::name(k),
                     retained: product.text(&self.mechanism),
-                    expression: crate::review::base_expression(self, k).text(),
-                    unit: unit(&self.mechanism, product),
+                    expression: base::written_out(&self.mechanism, reduction, k).text(),
+                    unit: base::unit(&self.mechanism, product),
                 }
             })
             .collect()
@@ -108,49 +107,4 @@ impl Derivation {
         let constants: Vec<f64> = self.mechanism.constants.iter().map(|c| c.value).collect();
         self.base_values(&parameters, &constants)
     }
-}
-
-/// The base parameters as expressions of the graph: eq. (7) carried out.
-pub(crate) fn expressions(graph: &mut Graph, reduction: &Reduction) -> Vec<ExprId> {
-    let mut terms: Vec<Vec<ExprId>> = reduction
-        .retained
-        .iter()
-        .map(|k| vec![product(graph, &reduction.products[*k])])
-        .collect();
-    for line in &reduction.dependencies {
-        let value = product(graph, &reduction.products[line.product]);
-        for (k, factor) in &line.equals {
-            let factor = factor.expression(graph);
-            terms[*k].push(graph.mul(factor, value));
-        }
-    }
-    terms.iter().map(|terms| graph.add_all(terms)).collect()
-}
-
-/// A product of parameters as an expression.
-pub(crate) fn product(graph: &mut Graph, product: &Monomial) -> ExprId {
-    let factors: Vec<_> = product
-        .0
-        .iter()
-        .map(|(p, n)| {
-            let power = i32::try_from(*n).expect("a small power");
-            (graph.atom(Atom::Parameter(*p)), power)
-        })
-        .collect();
-    graph.product(&factors)
-}
-
-/// Unit of a product of parameters.
-pub(crate) fn unit(mechanism: &Mechanism, product: &Monomial) -> String {
-    let factors: Vec<(&str, i32)> = product
-        .0
-        .iter()
-        .map(|(p, n)| {
-            (
-                mechanism.parameters[*p].unit.as_str(),
-                i32::try_from(*n).expect("a small power"),
-            )
-        })
-        .collect();
-    modelmill_spec::unit_product(&factors)
 }

@@ -8,7 +8,7 @@ use crate::loops::magnitude;
 /// Reach of every independent coordinate, rad or m: everywhere for open chains, where loops stay closed for others.
 pub(crate) fn reaches(derivation: &Derivation) -> Vec<f64> {
     let mechanism = &derivation.mechanism;
-    let residual = &derivation.equations.projection.residual;
+    let residual = &derivation.equations.projection.loops.residual;
     let mut graph = derivation.graph.clone();
     let size = magnitude::at_nominal(&mut graph, mechanism, residual);
     let (active, _) = derivation.coordinates();

@@ -10,9 +10,9 @@ use modelmill_spec::{Mechanism, Motion};
 use nalgebra::DMatrix;
 
 use super::{Evaluator, States};
-use crate::field::Stream;
 use crate::loops::numeric_poses::symmetric;
 use crate::{Derivation, DeriveError};
+use modelmill_algebra::field::Stream;
 
 /// Error of a drive's force, relative to the sum of what its products add to it, beyond which a base is refused. Errors of a
 /// millionth count as rounding of a recording's numbers elsewhere; ten of sixteen digits may be lost up to there.

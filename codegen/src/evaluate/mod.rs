@@ -133,8 +133,8 @@ impl<'a> Evaluator<'a> {
         Self {
             mechanism: &derivation.mechanism,
             programs: &derivation.programs,
-            active: projection.active.clone(),
-            passive: projection.passive.clone(),
+            active: projection.loops.active.clone(),
+            passive: projection.loops.passive.clone(),
             constants,
         }
     }

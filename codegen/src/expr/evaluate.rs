@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::{AngleSum, Atom, ExprId, Graph, Node, Rational, Unary};
 use modelmill_algebra::field::{Element, Number, Stream};
+
+use super::{AngleSum, Atom, ExprId, Graph, Node, Rational, Unary};
 
 /// A number system in which expressions can be evaluated. `None` means that the value does not exist there:
 /// a division by zero, a root that is not in the field, a function that the domain does not know.

@@ -7,9 +7,12 @@
 
 mod angle;
 mod construct;
+mod coordinates;
 mod differentiate;
 mod evaluate;
+pub(crate) mod independent;
 pub(crate) mod linear;
+mod nominal;
 pub mod print;
 mod substitute;
 #[cfg(test)]
@@ -21,8 +24,10 @@ use std::collections::BTreeSet;
 use rustc_hash::FxHashMap;
 
 pub use angle::AngleSum;
+pub(crate) use coordinates::coordinates_of;
 pub use evaluate::{Domain, F64, FieldPoint, RationalPoint, Tape};
 pub use modelmill_algebra::Rational;
+pub(crate) use nominal::{nominal_of, nominal_value};
 
 /// Index of an expression in its [`Graph`]. Children have smaller indices than their parents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -54,6 +59,16 @@ pub enum Atom {
     Acceleration(usize),
     /// The force or torque that a drive carries, effects aside.
     Load(usize),
+}
+
+impl Atom {
+    /// Whether it is known once the geometry and the parameters are.
+    pub(crate) fn is_fixed(self) -> bool {
+        matches!(
+            self,
+            Self::Pi | Self::Constant(_) | Self::Parameter(_) | Self::Base(_)
+        )
+    }
 }
 
 /// Functions of one argument that are kept as nodes.

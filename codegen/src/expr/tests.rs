@@ -1,11 +1,12 @@
 //! Expressions against exact evaluation: whatever the constructors do to a random expression, its value stays.
 
+use modelmill_algebra::field::{Element, MODULUS};
+
 use proptest::prelude::*;
 
 use super::{
     AngleSum, Atom, Domain, ExprId, F64, FieldPoint, Graph, Rational, RationalPoint, Tape, Unary,
 };
-use modelmill_algebra::field::{Element, MODULUS};
 
 /// A random expression as a program for the constructors: each step uses values made before.
 #[derive(Clone, Debug)]

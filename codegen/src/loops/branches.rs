@@ -6,15 +6,16 @@
 //! crank. Then the sign of the root follows from other coordinates and may even change along one branch.
 //! Which is the case shows in the field: a radicand that is no square function takes square and other values alike.
 
+use modelmill_algebra::field::{Element, Extended, MODULUS, Number, Stream};
 use modelmill_spec::Mechanism;
 
-use super::SEED;
+use super::all::Loops;
 use super::field_poses::{MOST_DRAWS, Poses};
-use super::plan::{Plan, Unknowns, plan};
+use super::plan::{Unknowns, plan};
+use super::solve_step::{Plan, radicands};
 use crate::DeriveError;
-use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Tape, Unary};
-use crate::regressor::projection::Projection;
-use modelmill_algebra::field::{Element, Extended, MODULUS, Number, Stream};
+use crate::expr::independent::SEED;
+use crate::expr::{ExprId, FieldPoint, Graph};
 
 /// What a square root is to those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,16 +36,12 @@ const ENOUGH: usize = 40;
 
 /// The order in which the loops give the passive coordinates in closed form, if every root keeps its sign wherever the
 /// mechanism can move; otherwise the loops must be followed.
-pub(crate) fn closed_form(
-    graph: &mut Graph,
-    mechanism: &Mechanism,
-    projection: &Projection,
-) -> Option<Plan> {
-    let found = plan(graph, mechanism, projection, Unknowns::Passive)?;
+pub(crate) fn closed_form(graph: &mut Graph, mechanism: &Mechanism, loops: &Loops) -> Option<Plan> {
+    let found = plan(graph, mechanism, loops, Unknowns::Passive)?;
     if found.steps.iter().all(|step| step.solved.root.is_none()) {
         return Some(found);
     }
-    let poses = Poses::new(graph, mechanism, found.clone(), &projection.residual);
+    let poses = Poses::new(graph, mechanism, found.clone(), &loops.residual);
     let branches = of(graph, &poses, &[]).ok()?;
     (!branches.contains(&Branch::Bound)).then_some(found)
 }
@@ -246,22 +243,4 @@ impl Seen {
             Branch::Bound
         }
     }
-}
-
-/// What roots under `outputs` are taken of, if it depends on coordinates and constants alone.
-pub(crate) fn radicands(graph: &Graph, outputs: &[ExprId]) -> Vec<Tape> {
-    let inner = graph.nodes_of(outputs).filter_map(|node| match node {
-        Node::Unary(Unary::Sqrt, inner) => Some(*inner),
-        _ => None,
-    });
-    inner
-        .filter(|inner| {
-            let atoms = graph.atoms(&[*inner]);
-            atoms.iter().any(|a| matches!(a, Atom::Coordinate(_)))
-                && atoms
-                    .iter()
-                    .all(|a| matches!(a, Atom::Coordinate(_) | Atom::Constant(_) | Atom::Pi))
-        })
-        .map(|inner| Tape::new(graph, &[inner]))
-        .collect()
 }

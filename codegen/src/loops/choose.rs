@@ -4,9 +4,9 @@
 use modelmill_spec::{Mechanism, Motion};
 use nalgebra::DMatrix;
 
+use crate::expr::coordinates_of;
 use crate::expr::{Atom, ExprId, Graph};
-use crate::loops::closure::coordinates_of;
-use crate::loops::numeric_poses::Loops;
+use crate::loops::numeric_poses::NumericLoops;
 
 /// Sets of `size` of the `free` coordinates that settle the loops at the nominal pose and for which these look as if they
 /// could be solved together as [`crate::loops::spatial::solve`] does, seen from which coordinates occur in which equations. Sets that leave the
@@ -83,7 +83,7 @@ fn nominal_jacobian(
     residual: &[ExprId],
     coordinates: &[usize],
 ) -> Option<DMatrix<f64>> {
-    let loops = Loops::solved_for(graph, mechanism, residual, coordinates.to_vec(), &[]);
+    let loops = NumericLoops::solved_for(graph, mechanism, residual, coordinates.to_vec(), &[]);
     let (_, mut jacobian) = loops.linearise(&loops.as_written())?;
     for (mut column, i) in jacobian.column_iter_mut().zip(coordinates) {
         column *= loops.unit(*i);

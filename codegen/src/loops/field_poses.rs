@@ -1,12 +1,12 @@
 //! Random poses of a mechanism in the prime field: angles as rational points of the circle, loops solved by square roots
 //! in the field.
 
+use modelmill_algebra::field::{Element, Number, Stream};
 use modelmill_spec::{Mechanism, Motion};
 
-use super::plan::{Plan, SolveStep};
+use super::solve_step::{Plan, SolveStep};
 use crate::DeriveError;
 use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Tape, Unary};
-use modelmill_algebra::field::{Element, Number, Stream};
 
 /// How often a draw is repeated until all square roots exist.
 pub(crate) const MOST_DRAWS: usize = 4000;

@@ -7,34 +7,29 @@ use modelmill_spec::{Mechanism, Motion};
 use num_rational::BigRational;
 use num_traits::One;
 
+use super::all::Loops;
+use crate::expr::coordinates_of;
 use crate::expr::{Atom, ExprId, F64, Graph, Node, Tape, Unary};
-use crate::loops::closure::coordinates_of;
-use crate::lower::is_fixed;
-use crate::programs::{nominal_of, nominal_value};
-use crate::regressor::projection::Projection;
+use crate::expr::{nominal_of, nominal_value};
 
 /// Scales of the residuals, of the passive coordinates and of the active ones, one after the other.
 ///
 /// A residual's scale is the sum of the magnitudes of its terms, a sine counting as 1. A coordinate's is 1 for an angle,
 /// the sum of its residuals' scales for a length, and 0 if no loop depends on it.
-pub(crate) fn scales(
-    graph: &mut Graph,
-    mechanism: &Mechanism,
-    projection: &Projection,
-) -> Vec<ExprId> {
+pub(crate) fn scales(graph: &mut Graph, mechanism: &Mechanism, loops: &Loops) -> Vec<ExprId> {
     let mut known = HashMap::new();
-    let residuals: Vec<ExprId> = projection
+    let residuals: Vec<ExprId> = loops
         .residual
         .iter()
         .map(|r| magnitude(graph, mechanism, &mut known, *r))
         .collect();
-    let of: Vec<Vec<usize>> = projection
+    let of: Vec<Vec<usize>> = loops
         .residual
         .iter()
         .map(|r| coordinates_of(graph, &[*r]))
         .collect();
     let mut scales = residuals.clone();
-    for i in projection.passive.iter().chain(&projection.active) {
+    for i in loops.passive.iter().chain(&loops.active) {
         let rows = residuals.iter().zip(&of).filter(|(_, of)| of.contains(i));
         let rows: Vec<ExprId> = rows.map(|(scale, _)| *scale).collect();
         scales.push(match mechanism.coordinates[*i].motion {
@@ -80,7 +75,7 @@ impl Size {
         let total = graph.substitute(&[total], &still)[0];
         let nominal = nominal_value(graph, mechanism, total).filter(|size| size.is_normal());
         match nominal {
-            Some(nominal) if graph.atoms(&[total]).into_iter().all(is_fixed) => {
+            Some(nominal) if graph.atoms(&[total]).into_iter().all(Atom::is_fixed) => {
                 Self { total, nominal }
             }
             _ => Self {
@@ -113,7 +108,7 @@ impl Size {
             self.scaled(graph, nominal)
         });
         let at_any_pose = graph.substitute(&[found], &out)[0];
-        let is_known = graph.atoms(&[at_any_pose]).into_iter().all(is_fixed);
+        let is_known = graph.atoms(&[at_any_pose]).into_iter().all(Atom::is_fixed);
         let is_there = nominal_value(graph, mechanism, at_any_pose).is_some_and(f64::is_normal);
         if is_known && is_there {
             return at_any_pose;

@@ -1,14 +1,14 @@
 //! Poses in floating point: loops closed by Newton's method from the nominal pose.
 
+use modelmill_algebra::field::Stream;
 use modelmill_spec::{Mechanism, Motion};
 use nalgebra::{DMatrix, DVector};
 
 use crate::expr::{Atom, ExprId, F64, Graph, Tape};
 use crate::loops::magnitude;
-use modelmill_algebra::field::Stream;
 
 /// Residuals of loops with their derivatives by the coordinates that close them.
-pub(crate) struct Loops<'a> {
+pub(crate) struct NumericLoops<'a> {
     mechanism: &'a Mechanism,
     /// Coordinates that the loops are solved for.
     unknown: Vec<usize>,
@@ -20,7 +20,7 @@ pub(crate) struct Loops<'a> {
     tape: Tape,
 }
 
-impl<'a> Loops<'a> {
+impl<'a> NumericLoops<'a> {
     /// All loops of a mechanism, solved for its passive coordinates.
     pub(crate) fn new(graph: &mut Graph, mechanism: &'a Mechanism, residual: &[ExprId]) -> Self {
         let (unknown, moved): (Vec<usize>, Vec<usize>) =

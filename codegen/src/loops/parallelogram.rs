@@ -6,21 +6,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use modelmill_algebra::field::{Element, Stream};
 use modelmill_spec::{Mechanism, Motion};
 use nalgebra::{DMatrix, DVector};
 
+use crate::expr::coordinates_of;
 use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Node, Tape};
-use crate::loops::closure::{Closure, coordinates_of};
-use crate::loops::numeric_poses::Loops;
-use modelmill_algebra::field::{Element, Stream};
-
-/// A passive angle that equals `sum + pi12 * pi/12`.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Relation {
-    pub(crate) coordinate: usize,
-    pub(crate) sum: AngleSum,
-    pub(crate) pi12: i32,
-}
+use crate::loops::closure::Closure;
+use crate::loops::numeric_poses::NumericLoops;
+use crate::loops::relation::Relation;
 
 /// How far known coordinates are moved from the nominal pose, in rad or relative to the size of the loop, and how exact
 /// a relation must look.
@@ -80,22 +74,6 @@ fn relations_of(
     combinations(&candidates).find(|relations| closes(graph, residual, relations))
 }
 
-impl Relation {
-    /// The angle that it gives, as a number.
-    pub(crate) fn value(&self, graph: &mut Graph) -> ExprId {
-        graph.angle(&self.sum, self.pi12)
-    }
-
-    /// The relation as an equation.
-    fn residual(&self, graph: &mut Graph) -> ExprId {
-        let (coordinate, value) = (
-            graph.atom(Atom::Coordinate(self.coordinate)),
-            self.value(graph),
-        );
-        graph.sub(coordinate, value)
-    }
-}
-
 /// Coordinates at the nominal pose and at some poses around it; `None` if the loop cannot be followed there.
 fn poses(
     graph: &mut Graph,
@@ -106,7 +84,7 @@ fn poses(
 ) -> Option<Vec<Vec<f64>>> {
     /// How often the reach is halved where loops cannot be followed, as near the end of a slide.
     const HALVINGS: u32 = 6;
-    let loops = Loops::solved_for(graph, mechanism, residual, unknown.to_vec(), given);
+    let loops = NumericLoops::solved_for(graph, mechanism, residual, unknown.to_vec(), given);
     // A loop that leaves some of them free keeps to relations of many kinds.
     let nominal = loops.nominal().filter(|q| loops.is_regular(q))?;
     (0..=HALVINGS).find_map(|k| {

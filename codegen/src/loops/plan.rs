@@ -4,28 +4,15 @@ use std::collections::BTreeSet;
 
 use modelmill_spec::Mechanism;
 
-use super::branches;
-use crate::expr::{AngleSum, Atom, Domain, ExprId, FieldPoint, Graph, Tape};
+use super::all::Loops;
+use super::solve_step::{Plan, PlanStep};
+use super::solved::Solved;
+use crate::expr::nominal_value;
+use crate::expr::{ExprId, Graph};
 use crate::loops::choose;
 use crate::loops::closure::Closure;
-use crate::loops::planar::{self, Solved};
+use crate::loops::planar;
 use crate::loops::spatial;
-use crate::programs::nominal_value;
-use crate::regressor::projection::Projection;
-use modelmill_algebra::field::Number;
-
-/// A way to solve all loops one after the other, each for at most two coordinates.
-#[derive(Clone, Debug)]
-pub(crate) struct Plan {
-    pub(crate) steps: Vec<PlanStep>,
-}
-
-/// One loop of a plan, or one of its coordinates.
-#[derive(Clone, Debug)]
-pub(crate) struct PlanStep {
-    pub(crate) unknown: Vec<usize>,
-    pub(crate) solved: Solved,
-}
 
 /// Which coordinates a plan may solve for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,17 +32,17 @@ pub(crate) enum Unknowns {
 pub(crate) fn plan(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    projection: &Projection,
+    loops: &Loops,
     unknowns: Unknowns,
 ) -> Option<Plan> {
     let mut steps: Vec<PlanStep> = Vec::new();
-    let mut todo: Vec<usize> = (0..projection.closures.len())
-        .filter(|i| projection.closures[*i].n_independent > 0)
+    let mut todo: Vec<usize> = (0..loops.closures.len())
+        .filter(|i| loops.closures[*i].n_independent > 0)
         .collect();
-    let mut known: BTreeSet<usize> = projection.active.iter().copied().collect();
+    let mut known: BTreeSet<usize> = loops.active.iter().copied().collect();
     while !todo.is_empty() {
         let next = todo.iter().enumerate().find_map(|(position, index)| {
-            let closure = &projection.closures[*index];
+            let closure = &loops.closures[*index];
             let free: Vec<usize> = closure
                 .coordinates
                 .iter()
@@ -63,17 +50,17 @@ pub(crate) fn plan(
                 .filter(|c| match unknowns {
                     Unknowns::Passive => !known.contains(c),
                     Unknowns::Any => !todo.iter().any(|other| {
-                        other != index && projection.closures[*other].coordinates.contains(c)
+                        other != index && loops.closures[*other].coordinates.contains(c)
                     }),
                 })
                 .collect();
-            choices(graph, mechanism, closure, &free, projection, unknowns)
+            choices(graph, mechanism, closure, &free, loops, unknowns)
                 .into_iter()
                 .find_map(|unknown| solve(graph, mechanism, closure, unknown))
                 .map(|found| (position, found))
         });
         let Some((position, mut found)) = next else {
-            let mut found = together(graph, mechanism, projection, unknowns, &todo, &known)?;
+            let mut found = together(graph, mechanism, loops, unknowns, &todo, &known)?;
             if unknowns == Unknowns::Any {
                 found.reverse();
             }
@@ -81,7 +68,7 @@ pub(crate) fn plan(
             break;
         };
         let index = todo.remove(position);
-        known.extend(&projection.closures[index].coordinates);
+        known.extend(&loops.closures[index].coordinates);
         if unknowns == Unknowns::Any {
             found.reverse();
         }
@@ -103,7 +90,7 @@ fn choices(
     mechanism: &Mechanism,
     closure: &Closure,
     free: &[usize],
-    projection: &Projection,
+    loops: &Loops,
     unknowns: Unknowns,
 ) -> Vec<Vec<usize>> {
     if !closure.relations.is_empty() {
@@ -137,11 +124,7 @@ fn choices(
         );
     }
     let mut sets = subsets(free, size);
-    sets.sort_by_key(|set| {
-        set.iter()
-            .filter(|c| !projection.passive.contains(c))
-            .count()
-    });
+    sets.sort_by_key(|set| set.iter().filter(|c| !loops.passive.contains(c)).count());
     sets
 }
 
@@ -149,12 +132,12 @@ fn choices(
 fn together(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    projection: &Projection,
+    loops: &Loops,
     unknowns: Unknowns,
     todo: &[usize],
     known: &BTreeSet<usize>,
 ) -> Option<Vec<PlanStep>> {
-    let closures: Vec<&Closure> = todo.iter().map(|i| &projection.closures[*i]).collect();
+    let closures: Vec<&Closure> = todo.iter().map(|i| &loops.closures[*i]).collect();
     if closures
         .iter()
         .any(|c| c.equations.is_empty() || !c.relations.is_empty())
@@ -251,82 +234,4 @@ fn solve(
     // A root that is none can neither fail to exist nor choose between what hangs together.
     solved.root = solved.root.filter(|root| root.whole.is_none());
     Some(vec![PlanStep { unknown, solved }])
-}
-
-/// A step of a plan in the field.
-pub(crate) struct SolveStep {
-    unknown: Vec<usize>,
-    angles: Vec<AngleSum>,
-    /// Coordinates whose values follow: lengths, and angles that are combinations of known ones.
-    numbers: Vec<usize>,
-    /// Cosines and sines of the angles in pairs, then the numbers.
-    tape: Tape,
-    /// What the step takes roots of: one at most, as it stands.
-    pub(crate) radicands: Vec<Tape>,
-}
-
-impl SolveStep {
-    /// Makes a step evaluable; what it evaluates goes to `roots`.
-    pub(crate) fn new(graph: &mut Graph, step: PlanStep, roots: &mut Vec<ExprId>) -> Self {
-        let solved = step.solved;
-        let mut angles: Vec<(AngleSum, [ExprId; 2])> = solved.angles;
-        let mut numbers: Vec<(usize, ExprId)> = solved.lengths;
-        for relation in &solved.relations {
-            let (c, s) = graph.cos_sin(&relation.sum, relation.pi12);
-            let angle = AngleSum::new([(Atom::Coordinate(relation.coordinate), 1)]);
-            angles.push((angle, [c, s]));
-            numbers.push((relation.coordinate, relation.value(graph)));
-        }
-        let mut own: Vec<ExprId> = angles.iter().flat_map(|(_, cs)| *cs).collect();
-        own.extend(numbers.iter().map(|(_, value)| *value));
-        roots.extend(&own);
-        Self {
-            unknown: step.unknown,
-            angles: angles.into_iter().map(|(angle, _)| angle).collect(),
-            numbers: numbers.iter().map(|(i, _)| *i).collect(),
-            tape: Tape::new(graph, &own),
-            radicands: branches::radicands(graph, &own),
-        }
-    }
-
-    /// Sets the unknown coordinates of a point whose other coordinates are set; `None` if the loop does not close there.
-    pub(crate) fn solve<N: Number>(&self, point: &mut FieldPoint<N>) -> Option<()> {
-        let values = self.tape.evaluate(point)?;
-        let numbers = &values[2 * self.angles.len()..];
-        for (i, value) in self.numbers.iter().zip(numbers) {
-            point.values.insert(Atom::Coordinate(*i), *value);
-        }
-        let in_angles = |c: &usize| {
-            self.angles
-                .iter()
-                .any(|a| a.atoms().any(|x| x == Atom::Coordinate(*c)))
-        };
-        let mut unknown: Vec<usize> = self.unknown.iter().copied().filter(in_angles).collect();
-        while !unknown.is_empty() {
-            let before = unknown.len();
-            for (k, angle) in self.angles.iter().enumerate() {
-                let inside: Vec<_> = angle
-                    .terms()
-                    .iter()
-                    .filter(|(atom, _)| matches!(atom, Atom::Coordinate(i) if unknown.contains(i)))
-                    .collect();
-                let &[(atom @ Atom::Coordinate(i), sign)] = inside.as_slice() else {
-                    continue;
-                };
-                let rest = angle.plus(&AngleSum::new([(*atom, *sign)]), -1);
-                let (cr, sr) = point.cos_sin(&rest)?;
-                let (c, s) = (values[2 * k], values[2 * k + 1]);
-                // The unknown angle is sign * (angle - rest).
-                let (c, s) = (c * cr + s * sr, s * cr - c * sr);
-                point
-                    .angles
-                    .insert(*atom, (c, if *sign < 0 { -s } else { s }));
-                unknown.retain(|u| u != i);
-            }
-            if unknown.len() == before {
-                return None;
-            }
-        }
-        Some(())
-    }
 }

@@ -7,17 +7,17 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use modelmill_algebra::field::{Element, Stream};
 use modelmill_spec::{Mechanism, Motion};
 
+use crate::expr::nominal_value;
 use crate::expr::vector::{Turn, push_turn};
 use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Node, Rational, Tape, Unary};
-use crate::loops::closure::{Between, Stretch, inverse, stretches, sum_of};
 use crate::loops::magnitude;
-use crate::loops::planar::{Root, Solved};
+use crate::loops::solved::{Root, Solved};
+use crate::loops::stretch::{Between, Stretch, inverse, stretches, sum_of};
 use crate::loops::whole_root;
-use crate::programs::nominal_value;
 use crate::tree::Tree;
-use modelmill_algebra::field::{Element, Stream};
 
 /// A determinant this much smaller than the magnitudes of its terms cannot be divided by at the nominal pose.
 const SINGULAR: f64 = 1e-9;
@@ -138,7 +138,7 @@ pub(crate) fn solve(
 }
 
 fn unknowns_of(graph: &Graph, equation: ExprId, left: &BTreeSet<usize>) -> BTreeSet<usize> {
-    let all = crate::loops::closure::coordinates_of(graph, &[equation]);
+    let all = crate::expr::coordinates_of(graph, &[equation]);
     all.into_iter().filter(|c| left.contains(c)).collect()
 }
 

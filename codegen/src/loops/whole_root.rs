@@ -5,11 +5,12 @@
 //! the root divided by its value at one point can be evaluated anywhere, with one and the same sign; its coefficients
 //! follow from a linear system. That the square is the radicand is shown at the end.
 
-use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Rational, Tape, Unary};
 use modelmill_algebra::eliminate::null_space;
 use modelmill_algebra::field::{Element, MODULUS, Stream};
 use modelmill_algebra::lift::lift;
 use modelmill_algebra::univariate::interpolate;
+
+use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Rational, Tape, Unary};
 
 /// Draws at which a radicand must be a square everywhere, or nowhere, before any work is done.
 const CHARACTERS: usize = 24;

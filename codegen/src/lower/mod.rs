@@ -15,15 +15,7 @@ pub(crate) use program::SINGULAR;
 pub use program::{Guard, Op, OperationCount, Program, Stage, ValueId};
 pub(crate) use schedule::Definition;
 
-use crate::expr::{Atom, ExprId, Graph};
-
-/// Whether an atom is known once the geometry and the parameters are.
-pub(crate) fn is_fixed(atom: Atom) -> bool {
-    matches!(
-        atom,
-        Atom::Pi | Atom::Constant(_) | Atom::Parameter(_) | Atom::Base(_)
-    )
-}
+use crate::expr::{ExprId, Graph};
 
 /// What a program computes.
 pub(crate) struct Request<'a> {

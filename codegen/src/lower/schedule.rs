@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 
 use rustc_hash::FxHashMap;
 
+use super::Request;
 use super::program::{Guard, Op, Program, Stage, ValueId};
-use super::{Request, is_fixed};
 use crate::expr::{AngleSum, Atom, ExprId, Graph, Node, Rational};
 
 /// An atom that is computed: a passive angle from the sine and cosine of what it exceeds `quarters` quarter turns by.
@@ -78,8 +78,8 @@ pub(crate) fn fixed_nodes(graph: &Graph, roots: &[ExprId]) -> Vec<bool> {
         let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
         fixed[i] = match graph.node(id) {
             Node::Rational(_) => true,
-            Node::Atom(atom) => is_fixed(*atom),
-            Node::Sin(angle) | Node::Cos(angle) => angle.atoms().all(is_fixed),
+            Node::Atom(atom) => atom.is_fixed(),
+            Node::Sin(angle) | Node::Cos(angle) => angle.atoms().all(Atom::is_fixed),
             Node::Sum(terms) => terms.iter().all(|(c, _)| fixed[c.index()]),
             Node::Product(factors) => factors.iter().all(|(c, _)| fixed[c.index()]),
             Node::Unary(_, c) => fixed[c.index()],
@@ -120,7 +120,7 @@ impl Scheduler<'_> {
             return *value;
         }
         let mut stage = match &op {
-            Op::Input(atom) if !is_fixed(*atom) => Stage::State,
+            Op::Input(atom) if !atom.is_fixed() => Stage::State,
             _ => Stage::Fixed,
         };
         op.for_each_operand(|operand| stage = stage.max(self.program.stages[operand.index()]));

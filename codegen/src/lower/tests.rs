@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
+use modelmill_algebra::field::{Element, Stream};
+
 use super::{Op, Stage, cost, factor_sums, flatten, share};
 use crate::expr::{Atom, ExprId, FieldPoint, Graph, Tape};
 use crate::{Derivation, derive};
-use modelmill_algebra::field::{Element, Stream};
 
 fn derivation(model: &str) -> Derivation {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))

@@ -1,59 +1,11 @@
 //! The backward recursion: wrenches go down to the base, and leave their moment or force at each joint.
 
 use super::project::project;
+use super::rows::{ForceRows, back_along_axis, join};
 use super::{Side, Style, Wrench, turn_out_all};
 use crate::expr::vector::Vector;
 use crate::expr::{ExprId, Graph, Rational};
 use crate::tree::{Link, Tree};
-
-/// Generalised forces of the coordinates, as terms that are still to be added.
-pub(super) struct Rows(Vec<Vec<(ExprId, Rational)>>);
-
-impl Rows {
-    fn new(n_coordinates: usize) -> Self {
-        Self(vec![Vec::new(); n_coordinates])
-    }
-
-    /// Leaves a moment about a link's axis and a force along it.
-    pub(super) fn leave(&mut self, link: &Link, moment: ExprId, force: ExprId) {
-        for (coordinate, n) in &link.turns {
-            self.0[*coordinate].push((moment, Rational::integer(i64::from(*n))));
-        }
-        for (coordinate, k) in &link.slides {
-            self.0[*coordinate].push((force, k.clone()));
-        }
-    }
-
-    fn sums(self, graph: &mut Graph) -> Vec<ExprId> {
-        self.0.into_iter().map(|terms| graph.sum(&terms)).collect()
-    }
-}
-
-pub(super) fn join(graph: &mut Graph, total: &mut Option<Wrench>, wrench: Wrench) {
-    *total = Some(match *total {
-        None => wrench,
-        Some(there) => Wrench {
-            force: graph.add_vectors(&[there.force, wrench.force]),
-            moment: graph.add_vectors(&[there.moment, wrench.moment]),
-        },
-    });
-}
-
-/// The moment about the point on a link's axis that its position leads to across the axis.
-pub(super) fn back_along_axis(
-    graph: &mut Graph,
-    style: Style,
-    link: &Link,
-    wrench: &Wrench,
-) -> Vector {
-    let (_, along) = style.split_position(link);
-    let [mx, my, mz] = wrench.moment;
-    let (x, y) = (
-        graph.mul(along, wrench.force[1]),
-        graph.mul(along, wrench.force[0]),
-    );
-    [graph.sub(mx, x), graph.add(my, y), mz]
-}
 
 /// A wrench on a link, taken to its parent.
 pub(super) fn to_parent(
@@ -90,7 +42,7 @@ pub(crate) fn backward(
     for (link, side, wrench) in wrenches {
         join(graph, &mut total[side as usize][link], wrench);
     }
-    let mut rows = Rows::new(n_coordinates);
+    let mut rows = ForceRows::new(n_coordinates);
     for i in (0..n).rev() {
         let link = &tree.links[i];
         for side in [Side::Moving, Side::Fixed] {
@@ -125,7 +77,7 @@ pub(crate) fn carry(
     depths: Depths,
     wrenches: impl IntoIterator<Item = (usize, Side, Wrench)>,
 ) -> Vec<ExprId> {
-    let mut rows = Rows::new(n_coordinates);
+    let mut rows = ForceRows::new(n_coordinates);
     for (start, side, wrench) in wrenches {
         let depth = if wrench.has_force() {
             depths.forces
@@ -161,7 +113,7 @@ fn across(
     start: usize,
     side: Side,
     wrench: Wrench,
-    rows: &mut Rows,
+    rows: &mut ForceRows,
 ) -> (usize, Wrench) {
     let first = style.first(tree, start);
     // About z: from joint to joint, since only one component of the force is needed there.

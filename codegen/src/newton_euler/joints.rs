@@ -1,6 +1,7 @@
 //! What each joint transmits: the backward recursion with every wrench kept.
 
-use super::backward::{join, to_parent};
+use super::backward::to_parent;
+use super::rows::join;
 use super::{Side, Style, Wrench};
 use crate::expr::Graph;
 use crate::expr::vector;

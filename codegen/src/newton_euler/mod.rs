@@ -12,6 +12,7 @@ pub(crate) mod inertia;
 mod joints;
 mod motion;
 mod project;
+mod rows;
 
 use crate::expr::vector::{self, Turn, Vector};
 use crate::expr::{ExprId, Graph};

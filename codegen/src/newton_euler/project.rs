@@ -2,7 +2,7 @@
 //! joint i and a point on it (virtual power). Axes through one point share the moment about it, and axes and points are
 //! shared by all wrenches that are projected in the same frame.
 
-use super::backward::{Rows, back_along_axis};
+use super::rows::{ForceRows, back_along_axis};
 use super::{Style, Wrench, turn_in_all};
 use crate::expr::vector::{self, Vector};
 use crate::expr::{ExprId, Graph};
@@ -15,7 +15,7 @@ pub(super) fn project(
     style: Style,
     at: usize,
     wrench: &Wrench,
-    rows: &mut Rows,
+    rows: &mut ForceRows,
 ) {
     let path = tree.path(Some(at));
     let Some((_, above)) = path.split_last() else {

@@ -12,14 +12,14 @@ use modelmill_spec::Mechanism;
 use crate::Derivation;
 use crate::DeriveError;
 use crate::expr::{Atom, ExprId, Graph, Node};
-use crate::loops::branches::closed_form;
 use crate::lower::Program;
 use crate::lower::cost::cost;
 use crate::newton_euler::{self, Body, Element, Style};
 use crate::programs::base_atoms;
-use crate::programs::cheapest::{self, Frames, TotalForm};
+use crate::programs::cheapest;
 use crate::programs::closing::Closing;
 use crate::regressor::Equations;
+use crate::regressor::form::{Frames, TotalForm};
 use crate::tree::expressions::Monomial;
 
 /// Straight-line programs of the equation of motion in the independent coordinates, for given p_min.
@@ -46,7 +46,13 @@ impl Derivation {
         let mut graph = self.graph.clone();
         let base = base_atoms(&mut graph, &self.reduction);
         let value = |m: &Monomial| base.get(m).copied().unwrap_or(Graph::ZERO);
-        dynamics(&mut graph, &self.mechanism, &self.equations, &value)
+        dynamics(
+            &mut graph,
+            &self.mechanism,
+            &self.equations,
+            &self.closing,
+            &value,
+        )
     }
 }
 
@@ -54,15 +60,15 @@ fn dynamics(
     graph: &mut Graph,
     mechanism: &Mechanism,
     equations: &Equations,
+    closing: &Closing,
     value: &dyn Fn(&Monomial) -> ExprId,
 ) -> Result<Dynamics, DeriveError> {
-    let plan = closed_form(graph, mechanism, &equations.projection);
-    let closing = Closing::new(graph, mechanism, equations, plan)?;
     let projection = &equations.projection;
     let n = mechanism.coordinates.len();
     let still: Vec<ExprId> = (0..n).map(|i| graph.atom(Atom::Acceleration(i))).collect();
     // Passive coordinates accelerate even where the independent ones do not.
     let unaccelerated: BTreeMap<ExprId, ExprId> = projection
+        .loops
         .active
         .iter()
         .map(|a| (still[*a], Graph::ZERO))
@@ -189,9 +195,10 @@ fn mass_matrix(
 ) -> Vec<ExprId> {
     let projection = &equations.projection;
     let n = mechanism.coordinates.len();
-    let n_active = projection.active.len();
+    let n_active = projection.loops.active.len();
     // How every coordinate accelerates with each independent one.
     let motion: Vec<Vec<ExprId>> = projection
+        .loops
         .active
         .iter()
         .map(|a| {
@@ -199,7 +206,7 @@ fn mass_matrix(
                 graph.differentiate(&projection.passive_accelerations, Atom::Acceleration(*a));
             let mut column = vec![Graph::ZERO; n];
             column[*a] = Graph::ONE;
-            for (p, slope) in projection.passive.iter().zip(slopes) {
+            for (p, slope) in projection.loops.passive.iter().zip(slopes) {
                 column[*p] = slope;
             }
             column
@@ -261,7 +268,7 @@ fn mass_matrix(
         let form = TotalForm::PLAIN;
         let tree = &equations.tree;
         let frames = Frames::new(graph, tree, &crate::expr::vector::ZERO, form.style, false);
-        let wrenches = form.wrenches(graph, equations, &frames, value);
+        let wrenches = form.wrenches(graph, &equations.inertia, &equations.tree, &frames, value);
         let on_tree = newton_euler::backward(graph, tree, form.style, n, wrenches);
         let bodies = equations.on_active(graph, &on_tree, &[]);
         forces = forces

@@ -5,10 +5,8 @@ use std::collections::BTreeMap;
 use modelmill_spec::Mechanism;
 
 use crate::expr::{Atom, ExprId, Graph};
-use crate::loops::branches::closed_form;
 use crate::lower::{OperationCount, Stage};
 use crate::programs::cheapest;
-use crate::programs::closing::Closing;
 use crate::tree::expressions::Monomial;
 use crate::{Derivation, DeriveError, lower};
 
@@ -55,8 +53,7 @@ fn counted(
     let mut graph = derivation.graph.clone();
     let (graph, mechanism): (&mut Graph, &Mechanism) = (&mut graph, &derivation.mechanism);
     let (equations, reduction) = (&derivation.equations, &derivation.reduction);
-    let plan = closed_form(graph, mechanism, &equations.projection);
-    let mut closing = Closing::new(graph, mechanism, equations, plan)?;
+    let mut closing = derivation.closing.clone();
     closing.limit_passes(of_lowering);
     let retained: Vec<Monomial> = reduction
         .retained

@@ -6,19 +6,22 @@ use std::collections::BTreeMap;
 use modelmill_spec::Mechanism;
 
 use crate::DeriveError;
-use crate::derive::checks;
+use crate::expr::nominal_value;
 use crate::expr::{AngleSum, Atom, ExprId, Graph, Node};
+use crate::loops::branches::closed_form;
 use crate::loops::magnitude::{self, Size};
-use crate::loops::plan::Plan;
-use crate::loops::planar::turn;
+use crate::loops::solve_step::Plan;
+use crate::loops::solved::turn;
 use crate::lower::SINGULAR;
 use crate::lower::cost::cost;
 use crate::lower::{Definition, PASSES, Program, Request, lower_by};
-use crate::programs::nominal_value;
 use crate::regressor::Equations;
+use crate::tree::checks;
 
 /// Puts the passive coordinates' closed form, rates and accelerations in place.
+#[derive(Clone)]
 pub(crate) struct Closing {
+    /// The order in which the loops are solved, if they have closed forms.
     plan: Option<Plan>,
     /// Cosine and sine of passive coordinates alone, for their values.
     definitions: Vec<Definition>,
@@ -59,17 +62,16 @@ impl Closing {
         graph: &mut Graph,
         mechanism: &Mechanism,
         equations: &Equations,
-        plan: Option<Plan>,
     ) -> Result<Self, DeriveError> {
         let mut closing = Self {
-            plan,
+            plan: closed_form(graph, mechanism, &equations.projection.loops),
             definitions: Vec::new(),
             reachable: Vec::new(),
             position: BTreeMap::new(),
             solved: Vec::new(),
             angle_of: BTreeMap::new(),
             regular: Vec::new(),
-            size: Size::of(graph, mechanism, &equations.projection.residual),
+            size: Size::of(graph, mechanism, &equations.projection.loops.residual),
             may_be_undefined: checks::may_be_undefined(mechanism),
             n_passes: PASSES.len(),
         };
@@ -116,7 +118,7 @@ impl Closing {
                 closing.angle_of.insert(relation.coordinate, parts);
             }
         }
-        for p in &equations.projection.passive {
+        for p in &equations.projection.loops.passive {
             if closing.angle_of.contains_key(p) {
                 let parts = &closing.angle_of[p];
                 if parts.solved.is_empty() {
@@ -156,9 +158,9 @@ impl Closing {
         self.n_passes = n;
     }
 
-    /// Whether every loop has a closed form.
-    pub(crate) fn is_closed(&self) -> bool {
-        self.plan.is_some()
+    /// How every loop is solved in closed form, if all of them are.
+    pub(crate) fn plan(&self) -> Option<&Plan> {
+        self.plan.as_ref()
     }
 
     /// Writes every unknown angle as a sum of solved angles and known coordinates.
@@ -287,7 +289,7 @@ impl Closing {
         outputs: &[ExprId],
         known: &BTreeMap<ExprId, ExprId>,
     ) -> usize {
-        if equations.projection.passive.is_empty() {
+        if equations.projection.loops.passive.is_empty() {
             cost(graph, outputs)
         } else {
             self.program_at(graph, equations, outputs, known).weight()
@@ -305,6 +307,7 @@ impl Closing {
         let projection = &equations.projection;
         let passive_rates = graph.substitute(&projection.passive_rates, known);
         let mut rates: BTreeMap<ExprId, ExprId> = projection
+            .loops
             .passive
             .iter()
             .zip(passive_rates)
@@ -313,7 +316,7 @@ impl Closing {
         rates.extend(known);
         let accelerations = graph.substitute(&projection.passive_accelerations, &rates);
         let mut motion = rates;
-        for (p, acceleration) in projection.passive.iter().zip(accelerations) {
+        for (p, acceleration) in projection.loops.passive.iter().zip(accelerations) {
             motion.insert(graph.atom(Atom::Acceleration(*p)), acceleration);
         }
         let mut roots = graph.substitute(outputs, &motion);

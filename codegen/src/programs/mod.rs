@@ -11,12 +11,11 @@ use std::collections::BTreeMap;
 use modelmill_spec::{Mechanism, Motion};
 
 use crate::DeriveError;
-use crate::expr::{Atom, ExprId, F64, Graph, Tape};
-use crate::loops::branches::closed_form;
+use crate::expr::{Atom, ExprId, Graph};
 use crate::loops::magnitude::{self, Size};
 use crate::lower::{Program, Request, lower};
 use crate::programs::closing::Closing;
-use crate::reduce::Reduction;
+use crate::reduce::{Reduction, base};
 use crate::regressor::Equations;
 use crate::tree::expressions::Monomial;
 
@@ -66,9 +65,8 @@ pub(crate) fn programs(
     mechanism: &Mechanism,
     equations: &Equations,
     reduction: &Reduction,
+    closing: &Closing,
 ) -> Result<Programs, DeriveError> {
-    let plan = closed_form(graph, mechanism, &equations.projection);
-    let closing = Closing::new(graph, mechanism, equations, plan)?;
     let n_drives = mechanism.drives.len();
 
     let base = base_atoms(graph, reduction);
@@ -91,6 +89,7 @@ pub(crate) fn programs(
         })
         .collect();
     let mut passive: Vec<ExprId> = projection
+        .loops
         .passive
         .iter()
         .map(|p| graph.atom(Atom::Coordinate(*p)))
@@ -101,20 +100,20 @@ pub(crate) fn programs(
     drives.extend(projection.drives.iter().map(|d| d.rate));
     drives.extend(projection.drive_jacobian.iter().flatten());
 
-    let passive_position = if projection.passive.is_empty() {
+    let passive_position = if projection.loops.passive.is_empty() {
         PassivePosition::None
-    } else if closing.is_closed() {
+    } else if closing.plan().is_some() {
         PassivePosition::Closed
     } else {
-        let mut outputs = projection.residual.clone();
+        let mut outputs = projection.loops.residual.clone();
         outputs.extend(projection.residual_jacobian.iter().flatten());
-        let scales = magnitude::scales(graph, mechanism, projection);
+        let scales = magnitude::scales(graph, mechanism, &projection.loops);
         PassivePosition::Newton(Box::new(LoopPrograms {
             residual: plain(graph, &outputs),
             scales: plain(graph, &scales),
         }))
     };
-    let base_expressions = crate::derive::base::expressions(graph, reduction);
+    let base_expressions = base::expressions(graph, reduction);
     let base_parameters = plain(graph, &base_expressions);
     let nothing = BTreeMap::new();
     let weigh =
@@ -128,8 +127,8 @@ pub(crate) fn programs(
         .coordinates
         .iter()
         .any(|c| c.motion != Motion::Revolute);
-    let scale = (slides && !projection.residual.is_empty()).then(|| {
-        let scale = Size::of(graph, mechanism, &projection.residual).scale(graph);
+    let scale = (slides && !projection.loops.residual.is_empty()).then(|| {
+        let scale = Size::of(graph, mechanism, &projection.loops.residual).scale(graph);
         plain(graph, &[scale])
     });
     let mut program = |outputs: &[ExprId]| closing.program(graph, equations, outputs);
@@ -168,22 +167,4 @@ fn plain(graph: &mut Graph, outputs: &[ExprId]) -> Program {
         definitions: &[],
     };
     lower(graph, &request)
-}
-
-/// Value of an expression at the nominal pose, with the file's constants; rates are zero.
-pub(crate) fn nominal_value(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Option<f64> {
-    Tape::new(graph, &[id])
-        .evaluate(&F64(|atom| nominal_of(mechanism, atom)))
-        .map(|v| v[0])
-}
-
-/// Value of an atom at the nominal pose.
-pub(crate) fn nominal_of(mechanism: &Mechanism, atom: Atom) -> f64 {
-    match atom {
-        Atom::Constant(i) => mechanism.constants[i].value,
-        Atom::Coordinate(i) => mechanism.coordinates[i].nominal,
-        Atom::Parameter(i) => mechanism.parameters[i].nominal,
-        Atom::Pi => std::f64::consts::PI,
-        _ => 0.0,
-    }
 }

@@ -1,13 +1,16 @@
 //! The factors of eq. (6) as rational functions of the constants: reconstructed from points of motion for relations that
 //! are as simple as can be found, put together from there.
 
+use modelmill_algebra::field::{Element, Stream};
+
+use super::oracle::{Budget, Occurrence, Oracle};
+use super::pattern::Pattern;
 use super::rational_function::RationalFunction;
-use super::reconstruct::{self, Budget, Occurrence, Oracle, Survey};
+use super::reconstruct::{self, Survey};
 use super::relations::{self, Related, Relation};
-use super::{Pattern, SampledRegressor};
+use super::sample::SampledRegressor;
 use crate::DeriveError;
 use crate::expr::FieldPoint;
-use modelmill_algebra::field::{Element, Stream};
 
 /// Operations of the field that factors may take: a minute or so.
 pub(super) const MOST_OPERATIONS: u64 = 20_000_000_000;
@@ -206,8 +209,10 @@ mod tests {
     use modelmill_spec::Mechanism;
 
     use super::*;
+    use crate::expr::independent::SEED;
     use crate::expr::{ExprId, Graph};
-    use crate::reduce::{SEED, occurrences, root_radicands, sampled};
+    use crate::reduce::constants::{occurrences, root_radicands};
+    use crate::reduce::sample::sampled;
 
     /// An arm of revolute joints, each with a length, a twist and an offset of its own.
     fn twisted(n: usize) -> Mechanism {
@@ -253,8 +258,8 @@ mod tests {
         let mut stream = Stream::new(SEED);
         let order: Vec<usize> = (0..columns.len()).collect();
         let mut pattern = Pattern::find(&regressor, &order, &mut stream)?;
-        let variables = occurrences(&graph, &outputs, projection);
-        let roots = root_radicands(&graph, &outputs, projection);
+        let variables = occurrences(&graph, &outputs, &projection.loops.residual);
+        let roots = root_radicands(&graph, &outputs, &projection.loops.residual);
         let mut factors = |pattern: &Pattern| {
             of(
                 pattern,

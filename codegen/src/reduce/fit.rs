@@ -2,14 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use super::rational_function::{Polynomial, Powers, RationalFunction, Variable, monomial_value};
-use super::reconstruct::{Occurrence, Oracle};
-use super::support::support;
-use crate::DeriveError;
-use crate::expr::{FieldPoint, Rational};
 use modelmill_algebra::eliminate;
 use modelmill_algebra::field::{Element, MODULUS, PRIMES, Stream};
 use modelmill_algebra::lift::lift;
+
+use super::oracle::{Occurrence, Oracle};
+use super::rational_function::{Polynomial, Powers, RationalFunction, Variable, monomial_value};
+use super::support::support;
+use crate::DeriveError;
+use crate::expr::{FieldPoint, Rational};
 
 /// What is known about one function before its coefficients are.
 #[derive(Clone, Debug, Default)]

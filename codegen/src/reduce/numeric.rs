@@ -2,16 +2,18 @@
 //!
 //! Its factors are floating-point numbers and hold for these values alone; results say so.
 
+use modelmill_algebra::field::Stream;
 use modelmill_spec::Mechanism;
 use nalgebra::{DMatrix, DVector};
 
-use super::{Dependency, Method, RationalFunction, Reduction};
+use super::rational_function::RationalFunction;
+use super::reduction::{Dependency, Method, Reduction};
 use crate::DeriveError;
+use crate::expr::independent::SEED;
 use crate::expr::{Atom, ExprId, F64, Graph, Rational, Tape};
-use crate::loops::numeric_poses::{Loops, symmetric};
+use crate::loops::numeric_poses::{NumericLoops, symmetric};
 use crate::regressor::projection::Projection;
 use crate::tree::expressions::Monomial;
-use modelmill_algebra::field::Stream;
 
 /// What is left of a column, relative to its size, below which it counts as dependent.
 const DEPENDENT: f64 = 1e-9;
@@ -184,14 +186,14 @@ pub(super) fn sample(
     let outputs: Vec<ExprId> = (0..n_drives)
         .flat_map(|d| columns.iter().map(move |c| c[d]))
         .collect();
-    let loops = Loops::new(graph, mechanism, &projection.residual);
+    let loops = NumericLoops::new(graph, mechanism, &projection.loops.residual);
     let [rates, accelerations, outputs] = [
         &projection.passive_rates,
         &projection.passive_accelerations,
         &outputs,
     ]
     .map(|roots| Tape::new(graph, roots));
-    let mut stream = Stream::new(super::SEED);
+    let mut stream = Stream::new(SEED);
     let n_coordinates = mechanism.coordinates.len();
     let mut rows: Vec<f64> = Vec::new();
     let wanted = wanted.div_ceil(n_drives.max(1)) + 10;
@@ -229,13 +231,13 @@ pub(super) fn sample(
         let Some(found) = evaluate(&rates, &qd, &qdd) else {
             continue;
         };
-        for (p, value) in projection.passive.iter().zip(found) {
+        for (p, value) in projection.loops.passive.iter().zip(found) {
             qd[*p] = value;
         }
         let Some(found) = evaluate(&accelerations, &qd, &qdd) else {
             continue;
         };
-        for (p, value) in projection.passive.iter().zip(found) {
+        for (p, value) in projection.loops.passive.iter().zip(found) {
             qdd[*p] = value;
         }
         let Some(values) = evaluate(&outputs, &qd, &qdd) else {

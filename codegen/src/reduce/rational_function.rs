@@ -2,11 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use modelmill_algebra::field::Element;
+
 use num_rational::BigRational;
 use num_traits::{ToPrimitive, Zero};
 
 use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Rational};
-use modelmill_algebra::field::Element;
 
 /// What is left of a sum's terms, relative to their sizes, below which it is added up exactly.
 const CANCELLED: f64 = 1e-3;

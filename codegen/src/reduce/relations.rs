@@ -7,11 +7,12 @@
 
 use std::collections::BTreeMap;
 
+use modelmill_algebra::eliminate::{self, Echelon};
+use modelmill_algebra::field::Element;
+
 use super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
-use modelmill_algebra::eliminate::{self, Echelon};
-use modelmill_algebra::field::Element;
 
 /// One column in terms of others, all by position among the effective ones.
 #[derive(Clone, Debug)]

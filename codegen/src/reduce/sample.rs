@@ -3,17 +3,23 @@
 //!
 //! Which coordinates are drawn freely does not matter for linear dependence, so those are drawn that make every loop
 //! a dyad. It matters that the poses make up one irreducible variety, the one that the nominal pose lies on; see
-//! [`super::branches`].
+//! [`crate::loops::branches`].
 
+use modelmill_algebra::eliminate::Echelon;
+use modelmill_algebra::field::{Element, Extended, Number, Stream};
 use modelmill_spec::Mechanism;
 
 use crate::DeriveError;
-use crate::expr::{Atom, ExprId, FieldPoint, Graph, Tape};
+use crate::expr::independent::IDLE;
+use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Tape, Unary};
 use crate::loops::branches::{self, Branch};
 use crate::loops::field_poses::{MOST_DRAWS, Poses};
 use crate::loops::plan::{Unknowns, plan};
 use crate::regressor::projection::Projection;
-use modelmill_algebra::field::{Element, Extended, Number, Stream};
+
+/// The same where signs occur, which take only two values: that two of them agree by chance at all points must be out of
+/// the question.
+const IDLE_WITH_SIGNS: usize = 80;
 
 /// Draws points.
 pub(super) struct Sampler {
@@ -36,8 +42,15 @@ impl Sampler {
         projection: &Projection,
         outputs: &[ExprId],
     ) -> Result<Self, DeriveError> {
-        let loops = || projection.closures.iter().map(|c| c.name.clone()).collect();
-        let plan = plan(graph, mechanism, projection, Unknowns::Any)
+        let loops = || {
+            projection
+                .loops
+                .closures
+                .iter()
+                .map(|c| c.name.clone())
+                .collect()
+        };
+        let plan = plan(graph, mechanism, &projection.loops, Unknowns::Any)
             .ok_or_else(|| DeriveError::LoopsNotSampled { loops: loops() })?;
         let mut all = outputs.to_vec();
         all.extend(&projection.passive_rates);
@@ -54,8 +67,8 @@ impl Sampler {
             poses,
             has_roots: !branches.is_empty(),
             n_drives: mechanism.drives.len(),
-            active: projection.active.clone(),
-            passive: projection.passive.clone(),
+            active: projection.loops.active.clone(),
+            passive: projection.loops.passive.clone(),
             rates: Tape::new(graph, &projection.passive_rates),
             accelerations: Tape::new(graph, &projection.passive_accelerations),
             outputs: Tape::new(graph, outputs),
@@ -123,4 +136,73 @@ impl Sampler {
         }
         self.outputs.evaluate(&point)
     }
+}
+
+/// The regressor's effective columns at random points of motion.
+pub(super) struct SampledRegressor {
+    pub(super) sampler: Sampler,
+    pub(super) n_columns: usize,
+    /// How many points in a row must show nothing new.
+    idle: usize,
+}
+
+impl SampledRegressor {
+    /// The rows of H at one random point.
+    pub(super) fn point<const P: u64>(
+        &self,
+        constants: &FieldPoint<Element<P>>,
+        stream: &mut Stream,
+    ) -> Result<Vec<Vec<Element<P>>>, DeriveError> {
+        let values = self.sampler.draw(constants, stream)?;
+        Ok(values
+            .chunks(self.n_columns.max(1))
+            .map(<[Element<P>]>::to_vec)
+            .collect())
+    }
+
+    /// Rows of W for one set of constants, reduced, until they show nothing new or `rank` is reached.
+    pub(super) fn echelon<const P: u64>(
+        &self,
+        constants: &FieldPoint<Element<P>>,
+        order: &[usize],
+        rank: Option<usize>,
+        stream: &mut Stream,
+    ) -> Result<Echelon<P>, DeriveError> {
+        let mut echelon = Echelon::new(order);
+        let mut idle = 0;
+        while self.n_columns > 0 && idle < self.idle && Some(echelon.pivots.len()) != rank {
+            idle += 1;
+            for row in self.point(constants, stream)? {
+                if echelon.insert(row) {
+                    idle = 0;
+                }
+            }
+        }
+        Ok(echelon)
+    }
+}
+
+/// Prepares the evaluation of so many columns, drive by drive.
+pub(super) fn sampled(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    projection: &Projection,
+    outputs: &[ExprId],
+    n_columns: usize,
+) -> Result<SampledRegressor, DeriveError> {
+    Ok(SampledRegressor {
+        sampler: Sampler::new(graph, mechanism, projection, outputs)?,
+        n_columns,
+        idle: if has_sign(graph, outputs) {
+            IDLE_WITH_SIGNS
+        } else {
+            IDLE
+        },
+    })
+}
+
+fn has_sign(graph: &Graph, outputs: &[ExprId]) -> bool {
+    graph
+        .nodes_of(outputs)
+        .any(|node| matches!(node, Node::Unary(Unary::Sign | Unary::Abs, _)))
 }

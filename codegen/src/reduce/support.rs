@@ -5,12 +5,13 @@
 
 use std::collections::BTreeSet;
 
-use super::rational_function::{Powers, Variable, monomial_value};
-use super::reconstruct::{Occurrence, Oracle};
-use crate::DeriveError;
-use crate::expr::{Atom, FieldPoint};
 use modelmill_algebra::eliminate;
 use modelmill_algebra::field::{Element, Stream};
+
+use super::oracle::{Occurrence, Oracle};
+use super::rational_function::{Powers, Variable, monomial_value};
+use crate::DeriveError;
+use crate::expr::{Atom, FieldPoint};
 
 /// The monomials of numerator and denominator among those given that have a coefficient at a random place; `None` where
 /// a stage has more unknowns than `most`, or more than one solution.

@@ -1,5 +1,6 @@
 //! The regressor H of eq. (4): one column per product of dynamic parameters, one row per drive.
 
+pub(crate) mod form;
 pub(crate) mod projection;
 pub(crate) mod rod;
 
@@ -14,7 +15,7 @@ use crate::DeriveError;
 use crate::expr::{Atom, ExprId, Graph};
 use crate::newton_euler;
 use crate::newton_euler::inertia::InertiaByProduct;
-use crate::programs::cheapest::{ColumnForm, Frames, TotalForm};
+use crate::regressor::form::{ColumnForm, Frames, TotalForm};
 use crate::regressor::projection::Projection;
 use crate::tree::Tree;
 use crate::tree::expressions::{self, Monomial};
@@ -106,7 +107,7 @@ impl Equations {
         products
             .iter()
             .map(|product| {
-                let wrenches = form.wrenches(graph, self, frames, product, products);
+                let wrenches = form.wrenches(graph, &self.inertia, frames, product, products);
                 let on_tree = newton_euler::carry(graph, tree, style, n, form.depths, wrenches);
                 let value = |m: &Monomial| {
                     if m == product {
@@ -129,7 +130,7 @@ impl Equations {
         value: &dyn Fn(&Monomial) -> ExprId,
         form: TotalForm,
     ) -> Result<Vec<ExprId>, DeriveError> {
-        let wrenches = form.wrenches(graph, self, frames, value);
+        let wrenches = form.wrenches(graph, &self.inertia, &self.tree, frames, value);
         let n = mechanism.coordinates.len();
         let on_tree = newton_euler::backward(graph, &frames.tree, form.style, n, wrenches);
         self.forces(graph, mechanism, &on_tree, value)

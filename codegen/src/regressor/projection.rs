@@ -5,18 +5,14 @@
 //! `G = -J_p^-1 J_a`, and the drives' forces follow from `(d l / d z)' f = tau_z`.
 
 use modelmill_spec::{DriveKind, Mechanism};
-use nalgebra::DMatrix;
 
 use crate::DeriveError;
 use crate::expr::linear::{self, Solution};
+use crate::expr::nominal_value;
 use crate::expr::{Atom, ExprId, Graph, Node, Rational, Unary};
-use crate::loops::closure::{self, Closure};
-use crate::loops::magnitude;
-use crate::loops::numeric_poses::Loops;
-use crate::loops::parallelogram;
-use crate::programs::nominal_value;
+use crate::loops::Loops;
+use crate::loops::stretch::distance_squared;
 use crate::tree::Tree;
-use modelmill_algebra::field::Stream;
 
 /// Kinematics of a drive.
 #[derive(Clone, Debug)]
@@ -30,14 +26,11 @@ pub(crate) struct DriveMotion {
 /// Everything that loops and drives contribute.
 #[derive(Clone, Debug)]
 pub(crate) struct Projection {
-    pub(crate) active: Vec<usize>,
-    pub(crate) passive: Vec<usize>,
-    pub(crate) closures: Vec<Closure>,
+    pub(crate) loops: Loops,
     /// Rate and acceleration of each passive coordinate, in the order of `passive`.
     pub(crate) passive_rates: Vec<ExprId>,
     pub(crate) passive_accelerations: Vec<ExprId>,
-    /// Residuals of the loops that are independent, and their derivatives by the passive coordinates.
-    pub(crate) residual: Vec<ExprId>,
+    /// Derivatives of the loops' residuals by the passive coordinates.
     pub(crate) residual_jacobian: Vec<Vec<ExprId>>,
     /// Per drive.
     pub(crate) drives: Vec<DriveMotion>,
@@ -58,35 +51,11 @@ impl Projection {
         tree: &Tree,
     ) -> Result<Self, DeriveError> {
         let n = mechanism.coordinates.len();
-        let (passive, active): (Vec<usize>, Vec<usize>) =
-            (0..n).partition(|i| mechanism.coordinates[*i].passive);
-        let mut closures = closure::closures(graph, mechanism, tree)?;
-        parallelogram::find(graph, mechanism, &mut closures);
-        let residual: Vec<ExprId> = closures
-            .iter()
-            .flat_map(|c| c.residual.iter().copied())
-            .collect();
-        let mut residual = independent(graph, &residual)?;
-        if residual.len() > passive.len()
-            && let Some(enough) = sufficient(graph, mechanism, &residual, passive.len())
-        {
-            residual = enough;
-        }
-        let mut left = residual.clone();
-        for closure in &mut closures {
-            let before = left.len();
-            left.retain(|r| !closure.residual.contains(r));
-            closure.n_independent = before - left.len();
-        }
-        if residual.len() != passive.len() {
-            return Err(DeriveError::LoopCount {
-                equations: residual.len(),
-                passive: passive.len(),
-            });
-        }
-        let rates_of = rate_map(tree, &passive, n);
+        let loops = Loops::new(graph, mechanism, tree)?;
+        let (active, passive, residual) = (&loops.active, &loops.passive, &loops.residual);
+        let rates_of = rate_map(tree, passive, n);
         let by_coordinate: Vec<Vec<ExprId>> = (0..n)
-            .map(|i| graph.differentiate(&residual, Atom::Coordinate(i)))
+            .map(|i| graph.differentiate(residual, Atom::Coordinate(i)))
             .collect();
         let in_y = |graph: &mut Graph, by_coordinate: &[Vec<ExprId>], row: usize, j: usize| {
             let terms: Vec<_> = (0..n)
@@ -105,9 +74,9 @@ impl Projection {
                 })
                 .collect()
         };
-        let (loop_p, loop_a) = (pick(graph, &passive), pick(graph, &active));
+        let (loop_p, loop_a) = (pick(graph, passive), pick(graph, active));
         // Right-hand sides: the active columns, then what the accelerations see besides.
-        let drift = Self::drift(graph, &residual);
+        let drift = Self::drift(graph, residual);
         let rhs: Vec<Vec<ExprId>> = loop_a
             .iter()
             .zip(&drift)
@@ -127,12 +96,9 @@ impl Projection {
             .map(|r| passive.iter().map(|p| by_coordinate[*p][r]).collect())
             .collect();
         let mut projection = Self {
-            active,
-            passive,
-            closures,
+            loops,
             passive_rates: Vec::new(),
             passive_accelerations: Vec::new(),
-            residual,
             residual_jacobian,
             drives: Vec::new(),
             drive_jacobian: Vec::new(),
@@ -171,11 +137,12 @@ impl Projection {
     ) -> Vec<ExprId> {
         let n = self.rates_of.len();
         let mut y = vec![Graph::ZERO; n];
-        for a in &self.active {
+        for a in &self.loops.active {
             y[*a] = graph.atom(order(*a));
         }
-        for (k, p) in self.passive.iter().enumerate() {
+        for (k, p) in self.loops.passive.iter().enumerate() {
             let mut terms: Vec<ExprId> = self
+                .loops
                 .active
                 .iter()
                 .enumerate()
@@ -184,7 +151,8 @@ impl Projection {
             terms.extend(drift.map(|d| d[k]));
             y[*p] = graph.add_all(&terms);
         }
-        self.passive
+        self.loops
+            .passive
             .iter()
             .map(|p| {
                 let terms: Vec<_> = (0..n)
@@ -207,12 +175,13 @@ impl Projection {
                 graph.sum(&terms)
             })
             .collect();
-        self.active
+        self.loops
+            .active
             .iter()
             .enumerate()
             .map(|(j, a)| {
                 let mut terms = vec![in_y[*a]];
-                for (k, p) in self.passive.iter().enumerate() {
+                for (k, p) in self.loops.passive.iter().enumerate() {
                     terms.push(graph.mul(self.transmission[k][j], in_y[*p]));
                 }
                 graph.add_all(&terms)
@@ -249,8 +218,9 @@ impl Projection {
         gaps: &[ExprId],
         forces: &[ExprId],
     ) -> Result<Solution, DeriveError> {
-        let n = self.passive.len();
+        let n = self.loops.passive.len();
         let by_passive: Vec<Vec<ExprId>> = self
+            .loops
             .passive
             .iter()
             .map(|p| graph.differentiate(gaps, Atom::Coordinate(*p)))
@@ -259,17 +229,18 @@ impl Projection {
         let jacobian: Vec<Vec<ExprId>> = (0..gaps.len())
             .map(|row| {
                 let by = |j: &usize| {
-                    let terms = self.passive.iter().zip(&by_passive);
+                    let terms = self.loops.passive.iter().zip(&by_passive);
                     let terms = terms.filter(|(i, _)| self.rates_of[**i][*j] != 0);
                     let terms: Vec<_> = terms
                         .map(|(i, slopes)| (slopes[row], Rational::integer(self.rates_of[*i][*j])))
                         .collect();
                     graph.sum(&terms)
                 };
-                self.passive.iter().map(by).collect()
+                self.loops.passive.iter().map(by).collect()
             })
             .collect();
         let in_y: Vec<ExprId> = self
+            .loops
             .passive
             .iter()
             .map(|j| {
@@ -322,7 +293,7 @@ impl Projection {
             let coordinate = match drive.kind {
                 DriveKind::Joint(i) => graph.atom(Atom::Coordinate(i.0)),
                 DriveKind::Linear { from, to } => {
-                    let square = closure::distance_squared(graph, mechanism, tree, [to.0, from.0])?;
+                    let square = distance_squared(graph, mechanism, tree, [to.0, from.0])?;
                     let length = graph.unary(Unary::Sqrt, square);
                     signed_length(graph, mechanism, length)
                 }
@@ -332,7 +303,7 @@ impl Projection {
                 .collect();
             let row = self.project(graph, &by_coordinate);
             let mut rate_terms = Vec::new();
-            for (a, slope) in self.active.iter().zip(&row) {
+            for (a, slope) in self.loops.active.iter().zip(&row) {
                 let rate = graph.atom(Atom::Rate(*a));
                 rate_terms.push(graph.mul(*slope, rate));
             }
@@ -346,7 +317,7 @@ impl Projection {
             });
             self.drive_jacobian.push(row);
         }
-        let n = self.active.len();
+        let n = self.loops.active.len();
         if self.drives.len() != n {
             return Err(DeriveError::DriveCount {
                 drives: self.drives.len(),
@@ -413,77 +384,4 @@ fn rate_map(tree: &Tree, passive: &[usize], n: usize) -> Vec<Vec<i64>> {
         done.push(p);
     }
     rates_of
-}
-
-/// The residuals without those that are constant combinations of others (a planar loop seen in a tilted frame).
-fn independent(graph: &Graph, residual: &[ExprId]) -> Result<Vec<ExprId>, DeriveError> {
-    let columns = crate::reduce::independent_functions(graph, residual)?;
-    Ok(columns.into_iter().map(|i| residual[i]).collect())
-}
-
-/// As many residuals as there are passive coordinates, if the others follow from them: two points on the axis of a joint
-/// that both coincide with two others leave one equation too many, since their distance is the same on both sides.
-///
-/// That this is so is seen in numbers, at poses around the nominal one at which all residuals vanish. Those equations are
-/// taken that determine the passive coordinates best at the nominal pose.
-fn sufficient(
-    graph: &mut Graph,
-    mechanism: &Mechanism,
-    residual: &[ExprId],
-    n_passive: usize,
-) -> Option<Vec<ExprId>> {
-    /// Poses that are looked at besides the nominal one, and how far away, in rad or relative to the size of the loops.
-    const POSES: usize = 6;
-    const REACH: f64 = 0.05;
-    /// Residuals relative to the size of the loops, and singular values relative to the largest, that count as zero.
-    const CLOSED: f64 = 1e-10;
-    const SINGULAR: f64 = 1e-7;
-    let size = magnitude::at_nominal(graph, mechanism, residual);
-    let loops = Loops::new(graph, mechanism, residual);
-    let mut stream = Stream::new(5);
-    let mut poses = vec![loops.nominal()?];
-    for _ in 0..POSES {
-        poses.push(loops.random(REACH, &mut stream)?);
-    }
-    let is_regular = |jacobian: &DMatrix<f64>| {
-        let values = jacobian.clone().svd(false, false).singular_values;
-        values.len() == n_passive && values.min() > SINGULAR * values.max()
-    };
-    let mut chosen: Option<Vec<usize>> = None;
-    for q in &poses {
-        let (gaps, mut jacobian) = loops.linearise(q)?;
-        let passive =
-            (0..mechanism.coordinates.len()).filter(|i| mechanism.coordinates[*i].passive);
-        for (mut column, i) in jacobian.column_iter_mut().zip(passive) {
-            column *= loops.unit(i);
-        }
-        if gaps.amax() > CLOSED * size || !is_regular(&jacobian) {
-            return None;
-        }
-        let rows = chosen.get_or_insert_with(|| most_different_rows(&jacobian, n_passive));
-        if !is_regular(&jacobian.select_rows(rows.iter())) {
-            return None;
-        }
-    }
-    Some(chosen?.into_iter().map(|i| residual[i]).collect())
-}
-
-/// Rows of a matrix that span its row space well: each time the one of which most is left.
-pub(crate) fn most_different_rows(matrix: &DMatrix<f64>, n: usize) -> Vec<usize> {
-    let mut rest = matrix.clone();
-    let mut chosen = Vec::new();
-    for _ in 0..n.min(matrix.nrows()) {
-        let norms: Vec<f64> = rest.row_iter().map(|row| row.norm()).collect();
-        let best =
-            (0..norms.len()).fold(0, |best, i| if norms[i] > norms[best] { i } else { best });
-        if norms[best] <= 0.0 {
-            break;
-        }
-        let direction = rest.row(best) / norms[best];
-        let shares = &rest * direction.transpose();
-        rest -= shares * direction;
-        chosen.push(best);
-    }
-    chosen.sort_unstable();
-    chosen
 }

@@ -11,7 +11,7 @@ use modelmill_spec::{DriveKind, Mechanism};
 use crate::DeriveError;
 use crate::expr::vector::Vector;
 use crate::expr::{Atom, ExprId, Graph};
-use crate::loops::closure::position_in_base;
+use crate::loops::stretch::position_in_base;
 use crate::regressor::projection::Projection;
 use crate::tree::Tree;
 

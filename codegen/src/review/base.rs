@@ -5,32 +5,17 @@ use modelmill_spec::Mechanism;
 use super::document::{
     self, Document, Equation, Inline, Line, Table, cell, linear_model, name, number, text,
 };
-use super::equations::{NumericRank, base_name};
+use super::rank::NumericRank;
 use crate::Derivation;
-use crate::derive::base::unit;
 use crate::expr::Rational;
 use crate::expr::print::{Formula, Symbol};
+use crate::reduce::base::{name as base_name, product_formula as product, unit, written_out};
 use crate::reduce::{Method, RationalFunction};
 use crate::tree::expressions::Monomial;
 
 /// Base parameter `k` written out term by term: what a script reads.
 pub fn base_expression(derivation: &Derivation, k: usize) -> Formula {
-    let Derivation {
-        mechanism,
-        reduction,
-        ..
-    } = derivation;
-    let mut terms = vec![product(
-        mechanism,
-        &reduction.products[reduction.retained[k]],
-    )];
-    for line in &reduction.dependencies {
-        let factors = factors(mechanism, &reduction.products[line.product]);
-        for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
-            terms.extend(factor.expanded_times(mechanism, &factors));
-        }
-    }
-    Formula::sum(terms)
+    written_out(&derivation.mechanism, &derivation.reduction, k)
 }
 
 /// Base parameter `k` with common factors collected: `m1*dc1 + d1*(m2 + m3)`.
@@ -80,21 +65,6 @@ pub fn base_grouped(derivation: &Derivation, k: usize) -> Formula {
 /// A factor of eq. (6) as expanded text.
 pub(super) fn factor_text(mechanism: &Mechanism, factor: &RationalFunction) -> String {
     factor.expanded(mechanism).text()
-}
-
-fn factors(mechanism: &Mechanism, product: &Monomial) -> Vec<Formula> {
-    product
-        .0
-        .iter()
-        .map(|(p, n)| {
-            let name = Formula::name(&*mechanism.parameters[*p].name);
-            name.power(i32::try_from(*n).unwrap_or(i32::MAX))
-        })
-        .collect()
-}
-
-fn product(mechanism: &Mechanism, product: &Monomial) -> Formula {
-    Formula::product(Rational::ONE, factors(mechanism, product))
 }
 
 /// The column of a product: `h` with the product as its index.

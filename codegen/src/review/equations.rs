@@ -4,18 +4,9 @@
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use super::base::{base_expression, factor_text};
+use super::rank::NumericRank;
+use crate::reduce::base::name as base_name;
 use crate::{Derivation, Method, OperationCount, Reduction, Stage};
-
-/// Rank of the regressor on the file's values, found numerically.
-#[derive(Clone, Debug, PartialEq)]
-pub struct NumericRank {
-    /// The rank.
-    pub rank: usize,
-    /// At how many random states the regressor was stacked.
-    pub samples: usize,
-    /// Condition number of the columns that are retained, if known.
-    pub condition: Option<f64>,
-}
 
 /// Everything that reduction says about a model.
 #[derive(Clone, Debug)]
@@ -195,9 +186,4 @@ impl Equations {
         text.push('\n');
         text
     }
-}
-
-/// Name of the base parameter at position `k`.
-pub(super) fn base_name(k: usize) -> String {
-    format!("p{}_min", k + 1)
 }

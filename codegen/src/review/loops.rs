@@ -3,10 +3,9 @@
 use modelmill_spec::{DriveKind, Mechanism, Motion};
 
 use super::document::{Block, Document, Equation, Inline, Line, Table, cell, code, text};
+use crate::expr::nominal_value;
 use crate::expr::print::{Formula, angle_sum, formula, tree_size};
 use crate::expr::{ExprId, Graph, Rational};
-use crate::loops::branches::closed_form;
-use crate::programs::nominal_value;
 use crate::{Derivation, PassivePosition};
 
 /// Expressions with more nodes than this are shown in a program rather than in one line.
@@ -48,7 +47,7 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
     }
     page.heading("Loops");
     let mut tag = 0;
-    for (l, closure) in mechanism.loops.iter().zip(&projection.closures) {
+    for (l, closure) in mechanism.loops.iter().zip(&projection.loops.closures) {
         let [a, b] = l.joins.map(|p| code(&*mechanism.points[p.0].name));
         let plane = if closure.chain.is_some() {
             "; the loop is planar"
@@ -84,7 +83,7 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
         PassivePosition::Closed => solved_in_closed_form(page, derivation),
         PassivePosition::Newton { .. } => {
             let mut line = vec![text("The passive coordinates ")];
-            line.extend(names(mechanism, &projection.passive));
+            line.extend(names(mechanism, &projection.loops.passive));
             line.push(text(
                 " follow by Newton's method on the closure equations, started from the nominal pose or the pose before, \
                  which keeps to the assembly mode of the model file.",
@@ -120,11 +119,10 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
     let Derivation {
         mechanism,
         graph,
-        equations,
+        closing,
         ..
     } = derivation;
-    let mut graph = graph.clone();
-    let Some(plan) = closed_form(&mut graph, mechanism, &equations.projection) else {
+    let Some(plan) = closing.plan() else {
         return;
     };
     let mut related = Vec::new();
@@ -151,7 +149,7 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
             _ => " follow from two linear equations",
         }));
         if let Some(root) = step.solved.root {
-            let sign = if nominal_value(&graph, mechanism, root.witness).is_none_or(|x| x >= 0.0) {
+            let sign = if nominal_value(graph, mechanism, root.witness).is_none_or(|x| x >= 0.0) {
                 "positive"
             } else {
                 "negative"
@@ -236,7 +234,12 @@ pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
             Some(())
         };
         line(format!("l_{}", drive.name), projection.drives[d].coordinate);
-        for (a, slope) in projection.active.iter().zip(&projection.drive_jacobian[d]) {
+        for (a, slope) in projection
+            .loops
+            .active
+            .iter()
+            .zip(&projection.drive_jacobian[d])
+        {
             let coordinate = &mechanism.coordinates[*a].name;
             line(format!("J_{}_{coordinate}", drive.name), *slope);
         }

@@ -12,6 +12,7 @@ mod listing;
 mod loops;
 mod parameters;
 mod programs;
+mod rank;
 mod render_html;
 mod render_latex;
 mod render_markdown;
@@ -21,9 +22,8 @@ mod render_text;
 pub(crate) mod tests;
 
 pub use base::{base_expression, base_grouped};
-pub use equations::{
-    BaseLine, DependencyLine, Equations, NumericMethod, NumericRank, Operations, Rank,
-};
+pub use equations::{BaseLine, DependencyLine, Equations, NumericMethod, Operations, Rank};
+pub use rank::NumericRank;
 
 use crate::Derivation;
 use document::Document;

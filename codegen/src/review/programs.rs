@@ -5,11 +5,11 @@ use std::collections::BTreeSet;
 use modelmill_spec::{Drive, DriveKind};
 
 use super::document::{Block, Document, Equation, Line, Table, cell, name, text};
-use super::equations::base_name;
 use super::listing::{self, Listing};
 use crate::emit::tree::names::{Meaning, Meanings, reserved};
 use crate::expr::print::{Formula, Symbol};
 use crate::lower::{OperationCount, Program, Stage};
+use crate::reduce::base::name as base_name;
 use crate::{Derivation, PassivePosition};
 
 /// Operation counts, then the programs.

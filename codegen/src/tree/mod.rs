@@ -3,6 +3,7 @@
 //!
 //! Loops are cut here; they come back in `closure`.
 
+pub(crate) mod checks;
 pub(crate) mod expressions;
 
 use modelmill_spec::{Axis, FrameIdx, Mechanism, Step};

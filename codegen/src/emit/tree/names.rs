@@ -5,6 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use modelmill_algebra::field::Stream;
 use modelmill_spec::{DriveKind, Mechanism};
 
 use crate::expr::print::Symbol;
@@ -12,7 +13,6 @@ use crate::expr::vector::{self, Vector};
 use crate::expr::{Atom, ExprId, F64, Graph, Node, Tape};
 use crate::lower::{Op, Program};
 use crate::{Derivation, Evaluator, States};
-use modelmill_algebra::field::Stream;
 
 /// A state with all its atoms' values, and the quantities with a meaning there.
 #[derive(Clone, Debug)]
@@ -213,7 +213,7 @@ pub(crate) fn reserved(mechanism: &Mechanism) -> BTreeSet<String> {
 fn sines(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
     let projection = &derivation.equations.projection;
     let mechanism = &derivation.mechanism;
-    let seen = graph.reachable(&projection.residual);
+    let seen = graph.reachable(&projection.loops.residual);
     let mut named = Vec::new();
     for (i, _) in seen.into_iter().enumerate().filter(|(_, seen)| *seen) {
         let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
@@ -224,7 +224,7 @@ fn sines(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
         };
         named.push((trigonometric(mechanism, letter, angle), id));
     }
-    for p in &projection.passive {
+    for p in &projection.loops.passive {
         let angle = crate::expr::AngleSum::new([(Atom::Coordinate(*p), 1)]);
         let (cosine, sine) = graph.cos_sin(&angle, 0);
         named.push((trigonometric(mechanism, "c", &angle), cosine));
@@ -259,7 +259,7 @@ fn rates(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
     let mechanism = &derivation.mechanism;
     let projection = &derivation.equations.projection;
     let mut named = Vec::new();
-    for (k, p) in projection.passive.iter().enumerate() {
+    for (k, p) in projection.loops.passive.iter().enumerate() {
         let name = &*mechanism.coordinates[*p].name;
         named.push((Symbol::derived(name, 1), projection.passive_rates[k]));
         named.push((
@@ -276,7 +276,12 @@ fn rates(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
         named.push((Symbol::new(&*name), motion.coordinate));
         named.push((Symbol::derived(&*name, 1), motion.rate));
         named.push((Symbol::derived(&*name, 2), motion.acceleration));
-        for (a, slope) in projection.active.iter().zip(&projection.drive_jacobian[d]) {
+        for (a, slope) in projection
+            .loops
+            .active
+            .iter()
+            .zip(&projection.drive_jacobian[d])
+        {
             let coordinate = &mechanism.coordinates[*a].name;
             named.push((
                 Symbol::new(format!("J_{}_{coordinate}", drive.name)),
@@ -395,7 +400,7 @@ fn points(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
         });
     }
     let places: Option<Vec<Vector>> = (0..mechanism.points.len())
-        .map(|i| crate::loops::closure::position_in_base(graph, &mechanism, tree, i).ok())
+        .map(|i| crate::loops::stretch::position_in_base(graph, &mechanism, tree, i).ok())
         .collect();
     let Some(places) = places else {
         return Vec::new();

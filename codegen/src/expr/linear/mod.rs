@@ -3,18 +3,16 @@
 //! Blocks that are too large for that are torn apart first.
 //! No pivot is ever divided by except the determinant of a block, so that a regular system has no spurious singularity.
 
+mod cofactors;
 mod torn;
-
-use rustc_hash::FxHashMap;
 
 use petgraph::algo::{maximum_matching, tarjan_scc};
 use petgraph::graph::{DiGraph, NodeIndex, UnGraph};
 
+use cofactors::{LARGEST_BLOCK, by_cofactors};
+
 use crate::DeriveError;
 use crate::expr::{ExprId, Graph, Rational};
-
-/// The largest block that is solved by cofactors.
-pub(crate) const LARGEST_BLOCK: usize = 10;
 
 /// The solution of a linear system, and what must not vanish for it to exist.
 pub(crate) struct Solution {
@@ -84,59 +82,6 @@ pub(crate) fn solve(
     })
 }
 
-/// Solves a small system by cofactors: one row of values per unknown, and the determinant. `None` if that is zero.
-pub(crate) fn by_cofactors(
-    graph: &mut Graph,
-    block: &[Vec<ExprId>],
-    rhs: &[Vec<ExprId>],
-) -> Option<(Vec<Vec<ExprId>>, ExprId)> {
-    let (n, n_rhs) = (block.len(), rhs.first().map_or(0, Vec::len));
-    let all = (1u32 << n) - 1;
-    let mut minors = Minors {
-        matrix: block,
-        known: FxHashMap::default(),
-    };
-    let determinant = minors.minor(graph, all, all);
-    if determinant == Graph::ZERO {
-        return None;
-    }
-    let inverse = graph.pow(determinant, -1);
-    let mut values = vec![vec![Graph::ZERO; n_rhs]; n];
-    for k in 0..n_rhs {
-        if rhs.iter().all(|row| row[k] == Graph::ZERO) {
-            continue;
-        }
-        for (j, value) in values.iter_mut().enumerate() {
-            let mut terms = Vec::new();
-            for (i, row) in rhs.iter().enumerate() {
-                if row[k] == Graph::ZERO {
-                    continue;
-                }
-                let minor = minors.minor(graph, all & !(1 << i), all & !(1 << j));
-                let sign = if (i + j) % 2 == 0 {
-                    Rational::ONE
-                } else {
-                    Rational::MINUS_ONE
-                };
-                terms.push((graph.mul(minor, row[k]), sign));
-            }
-            let numerator = graph.sum(&terms);
-            value[k] = graph.mul(numerator, inverse);
-        }
-    }
-    Some((values, determinant))
-}
-
-/// The determinant of a small matrix.
-pub(crate) fn determinant(graph: &mut Graph, matrix: &[Vec<ExprId>]) -> ExprId {
-    let all = (1u32 << matrix.len()) - 1;
-    let mut minors = Minors {
-        matrix,
-        known: FxHashMap::default(),
-    };
-    minors.minor(graph, all, all)
-}
-
 /// Rows with the columns that they determine, such that a block needs only the columns of blocks before it
 /// (Dulmage and Mendelsohn 1963). `None` if no choice of one entry per row and column avoids zeros.
 fn blocks(matrix: &[Vec<ExprId>]) -> Option<Vec<(Vec<usize>, Vec<usize>)>> {
@@ -171,35 +116,4 @@ fn blocks(matrix: &[Vec<ExprId>]) -> Option<Vec<(Vec<usize>, Vec<usize>)>> {
         (rows, columns)
     });
     Some(blocks.collect())
-}
-
-/// Minors by expansion along their first row, each computed once.
-struct Minors<'a> {
-    matrix: &'a [Vec<ExprId>],
-    known: FxHashMap<(u32, u32), ExprId>,
-}
-
-impl Minors<'_> {
-    fn minor(&mut self, graph: &mut Graph, rows: u32, columns: u32) -> ExprId {
-        if rows == 0 {
-            return Graph::ONE;
-        }
-        if let Some(value) = self.known.get(&(rows, columns)) {
-            return *value;
-        }
-        let row = rows.trailing_zeros();
-        let mut terms = Vec::new();
-        let mut sign = Rational::ONE;
-        for column in (0..u32::BITS as usize).filter(|c| columns & (1 << c) != 0) {
-            let entry = self.matrix[row as usize][column];
-            if entry != Graph::ZERO {
-                let minor = self.minor(graph, rows & !(1 << row), columns & !(1 << column));
-                terms.push((graph.mul(entry, minor), sign.clone()));
-            }
-            sign = -&sign;
-        }
-        let value = graph.sum(&terms);
-        self.known.insert((rows, columns), value);
-        value
-    }
 }

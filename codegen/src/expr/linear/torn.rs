@@ -6,7 +6,7 @@
 //! and every part follows by least squares, which here are exact and divide by a sum of squares: a part is singular only
 //! where its own unknowns are not determined. (Tearing: Kron 1963.)
 
-use crate::expr::linear::{LARGEST_BLOCK, by_cofactors, determinant};
+use super::cofactors::{LARGEST_BLOCK, by_cofactors, determinant};
 use crate::expr::{ExprId, Graph, Rational};
 
 /// Rows and columns that hang together without the torn columns.

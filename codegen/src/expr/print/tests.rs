@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use modelmill_algebra::field::Stream;
 use modelmill_spec::Mechanism;
 use proptest::prelude::*;
 
 use super::parse::parse;
 use super::{Formula, Function, Symbol, atom, formula};
 use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Rational, Tape, Unary};
-use modelmill_algebra::field::Stream;
 
 /// How to build an expression.
 #[derive(Clone, Debug)]

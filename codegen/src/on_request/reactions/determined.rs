@@ -3,14 +3,14 @@
 //! Forces at the cuts that no virtual motion feels, the null space of the transposed Jacobian of all closing equations,
 //! may have any size. A component is determined if none of them reaches it.
 
+use modelmill_algebra::field::Stream;
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
 use super::loads::Cut;
 use crate::expr::{Atom, ExprId, F64, Graph, Tape};
-use crate::loops::numeric_poses::{Loops, symmetric};
+use crate::loops::numeric_poses::{NumericLoops, symmetric};
 use crate::regressor::Equations;
-use modelmill_algebra::field::Stream;
 
 /// Poses that are looked at, and how far they reach, in rad or relative to the size of the loops.
 const POSES: usize = 4;
@@ -70,7 +70,7 @@ pub(super) fn determined(
         .flat_map(|i| graph.differentiate(&gaps, Atom::Coordinate(i)))
         .collect();
     let jacobian = Tape::new(graph, &slopes);
-    let loops = Loops::new(graph, mechanism, &equations.projection.residual);
+    let loops = NumericLoops::new(graph, mechanism, &equations.projection.loops.residual);
     let mut poses: Vec<Vec<f64>> = (0..POSES)
         .filter_map(|_| loops.random(REACH, &mut stream))
         .collect();

@@ -8,7 +8,7 @@ use super::through;
 use crate::DeriveError;
 use crate::expr::vector::{self, Turn, Vector, push_turn};
 use crate::expr::{Atom, ExprId, Graph};
-use crate::loops::closure::{self, Between, fixed_turns, inverse, point_at, sum_of};
+use crate::loops::stretch::{self, Between, fixed_turns, inverse, point_at, sum_of};
 use crate::newton_euler::{Load, Wrench, turn_in_all};
 use crate::regressor::Equations;
 use crate::regressor::rod;
@@ -275,7 +275,7 @@ pub(super) fn rods(
             };
             let length = equations.projection.drives[d.0].coordinate;
             let ends = [from.0, to.0]
-                .map(|point| closure::position_in_base(graph, mechanism, tree, point));
+                .map(|point| stretch::position_in_base(graph, mechanism, tree, point));
             let [a, b] = ends;
             let forces = rod::end_forces(graph, [a?, b?], length, &equations.gravity, &moments);
             for (point, force) in [from, to].into_iter().zip(forces) {

@@ -16,16 +16,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use modelmill_spec::{Axis, Mechanism, Place};
 use nalgebra::DMatrix;
 
-use crate::derive::base;
+use crate::expr::nominal_value;
 use crate::expr::vector::Vector;
 use crate::expr::{Atom, ExprId, Graph};
-use crate::loops::branches::closed_form;
+use crate::loops::independent::most_different_rows;
 use crate::lower::Program;
 use crate::newton_euler::{self, Load, Style, Wrench, joint_wrenches};
 use crate::programs::closing::Closing;
-use crate::programs::nominal_value;
+use crate::reduce::base;
 use crate::regressor::Equations;
-use crate::regressor::projection::most_different_rows;
 use crate::tree::Tree;
 use crate::tree::expressions::Monomial;
 use crate::{Derivation, DeriveError};
@@ -80,7 +79,7 @@ impl Derivation {
     /// Loops that are too large to be solved for their forces.
     pub fn reactions(&self) -> Result<Reactions, DeriveError> {
         let mut graph = self.graph.clone();
-        reactions(&mut graph, &self.mechanism, &self.equations)
+        reactions(&mut graph, &self.mechanism, &self.equations, &self.closing)
     }
 }
 
@@ -88,6 +87,7 @@ fn reactions(
     graph: &mut Graph,
     mechanism: &Mechanism,
     equations: &Equations,
+    closing: &Closing,
 ) -> Result<Reactions, DeriveError> {
     let tree = &equations.tree;
     let free = free_links(mechanism, equations);
@@ -126,8 +126,7 @@ fn reactions(
         .filter_map(|(component, determined)| determined.then_some(*component))
         .collect();
     let outputs = graph.substitute(&outputs, &known);
-    let plan = closed_form(graph, mechanism, &equations.projection);
-    let mut closing = Closing::new(graph, mechanism, equations, plan)?;
+    let mut closing = closing.clone();
     closing.guard(graph, mechanism, &closing_forces.determinants);
     let program = closing.program(graph, equations, &outputs);
 
@@ -226,7 +225,7 @@ fn closing_forces(
     drives: &[ExprId],
 ) -> Result<ClosingForces, DeriveError> {
     let projection = &equations.projection;
-    if projection.passive.is_empty() {
+    if projection.loops.passive.is_empty() {
         return Ok(ClosingForces {
             of_gap: BTreeMap::new(),
             determinants: Vec::new(),
@@ -246,7 +245,7 @@ fn closing_forces(
         })
         .collect();
     let gaps = closing_gaps(graph, mechanism, equations, cuts);
-    if gaps.len() != projection.passive.len() {
+    if gaps.len() != projection.loops.passive.len() {
         return Err(DeriveError::Singular {
             what: "the loops for their forces".to_owned(),
         });
@@ -274,10 +273,16 @@ fn closing_gaps(
             all.push(gap);
         }
     }
-    if projection.residual.iter().all(|row| all.contains(row)) {
-        return projection.residual.clone();
+    if projection
+        .loops
+        .residual
+        .iter()
+        .all(|row| all.contains(row))
+    {
+        return projection.loops.residual.clone();
     }
     let slopes: Vec<ExprId> = projection
+        .loops
         .passive
         .iter()
         .flat_map(|p| graph.differentiate(&all, Atom::Coordinate(*p)))
@@ -286,7 +291,7 @@ fn closing_gaps(
         let value = nominal_value(graph, mechanism, *slope);
         value.filter(|x| x.is_finite()).unwrap_or(0.0)
     });
-    let n = projection.passive.len();
+    let n = projection.loops.passive.len();
     let jacobian = DMatrix::from_iterator(all.len(), n, values);
     let rows = most_different_rows(&jacobian, n);
     rows.into_iter().map(|row| all[row]).collect()

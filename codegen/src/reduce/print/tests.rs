@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use modelmill_algebra::field::{Element, Stream};
+
 use proptest::prelude::*;
 
 use super::super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
 use crate::expr::print::parse::parse;
 use crate::expr::{Atom, FieldPoint, Rational};
 use crate::review::tests::model;
-use modelmill_algebra::field::{Element, Stream};
 
 fn multiply(a: &Polynomial, b: &Polynomial) -> Polynomial {
     let mut product: BTreeMap<Powers, Rational> = BTreeMap::new();

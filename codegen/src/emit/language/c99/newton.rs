@@ -7,14 +7,14 @@ use modelmill_spec::Motion;
 use super::Unit;
 use super::source::{given, single};
 use crate::emit::tree::Routine;
-use crate::loops::closure::coordinates_of;
+use crate::expr::coordinates_of;
 
 /// The nominal pose, Newton's method, and how it begins.
 pub(super) fn newton(unit: &Unit<'_>, text: &mut String) {
     let Unit { name, upper, .. } = unit;
     let derivation = unit.source.derivation;
     let (active, passive) = derivation.coordinates();
-    let residual = &derivation.equations.projection.residual;
+    let residual = &derivation.equations.projection.loops.residual;
     let in_loops = coordinates_of(&derivation.graph, residual);
     let has_scale = derivation.programs.scale.is_some();
     let nominal = |i: &usize| {

@@ -12,7 +12,7 @@ use crate::emit::identifier::of_field;
 use crate::emit::language::syntax::Syntax;
 use crate::emit::tree::{Expression, Scope, inputs_of_state, uses_load};
 use crate::expr::Atom;
-use crate::loops::closure::coordinates_of;
+use crate::expr::coordinates_of;
 use crate::lower::{OperationCount, Program, Stage};
 
 /// What the module says of itself.
@@ -307,7 +307,7 @@ pub(super) fn nominal<'a>(
     coordinates: &'a [usize],
     scale: Option<&'a TokenStream>,
 ) -> impl Iterator<Item = TokenStream> + use<'a> {
-    let residual = &derivation.equations.projection.residual;
+    let residual = &derivation.equations.projection.loops.residual;
     let in_loops = coordinates_of(&derivation.graph, residual);
     coordinates.iter().map(move |i| {
         let coordinate = &derivation.mechanism.coordinates[*i];

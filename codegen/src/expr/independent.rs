@@ -1,0 +1,62 @@
+//! Which functions are linearly independent: elimination on their values at random points of a prime field.
+
+use modelmill_algebra::eliminate::Echelon;
+use modelmill_algebra::field::{Element, Stream};
+
+use super::{Atom, ExprId, FieldPoint, Graph, Tape};
+use crate::DeriveError;
+
+/// Seed of the draws: the same model gives the same text on any machine.
+pub(crate) const SEED: u64 = 0x6D6F_6465_6C6D_696C;
+
+/// How many points in a row must show nothing new. At a random point the rows of H leave a space that is not yet all of
+/// theirs with certainty but for a chance of about 2^-55, so that one would do.
+pub(crate) const IDLE: usize = 2;
+
+/// Which of some functions are linearly independent over the constants, all atoms being free; the first ones are kept.
+pub(crate) fn independent_functions(
+    graph: &Graph,
+    roots: &[ExprId],
+) -> Result<Vec<usize>, DeriveError> {
+    if roots.is_empty() {
+        return Ok(Vec::new());
+    }
+    let tape = Tape::new(graph, roots);
+    let atoms = graph.atoms(roots);
+    let mut stream = Stream::new(SEED);
+    let mut constants = FieldPoint::<Element> {
+        seed: stream.bits(),
+        root_seed: stream.bits(),
+        ..FieldPoint::default()
+    };
+    let mut draw = |point: &mut FieldPoint, fixed: bool| {
+        for atom in &atoms {
+            if matches!(atom, Atom::Constant(_) | Atom::Pi) == fixed {
+                point.values.insert(*atom, stream.element());
+                point.angles.insert(*atom, stream.circle());
+            }
+        }
+    };
+    draw(&mut constants, true);
+    let order: Vec<usize> = (0..roots.len()).collect();
+    let mut echelon = Echelon::new(&order);
+    let mut idle = 0;
+    for _ in 0..50 * roots.len() {
+        let mut point = constants.clone();
+        draw(&mut point, false);
+        if let Some(row) = tape.evaluate(&point) {
+            idle = if echelon.insert(row) { 0 } else { idle + 1 };
+        } else {
+            // Roots of constants that are not in the field: others may be.
+            draw(&mut constants, true);
+        }
+        if idle >= IDLE {
+            let mut kept = echelon.pivots;
+            kept.sort_unstable();
+            return Ok(kept);
+        }
+    }
+    Err(DeriveError::NoPointFound {
+        draws: 50 * roots.len(),
+    })
+}

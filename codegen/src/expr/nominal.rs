@@ -1,0 +1,23 @@
+//! Values at the nominal pose, with the constants and parameters of the model file.
+
+use modelmill_spec::Mechanism;
+
+use super::{Atom, ExprId, F64, Graph, Tape};
+
+/// Value of an expression at the nominal pose, with the file's constants; rates are zero.
+pub(crate) fn nominal_value(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Option<f64> {
+    Tape::new(graph, &[id])
+        .evaluate(&F64(|atom| nominal_of(mechanism, atom)))
+        .map(|v| v[0])
+}
+
+/// Value of an atom at the nominal pose.
+pub(crate) fn nominal_of(mechanism: &Mechanism, atom: Atom) -> f64 {
+    match atom {
+        Atom::Constant(i) => mechanism.constants[i].value,
+        Atom::Coordinate(i) => mechanism.coordinates[i].nominal,
+        Atom::Parameter(i) => mechanism.parameters[i].nominal,
+        Atom::Pi => std::f64::consts::PI,
+        _ => 0.0,
+    }
+}

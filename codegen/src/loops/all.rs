@@ -1,0 +1,61 @@
+//! All loops of a mechanism, and which coordinates they settle.
+
+use modelmill_spec::Mechanism;
+
+use super::closure::{Closure, closures};
+use super::independent::{independent, sufficient};
+use super::parallelogram;
+use crate::DeriveError;
+use crate::expr::{ExprId, Graph};
+use crate::tree::Tree;
+
+/// The loops of a mechanism with the coordinates that move it and those that follow.
+#[derive(Clone, Debug)]
+pub(crate) struct Loops {
+    pub(crate) active: Vec<usize>,
+    pub(crate) passive: Vec<usize>,
+    pub(crate) closures: Vec<Closure>,
+    /// Residuals that are independent, as many as there are passive coordinates.
+    pub(crate) residual: Vec<ExprId>,
+}
+
+impl Loops {
+    pub(crate) fn new(
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        tree: &Tree,
+    ) -> Result<Self, DeriveError> {
+        let (passive, active): (Vec<usize>, Vec<usize>) =
+            (0..mechanism.coordinates.len()).partition(|i| mechanism.coordinates[*i].passive);
+        let mut closures = closures(graph, mechanism, tree)?;
+        parallelogram::find(graph, mechanism, &mut closures);
+        let residual: Vec<ExprId> = closures
+            .iter()
+            .flat_map(|c| c.residual.iter().copied())
+            .collect();
+        let mut residual = independent(graph, &residual)?;
+        if residual.len() > passive.len()
+            && let Some(enough) = sufficient(graph, mechanism, &residual, passive.len())
+        {
+            residual = enough;
+        }
+        let mut left = residual.clone();
+        for closure in &mut closures {
+            let before = left.len();
+            left.retain(|r| !closure.residual.contains(r));
+            closure.n_independent = before - left.len();
+        }
+        if residual.len() != passive.len() {
+            return Err(DeriveError::LoopCount {
+                equations: residual.len(),
+                passive: passive.len(),
+            });
+        }
+        Ok(Self {
+            active,
+            passive,
+            closures,
+            residual,
+        })
+    }
+}

@@ -1,0 +1,37 @@
+//! What solving a loop yields, whichever way it is solved.
+
+use super::relation::Relation;
+use crate::expr::{AngleSum, ExprId, Graph};
+
+/// Unknown coordinates of a loop as expressions of known ones.
+#[derive(Clone, Debug)]
+pub(crate) struct Solved {
+    /// Cosine and sine of sums of angles, each of which holds unknown coordinates.
+    pub(crate) angles: Vec<(AngleSum, [ExprId; 2])>,
+    /// Angles that are integer combinations of known ones.
+    pub(crate) relations: Vec<Relation>,
+    /// Values of prismatic coordinates.
+    pub(crate) lengths: Vec<(usize, ExprId)>,
+    /// The square root that chooses between the two assembly modes: its sign is `branch`'s.
+    pub(crate) root: Option<Root>,
+}
+
+/// A square root whose sign depends on the assembly mode.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Root {
+    /// What must not be negative for the loop to close.
+    pub(crate) radicand: ExprId,
+    /// An expression of the coordinates that equals the signed root.
+    pub(crate) witness: ExprId,
+    /// The function that the root is, if it needs no root sign: the two modes are then two motions, each by itself.
+    pub(crate) whole: Option<ExprId>,
+}
+
+/// The vector turned by the angle of the given cosine and sine.
+pub(crate) fn turn(graph: &mut Graph, [c, s]: [ExprId; 2], [x, y]: [ExprId; 2]) -> [ExprId; 2] {
+    let products = [(c, x), (s, y), (s, x), (c, y)].map(|(a, b)| graph.mul(a, b));
+    [
+        graph.sub(products[0], products[1]),
+        graph.add(products[2], products[3]),
+    ]
+}

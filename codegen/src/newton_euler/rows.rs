@@ -1,0 +1,55 @@
+//! What wrenches leave at joints, and what both ways of carrying them share.
+
+use super::{Style, Wrench};
+use crate::expr::vector::Vector;
+use crate::expr::{ExprId, Graph, Rational};
+use crate::tree::Link;
+
+/// Generalised forces of the coordinates, as terms that are still to be added.
+pub(super) struct ForceRows(Vec<Vec<(ExprId, Rational)>>);
+
+impl ForceRows {
+    pub(super) fn new(n_coordinates: usize) -> Self {
+        Self(vec![Vec::new(); n_coordinates])
+    }
+
+    /// Leaves a moment about a link's axis and a force along it.
+    pub(super) fn leave(&mut self, link: &Link, moment: ExprId, force: ExprId) {
+        for (coordinate, n) in &link.turns {
+            self.0[*coordinate].push((moment, Rational::integer(i64::from(*n))));
+        }
+        for (coordinate, k) in &link.slides {
+            self.0[*coordinate].push((force, k.clone()));
+        }
+    }
+
+    pub(super) fn sums(self, graph: &mut Graph) -> Vec<ExprId> {
+        self.0.into_iter().map(|terms| graph.sum(&terms)).collect()
+    }
+}
+
+pub(super) fn join(graph: &mut Graph, total: &mut Option<Wrench>, wrench: Wrench) {
+    *total = Some(match *total {
+        None => wrench,
+        Some(there) => Wrench {
+            force: graph.add_vectors(&[there.force, wrench.force]),
+            moment: graph.add_vectors(&[there.moment, wrench.moment]),
+        },
+    });
+}
+
+/// The moment about the point on a link's axis that its position leads to across the axis.
+pub(super) fn back_along_axis(
+    graph: &mut Graph,
+    style: Style,
+    link: &Link,
+    wrench: &Wrench,
+) -> Vector {
+    let (_, along) = style.split_position(link);
+    let [mx, my, mz] = wrench.moment;
+    let (x, y) = (
+        graph.mul(along, wrench.force[1]),
+        graph.mul(along, wrench.force[0]),
+    );
+    [graph.sub(mx, x), graph.add(my, y), mz]
+}

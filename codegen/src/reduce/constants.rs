@@ -1,0 +1,47 @@
+//! Which numbers and constants of the model the factors of eq. (6) can be made of.
+
+use std::collections::BTreeSet;
+
+use super::oracle::Occurrence;
+use crate::expr::{Atom, ExprId, Graph, Node, Unary};
+
+/// In which ways the constants occur in the columns and in the loops.
+pub(super) fn occurrences(
+    graph: &Graph,
+    outputs: &[ExprId],
+    residual: &[ExprId],
+) -> Vec<Occurrence> {
+    let mut roots = outputs.to_vec();
+    roots.extend(residual);
+    let mut found = BTreeSet::new();
+    for node in graph.nodes_of(&roots) {
+        match node {
+            Node::Atom(Atom::Constant(i)) => _ = found.insert((*i, false)),
+            Node::Sin(angle) | Node::Cos(angle) => {
+                found.extend(angle.atoms().filter_map(|atom| match atom {
+                    Atom::Constant(i) => Some((i, true)),
+                    _ => None,
+                }));
+            }
+            _ => {}
+        }
+    }
+    found.into_iter().collect()
+}
+
+/// Numbers under a root sign: they come from sines and cosines of multiples of pi/12.
+pub(super) fn root_radicands(graph: &Graph, outputs: &[ExprId], residual: &[ExprId]) -> Vec<i64> {
+    let mut roots = outputs.to_vec();
+    roots.extend(residual);
+    let mut found = Vec::new();
+    for node in graph.nodes_of(&roots) {
+        if let Node::Unary(Unary::Sqrt, inner) = node
+            && let Node::Rational(value) = graph.node(*inner)
+            && let Some((n, 1)) = value.as_small()
+            && !found.contains(&n)
+        {
+            found.push(n);
+        }
+    }
+    found
+}

@@ -1,0 +1,162 @@
+//! Which columns depend on which, and the proof that the dependences hold.
+
+use modelmill_algebra::field::{Element, MODULUS, PRIMES, Stream};
+use modelmill_spec::Mechanism;
+
+use super::rational_function::RationalFunction;
+use super::reduction::{Dependency, Method, Reduction};
+use super::relations::{self, Relation};
+use super::sample::SampledRegressor;
+use crate::DeriveError;
+use crate::tree::expressions::Monomial;
+
+/// With how many sets of constants the result is shown, and at how many points of motion for each.
+const CONFIRMED_WITH: usize = 4;
+const CONFIRMED_AT: usize = 2;
+
+/// Which columns depend on which, as seen for one random set of constants; columns by position among the effective ones.
+pub(super) struct Pattern {
+    /// Columns that are not identically zero.
+    pub(super) shown: Vec<usize>,
+    /// Retained columns, sorted.
+    pub(super) pivots: Vec<usize>,
+    /// Columns that depend on them.
+    pub(super) dependent: Vec<usize>,
+    /// Pairs of a dependent and a retained column with a factor that does not vanish.
+    pub(super) wanted: Vec<(usize, usize)>,
+    /// The same dependences, also between columns that are closer together.
+    pub(super) relations: Vec<Relation>,
+}
+
+impl Pattern {
+    pub(super) fn find(
+        regressor: &SampledRegressor,
+        order: &[usize],
+        stream: &mut Stream,
+    ) -> Result<Self, DeriveError> {
+        let n = regressor.n_columns;
+        let constants = regressor.sampler.constants::<MODULUS>(stream)?;
+        let echelon = regressor.echelon(&constants, order, None, stream)?;
+        let shown: Vec<usize> = (0..n).filter(|k| echelon.is_seen(*k)).collect();
+        let mut pivots = echelon.pivots.clone();
+        pivots.sort_unstable();
+        let dependent: Vec<usize> = shown
+            .iter()
+            .copied()
+            .filter(|k| !pivots.contains(k))
+            .collect();
+        let wanted = dependent
+            .iter()
+            .flat_map(|j| pivots.iter().map(move |p| (*j, *p)))
+            .filter(|(j, p)| echelon.entry(*p, *j).is_some_and(|x| x != Element::ZERO))
+            .collect();
+        let order: Vec<usize> = (order.iter().copied())
+            .filter(|k| shown.contains(k))
+            .collect();
+        let relations = relations::find(&echelon, &order, &dependent);
+        Ok(Self {
+            shown,
+            pivots,
+            dependent,
+            wanted,
+            relations,
+        })
+    }
+
+    pub(super) fn reduction(
+        &self,
+        mechanism: &Mechanism,
+        candidates: &[Monomial],
+        name: &dyn Fn(usize) -> Monomial,
+        factors: Vec<Option<RationalFunction>>,
+    ) -> Result<Reduction, DeriveError> {
+        let position = |k: usize| {
+            self.shown
+                .iter()
+                .position(|x| *x == k)
+                .expect("a column with an effect is shown")
+        };
+        let mut dependencies: Vec<Dependency> = self
+            .dependent
+            .iter()
+            .map(|j| Dependency {
+                product: position(*j),
+                equals: Vec::new(),
+            })
+            .collect();
+        for ((j, p), factor) in self.wanted.iter().zip(factors) {
+            let retained = self
+                .pivots
+                .iter()
+                .position(|x| x == p)
+                .expect("a wanted pivot is one");
+            let line = self
+                .dependent
+                .iter()
+                .position(|x| x == j)
+                .expect("a wanted column is dependent");
+            let factor = factor.ok_or_else(|| DeriveError::FactorNotRecovered {
+                product: name(*j).text(mechanism),
+                retained: name(*p).text(mechanism),
+            })?;
+            dependencies[line].equals.push((retained, factor));
+        }
+        let products: Vec<Monomial> = self.shown.iter().map(|k| name(*k)).collect();
+        Ok(Reduction {
+            without_effect: candidates
+                .iter()
+                .filter(|c| !products.contains(c))
+                .cloned()
+                .collect(),
+            retained: self.pivots.iter().map(|p| position(*p)).collect(),
+            products,
+            dependencies,
+            method: Method::Exact {
+                confirmed_at: CONFIRMED_WITH * CONFIRMED_AT,
+            },
+        })
+    }
+}
+
+impl Reduction {
+    /// Shows `H p_g = H_min p_min` for random parameters at fresh points of motion with fresh constants.
+    pub(super) fn confirm(
+        &self,
+        regressor: &SampledRegressor,
+        shown: &[usize],
+        stream: &mut Stream,
+    ) -> Result<(), DeriveError> {
+        /// A field that had no part in finding it.
+        const FRESH: u64 = PRIMES[PRIMES.len() - 1];
+        for _ in 0..CONFIRMED_WITH {
+            let constants = regressor.sampler.constants::<FRESH>(stream)?;
+            let parameters: Vec<Element<FRESH>> =
+                self.products.iter().map(|_| stream.element()).collect();
+            let mut base: Vec<Element<FRESH>> =
+                self.retained.iter().map(|k| parameters[*k]).collect();
+            for line in &self.dependencies {
+                for (k, factor) in &line.equals {
+                    let factor = factor.value(&constants).ok_or(DeriveError::RankChanged)?;
+                    base[*k] = base[*k] + factor * parameters[line.product];
+                }
+            }
+            for _ in 0..CONFIRMED_AT {
+                for row in regressor.point(&constants, stream)? {
+                    let sum = |terms: &mut dyn Iterator<Item = (usize, Element<FRESH>)>| {
+                        terms.fold(Element::ZERO, |s, (k, p)| s + row[k] * p)
+                    };
+                    let full = sum(&mut shown.iter().copied().zip(parameters.iter().copied()));
+                    let reduced = sum(&mut self
+                        .retained
+                        .iter()
+                        .map(|k| shown[*k])
+                        .zip(base.iter().copied()));
+                    if full != reduced {
+                        return Err(DeriveError::NotConfirmed);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
