@@ -29,6 +29,7 @@ impl Powers {
     }
 
     /// The product of two terms.
+    #[must_use]
     pub fn times(&self, other: &Self) -> Self {
         Self(self.0.iter().zip(&other.0).map(|(a, b)| a + b).collect())
     }
@@ -43,6 +44,7 @@ impl Powers {
     }
 
     /// The least term that both divide.
+    #[must_use]
     pub fn least_common_multiple(&self, other: &Self) -> Self {
         Self(
             self.0
@@ -150,6 +152,7 @@ impl Polynomial {
     }
 
     /// Its derivative by an unknown.
+    #[must_use]
     pub fn derivative(&self, i: usize) -> Self {
         let mut derivative = Self::new(self.n);
         for (term, factor) in &self.terms {

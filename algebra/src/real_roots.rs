@@ -30,6 +30,7 @@ impl Interval {
     }
 
     /// Values of a polynomial over the interval, by Horner's rule; wider than need be, never too narrow.
+    #[must_use]
     pub fn image(&self, polynomial: &[BigRational]) -> Self {
         let zero = BigRational::zero();
         let mut image = Self {

@@ -14,11 +14,16 @@ fn no_folder_uses_one_that_stands_after_it() {
     let text = fs::read_to_string(root.join("ARCHITECTURE.md")).expect("the page is there");
     let orders = orders(&text);
     assert!(orders.len() > 1, "the table of ARCHITECTURE.md is read");
-    for (crate_folder, order) in &orders {
-        let sources = sources(&root.join(crate_folder));
-        let faults = faults(order, &sources);
-        assert!(faults.is_empty(), "{crate_folder}:\n{}", faults.join("\n"));
-    }
+    let faults: Vec<String> = orders
+        .iter()
+        .flat_map(|(folder, order)| {
+            let faults = faults(order, &sources(&root.join(folder)));
+            faults
+                .into_iter()
+                .map(move |fault| format!("{folder}: {fault}"))
+        })
+        .collect();
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
 /// The table: for every folder of sources, its parts in the order in which they may use each other.

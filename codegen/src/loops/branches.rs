@@ -10,7 +10,7 @@ use modelmill_algebra::field::{Element, Extended, MODULUS, Number, Stream};
 use modelmill_spec::Mechanism;
 
 use super::all::Loops;
-use super::field_poses::{MOST_DRAWS, Poses};
+use super::field_poses::{FieldPoses, MOST_DRAWS};
 use super::plan::{Unknowns, plan};
 use super::solve_step::{Plan, radicands};
 use crate::DeriveError;
@@ -41,17 +41,17 @@ pub(crate) fn closed_form(graph: &mut Graph, mechanism: &Mechanism, loops: &Loop
     if found.steps.iter().all(|step| step.solved.root.is_none()) {
         return Some(found);
     }
-    let poses = Poses::new(graph, mechanism, found.clone(), &loops.residual);
-    let branches = of(graph, &poses, &[]).ok()?;
+    let poses = FieldPoses::new(graph, mechanism, found.clone(), &loops.residual);
+    let branches = branches(graph, &poses, &[]).ok()?;
     (!branches.contains(&Branch::Bound)).then_some(found)
 }
 
 /// What each square root on the way to a pose is, and each of those of coordinates under `outputs`.
 ///
 /// Poses are closed over the quadratic extension, where roots of the prime field always exist.
-pub(crate) fn of(
+pub(crate) fn branches(
     graph: &Graph,
-    poses: &Poses,
+    poses: &FieldPoses,
     outputs: &[ExprId],
 ) -> Result<Vec<Branch>, DeriveError> {
     let further = radicands(graph, outputs);

@@ -4,8 +4,7 @@
 use modelmill_spec::{Mechanism, Motion};
 use nalgebra::DMatrix;
 
-use crate::expr::coordinates_of;
-use crate::expr::{Atom, ExprId, Graph};
+use crate::expr::{Atom, ExprId, Graph, coordinates_of};
 use crate::loops::numeric_poses::NumericLoops;
 
 /// Sets of `size` of the `free` coordinates that settle the loops at the nominal pose and for which these look as if they

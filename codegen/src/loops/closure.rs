@@ -4,7 +4,7 @@ use modelmill_spec::{FrameIdx, Mechanism};
 
 use crate::DeriveError;
 use crate::expr::{AngleSum, ExprId, Graph, coordinates_of};
-use crate::loops::relation::Relation;
+use crate::loops::relation::AngleRelation;
 use crate::loops::spatial;
 use crate::loops::stretch::{Between, Stretch, fixed_turns, inverse, point_at, sum_of};
 use crate::tree::Tree;
@@ -24,7 +24,7 @@ pub(crate) struct Closure {
     /// planar.
     pub(crate) equations: Vec<ExprId>,
     /// Relations that solve it outright; empty if there are none.
-    pub(crate) relations: Vec<Relation>,
+    pub(crate) relations: Vec<AngleRelation>,
     /// Coordinates on which it depends, sorted.
     pub(crate) coordinates: Vec<usize>,
 }

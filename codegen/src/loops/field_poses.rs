@@ -12,7 +12,7 @@ use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Tape, Unary};
 pub(crate) const MOST_DRAWS: usize = 4000;
 
 /// Draws poses that a plan solves for.
-pub(crate) struct Poses {
+pub(crate) struct FieldPoses {
     coordinates: Vec<(usize, Motion)>,
     n_constants: usize,
     /// Functions of constants that exist only for some of them.
@@ -20,7 +20,7 @@ pub(crate) struct Poses {
     pub(crate) steps: Vec<SolveStep>,
 }
 
-impl Poses {
+impl FieldPoses {
     /// Makes a plan evaluable at constants for which also `outputs` may exist.
     pub(crate) fn new(
         graph: &mut Graph,

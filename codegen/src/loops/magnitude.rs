@@ -7,38 +7,7 @@ use modelmill_spec::{Mechanism, Motion};
 use num_rational::BigRational;
 use num_traits::One;
 
-use super::all::Loops;
-use crate::expr::coordinates_of;
-use crate::expr::{Atom, ExprId, F64, Graph, Node, Tape, Unary};
-use crate::expr::{nominal_of, nominal_value};
-
-/// Scales of the residuals, of the passive coordinates and of the active ones, one after the other.
-///
-/// A residual's scale is the sum of the magnitudes of its terms, a sine counting as 1. A coordinate's is 1 for an angle,
-/// the sum of its residuals' scales for a length, and 0 if no loop depends on it.
-pub(crate) fn scales(graph: &mut Graph, mechanism: &Mechanism, loops: &Loops) -> Vec<ExprId> {
-    let mut known = HashMap::new();
-    let residuals: Vec<ExprId> = loops
-        .residual
-        .iter()
-        .map(|r| magnitude(graph, mechanism, &mut known, *r))
-        .collect();
-    let of: Vec<Vec<usize>> = loops
-        .residual
-        .iter()
-        .map(|r| coordinates_of(graph, &[*r]))
-        .collect();
-    let mut scales = residuals.clone();
-    for i in loops.passive.iter().chain(&loops.active) {
-        let rows = residuals.iter().zip(&of).filter(|(_, of)| of.contains(i));
-        let rows: Vec<ExprId> = rows.map(|(scale, _)| *scale).collect();
-        scales.push(match mechanism.coordinates[*i].motion {
-            Motion::Revolute if !rows.is_empty() => Graph::ONE,
-            _ => graph.add_all(&rows),
-        });
-    }
-    scales
-}
+use crate::expr::{Atom, ExprId, F64, Graph, Node, Tape, Unary, nominal_of, nominal_value};
 
 /// The sum of the magnitudes of all terms of some expressions at the nominal pose: the size of a mechanism's loops in m.
 /// It is 1 where there is none.
@@ -189,7 +158,7 @@ fn number(graph: &mut Graph, value: f64) -> ExprId {
 }
 
 /// An expression with every term taken by its magnitude.
-fn magnitude(
+pub(crate) fn magnitude(
     graph: &mut Graph,
     mechanism: &Mechanism,
     known: &mut HashMap<ExprId, ExprId>,

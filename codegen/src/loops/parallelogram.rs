@@ -10,11 +10,10 @@ use modelmill_algebra::field::{Element, Stream};
 use modelmill_spec::{Mechanism, Motion};
 use nalgebra::{DMatrix, DVector};
 
-use crate::expr::coordinates_of;
-use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Node, Tape};
+use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Node, Tape, coordinates_of};
 use crate::loops::closure::Closure;
 use crate::loops::numeric_poses::NumericLoops;
-use crate::loops::relation::Relation;
+use crate::loops::relation::AngleRelation;
 
 /// How far known coordinates are moved from the nominal pose, in rad or relative to the size of the loop, and how exact
 /// a relation must look.
@@ -29,7 +28,7 @@ pub(crate) fn find(graph: &mut Graph, mechanism: &Mechanism, closures: &mut [Clo
     let mut known: BTreeSet<usize> = (0..mechanism.coordinates.len())
         .filter(|c| !mechanism.coordinates[*c].passive)
         .collect();
-    let mut related: Vec<Relation> = Vec::new();
+    let mut related: Vec<AngleRelation> = Vec::new();
     let mut todo: Vec<usize> = (0..closures.len()).collect();
     let unknown_of = |closure: &Closure, known: &BTreeSet<usize>| -> Vec<usize> {
         let coordinates = closure.coordinates.iter().copied();
@@ -60,14 +59,14 @@ fn relations_of(
     mechanism: &Mechanism,
     residual: &[ExprId],
     unknown: &[usize],
-) -> Option<Vec<Relation>> {
+) -> Option<Vec<AngleRelation>> {
     let given: Vec<usize> = coordinates_of(graph, residual)
         .into_iter()
         .filter(|c| !unknown.contains(c))
         .collect();
     let poses = poses(graph, mechanism, residual, unknown, &given)?;
     let fixed = fixed_angles(graph, residual);
-    let candidates: Vec<Vec<Relation>> = unknown
+    let candidates: Vec<Vec<AngleRelation>> = unknown
         .iter()
         .map(|p| relations(mechanism, &poses, &given, &fixed, *p))
         .collect();
@@ -113,7 +112,7 @@ fn fixed_angles(graph: &Graph, roots: &[ExprId]) -> Vec<usize> {
 }
 
 /// One candidate of each list, in all combinations; only the first few.
-fn combinations(candidates: &[Vec<Relation>]) -> impl Iterator<Item = Vec<Relation>> {
+fn combinations(candidates: &[Vec<AngleRelation>]) -> impl Iterator<Item = Vec<AngleRelation>> {
     const MOST: usize = 64;
     let n = candidates
         .iter()
@@ -139,7 +138,7 @@ fn relations(
     given: &[usize],
     fixed: &[usize],
     p: usize,
-) -> Vec<Relation> {
+) -> Vec<AngleRelation> {
     let Some((turning, offset)) = turning(mechanism, poses, given, p) else {
         return Vec::new();
     };
@@ -157,7 +156,7 @@ fn relations(
             let pi12 = twelfths.round() as i32;
             let constants = fixed.iter().zip(&factors);
             let constants = AngleSum::new(constants.map(|(c, n)| (Atom::Constant(*c), *n)));
-            Some(Relation {
+            Some(AngleRelation {
                 coordinate: p,
                 sum: turning.plus(&constants, 1),
                 pi12,
@@ -233,7 +232,7 @@ fn turning(
 }
 
 /// Whether the relations close the loop at every pose: shown at random points of the field.
-fn closes(graph: &mut Graph, residual: &[ExprId], relations: &[Relation]) -> bool {
+fn closes(graph: &mut Graph, residual: &[ExprId], relations: &[AngleRelation]) -> bool {
     let closed = put_in(graph, relations, residual);
     let tape = Tape::new(graph, &closed);
     let atoms = graph.atoms(&closed);
@@ -250,7 +249,7 @@ fn closes(graph: &mut Graph, residual: &[ExprId], relations: &[Relation]) -> boo
 }
 
 /// Replaces the related angles in sines and cosines.
-fn put_in(graph: &mut Graph, relations: &[Relation], roots: &[ExprId]) -> Vec<ExprId> {
+fn put_in(graph: &mut Graph, relations: &[AngleRelation], roots: &[ExprId]) -> Vec<ExprId> {
     let nodes: Vec<Node> = graph
         .nodes_of(roots)
         .filter(|n| matches!(n, Node::Sin(_) | Node::Cos(_)))

@@ -5,8 +5,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::expr::coordinates_of;
-use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational};
+use crate::expr::{AngleSum, Atom, ExprId, Graph, Rational, coordinates_of};
 use crate::loops::closure::{Closure, Leg};
 use crate::loops::solved::{Root, Solved, turn};
 use crate::loops::whole_root;

@@ -4,13 +4,13 @@ use crate::expr::{AngleSum, Atom, ExprId, Graph};
 
 /// A passive angle that equals `sum + pi12 * pi/12`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Relation {
+pub(crate) struct AngleRelation {
     pub(crate) coordinate: usize,
     pub(crate) sum: AngleSum,
     pub(crate) pi12: i32,
 }
 
-impl Relation {
+impl AngleRelation {
     /// The angle that it gives, as a number.
     pub(crate) fn value(&self, graph: &mut Graph) -> ExprId {
         graph.angle(&self.sum, self.pi12)

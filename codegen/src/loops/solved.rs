@@ -1,6 +1,6 @@
 //! What solving a loop yields, whichever way it is solved.
 
-use super::relation::Relation;
+use super::relation::AngleRelation;
 use crate::expr::{AngleSum, ExprId, Graph};
 
 /// Unknown coordinates of a loop as expressions of known ones.
@@ -9,7 +9,7 @@ pub(crate) struct Solved {
     /// Cosine and sine of sums of angles, each of which holds unknown coordinates.
     pub(crate) angles: Vec<(AngleSum, [ExprId; 2])>,
     /// Angles that are integer combinations of known ones.
-    pub(crate) relations: Vec<Relation>,
+    pub(crate) relations: Vec<AngleRelation>,
     /// Values of prismatic coordinates.
     pub(crate) lengths: Vec<(usize, ExprId)>,
     /// The square root that chooses between the two assembly modes: its sign is `branch`'s.

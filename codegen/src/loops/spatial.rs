@@ -10,9 +10,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use modelmill_algebra::field::{Element, Stream};
 use modelmill_spec::{Mechanism, Motion};
 
-use crate::expr::nominal_value;
 use crate::expr::vector::{Turn, push_turn};
-use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Node, Rational, Tape, Unary};
+use crate::expr::{
+    AngleSum, Atom, ExprId, FieldPoint, Graph, Node, Rational, Tape, Unary, nominal_value,
+};
 use crate::loops::magnitude;
 use crate::loops::solved::{Root, Solved};
 use crate::loops::stretch::{Between, Stretch, inverse, stretches, sum_of};

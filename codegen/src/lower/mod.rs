@@ -31,41 +31,61 @@ pub(crate) struct Request<'a> {
     pub(crate) definitions: &'a [Definition],
 }
 
-/// The passes of lowering, by name, in their order.
-pub(crate) const PASSES: [&str; 3] = [
-    "common factors out of sums",
-    "common pairs of terms and factors once",
-    "nested sums and products opened first",
+/// A rewriting of expressions into cheaper ones of equal value.
+pub(crate) struct Pass {
+    /// What it does.
+    pub(crate) name: &'static str,
+    run: fn(Graph, &[ExprId]) -> (Graph, Vec<ExprId>),
+}
+
+/// The passes of lowering in the order in which they run. What stands here is checked and counted with all others.
+pub(crate) static PASSES: [Pass; 3] = [
+    Pass {
+        name: "nested sums and products opened first",
+        run: |mut graph, roots| {
+            let roots = flatten::flatten(&mut graph, roots);
+            (graph, roots)
+        },
+    },
+    Pass {
+        name: "common factors out of sums",
+        run: |mut graph, roots| {
+            let roots = factor_sums::factor_sums(&mut graph, roots);
+            (graph, roots)
+        },
+    },
+    Pass {
+        name: "common pairs of terms and factors once",
+        run: |graph, roots| share::share(&graph, roots),
+    },
 ];
+
+/// How often all passes are run at most; they stop where a round makes the program no cheaper.
+const MOST_ROUNDS: usize = 4;
 
 /// Lowers the expressions of a request to a program.
 pub(crate) fn lower(graph: &Graph, request: &Request<'_>) -> Program {
-    lower_by(graph, PASSES.len(), request)
+    lower_by(graph, &PASSES, request)
 }
 
-/// Lowers them with the first passes of [`PASSES`] only.
-pub(crate) fn lower_by(graph: &Graph, n_passes: usize, request: &Request<'_>) -> Program {
+/// Lowers them with some passes only.
+pub(crate) fn lower_by(graph: &Graph, passes: &[Pass], request: &Request<'_>) -> Program {
     let mut roots: Vec<ExprId> = request.outputs.to_vec();
     roots.extend(request.reachable);
     roots.extend(request.regular.iter().flat_map(|(id, size)| [*id, *size]));
     for definition in request.definitions {
         roots.extend(definition.operands());
     }
-    // Costs are the finished programs', so that no pass is kept that does not pay. The passes go through the whole arena again and again, so that only what is needed should be in it.
-    let (mut graph, mut next) = graph.compacted(&roots);
-    let mut best = schedule::schedule(&graph, &next, request);
-    for _ in 0..4 {
-        (graph, next) = graph.compacted(&next);
-        if n_passes > 2 {
-            next = flatten::flatten(&mut graph, &next);
+    // Costs are the finished programs', so that no round is kept that does not pay. The passes go through the whole arena
+    // again and again, so that only what is needed should be in it.
+    let (mut graph, mut roots) = graph.compacted(&roots);
+    let mut best = schedule::schedule(&graph, &roots, request);
+    for _ in 0..MOST_ROUNDS {
+        (graph, roots) = graph.compacted(&roots);
+        for pass in passes {
+            (graph, roots) = (pass.run)(graph, &roots);
         }
-        if n_passes > 0 {
-            next = factor_sums::factor_sums(&mut graph, &next);
-        }
-        if n_passes > 1 {
-            (graph, next) = share::share(&graph, &next);
-        }
-        let program = schedule::schedule(&graph, &next, request);
+        let program = schedule::schedule(&graph, &roots, request);
         if program.weight() >= best.weight() {
             break;
         }

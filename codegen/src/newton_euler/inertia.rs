@@ -8,7 +8,7 @@ use crate::DeriveError;
 use crate::expr::{ExprId, Graph, Rational};
 use crate::newton_euler::{ELEMENTS, Element, Inertia};
 use crate::tree::Tree;
-use crate::tree::expressions::{self, Monomial, Polynomial};
+use crate::tree::expressions::{self, Monomial, ParameterPolynomial};
 
 /// For every product of parameters, the inertia that it has on each link.
 #[derive(Clone, Debug, Default)]
@@ -94,7 +94,12 @@ impl InertiaByProduct {
             .collect()
     }
 
-    fn add(&mut self, graph: &mut Graph, link: Option<usize>, elements: [Polynomial; ELEMENTS]) {
+    fn add(
+        &mut self,
+        graph: &mut Graph,
+        link: Option<usize>,
+        elements: [ParameterPolynomial; ELEMENTS],
+    ) {
         // What is fixed to the base moves nothing; its products stay known, with no inertia anywhere.
         for (element, polynomial) in elements.into_iter().enumerate() {
             for (product, factor) in polynomial.0 {
@@ -123,8 +128,8 @@ fn mass_at(point: &Point, term: &EffectTerm) -> LumpedMass {
 fn part_elements(
     graph: &mut Graph,
     inertial: &Inertial,
-) -> Result<[Polynomial; ELEMENTS], DeriveError> {
-    let mut elements: [Polynomial; ELEMENTS] = Default::default();
+) -> Result<[ParameterPolynomial; ELEMENTS], DeriveError> {
+    let mut elements: [ParameterPolynomial; ELEMENTS] = Default::default();
     match inertial {
         Inertial::Linear {
             mass,
@@ -163,7 +168,7 @@ fn part_elements(
 fn lump_elements(
     graph: &mut Graph,
     lump: &LumpedMass,
-) -> Result<[Polynomial; ELEMENTS], DeriveError> {
+) -> Result<[ParameterPolynomial; ELEMENTS], DeriveError> {
     let share = Rational::from(lump.share.clone());
     let mass = expressions::polynomial(graph, &lump.mass)?.scaled(&share, graph);
     let force_at = polynomials(graph, &lump.force_at)?;
@@ -171,7 +176,10 @@ fn lump_elements(
     point_elements(graph, &mass, &force_at, &moment_at)
 }
 
-fn polynomials(graph: &mut Graph, exact: &[Exact; 3]) -> Result<[Polynomial; 3], DeriveError> {
+fn polynomials(
+    graph: &mut Graph,
+    exact: &[Exact; 3],
+) -> Result<[ParameterPolynomial; 3], DeriveError> {
     Ok([
         expressions::polynomial(graph, &exact[0])?,
         expressions::polynomial(graph, &exact[1])?,
@@ -182,11 +190,11 @@ fn polynomials(graph: &mut Graph, exact: &[Exact; 3]) -> Result<[Polynomial; 3],
 /// A point mass: `m`, `m c` and `m (c'c 1 - c c')` about the origin (Steiner).
 fn point_elements(
     graph: &mut Graph,
-    mass: &Polynomial,
-    force_at: &[Polynomial; 3],
-    moment_at: &[Polynomial; 3],
-) -> Result<[Polynomial; ELEMENTS], DeriveError> {
-    let mut elements: [Polynomial; ELEMENTS] = Default::default();
+    mass: &ParameterPolynomial,
+    force_at: &[ParameterPolynomial; 3],
+    moment_at: &[ParameterPolynomial; 3],
+) -> Result<[ParameterPolynomial; ELEMENTS], DeriveError> {
+    let mut elements: [ParameterPolynomial; ELEMENTS] = Default::default();
     elements[Element::Mass.index()] = mass.clone();
     for i in 0..3 {
         elements[Element::ForceMoment(i).index()] = mass.times(&force_at[i], graph)?;
@@ -198,8 +206,9 @@ fn point_elements(
     };
     let squares = [second(0, 0)?, second(1, 1)?, second(2, 2)?];
     let pairs = [second(0, 1)?, second(0, 2)?, second(1, 2)?];
-    let mut set =
-        |position: usize, value: Polynomial| elements[Element::Inertia(position).index()] = value;
+    let mut set = |position: usize, value: ParameterPolynomial| {
+        elements[Element::Inertia(position).index()] = value;
+    };
     set(0, squares[1].plus(&squares[2], graph));
     set(3, squares[0].plus(&squares[2], graph));
     set(5, squares[0].plus(&squares[1], graph));

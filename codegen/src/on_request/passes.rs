@@ -30,10 +30,15 @@ impl Derivation {
     pub fn operations_by_pass(&self) -> Result<Vec<PassCount>, DeriveError> {
         let mut counts = Vec::new();
         let plain = ["plain recursion, equal expressions once"];
-        let names = plain.iter().chain(&cheapest::PASSES).chain(&lower::PASSES);
-        for (n, pass) in names.enumerate() {
-            let of_forms = n.min(cheapest::PASSES.len());
-            let [inverse_dynamics, regressor] = counted(self, of_forms, n - of_forms)?;
+        let forms = plain.iter().chain(&cheapest::PASSES).enumerate();
+        let forms = forms.map(|(n, pass)| (*pass, n, &lower::PASSES[..0]));
+        let all_forms = cheapest::PASSES.len();
+        // The first pass only makes the others find more, so that it is counted last.
+        let lowering = [(1, 1..2), (2, 1..3), (0, 0..3)];
+        let lowering = lowering
+            .map(|(last, used)| (lower::PASSES[last].name, all_forms, &lower::PASSES[used]));
+        for (pass, of_forms, of_lowering) in forms.chain(lowering) {
+            let [inverse_dynamics, regressor] = counted(self, of_forms, of_lowering)?;
             counts.push(PassCount {
                 pass,
                 inverse_dynamics,
@@ -44,11 +49,11 @@ impl Derivation {
     }
 }
 
-/// Operations of inverse dynamics and base regressor with so many passes of the recursions and of lowering.
+/// Operations of inverse dynamics and base regressor with so many passes of the recursions and these of lowering.
 fn counted(
     derivation: &Derivation,
     of_forms: usize,
-    of_lowering: usize,
+    of_lowering: &'static [lower::Pass],
 ) -> Result<[OperationCount; 2], DeriveError> {
     let mut graph = derivation.graph.clone();
     let (graph, mechanism): (&mut Graph, &Mechanism) = (&mut graph, &derivation.mechanism);

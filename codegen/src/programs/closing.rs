@@ -6,15 +6,14 @@ use std::collections::BTreeMap;
 use modelmill_spec::Mechanism;
 
 use crate::DeriveError;
-use crate::expr::nominal_value;
-use crate::expr::{AngleSum, Atom, ExprId, Graph, Node};
+use crate::expr::{AngleSum, Atom, ExprId, Graph, Node, nominal_value};
 use crate::loops::branches::closed_form;
 use crate::loops::magnitude::{self, Size};
 use crate::loops::solve_step::Plan;
 use crate::loops::solved::turn;
 use crate::lower::SINGULAR;
 use crate::lower::cost::cost;
-use crate::lower::{Definition, PASSES, Program, Request, lower_by};
+use crate::lower::{Definition, PASSES, Pass, Program, Request, lower_by};
 use crate::regressor::Equations;
 use crate::tree::checks;
 
@@ -36,8 +35,8 @@ pub(crate) struct Closing {
     size: Size,
     /// Whether effects may have no finite value at some states.
     may_be_undefined: bool,
-    /// How many of the passes of lowering are used.
-    n_passes: usize,
+    /// The passes of lowering that are used.
+    passes: &'static [Pass],
 }
 
 /// An angle as a sum of known angles, a multiple of pi/12, and solved angles by position.
@@ -73,7 +72,7 @@ impl Closing {
             regular: Vec::new(),
             size: Size::of(graph, mechanism, &equations.projection.loops.residual),
             may_be_undefined: checks::may_be_undefined(mechanism),
-            n_passes: PASSES.len(),
+            passes: &PASSES,
         };
         for id in &equations.projection.determinants {
             let limit = SINGULAR * magnitude::at_nominal(graph, mechanism, &[*id]);
@@ -153,9 +152,9 @@ impl Closing {
         }
     }
 
-    /// Uses the first passes of lowering only, to see what the others do.
-    pub(crate) fn limit_passes(&mut self, n: usize) {
-        self.n_passes = n;
+    /// Uses some passes of lowering only, to see what the others do.
+    pub(crate) fn limit_passes(&mut self, passes: &'static [Pass]) {
+        self.passes = passes;
     }
 
     /// How every loop is solved in closed form, if all of them are.
@@ -344,7 +343,7 @@ impl Closing {
             .collect();
         lower_by(
             graph,
-            self.n_passes,
+            self.passes,
             &Request {
                 may_be_undefined: self.may_be_undefined,
                 outputs,

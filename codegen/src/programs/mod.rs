@@ -5,6 +5,7 @@
 
 pub(crate) mod cheapest;
 pub(crate) mod closing;
+mod scales;
 
 use std::collections::BTreeMap;
 
@@ -12,7 +13,7 @@ use modelmill_spec::{Mechanism, Motion};
 
 use crate::DeriveError;
 use crate::expr::{Atom, ExprId, Graph};
-use crate::loops::magnitude::{self, Size};
+use crate::loops::magnitude::Size;
 use crate::lower::{Program, Request, lower};
 use crate::programs::closing::Closing;
 use crate::reduce::{Reduction, base};
@@ -107,7 +108,7 @@ pub(crate) fn programs(
     } else {
         let mut outputs = projection.loops.residual.clone();
         outputs.extend(projection.residual_jacobian.iter().flatten());
-        let scales = magnitude::scales(graph, mechanism, &projection.loops);
+        let scales = scales::scales(graph, mechanism, &projection.loops);
         PassivePosition::Newton(Box::new(LoopPrograms {
             residual: plain(graph, &outputs),
             scales: plain(graph, &scales),

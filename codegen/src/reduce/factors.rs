@@ -7,7 +7,7 @@ use super::oracle::{Budget, Occurrence, Oracle};
 use super::pattern::Pattern;
 use super::rational_function::RationalFunction;
 use super::reconstruct::{self, Survey};
-use super::relations::{self, Related, Relation};
+use super::relations::{self, ColumnRelation, Related};
 use super::sample::SampledRegressor;
 use crate::DeriveError;
 use crate::expr::FieldPoint;
@@ -19,7 +19,7 @@ pub(super) const MOST_OPERATIONS: u64 = 20_000_000_000;
 const FEW: usize = 6;
 
 /// The wanted factors of a pattern; those that resist are `None`.
-pub(super) fn of(
+pub(super) fn find(
     pattern: &Pattern,
     regressor: &SampledRegressor,
     variables: &[Occurrence],
@@ -30,12 +30,12 @@ pub(super) fn of(
     if pattern.wanted.is_empty() {
         return Ok(Vec::new());
     }
-    let direct: Vec<Relation> = (pattern.relations.iter())
+    let direct: Vec<ColumnRelation> = (pattern.relations.iter())
         .filter(|relation| relation.is_direct())
         .cloned()
         .collect();
     let mut budget = Budget::new(operations);
-    let mut by = |relations: &[Relation]| {
+    let mut by = |relations: &[ColumnRelation]| {
         by_relations(
             relations,
             pattern,
@@ -55,7 +55,7 @@ pub(super) fn of(
 
 /// The wanted factors by some relations, those to retained columns among them.
 fn by_relations(
-    all: &[Relation],
+    all: &[ColumnRelation],
     pattern: &Pattern,
     regressor: &SampledRegressor,
     variables: &[Occurrence],
@@ -140,7 +140,7 @@ fn by_relations(
 struct FromMotion<'a> {
     regressor: &'a SampledRegressor,
     pivots: &'a [usize],
-    relations: &'a [Relation],
+    relations: &'a [ColumnRelation],
     sampling: Stream,
     budget: &'a mut Budget,
 }
@@ -261,7 +261,7 @@ mod tests {
         let variables = occurrences(&graph, &outputs, &projection.loops.residual);
         let roots = root_radicands(&graph, &outputs, &projection.loops.residual);
         let mut factors = |pattern: &Pattern| {
-            of(
+            find(
                 pattern,
                 &regressor,
                 &variables,
@@ -275,7 +275,7 @@ mod tests {
             pattern.relations.iter().any(|r| !r.is_direct()),
             "nothing is near"
         );
-        pattern.relations.retain(Relation::is_direct);
+        pattern.relations.retain(ColumnRelation::is_direct);
         Ok([near, factors(&pattern)?])
     }
 

@@ -102,7 +102,7 @@ fn reduce_exactly(
     let pattern = Pattern::find(&regressor, order, &mut stream)?;
     let roots = root_radicands(graph, outputs, &projection.loops.residual);
     let variables = occurrences(graph, outputs, &projection.loops.residual);
-    let factors = factors::of(
+    let factors = factors::find(
         &pattern,
         &regressor,
         &variables,

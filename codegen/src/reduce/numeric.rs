@@ -66,13 +66,13 @@ pub(super) fn reduce(
         } else {
             most_dropped = most_dropped.max(left);
             // What contributes less than is dropped is rounding.
-            let felt = |f: f64| if f.abs() > DEPENDENT { f } else { 0.0 };
+            let above_rounding = |f: f64| if f.abs() > DEPENDENT { f } else { 0.0 };
             lines.push((
                 k,
                 factors
                     .iter()
                     .zip(&kept)
-                    .map(|(f, j)| felt(*f) * norms[k] / norms[*j])
+                    .map(|(f, j)| above_rounding(*f) * norms[k] / norms[*j])
                     .collect(),
             ));
         }

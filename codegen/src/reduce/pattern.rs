@@ -5,7 +5,7 @@ use modelmill_spec::Mechanism;
 
 use super::rational_function::RationalFunction;
 use super::reduction::{Dependency, Method, Reduction};
-use super::relations::{self, Relation};
+use super::relations::{self, ColumnRelation};
 use super::sample::SampledRegressor;
 use crate::DeriveError;
 use crate::tree::expressions::Monomial;
@@ -25,7 +25,7 @@ pub(super) struct Pattern {
     /// Pairs of a dependent and a retained column with a factor that does not vanish.
     pub(super) wanted: Vec<(usize, usize)>,
     /// The same dependences, also between columns that are closer together.
-    pub(super) relations: Vec<Relation>,
+    pub(super) relations: Vec<ColumnRelation>,
 }
 
 impl Pattern {

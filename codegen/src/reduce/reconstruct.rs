@@ -135,14 +135,14 @@ fn moved<O: Oracle>(
         let at = stream.element();
         set(&mut point, constant, at);
         let values = oracle.values(&point)?;
-        let mut is_felt = false;
+        let mut has_effect = false;
         for (k, shape) in shapes.iter_mut().enumerate() {
             if values[k] != at_origin[k] {
                 shape.degrees.insert(constant, (0, 0));
-                is_felt = true;
+                has_effect = true;
             }
         }
-        if is_felt {
+        if has_effect {
             all.push(Moved {
                 constant,
                 at,
@@ -158,14 +158,14 @@ fn moved<O: Oracle>(
 fn apart<'a>(moved: &'a [Moved], functions: &[usize], shapes: &[Shape]) -> Vec<Vec<&'a Moved>> {
     let mut groups: Vec<Vec<&Moved>> = Vec::new();
     for one in moved {
-        let felt = |k: &usize| shapes[*k].degrees.contains_key(&one.constant);
-        let own: Vec<usize> = functions.iter().copied().filter(felt).collect();
+        let depends = |k: &usize| shapes[*k].degrees.contains_key(&one.constant);
+        let own: Vec<usize> = functions.iter().copied().filter(depends).collect();
         if own.is_empty() {
             continue;
         }
         let meet = |other: &Moved| {
-            let felt = |k: &usize| shapes[*k].degrees.contains_key(&other.constant);
-            own.iter().any(felt)
+            let depends = |k: &usize| shapes[*k].degrees.contains_key(&other.constant);
+            own.iter().any(depends)
         };
         let group = groups.iter_mut().find(|g| !g.iter().any(|m| meet(m)));
         match group {
@@ -189,9 +189,9 @@ fn probe<O: Oracle>(
     // Every function with the position in the group of the one constant on which it depends.
     let mut open: Vec<(usize, usize)> = Vec::new();
     for (i, one) in group.iter().enumerate() {
-        let felt = functions.iter().copied();
-        let felt = felt.filter(|k| shapes[*k].degrees.contains_key(&one.constant));
-        open.extend(felt.map(|k| (k, i)));
+        let depends = functions.iter().copied();
+        let depends = depends.filter(|k| shapes[*k].degrees.contains_key(&one.constant));
+        open.extend(depends.map(|k| (k, i)));
     }
     // Places of each constant: different ones, since lengths that are equal may be special.
     let mut places: Vec<Vec<Element>> = group.iter().map(|one| vec![one.at]).collect();

@@ -16,7 +16,7 @@ use crate::expr::{FieldPoint, Rational};
 
 /// One column in terms of others, all by position among the effective ones.
 #[derive(Clone, Debug)]
-pub(super) struct Relation {
+pub(super) struct ColumnRelation {
     /// The column.
     pub(super) column: usize,
     /// Retained columns that it needs.
@@ -25,7 +25,7 @@ pub(super) struct Relation {
     pub(super) dependent: Vec<usize>,
 }
 
-impl Relation {
+impl ColumnRelation {
     /// How many factors it has.
     pub(super) fn len(&self) -> usize {
         self.retained.len() + self.dependent.len()
@@ -90,7 +90,7 @@ pub(super) fn find<const P: u64>(
     echelon: &Echelon<P>,
     order: &[usize],
     dependent: &[usize],
-) -> Vec<Relation> {
+) -> Vec<ColumnRelation> {
     let mut found = Vec::new();
     for (at, column) in order.iter().enumerate() {
         if !dependent.contains(column) {
@@ -107,7 +107,7 @@ pub(super) fn find<const P: u64>(
             .flatten()
         {
             let (dependent, retained) = columns.into_iter().partition(|k| dependent.contains(k));
-            found.push(Relation {
+            found.push(ColumnRelation {
                 column: *column,
                 retained,
                 dependent,
@@ -171,7 +171,7 @@ fn near<const P: u64>(echelon: &Echelon<P>, before: &[usize], column: usize) -> 
 
 /// Values of the factors of all relations, one after the other.
 pub(super) fn values<const P: u64>(
-    relations: &[Relation],
+    relations: &[ColumnRelation],
     echelon: &Echelon<P>,
 ) -> Result<Vec<Element<P>>, DeriveError> {
     let mut values = Vec::new();
@@ -182,16 +182,19 @@ pub(super) fn values<const P: u64>(
 }
 
 /// Relations with their factors as functions of the constants.
-pub(super) struct Related(Vec<(Relation, Factors)>);
+pub(super) struct Related(Vec<(ColumnRelation, Factors)>);
 
 /// The factor of each column of a relation; `None` for those that resist.
 type Factors = Vec<Option<RationalFunction>>;
 
 impl Related {
     /// Takes the factors as [`values`] orders them.
-    pub(super) fn new<'a>(relations: impl Iterator<Item = &'a Relation>, factors: Factors) -> Self {
+    pub(super) fn new<'a>(
+        relations: impl Iterator<Item = &'a ColumnRelation>,
+        factors: Factors,
+    ) -> Self {
         let mut rest = factors.into_iter();
-        let own = |relation: &Relation| {
+        let own = |relation: &ColumnRelation| {
             let factors = relation.columns().map(|_| rest.next().flatten());
             (relation.clone(), factors.collect())
         };
@@ -215,7 +218,7 @@ impl Related {
 
     /// Puts others in the place of relations of the same columns, if they are known.
     pub(super) fn replace(&mut self, others: Self) {
-        let known = |(_, factors): &(Relation, Factors)| factors.iter().all(Option::is_some);
+        let known = |(_, factors): &(ColumnRelation, Factors)| factors.iter().all(Option::is_some);
         for other in others.0.into_iter().filter(known) {
             if let Some(line) = self.0.iter_mut().find(|(r, _)| r.column == other.0.column) {
                 *line = other;
@@ -293,7 +296,7 @@ struct Line {
 }
 
 impl Line {
-    fn of(relation: &Relation, factors: &[Option<RationalFunction>]) -> Self {
+    fn of(relation: &ColumnRelation, factors: &[Option<RationalFunction>]) -> Self {
         let pairs = relation.retained.iter().zip(factors);
         let quotients = (pairs.clone()).map(|(p, f)| Some((*p, Quotient::of(f.as_ref()?)?)));
         Self {
@@ -303,7 +306,7 @@ impl Line {
     }
 
     fn sum(
-        relation: &Relation,
+        relation: &ColumnRelation,
         factors: &[Option<RationalFunction>],
         expanded: &BTreeMap<usize, Self>,
     ) -> Self {

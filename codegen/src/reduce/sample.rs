@@ -13,7 +13,7 @@ use crate::DeriveError;
 use crate::expr::independent::IDLE;
 use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Tape, Unary};
 use crate::loops::branches::{self, Branch};
-use crate::loops::field_poses::{MOST_DRAWS, Poses};
+use crate::loops::field_poses::{FieldPoses, MOST_DRAWS};
 use crate::loops::plan::{Unknowns, plan};
 use crate::regressor::projection::Projection;
 
@@ -23,7 +23,7 @@ const IDLE_WITH_SIGNS: usize = 80;
 
 /// Draws points.
 pub(super) struct Sampler {
-    poses: Poses,
+    poses: FieldPoses,
     n_drives: usize,
     /// Whether poses or outputs take roots of what moves.
     has_roots: bool,
@@ -55,8 +55,8 @@ impl Sampler {
         let mut all = outputs.to_vec();
         all.extend(&projection.passive_rates);
         all.extend(&projection.passive_accelerations);
-        let poses = Poses::new(graph, mechanism, plan, &all);
-        let branches = branches::of(graph, &poses, &all)?;
+        let poses = FieldPoses::new(graph, mechanism, plan, &all);
+        let branches = branches::branches(graph, &poses, &all)?;
         if branches
             .iter()
             .any(|branch| matches!(branch, Branch::Multiple | Branch::Bound))

@@ -57,13 +57,16 @@ pub(super) fn support<O: Oracle>(
         let [solution] = solutions.as_slice() else {
             return Ok(None);
         };
-        let felt = |monomials: &[Powers], factors: &[Element]| -> BTreeSet<Powers> {
+        let with_coefficient = |monomials: &[Powers], factors: &[Element]| -> BTreeSet<Powers> {
             let pairs = monomials.iter().zip(factors);
-            let felt = pairs.filter(|(_, x)| **x != Element::ZERO);
-            felt.map(|(m, _)| m.clone()).collect()
+            let with_coefficient = pairs.filter(|(_, x)| **x != Element::ZERO);
+            with_coefficient.map(|(m, _)| m.clone()).collect()
         };
         let (above, below) = solution.split_at(top.len());
-        kept = [felt(&top, above), felt(&bottom, below)];
+        kept = [
+            with_coefficient(&top, above),
+            with_coefficient(&bottom, below),
+        ];
     }
     Ok(Some(kept.map(|set| set.into_iter().collect())))
 }

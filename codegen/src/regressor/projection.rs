@@ -8,8 +8,7 @@ use modelmill_spec::{DriveKind, Mechanism};
 
 use crate::DeriveError;
 use crate::expr::linear::{self, Solution};
-use crate::expr::nominal_value;
-use crate::expr::{Atom, ExprId, Graph, Node, Rational, Unary};
+use crate::expr::{Atom, ExprId, Graph, Node, Rational, Unary, nominal_value};
 use crate::loops::Loops;
 use crate::loops::stretch::distance_squared;
 use crate::tree::Tree;

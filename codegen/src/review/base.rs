@@ -144,7 +144,7 @@ pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
         let mut says =
             "All columns are linearly independent; nothing needs to be regrouped.".to_owned();
         if let Some(caution) = reduction.method.caution() {
-            says.push_str(&format!(" Beware: {caution}."));
+            says = format!("{says} Beware: {caution}.");
         }
         page.paragraph([text(says)]);
         return;

@@ -62,7 +62,10 @@ pub struct Rank {
     /// States of which eq. (9) was made.
     pub samples: Option<usize>,
     /// How columns were reduced where that was done numerically.
-    #[cfg_attr(any(test, feature = "json"), serde(skip_serializing_if = "Option::is_none"))]
+    #[cfg_attr(
+        any(test, feature = "json"),
+        serde(skip_serializing_if = "Option::is_none")
+    )]
     pub method: Option<NumericMethod>,
 }
 

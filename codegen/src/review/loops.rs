@@ -3,9 +3,8 @@
 use modelmill_spec::{DriveKind, Mechanism, Motion};
 
 use super::document::{Block, Document, Equation, Inline, Line, Table, cell, code, text};
-use crate::expr::nominal_value;
 use crate::expr::print::{Formula, angle_sum, formula, tree_size};
-use crate::expr::{ExprId, Graph, Rational};
+use crate::expr::{ExprId, Graph, Rational, nominal_value};
 use crate::{Derivation, PassivePosition};
 
 /// Expressions with more nodes than this are shown in a program rather than in one line.

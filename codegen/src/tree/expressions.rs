@@ -80,9 +80,9 @@ const MOST_TERMS: usize = 2000;
 
 /// A polynomial in the dynamic parameters whose coefficients are expressions over constants.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Polynomial(pub(crate) BTreeMap<Monomial, ExprId>);
+pub(crate) struct ParameterPolynomial(pub(crate) BTreeMap<Monomial, ExprId>);
 
-impl Polynomial {
+impl ParameterPolynomial {
     fn constant(value: ExprId) -> Self {
         let mut terms = BTreeMap::new();
         if value != Graph::ZERO {
@@ -197,7 +197,10 @@ pub(crate) fn expression_at(
 }
 
 /// An expression as a polynomial in the dynamic parameters.
-pub(crate) fn polynomial(graph: &mut Graph, exact: &Exact) -> Result<Polynomial, DeriveError> {
+pub(crate) fn polynomial(
+    graph: &mut Graph,
+    exact: &Exact,
+) -> Result<ParameterPolynomial, DeriveError> {
     polynomial_at(graph, exact, &|_| None)
 }
 
@@ -205,17 +208,17 @@ fn polynomial_at(
     graph: &mut Graph,
     exact: &Exact,
     place: &dyn Fn(PlaceQuantity) -> Option<ExprId>,
-) -> Result<Polynomial, DeriveError> {
+) -> Result<ParameterPolynomial, DeriveError> {
     Ok(match exact {
         Exact::Rational(value) => {
-            Polynomial::constant(graph.rational(Rational::from(value.clone())))
+            ParameterPolynomial::constant(graph.rational(Rational::from(value.clone())))
         }
-        Exact::Pi => Polynomial::constant(graph.atom(Atom::Pi)),
+        Exact::Pi => ParameterPolynomial::constant(graph.atom(Atom::Pi)),
         Exact::Symbol(Symbol::Parameter(i)) => {
-            Polynomial(BTreeMap::from([(Monomial(vec![(i.0, 1)]), Graph::ONE)]))
+            ParameterPolynomial(BTreeMap::from([(Monomial(vec![(i.0, 1)]), Graph::ONE)]))
         }
         Exact::Symbol(Symbol::Place(quantity)) => match place(*quantity) {
-            Some(value) => Polynomial::constant(value),
+            Some(value) => ParameterPolynomial::constant(value),
             None => {
                 return Err(DeriveError::unsupported(
                     "a quantity of a place stands outside an effect",
@@ -223,9 +226,9 @@ fn polynomial_at(
                 ));
             }
         },
-        Exact::Symbol(symbol) => Polynomial::constant(graph.atom(atom(*symbol))),
+        Exact::Symbol(symbol) => ParameterPolynomial::constant(graph.atom(atom(*symbol))),
         Exact::Sum(operands) => {
-            let mut total = Polynomial::default();
+            let mut total = ParameterPolynomial::default();
             for operand in operands {
                 let operand = polynomial_at(graph, operand, place)?;
                 total = total.plus(&operand, graph);
@@ -233,7 +236,7 @@ fn polynomial_at(
             total
         }
         Exact::Product(operands) => {
-            let mut total = Polynomial::constant(Graph::ONE);
+            let mut total = ParameterPolynomial::constant(Graph::ONE);
             for operand in operands {
                 let operand = polynomial_at(graph, operand, place)?;
                 total = total.times(&operand, graph)?;
@@ -245,7 +248,7 @@ fn polynomial_at(
             if divisor == Graph::ZERO {
                 return Err(DeriveError::unsupported("division by zero", exact));
             }
-            let inverse = Polynomial::constant(graph.pow(divisor, -1));
+            let inverse = ParameterPolynomial::constant(graph.pow(divisor, -1));
             polynomial_at(graph, a, place)?.times(&inverse, graph)?
         }
         Exact::Negative(a) => polynomial_at(graph, a, place)?.scaled(&Rational::MINUS_ONE, graph),
@@ -254,11 +257,11 @@ fn polynomial_at(
             if base == Graph::ZERO {
                 return Err(DeriveError::unsupported("division by zero", exact));
             }
-            Polynomial::constant(graph.pow(base, *n))
+            ParameterPolynomial::constant(graph.pow(base, *n))
         }
         Exact::Power(a, n) => {
             let base = polynomial_at(graph, a, place)?;
-            let mut power = Polynomial::constant(Graph::ONE);
+            let mut power = ParameterPolynomial::constant(Graph::ONE);
             for _ in 0..*n {
                 power = power.times(&base, graph)?;
             }
@@ -269,14 +272,12 @@ fn polynomial_at(
                 (function, AngleParts::of(a))
             {
                 let (c, s) = graph.cos_sin(&sum, pi12);
-                return Ok(Polynomial::constant(if *function == Function::Sin {
-                    s
-                } else {
-                    c
-                }));
+                return Ok(ParameterPolynomial::constant(
+                    if *function == Function::Sin { s } else { c },
+                ));
             }
             let argument = expression_at(graph, a, place)?;
-            Polynomial::constant(graph.unary(unary(*function), argument))
+            ParameterPolynomial::constant(graph.unary(unary(*function), argument))
         }
     })
 }

@@ -150,7 +150,8 @@ pub(in crate::emit) fn base_parameters(
     let called: BTreeMap<&str, Atom> = atoms.values().map(|a| (scope.name(*a), *a)).collect();
     let mut read = BTreeSet::new();
     let values = (0..derivation.reduction.retained.len()).map(|k| {
-        let formula = crate::review::base_expression(derivation, k);
+        let formula =
+            crate::reduce::base::written_out(&derivation.mechanism, &derivation.reduction, k);
         let value = Expression::of_formula(&formula, &|name| match atoms.get(name) {
             Some(atom) => scope.name(*atom).to_owned(),
             None => name.to_owned(),

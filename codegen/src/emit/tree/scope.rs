@@ -139,7 +139,12 @@ fn notes(derivation: &Derivation) -> BTreeMap<String, String> {
     let mechanism = &derivation.mechanism;
     let projection = &derivation.equations.projection;
     let mut notes = BTreeMap::new();
-    let n_gaps: usize = projection.loops.closures.iter().map(|c| c.residual.len()).sum();
+    let n_gaps: usize = projection
+        .loops
+        .closures
+        .iter()
+        .map(|c| c.residual.len())
+        .sum();
     let loops: Vec<String> = mechanism
         .loops
         .iter()

@@ -566,7 +566,9 @@ fn header(face: &Face<'_>) -> String {
     for base in face.derivation.base_parameters() {
         line(&plain(&format!(
             " * {} = {} ({})",
-            base.name, base.expression, comment(&base.unit)
+            base.name,
+            base.expression,
+            comment(&base.unit)
         )));
     }
     line(" */\n\n#ifdef __cplusplus\nextern \"C\" {\n#endif\n");

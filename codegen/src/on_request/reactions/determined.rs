@@ -88,12 +88,12 @@ pub(super) fn determined(
         let (Some(found), Some(slopes)) = (found, jacobian.evaluate(&F64(at))) else {
             continue;
         };
-        let mut felt = DMatrix::from_column_slice(gaps.len(), n, &slopes);
-        for (i, mut column) in felt.column_iter_mut().enumerate() {
+        let mut scaled = DMatrix::from_column_slice(gaps.len(), n, &slopes);
+        for (i, mut column) in scaled.column_iter_mut().enumerate() {
             column *= loops.unit(i);
         }
         let reaching = DMatrix::from_fn(components.len(), unknowns.len(), |r, c| found[c][r]);
-        for null in null_space(&felt) {
+        for null in null_space(&scaled) {
             let moved = &reaching * &null;
             for (r, determined) in determined.iter_mut().enumerate() {
                 *determined &= moved[r].abs() <= NOTHING * reaching.row(r).amax();

@@ -16,9 +16,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use modelmill_spec::{Axis, Mechanism, Place};
 use nalgebra::DMatrix;
 
-use crate::expr::nominal_value;
 use crate::expr::vector::Vector;
-use crate::expr::{Atom, ExprId, Graph};
+use crate::expr::{Atom, ExprId, Graph, nominal_value};
 use crate::loops::independent::most_different_rows;
 use crate::lower::Program;
 use crate::newton_euler::{self, Load, Style, Wrench, joint_wrenches};

@@ -1,0 +1,37 @@
+//! What Newton's method on the loops holds residuals and steps against.
+
+use std::collections::HashMap;
+
+use modelmill_spec::{Mechanism, Motion};
+
+use crate::expr::{ExprId, Graph, coordinates_of};
+use crate::loops::Loops;
+use crate::loops::magnitude::magnitude;
+
+/// Scales of the residuals, of the passive coordinates and of the active ones, one after the other.
+///
+/// A residual's scale is the sum of the magnitudes of its terms, a sine counting as 1. A coordinate's is 1 for an angle,
+/// the sum of its residuals' scales for a length, and 0 if no loop depends on it.
+pub(crate) fn scales(graph: &mut Graph, mechanism: &Mechanism, loops: &Loops) -> Vec<ExprId> {
+    let mut known = HashMap::new();
+    let residuals: Vec<ExprId> = loops
+        .residual
+        .iter()
+        .map(|r| magnitude(graph, mechanism, &mut known, *r))
+        .collect();
+    let of: Vec<Vec<usize>> = loops
+        .residual
+        .iter()
+        .map(|r| coordinates_of(graph, &[*r]))
+        .collect();
+    let mut scales = residuals.clone();
+    for i in loops.passive.iter().chain(&loops.active) {
+        let rows = residuals.iter().zip(&of).filter(|(_, of)| of.contains(i));
+        let rows: Vec<ExprId> = rows.map(|(scale, _)| *scale).collect();
+        scales.push(match mechanism.coordinates[*i].motion {
+            Motion::Revolute if !rows.is_empty() => Graph::ONE,
+            _ => graph.add_all(&rows),
+        });
+    }
+    scales
+}
