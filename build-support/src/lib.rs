@@ -124,8 +124,8 @@ pub fn try_generate_with(pattern: &str, options: Options, out: &Path) -> Result<
     if std::fs::read_to_string(out).is_ok_and(|old| old == text) {
         return Ok(());
     }
-    std::fs::write(out, text)
-        .map_err(|error| BuildError(format!("cannot write {}: {error}", out.display())))
+    modelmill_boundary::files::write(out, text.as_bytes())
+        .map_err(|error| BuildError(format!("cannot write {error}")))
 }
 
 fn files(pattern: &str) -> Result<Vec<PathBuf>, BuildError> {

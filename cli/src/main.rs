@@ -29,6 +29,7 @@ fn main() -> ExitCode {
         }
     };
     let host = Host::new()
+        .with_files(Arc::new(output::disk().clone()))
         .with_libraries(cli.library)
         .with_progress(Arc::new(Terminal::new()));
     match run(&host, &cli.command) {

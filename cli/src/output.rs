@@ -1,8 +1,17 @@
 //! Files that commands write: never over an input, with the reason when it fails.
 
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use modelmill_boundary::files::{Disk, FileError, FileFault};
 
 use crate::failure::{Failure, Outcome};
+
+/// The disk of this run, which remembers what was read so that it is not written over.
+pub(crate) fn disk() -> &'static Disk {
+    static DISK: LazyLock<Disk> = LazyLock::new(Disk::default);
+    &DISK
+}
 
 /// A place to write to that is none of the inputs.
 #[derive(Debug, Clone)]
@@ -73,13 +82,26 @@ pub(crate) fn refuse_dash(path: &Path) -> Outcome {
     ))
 }
 
-/// Writes a file; the reason and what to do if it cannot be.
+/// Writes a file as a whole, but not over one that was read; the reason and what to do if it cannot be.
 pub(crate) fn write(path: &Path, text: &str) -> Outcome {
-    std::fs::write(path, text).map_err(|error| {
-        Failure::Input(format!(
-            "{} cannot be written: {error}; check that the folder exists and may be written to",
-            path.display()
-        ))
+    disk().write(path, text.as_bytes()).map_err(not_written)
+}
+
+/// Writes a file as a whole over one that was read, as the user asks for.
+pub(crate) fn replace(path: &Path, text: &str) -> Outcome {
+    disk().replace(path, text.as_bytes()).map_err(not_written)
+}
+
+fn not_written(error: FileError) -> Failure {
+    let path = error.path.display();
+    Failure::Input(match &error.fault {
+        FileFault::Missing => format!(
+            "{path} cannot be written: there is no such folder; check that the folder exists and may be written to"
+        ),
+        FileFault::Input => {
+            format!("{path} would be overwritten, which this command reads; choose another name")
+        }
+        fault => format!("{path} cannot be written: {fault}; {}", fault.remedy()),
     })
 }
 

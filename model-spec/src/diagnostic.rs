@@ -235,7 +235,8 @@ pub(crate) fn render(diagnostics: &[Diagnostic], sources: &Sources, color: bool)
     }
     text.truncate(text.trim_end().len());
     text.push('\n');
-    text
+    // Names of files and texts of users are in it.
+    modelmill_boundary::text::terminal(&text, color).into_owned()
 }
 
 fn render_one(diagnostic: &Diagnostic, sources: &Sources, renderer: &Renderer) -> String {

@@ -5,7 +5,9 @@
 
 use std::collections::BTreeSet;
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+
+use modelmill_boundary::files::Files;
 
 use crate::diagnostic::{Log, SourceFile, Span};
 use crate::document::{self, Node, Value, get, quote};
@@ -82,15 +84,15 @@ pub fn add_to_model(
     text: &str,
     effect: &NewEffect,
     libraries: &[PathBuf],
-    read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
+    files: &dyn Files,
 ) -> Result<Edited, EditFailure> {
     let model = |failure| EditFailure::Model(Box::new(failure));
-    let before = load_with(path_name, text, libraries, read).map_err(model)?;
+    let before = load_with(path_name, text, libraries, files).map_err(model)?;
     let kind = kind_of(effect, &before.kinds)?;
     refuse_twin(effect, kind, &before.mechanism)?;
     let effect = with_free_names(effect, kind, &before.mechanism);
     let edited = add_effect(text, &effect)?;
-    let loaded = load_with(path_name, &edited, libraries, read)
+    let loaded = load_with(path_name, &edited, libraries, files)
         .map_err(|failure| model(apart(failure, text, &edited, &effect)))?;
     Ok(Edited {
         text: edited,

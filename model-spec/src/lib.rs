@@ -33,6 +33,7 @@ mod print;
 mod range;
 #[cfg(test)]
 mod rank_tests;
+mod reading;
 mod record;
 mod schema;
 mod scope;
@@ -49,11 +50,10 @@ pub use kinds::{
     ActsOn, Carries, EffectKind, KindConstant, KindParameter, LIBRARY, Mechanics, Scale, Search,
     Sign, library,
 };
-pub use load::{
-    Failure, Loaded, kinds_with, load, load_file, load_file_with, load_with, read_limited,
-};
+pub use load::{Failure, Loaded, kinds_with, load, load_file, load_file_with, load_with};
 pub use mechanism::*;
 pub use motion::{Kinematics, Poses};
+pub use reading::{read_named, read_text};
 pub use unit::unit_product;
 
 #[cfg(any(test, feature = "schema"))]

@@ -1,14 +1,16 @@
 //! Reads a model file and those that it extends, and makes the mechanism that they describe.
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use modelmill_boundary::files::{Disk, FileError, FileFault, Files, tidy};
+
 use crate::build::build;
-use crate::diagnostic::{self, Diagnostic, Log, Severity, SourceFile, Sources, Span};
-use crate::document::{self, LARGEST_FILE, Table, Value, get, quote};
+use crate::diagnostic::{self, Diagnostic, Log, SourceFile, Sources, Span};
+use crate::document::{self, Table, Value, get, quote};
 use crate::kinds::{self, EffectKind};
 use crate::mechanism::Mechanism;
 use crate::merge::merge;
+use crate::reading::{read_named, read_text};
 use crate::schema::{EffectKindEntry, ModelEntry};
 
 /// Longest chain of variants.
@@ -67,78 +69,21 @@ impl std::error::Error for Failure {}
 ///
 /// Fails with every finding about the files, each with its place.
 pub fn load_file(path: &Path) -> Result<Loaded, Failure> {
-    load_file_with(path, &[])
+    load_file_with(path, &[], &Disk::default())
 }
 
-/// Reads a model file from disk as [`load_file`] does, with further libraries of kinds of effects.
-pub fn load_file_with(path: &Path, libraries: &[PathBuf]) -> Result<Loaded, Failure> {
-    let mut read = read_limited;
-    match read(path) {
-        Ok(text) => load_with(&path.to_string_lossy(), &text, libraries, &mut read),
-        Err(error) if error.kind() == std::io::ErrorKind::InvalidData => Err(no_text(path)),
-        Err(error) => Err(Failure {
-            diagnostics: vec![Diagnostic {
-                severity: Severity::Error,
-                message: format!("cannot read `{}`: {error}", path.display()),
-                span: None,
-                label: String::new(),
-                related: None,
-                help: vec![
-                    "give the path of a model file, such as `model-spec/models/two_link.toml`"
-                        .to_owned(),
-                ],
-            }],
-            sources: Sources::default(),
-        }),
-    }
+/// Reads a model file as [`load_file`] does, with further libraries of kinds of effects, and all files from `files`.
+pub fn load_file_with(
+    path: &Path,
+    libraries: &[PathBuf],
+    files: &dyn Files,
+) -> Result<Loaded, Failure> {
+    let advice = "give the path of a model file, such as `model-spec/models/two_link.toml`";
+    let text = read_text(files, path, advice)?;
+    load_with(&path.to_string_lossy(), &text, libraries, files)
 }
 
-/// What is wrong with a file whose bytes are no text, with the place of the first of them.
-fn no_text(path: &Path) -> Failure {
-    let mut bytes = Vec::new();
-    // What could be read a moment ago can be read again; if not, the place is the start.
-    if let Ok(file) = std::fs::File::open(path) {
-        let _ = file.take(LARGEST_FILE as u64 + 1).read_to_end(&mut bytes);
-    }
-    let start = match std::str::from_utf8(&bytes) {
-        Ok(text) => text.len(),
-        Err(error) => error.valid_up_to(),
-    };
-    let text = String::from_utf8_lossy(&bytes).into_owned();
-    let end = (start + char::REPLACEMENT_CHARACTER.len_utf8()).min(text.len());
-    let span = Span {
-        file: 0,
-        start,
-        end,
-    };
-    Failure {
-        diagnostics: vec![
-            Diagnostic::error(span, "this file is no text in UTF-8")
-                .label("the first byte that is not")
-                .help("save it as UTF-8; `modelmill` reads model files as text (TOML)"),
-        ],
-        sources: Sources {
-            files: vec![SourceFile {
-                path: path.to_owned(),
-                text,
-            }],
-        },
-    }
-}
-
-/// Reads a text file, but no more than a model file may hold and a byte, by which it shows that it is too large: what
-/// the path leads to may never end.
-///
-/// Fails when the file cannot be read, or what is read of it is no UTF-8.
-pub fn read_limited(path: &Path) -> std::io::Result<String> {
-    let mut text = String::new();
-    std::fs::File::open(path)?
-        .take(LARGEST_FILE as u64 + 1)
-        .read_to_string(&mut text)?;
-    Ok(text)
-}
-
-/// Reads a model from its text; `read` fetches the files that it extends.
+/// Reads a model from its text; what it extends comes from `files`.
 ///
 /// `path_name` is what messages call the file, and paths in `extends` are relative to its folder.
 ///
@@ -153,19 +98,16 @@ pub fn read_limited(path: &Path) -> std::io::Result<String> {
 ///     part = [{ on = "arm", linear = { planar = "1" } }]
 ///     drive = [{ name = "motor", joint = "angle" }]
 /// "#;
-/// let loaded = modelmill_spec::load("pendulum.toml", text, &mut |_| unreachable!()).unwrap();
+/// let files = modelmill_boundary::files::Memory::default();
+/// let loaded = modelmill_spec::load("pendulum.toml", text, &files).unwrap();
 /// let names: Vec<_> = loaded.mechanism.parameters.iter().map(|p| p.name.as_str()).collect();
 /// assert_eq!(names, ["ZZ1", "MX1", "MY1", "M1"]);
 ///
-/// let failure = modelmill_spec::load("p.toml", &text.replace("\"angle\" }", "\"angel\" }"), &mut |_| unreachable!());
+/// let failure = modelmill_spec::load("p.toml", &text.replace("\"angle\" }", "\"angel\" }"), &files);
 /// assert!(failure.unwrap_err().render(false).contains("did you mean `angle`?"));
 /// ```
-pub fn load(
-    path_name: &str,
-    text: &str,
-    read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
-) -> Result<Loaded, Failure> {
-    load_with(path_name, text, &[], read)
+pub fn load(path_name: &str, text: &str, files: &dyn Files) -> Result<Loaded, Failure> {
+    load_with(path_name, text, &[], files)
 }
 
 /// Reads a model from its text as [`load`] does, with further libraries of kinds of effects, whose paths are taken as
@@ -174,14 +116,14 @@ pub fn load_with(
     path_name: &str,
     text: &str,
     libraries: &[PathBuf],
-    read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
+    files: &dyn Files,
 ) -> Result<Loaded, Failure> {
     let mut log = Log::default();
     let mut sources = Sources::default();
-    let (table, named) = read_chain(path_name, text, read, &mut sources, &mut log);
+    let (table, named) = read_chain(path_name, text, files, &mut sources, &mut log);
     let given = libraries.iter().map(|path| (path.clone(), None));
     let libraries: Vec<_> = given.chain(named).collect();
-    let kinds = read_libraries(&libraries, read, &mut sources, &mut log);
+    let kinds = read_libraries(&libraries, files, &mut sources, &mut log);
     let whole = Span {
         file: 0,
         start: 0,
@@ -219,14 +161,11 @@ pub fn load_with(
 /// The kinds of effects of the program's library and of further ones.
 ///
 /// Fails with every finding about those, each with its place.
-pub fn kinds_with(
-    libraries: &[PathBuf],
-    read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
-) -> Result<Vec<EffectKind>, Failure> {
+pub fn kinds_with(libraries: &[PathBuf], files: &dyn Files) -> Result<Vec<EffectKind>, Failure> {
     let mut log = Log::default();
     let mut sources = Sources::default();
     let named: Vec<NamedPath> = libraries.iter().map(|path| (path.clone(), None)).collect();
-    let own = read_libraries(&named, read, &mut sources, &mut log);
+    let own = read_libraries(&named, files, &mut sources, &mut log);
     for entry in &own {
         kinds::check(entry, &mut log);
     }
@@ -244,7 +183,7 @@ pub fn kinds_with(
 fn read_chain(
     path_name: &str,
     text: &str,
-    read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
+    files: &dyn Files,
     sources: &mut Sources,
     log: &mut Log,
 ) -> (Table, Vec<NamedPath>) {
@@ -260,7 +199,7 @@ fn read_chain(
             text,
         });
         libraries.extend(named_libraries(&table, &path));
-        let next = extended(&table, &path, sources, read, log);
+        let next = extended(&table, &path, sources, files, log);
         tables.push(table);
         match next {
             Some((next_path, next_text)) => {
@@ -303,7 +242,7 @@ fn named_libraries(table: &Table, path: &Path) -> Vec<NamedPath> {
 /// Reads libraries of kinds of effects, each once.
 fn read_libraries(
     libraries: &[NamedPath],
-    read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
+    files: &dyn Files,
     sources: &mut Sources,
     log: &mut Log,
 ) -> Vec<EffectKindEntry> {
@@ -315,7 +254,7 @@ fn read_libraries(
         }
         let file = sources.files.len();
         let path_name = quote(&path.to_string_lossy());
-        match read(path) {
+        match read_named(files, path, &["effect_kind", "schema"]) {
             Ok(text) => {
                 let entries = kinds::own_library(&text, file, log);
                 sources.files.push(SourceFile {
@@ -333,7 +272,7 @@ fn read_libraries(
                             start: 0,
                             end: 0,
                         },
-                        format!("cannot read `{path_name}`: {error}"),
+                        format!("cannot read `{path_name}`: {}", error.fault),
                     )
                 };
                 log.push(
@@ -354,7 +293,7 @@ fn extended(
     table: &Table,
     path: &Path,
     sources: &Sources,
-    read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
+    files: &dyn Files,
     log: &mut Log,
 ) -> Option<(PathBuf, String)> {
     let (_, node) = get(table, "extends")?;
@@ -369,7 +308,7 @@ fn extended(
         return None;
     };
     let next = tidy(&path.parent().unwrap_or(Path::new("")).join(target));
-    let mut fault = |message: String, label: &str, help: &str| {
+    let mut refuse = |message: String, label: &str, help: &str| {
         log.push(
             Diagnostic::error(node.span, message)
                 .label(label)
@@ -379,7 +318,7 @@ fn extended(
         log.syntax_broken = true;
     };
     if sources.files.iter().any(|file| tidy(&file.path) == next) {
-        fault(
+        refuse(
             "these files extend one another in a circle".to_owned(),
             "this file is being read already",
             "a variant extends a file that does not depend on it",
@@ -387,49 +326,33 @@ fn extended(
         return None;
     }
     if sources.files.len() >= LONGEST_CHAIN {
-        fault(
+        refuse(
             "this chain of variants is too long".to_owned(),
             "one file too many",
             &format!("at most {LONGEST_CHAIN} files extend one another"),
         );
         return None;
     }
-    match read(&next) {
+    match read_named(files, &next, &["schema"]) {
         Ok(text) => Some((next, text)),
         // `.` beside a file without a folder in its path leaves no name at all.
-        Err(error)
-            if error.kind() == std::io::ErrorKind::IsADirectory || next.as_os_str().is_empty() =>
+        Err(FileError { fault, .. })
+            if fault == FileFault::Folder || next.as_os_str().is_empty() =>
         {
-            fault(
+            refuse(
                 format!("`{}` is a folder", quote(target)),
                 "expected the path of a model file, relative to this one",
                 "name the file in it, such as `extends = \"arm.toml\"`",
             );
             None
         }
-        Err(error) => {
-            fault(
-                format!("cannot read `{}`: {error}", quote(&next.to_string_lossy())),
+        Err(FileError { fault, .. }) => {
+            refuse(
+                format!("cannot read `{}`: {fault}", quote(&next.to_string_lossy())),
                 "expected the path of a model file, relative to this one",
                 "check the path; it starts from the folder of the file that names it",
             );
             None
         }
     }
-}
-
-/// Drops `.` and resolves `..` by name, so that one file has one path.
-fn tidy(path: &Path) -> PathBuf {
-    use std::path::Component;
-    let mut parts: Vec<Component<'_>> = Vec::new();
-    for part in path.components() {
-        match part {
-            Component::CurDir => {}
-            Component::ParentDir if matches!(parts.last(), Some(Component::Normal(_))) => {
-                parts.pop();
-            }
-            part => parts.push(part),
-        }
-    }
-    parts.into_iter().collect()
 }

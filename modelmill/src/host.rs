@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use modelmill_boundary::files::{Disk, Files};
 use modelmill_identify::{FitFile, Note};
 use modelmill_spec::edit::{EditFailure, Edited, NewEffect, add_to_model};
 use modelmill_spec::{EffectKind, Loaded};
@@ -17,6 +18,7 @@ use crate::progress::{Job, Progress, Silent, watched};
 /// comes from the same place.
 #[derive(Clone)]
 pub struct Host {
+    files: Arc<dyn Files>,
     libraries: Vec<PathBuf>,
     progress: Arc<dyn Progress>,
 }
@@ -24,6 +26,7 @@ pub struct Host {
 impl Default for Host {
     fn default() -> Self {
         Self {
+            files: Arc::new(Disk::default()),
             libraries: Vec::new(),
             progress: Arc::new(Silent),
         }
@@ -34,6 +37,18 @@ impl Host {
     /// Files come from disk, there are no further libraries, and nobody listens.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// With files from elsewhere, such as memory.
+    #[must_use]
+    pub fn with_files(mut self, files: Arc<dyn Files>) -> Self {
+        self.files = files;
+        self
+    }
+
+    /// Where files come from.
+    pub fn files(&self) -> &dyn Files {
+        &*self.files
     }
 
     /// With further libraries of kinds of effects, for every model that is read.
@@ -59,8 +74,7 @@ impl Host {
     ///
     /// Fails with every finding about the host's libraries, each with its place.
     pub fn kinds(&self) -> Outcome<Vec<EffectKind>> {
-        let mut read = modelmill_spec::read_limited;
-        Ok(modelmill_spec::kinds_with(&self.libraries, &mut read)?)
+        Ok(modelmill_spec::kinds_with(&self.libraries, self.files())?)
     }
 
     /// Reads a model file and validates it, without deriving it.
@@ -71,7 +85,7 @@ impl Host {
             &*self.progress,
             &format!("reading {}", path.display()),
             0,
-            |_| modelmill_spec::load_file_with(path, &self.libraries),
+            |_| modelmill_spec::load_file_with(path, &self.libraries, self.files()),
         )?
         .map_err(|failure| match kinds_of_files::kind(self, path) {
             Some(kind) => Error::input(format!(
@@ -91,13 +105,12 @@ impl Host {
     ///
     /// Fails with every finding about the files, each with its place.
     pub fn load_text(&self, path: &Path, text: &str) -> Outcome<Loaded> {
-        let mut read = modelmill_spec::read_limited;
         let name = path.to_string_lossy();
         Ok(modelmill_spec::load_with(
             &name,
             text,
             &self.libraries,
-            &mut read,
+            self.files(),
         )?)
     }
 
@@ -105,13 +118,12 @@ impl Host {
     ///
     /// Fails when the file with the effect has no meaning: unknown kind or place, a value that is missing, an effect twice.
     pub fn edit(&self, path: &str, text: &str, effect: &NewEffect) -> Outcome<Edited> {
-        let mut read = modelmill_spec::read_limited;
-        add_to_model(path, text, effect, &self.libraries, &mut read).map_err(
-            |failure| match failure {
+        add_to_model(path, text, effect, &self.libraries, self.files()).map_err(|failure| {
+            match failure {
                 EditFailure::Effect(says) => Error::input(format!("{path}: {says}")),
                 EditFailure::Model(failure) => (*failure).into(),
-            },
-        )
+            }
+        })
     }
 
     /// Runs a job that somebody may watch and stop.
@@ -125,7 +137,7 @@ impl Host {
     ///
     /// Fails with the place of what is wrong with the file.
     pub fn fit(&self, path: &Path) -> Outcome<FitFile> {
-        Ok(FitFile::read(path)?)
+        Ok(FitFile::read_from(self.files(), path)?)
     }
 
     /// Passes a remark on to whoever watches.

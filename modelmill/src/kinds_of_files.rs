@@ -2,25 +2,27 @@
 
 use std::path::Path;
 
+use modelmill_boundary::files::Kind;
+
 use crate::host::Host;
 
 /// What kind of file of ours this is, in words with an article; `None` where it is none.
 pub(crate) fn kind(host: &Host, path: &Path) -> Option<&'static str> {
     // Anything else may be a pipe, which cannot be read twice, or too large to be one of these.
-    let is_small = std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() < 1 << 24);
-    if !is_small {
+    let files = host.files();
+    if files.kind(path) != Kind::File {
         return None;
     }
     let starts_as_json = || {
-        let text = std::fs::read_to_string(path).ok()?;
+        let text = files.read_text(path, 1 << 24).ok()?;
         Some(text.trim_start().starts_with('{'))
     };
     if path.extension().is_some_and(|e| e == "toml") {
-        if modelmill_spec::load_file_with(path, host.libraries()).is_ok() {
+        if modelmill_spec::load_file_with(path, host.libraries(), files).is_ok() {
             Some("a model file")
-        } else if modelmill_rig::load_file(path).is_ok() {
+        } else if modelmill_rig::load_file_with(path, files).is_ok() {
             Some("a rig file, which describes the whole machine")
-        } else if modelmill_reduction::plan_file(path).is_ok() {
+        } else if modelmill_reduction::plan_file_with(path, files).is_ok() {
             Some("a plan of a reduction")
         } else {
             None

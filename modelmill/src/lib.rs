@@ -180,6 +180,7 @@ pub mod simulate;
 pub mod stretch;
 pub mod text;
 
+pub use modelmill_boundary::files;
 pub use modelmill_identify::{Note, Severity};
 pub use modelmill_spec::edit;
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use modelmill_boundary::files::Memory;
 use modelmill_codegen::{Evaluator, States};
 use modelmill_reduction::{Reduction, sampled_forces};
 use modelmill_rig::{Rig, State};
@@ -33,7 +34,7 @@ impl Host {
     pub fn reduce(&self, path: &Path, plan: Option<&Path>) -> Outcome<Reduced> {
         let loaded = self.rig(path)?;
         let made = match plan {
-            Some(plan) => modelmill_reduction::plan_file(plan)?,
+            Some(plan) => modelmill_reduction::plan_file_with(plan, self.files())?,
             None => modelmill_reduction::plan_for(&loaded.rig)
                 .map_err(|says| Error::input(format!("{}: {says}", path.display())))?,
         };
@@ -73,8 +74,7 @@ pub struct Compared {
 
 /// The model's forces with its nominal values against the rig's own: two programs that share no mechanics.
 fn compare(rig: &Rig, reduction: &Reduction) -> Outcome<Vec<Compared>> {
-    let none = &mut |_: &Path| Err(std::io::Error::other("nothing is extended"));
-    let loaded = modelmill_spec::load("the reduced model", &reduction.model, none)?;
+    let loaded = modelmill_spec::load("the reduced model", &reduction.model, &Memory::default())?;
     let derivation = modelmill_codegen::derive(&loaded.mechanism)
         .map_err(|error| Error::derivation("the reduced model", error))?;
     let mechanism = &derivation.mechanism;

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use modelmill_identify::{ReadOptions, Recording};
+use modelmill_boundary::files::Kind;
+use modelmill_identify::{ReadOptions, Recording, RecordingFile};
 use modelmill_rig::{Rig, Run, Samples, SimulationError, Trajectory, TrajectoryError};
 
 use crate::error::{Error, Outcome};
@@ -40,13 +41,13 @@ impl Host {
     ///
     /// Fails with every finding about it, each with its place.
     pub fn rig(&self, path: &Path) -> Outcome<modelmill_rig::Loaded> {
-        if path.is_dir() {
+        if self.files().kind(path) == Kind::Folder {
             return Err(Error::input(format!(
                 "{} is a folder; a rig file (TOML) is expected, such as those in model-spec/rigs",
                 path.display()
             )));
         }
-        modelmill_rig::load_file(path).map_err(|failure| {
+        modelmill_rig::load_file_with(path, self.files()).map_err(|failure| {
             if self.load(path).is_ok() {
                 return Error::input(format!(
                     "{} is a model file; a rig file is expected, which describes the whole machine (rig/README.md; \
@@ -70,13 +71,11 @@ impl Host {
         seed: Option<u64>,
     ) -> Outcome<Simulated> {
         let rig = self.rig(path)?.rig;
-        let recording = Recording::read_with(
-            trajectory,
-            &ReadOptions {
-                renames: columns.to_vec(),
-                ..ReadOptions::default()
-            },
-        )?;
+        let file = RecordingFile::open(self.files(), trajectory)?;
+        let recording = file.read(&ReadOptions {
+            renames: columns.to_vec(),
+            ..ReadOptions::default()
+        })?;
         let mut notes = Vec::new();
         let trajectory = self::trajectory(&rig, &recording, &mut notes)?;
         let steps = modelmill_rig::n_instants(&rig, &trajectory);

@@ -28,9 +28,9 @@ mod urdf_file;
 mod urdf_geometry;
 mod write;
 
-pub use plan::{Plan, plan, plan_file};
+pub use plan::{Plan, plan, plan_file, plan_file_with};
 pub use plan_for::plan_for;
 pub use reduce::{Reduction, reduce};
 pub use report::{Finding, Report, Size};
 pub use samples::sampled_forces;
-pub use urdf::{Imported, UrdfError, import_urdf};
+pub use urdf::{Imported, LARGEST_URDF, UrdfError, import_urdf};

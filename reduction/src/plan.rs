@@ -5,9 +5,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use modelmill_rig::{Failure, Log, Rig, fault, parse, span};
-use modelmill_spec::read_limited;
-use modelmill_spec::{Diagnostic, SourceFile, Sources};
+use modelmill_boundary::files::{Disk, Files};
+use modelmill_rig::{Failure, Log, Rig, parse, span};
+use modelmill_spec::{SourceFile, Sources, read_text};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -253,17 +253,12 @@ pub fn plan(path: &str, text: &str) -> Result<Plan, Failure> {
 
 /// Reads a plan from disk.
 pub fn plan_file(path: &Path) -> Result<Plan, Failure> {
-    match read_limited(path) {
-        Ok(text) => plan(&path.to_string_lossy(), &text),
-        Err(error) => Err(Failure {
-            diagnostics: vec![Diagnostic {
-                help: vec![
-                    "give the path of a plan, such as `model-spec/rigs/spidermill-plan.toml`"
-                        .to_owned(),
-                ],
-                ..fault(None, format!("cannot read `{}`: {error}", path.display()))
-            }],
-            sources: Sources::default(),
-        }),
-    }
+    plan_file_with(path, &Disk::default())
+}
+
+/// Reads a plan from `files`.
+pub fn plan_file_with(path: &Path, files: &dyn Files) -> Result<Plan, Failure> {
+    let advice = "give the path of a plan, such as `model-spec/rigs/spidermill-plan.toml`";
+    let text = read_text(files, path, advice)?;
+    plan(&path.to_string_lossy(), &text)
 }

@@ -8,6 +8,7 @@ use crate::planar::{Flat, check_group, out_of_plane};
 use crate::report::{Report, Size};
 use crate::samples::{Plane, Samples};
 use crate::write::{digits, model_file};
+use modelmill_boundary::files::Memory;
 use modelmill_rig::{Failure, Log, Rig, fault};
 
 /// What a reduction gives.
@@ -36,8 +37,7 @@ pub fn reduce(rig: &Rig, plan: &Plan) -> Result<Reduction, Failure> {
             let model = model_file(&draft);
             // What comes out is a sound model file, or the plan asks for something that is none.
             let path = format!("{}.toml (reduced)", draft.name);
-            let none = &mut |_: &std::path::Path| Err(std::io::Error::other("nothing is extended"));
-            modelmill_spec::load(&path, &model, none)?;
+            modelmill_spec::load(&path, &model, &Memory::default())?;
             Ok(Reduction { model, report })
         }
         _ => {

@@ -9,6 +9,7 @@
 use std::fmt;
 use std::fmt::Write as _;
 
+use modelmill_boundary::files::Memory;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::urdf_file::{Joint, Link, Robot, read};
@@ -36,8 +37,8 @@ impl fmt::Display for UrdfError {
 
 impl std::error::Error for UrdfError {}
 
-/// Longer descriptions are no robots.
-const LARGEST: usize = 16 << 20;
+/// The longest text that is looked at, bytes.
+pub const LARGEST_URDF: usize = 16 << 20;
 /// Angles this near to a multiple of a twelfth of pi are taken for it, rad.
 const SAME_ANGLE: f64 = 1e-4;
 /// Deviations below this are rounding of the format.
@@ -47,7 +48,7 @@ const ROUNDING: f64 = 1e-9;
 ///
 /// Fails when the text is no URDF, its links form no tree, or a joint is of a kind that models do not have.
 pub fn import_urdf(text: &str) -> Result<Imported, UrdfError> {
-    if text.len() > LARGEST {
+    if text.len() > LARGEST_URDF {
         return Err(UrdfError(
             "this file is too large for a robot description".to_owned(),
         ));
@@ -64,8 +65,11 @@ pub fn import_urdf(text: &str) -> Result<Imported, UrdfError> {
     import.link(&robot, root, None, &Placed::identity())?;
     import.tree(&robot, root)?;
     let imported = import.finish(&robot.name)?;
-    let none = &mut |_: &std::path::Path| Err(std::io::Error::other("nothing is extended"));
-    match modelmill_spec::load("the model made from it", &imported.model, none) {
+    match modelmill_spec::load(
+        "the model made from it",
+        &imported.model,
+        &Memory::default(),
+    ) {
         Ok(_) => Ok(imported),
         Err(failure) => Err(UrdfError(format!(
             "this description makes no sound model:\n{}",

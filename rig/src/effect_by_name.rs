@@ -106,7 +106,8 @@ impl Rig {
     /// # let text = "schema = 1\nname = 'm'\nbody = [{ name = 'cart', mass = 2 }]\n\
     /// #     joint = [{ name = 'rail', kind = 'prismatic', between = ['base', 'cart'], at = [0, 0, 0], axis = [1, 0, 0] }]\n\
     /// #     coordinate = [{ name = 'x', joint = 'rail' }]\ndrive = [{ name = 'screw', joint = 'rail' }]";
-    /// # let mut rig = modelmill_rig::load("m.toml", text, &mut |_| unreachable!())?.rig;
+    /// # let files = modelmill_boundary::files::Memory::default();
+    /// # let mut rig = modelmill_rig::load("m.toml", text, &files)?.rig;
     /// let friction = rig.effect("viscous_friction", &["screw"], &[("Fv", 20.0)]).unwrap();
     /// rig.effects.push(friction);
     /// let state = modelmill_rig::State { q: vec![0.0], qd: vec![0.1], qdd: vec![3.0] };

@@ -41,7 +41,7 @@ pub use dynamics::{Measured, energy};
 pub use effect::{Effect, Law, Place, ValueOfKind, ValueSign};
 pub use effect_by_name::{EffectFault, EffectPart};
 pub use kinematics::{Motion, PoseError, State, Tracker};
-pub use load::{Loaded, fault, load, load_file, parse, span};
+pub use load::{Loaded, fault, load, load_file, load_file_with, parse, span};
 pub use log::Log;
 pub use modelmill_spec::Failure;
 pub use pair::{Anchor, Pair};

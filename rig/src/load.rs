@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use modelmill_boundary::files::{Disk, Files, tidy};
 use modelmill_spec::{
-    Diagnostic, Failure, LARGEST_FILE, Severity, SourceFile, Sources, Span, read_limited,
+    Diagnostic, Failure, LARGEST_FILE, Severity, SourceFile, Sources, Span, read_named, read_text,
 };
 
 use crate::assemble::assemble;
@@ -26,22 +27,17 @@ pub struct Loaded {
 ///
 /// Fails with findings about the files, each with its place and what to do.
 pub fn load_file(path: &Path) -> Result<Loaded, Failure> {
-    match read_limited(path) {
-        Ok(text) => load(&path.to_string_lossy(), &text, &mut read_limited),
-        Err(error) => Err(failure(
-            Sources::default(),
-            Diagnostic {
-                help: vec![
-                    "give the path of a rig file, such as `model-spec/rigs/spidermill-full.toml`"
-                        .to_owned(),
-                ],
-                ..fault(None, format!("cannot read `{}`: {error}", path.display()))
-            },
-        )),
-    }
+    load_file_with(path, &Disk::default())
 }
 
-/// Reads a rig from its text; `read` fetches the files that it extends.
+/// Reads a rig file as [`load_file`] does, with all files from `files`.
+pub fn load_file_with(path: &Path, files: &dyn Files) -> Result<Loaded, Failure> {
+    let advice = "give the path of a rig file, such as `model-spec/rigs/spidermill-full.toml`";
+    let text = read_text(files, path, advice)?;
+    load(&path.to_string_lossy(), &text, files)
+}
+
+/// Reads a rig from its text; what it extends comes from `files`.
 ///
 /// ```
 /// let text = r#"
@@ -53,18 +49,15 @@ pub fn load_file(path: &Path) -> Result<Loaded, Failure> {
 ///     coordinate = [{ name = "q", joint = "hinge" }]
 ///     drive = [{ name = "motor", joint = "hinge" }]
 /// "#;
-/// let rig = modelmill_rig::load("pendulum.toml", text, &mut |_| unreachable!())?.rig;
+/// let files = modelmill_boundary::files::Memory::default();
+/// let rig = modelmill_rig::load("pendulum.toml", text, &files)?.rig;
 /// let mut tracker = modelmill_rig::Tracker::new(&rig)?;
 /// let state = modelmill_rig::State { q: vec![0.3], qd: vec![0.0], qdd: vec![0.0] };
 /// let torque = modelmill_rig::forces(&rig, &tracker.follow(&state)?)?[0];
 /// assert!((torque - 2.0 * 9.81 * 0.5 * 0.3_f64.cos()).abs() < 1e-12);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn load(
-    path_name: &str,
-    text: &str,
-    read: &mut dyn FnMut(&Path) -> std::io::Result<String>,
-) -> Result<Loaded, Failure> {
+pub fn load(path_name: &str, text: &str, files: &dyn Files) -> Result<Loaded, Failure> {
     let mut sources = Sources::default();
     let mut chain = Vec::new();
     let mut next = Some((PathBuf::from(path_name), text.to_owned()));
@@ -80,10 +73,8 @@ pub fn load(
         };
         if let Some(extends) = &entry.extends {
             let span = Some(span(file, &extends.span()));
-            let other = path
-                .parent()
-                .unwrap_or(Path::new(""))
-                .join(extends.get_ref());
+            let folder = path.parent().unwrap_or(Path::new(""));
+            let other = tidy(&folder.join(extends.get_ref()));
             if file + 1 == LONGEST_CHAIN {
                 let help = "check whether two files extend each other".to_owned();
                 let found = fault(span, "this chain of variants is too long");
@@ -95,10 +86,11 @@ pub fn load(
                     },
                 ));
             }
-            match read(&other) {
+            match read_named(files, &other, &["schema"]) {
                 Ok(text) => next = Some((other, text)),
                 Err(error) => {
-                    let found = fault(span, format!("cannot read `{}`: {error}", other.display()));
+                    let says = format!("cannot read `{}`: {}", other.display(), error.fault);
+                    let found = fault(span, says);
                     let help = "the path is relative to the folder of this file".to_owned();
                     return Err(failure(
                         sources,

@@ -11,18 +11,18 @@ use std::fs::{File, Metadata};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use super::{FileError, FileFault, Files, Kind, Opened, write};
 
-/// The files of this machine.
-#[derive(Debug)]
+/// The files of this machine; clones remember together what was read.
+#[derive(Clone, Debug)]
 pub struct Disk {
     /// How long a named pipe is waited for.
     pub patience: Duration,
     /// What was read, so that it is never overwritten.
-    read: Mutex<Vec<Identity>>,
+    read: Arc<Mutex<Vec<Identity>>>,
 }
 
 /// What makes two paths one file, be it through links.
@@ -40,7 +40,7 @@ impl Default for Disk {
     fn default() -> Self {
         Self {
             patience: Duration::from_secs(10),
-            read: Mutex::default(),
+            read: Arc::default(),
         }
     }
 }
@@ -88,7 +88,7 @@ impl Files for Disk {
     fn read(&self, path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
         match self.open(path, most)? {
             Opened::File(file) => capped(file, path, most),
-            Opened::Memory(bytes) => Ok(bytes.to_vec()),
+            Opened::Memory(bytes) => Ok(Arc::unwrap_or_clone(bytes)),
         }
     }
 

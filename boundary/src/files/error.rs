@@ -37,6 +37,11 @@ pub enum FileFault {
         /// Place of the first byte that is not.
         at: usize,
     },
+    /// The file holds something else than what it is named for.
+    OtherKind {
+        /// Keys of which it has none.
+        lacks: String,
+    },
     /// Folders cannot be listed here.
     NoList,
     /// The file is one that was read, and would be lost.
@@ -85,6 +90,7 @@ impl FileFault {
             }
             Self::Silent { .. } => "start the program that writes into the pipe first",
             Self::NoText { .. } => "save it as UTF-8",
+            Self::OtherKind { .. } => "name a file that was written for this",
             Self::NoList => "name the files one by one",
             Self::Input => "choose another name",
             Self::System { kind, .. } => match kind {
@@ -101,7 +107,7 @@ impl FileFault {
 impl fmt::Display for FileFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Missing => f.write_str("there is no such file"),
+            Self::Missing => f.write_str("no such file"),
             Self::Folder => f.write_str("it is a folder, not a file"),
             Self::Device => f.write_str("it is a device, not a file"),
             Self::TooLarge { most } => write!(f, "it holds more than {most} bytes"),
@@ -109,6 +115,9 @@ impl fmt::Display for FileFault {
                 write!(f, "nothing came through this pipe for {seconds} s")
             }
             Self::NoText { at } => write!(f, "byte {at} is no text in UTF-8"),
+            Self::OtherKind { lacks } => {
+                write!(f, "it is something else: it has no `{lacks}` at its top")
+            }
             Self::NoList => f.write_str("its files cannot be listed"),
             Self::Input => f.write_str("it was read, and would be overwritten"),
             Self::System { says, .. } => f.write_str(says),

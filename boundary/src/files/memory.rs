@@ -17,7 +17,7 @@ use super::{FileError, FileFault, Files, Kind, Opened, tidy};
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Memory {
-    files: BTreeMap<PathBuf, Arc<[u8]>>,
+    files: BTreeMap<PathBuf, Arc<Vec<u8>>>,
 }
 
 impl Memory {
@@ -30,10 +30,11 @@ impl Memory {
 
     /// Adds a file, which takes the place of one of its path.
     pub fn insert(&mut self, path: impl AsRef<Path>, bytes: impl Into<Vec<u8>>) {
-        self.files.insert(tidy(path.as_ref()), bytes.into().into());
+        self.files
+            .insert(tidy(path.as_ref()), Arc::new(bytes.into()));
     }
 
-    fn find(&self, path: &Path, most: u64) -> Result<&Arc<[u8]>, FileError> {
+    fn find(&self, path: &Path, most: u64) -> Result<&Arc<Vec<u8>>, FileError> {
         let fail = |fault| Err(FileError::new(path, fault));
         match self.files.get(&tidy(path)) {
             Some(bytes) if bytes.len() as u64 > most => fail(FileFault::TooLarge { most }),

@@ -17,7 +17,7 @@ pub use memory::Memory;
 pub use write::write;
 
 /// Where files come from.
-pub trait Files: Sync {
+pub trait Files: Send + Sync {
     /// All bytes of a file; fails when there are more than `most`, or the path leads to no file.
     fn read(&self, path: &Path, most: u64) -> Result<Vec<u8>, FileError>;
 
@@ -65,7 +65,7 @@ pub enum Opened {
     /// An ordinary file on a disk.
     File(std::fs::File),
     /// Bytes in memory.
-    Memory(Arc<[u8]>),
+    Memory(Arc<Vec<u8>>),
 }
 
 /// Drops `.` and resolves `..` by name, so that one file has one path.

@@ -5,14 +5,13 @@ use std::fmt::Write;
 
 use super::plain;
 
-/// Text of an HTML page, in an element or in a quoted attribute.
+/// Text of an HTML page, in an element or in an attribute between double quotes; lines stay lines.
 pub fn html(text: &str) -> Cow<'_, str> {
-    escaped(plain(text), |c, out| match c {
+    escaped(super::lines(text), |c, out| match c {
         '&' => out.push_str("&amp;"),
         '<' => out.push_str("&lt;"),
         '>' => out.push_str("&gt;"),
         '"' => out.push_str("&quot;"),
-        '\'' => out.push_str("&#39;"),
         c => out.push(c),
     })
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use modelmill_boundary::files::Disk;
 use modelmill_codegen::{Derivation, Evaluator, States};
 use modelmill_rig::{Effect, Measured, Motion, Place, Rig, State, Tracker};
 use modelmill_spec::Limits;
@@ -60,13 +61,9 @@ impl Plant {
     /// Reads both; `specs` is the folder of the bundled models and rigs.
     pub(crate) fn load(specs: &Path) -> Result<Self, String> {
         let path = specs.join("rigs").join("hidden.toml");
-        let rig = modelmill_rig::load(
-            &path.to_string_lossy(),
-            RIG,
-            &mut modelmill_spec::read_limited,
-        )
-        .map_err(|failure| failure.render(false))?
-        .rig;
+        let rig = modelmill_rig::load(&path.to_string_lossy(), RIG, &Disk::default())
+            .map_err(|failure| failure.render(false))?
+            .rig;
         let model = specs.join("models").join("spidermill.toml");
         let loaded = modelmill_spec::load_file(&model).map_err(|failure| failure.render(false))?;
         let derivation =

@@ -38,7 +38,7 @@ pub(crate) fn run(host: &Host, args: &AddArgs) -> Outcome {
             Some(target.path().display().to_string())
         }
         (None, true) => {
-            output::write(&args.model, &edited.text)?;
+            output::replace(&args.model, &edited.text)?;
             Some(path.clone())
         }
         (None, false) => None,

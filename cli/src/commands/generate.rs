@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use modelmill::Host;
+use modelmill::files::{Disk, Files};
 use modelmill::generate::{Code, EmittedFile, Language};
 use modelmill::text::table::count;
 
@@ -109,7 +110,9 @@ const OURS: &str = "# Written by modelmill.";
 fn write_crate(folder: &Path, files: &[EmittedFile]) -> Outcome {
     refuse_dash(folder)?;
     let manifest = folder.join("Cargo.toml");
-    let ours = std::fs::read_to_string(&manifest).is_ok_and(|text| text.starts_with(OURS));
+    let ours = Disk::default()
+        .read_text(&manifest, 1 << 20)
+        .is_ok_and(|text| text.starts_with(OURS));
     let occupied = folder.is_file()
         || std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
     if occupied && !ours {

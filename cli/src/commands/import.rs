@@ -8,19 +8,18 @@ use crate::failure::{Failure, Outcome};
 use crate::output::Target;
 use crate::terminal;
 
+/// No robot description is longer, bytes.
+const LARGEST_URDF: u64 = 16 << 20;
+
 /// Writes the model file and says what was left out or rounded.
 pub(crate) fn run(host: &Host, args: &ImportArgs) -> Outcome {
     let target = Target::new(&args.out, [args.urdf.as_path()])?;
-    let bytes = std::fs::read(&args.urdf).map_err(|error| {
+    let read = host.files().read_text(&args.urdf, LARGEST_URDF);
+    let text = read.map_err(|error| {
         Failure::Input(format!(
-            "{} cannot be read: {error}; a URDF file is expected",
-            args.urdf.display()
-        ))
-    })?;
-    let text = String::from_utf8(bytes).map_err(|_| {
-        Failure::Input(format!(
-            "{} is no text; a URDF file (XML) is expected",
-            args.urdf.display()
+            "{} cannot be read: {}; a URDF file (XML) is expected",
+            args.urdf.display(),
+            error.fault
         ))
     })?;
     let imported = host.import(&args.urdf.display().to_string(), &text)?;

@@ -23,6 +23,7 @@ pub(crate) mod tour;
 use std::path::{Path, PathBuf};
 
 use modelmill::diagnose::{Findings, Held, Question};
+use modelmill::files::{Disk, Files, Kind};
 use modelmill::model::Loaded;
 use modelmill::recording::{Reading, Recording};
 use modelmill::{Host, Model};
@@ -145,9 +146,10 @@ fn nearby(path: &Path) -> String {
 
 /// Whether a file looks like a model: TOML with a line that gives the version of the schema.
 fn is_model(path: &Path) -> bool {
+    let disk = Disk::default();
     path.extension().is_some_and(|e| e == "toml")
-        && std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() < 1 << 20)
-        && std::fs::read_to_string(path).is_ok_and(|text| {
+        && disk.kind(path) == Kind::File
+        && disk.read_text(path, 1 << 20).is_ok_and(|text| {
             text.lines()
                 .filter_map(|line| line.split_once('='))
                 .any(|(key, _)| key.trim() == "schema")

@@ -1,5 +1,7 @@
 //! `report`: what a model lacks, as one self-contained page.
 
+use std::path::PathBuf;
+
 use modelmill::Host;
 use modelmill::diagnose::{Question, words};
 use modelmill::report::page;
@@ -8,7 +10,7 @@ use crate::args::ReportArgs;
 use crate::commands;
 use crate::failure::Outcome;
 use crate::flags::Flags;
-use crate::output;
+use crate::output::{self, Target};
 use crate::terminal;
 
 /// Name of the page in its folder.
@@ -17,13 +19,16 @@ pub(crate) const PAGE: &str = "report.html";
 /// Diagnoses and writes the page.
 pub(crate) fn run(host: &Host, args: &ReportArgs) -> Outcome {
     output::make_folder(&args.out)?;
+    let path = args.out.join(PAGE);
+    let ask = &args.ask;
+    let inputs = [&ask.model].into_iter().chain(&ask.data).chain(&ask.check);
+    let target = Target::new(&path, inputs.map(PathBuf::as_path))?;
     let question = Question {
         held: args.ask.held(),
         again_with_nominal: false,
     };
     let findings = commands::diagnose(host, &args.ask, &question)?;
-    let path = args.out.join(PAGE);
-    output::write(&path, &page(&findings, &Flags::of(&args.ask))?)?;
+    target.write(&page(&findings, &Flags::of(&args.ask))?)?;
     let says = words::verdict(&findings.diagnosis, findings.channels(), findings.judged);
     terminal::print(&format!(
         "{}\n\nThe page is {}.",

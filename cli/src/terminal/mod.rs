@@ -8,6 +8,7 @@ use std::io::{self, ErrorKind, IsTerminal, Write};
 
 use modelmill::text::Style;
 use modelmill::{Note, Severity};
+use modelmill_boundary::text;
 
 use crate::failure::{Failure, Outcome};
 
@@ -37,6 +38,7 @@ pub(crate) fn errors_in_colour() -> bool {
 
 /// Writes the result of a command to standard output, with one line feed at its end.
 pub(crate) fn print(text: &str) -> Outcome {
+    let text = text::terminal(text, colours_allowed() && io::stdout().is_terminal());
     let mut out = io::stdout().lock();
     let end = if text.ends_with('\n') { "" } else { "\n" };
     out.write_all(text.as_bytes())
@@ -50,11 +52,12 @@ pub(crate) fn print(text: &str) -> Outcome {
 
 /// Prints one JSON object to standard output.
 pub(crate) fn print_json(value: &serde_json::Value) -> Outcome {
-    print(&format!("{value:#}"))
+    print(&text::json(&format!("{value:#}")))
 }
 
 /// Writes to standard error; who does not read it is not bothered.
 pub(crate) fn say(text: &str) {
+    let text = text::terminal(text, errors_in_colour());
     let _ = writeln!(io::stderr(), "{text}");
 }
 

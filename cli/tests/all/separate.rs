@@ -67,7 +67,7 @@ fn the_difference_is_what_least_squares_leaves() {
     let columns = states(&out);
     let samples = columns[0].len();
     let path = workspace("model-spec/models/spidermill.toml");
-    let loaded = modelmill_spec::load_file_with(&path, &[]).expect("the model");
+    let loaded = modelmill_spec::load_file(&path).expect("the model");
     let derivation = modelmill_codegen::derive(&loaded.mechanism).expect("derived");
     let slices = |from: usize| columns[from..from + 2].iter().map(Vec::as_slice).collect();
     let along = States {

@@ -339,7 +339,11 @@ mod tests {
             "#,
             b = a + gap,
         );
-        let loaded = modelmill_spec::load("pendulum.toml", &text, &mut |_| unreachable!());
+        let loaded = modelmill_spec::load(
+            "pendulum.toml",
+            &text,
+            &modelmill_boundary::files::Memory::default(),
+        );
         loaded
             .unwrap_or_else(|failure| panic!("{failure}"))
             .mechanism

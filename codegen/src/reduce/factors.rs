@@ -235,9 +235,13 @@ mod tests {
             writeln!(text, "[[frame]]\nname = \"l{i}\"\non = \"{on}\"\nmodified_dh = {{ a = {a}, alpha = {b}, d = {d}, theta = \"q{i}\" }}\n[[part]]\non = \"l{i}\"\nlinear = {{ all = \"_{i}\" }}\n[[drive]]\nname = \"t{i}\"\njoint = \"q{i}\"").unwrap();
             on = format!("l{i}");
         }
-        modelmill_spec::load("twisted.toml", &text, &mut |_| unreachable!())
-            .unwrap_or_else(|failure| panic!("{failure}"))
-            .mechanism
+        modelmill_spec::load(
+            "twisted.toml",
+            &text,
+            &modelmill_boundary::files::Memory::default(),
+        )
+        .unwrap_or_else(|failure| panic!("{failure}"))
+        .mechanism
     }
 
     /// Factors by near relations where they pay, and by relations to retained columns alone.

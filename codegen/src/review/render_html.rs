@@ -2,8 +2,10 @@
 
 use std::fmt::Write;
 
+use modelmill_boundary::text::html as escape;
+
 use super::document::{Block, Document, Equation, Inline, Line, terms};
-use crate::expr::print::{Formula, escape};
+use crate::expr::print::Formula;
 
 const STYLE: &str = include_str!("page.css");
 
@@ -146,7 +148,7 @@ fn math(content: &str) -> String {
 fn inlines(line: &Line) -> String {
     line.iter()
         .map(|inline| match inline {
-            Inline::Text(text) => escape(text),
+            Inline::Text(text) => escape(text).into_owned(),
             Inline::Unit(text) => unit(text),
             Inline::Code(text) => format!("<code>{}</code>", escape(text)),
             Inline::Math(Formula::Number(n)) => n.to_string().replace('-', "\u{2212}"),

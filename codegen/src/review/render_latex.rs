@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use modelmill_boundary::text::latex as escape;
+
 use super::document::{Block, Document, Equation, Inline, Line, Table, terms};
 use crate::expr::print::Formula;
 
@@ -65,7 +67,7 @@ fn write_table(out: &mut String, table: &Table) {
         columns.push_str("p{75mm}");
     }
     _ = writeln!(out, "\\begin{{longtable}}{{{columns}}}");
-    let head: Vec<String> = table.head.iter().map(|h| escape(h)).collect();
+    let head: Vec<String> = table.head.iter().map(|h| escape(h).into_owned()).collect();
     _ = writeln!(out, "{} \\\\ \\hline\n\\endhead", head.join(" & "));
     for row in &table.rows {
         let cells: Vec<String> = row.iter().map(inlines).collect();
@@ -132,29 +134,10 @@ pub(super) fn unit(text: &str) -> String {
 fn inlines(line: &Line) -> String {
     line.iter()
         .map(|inline| match inline {
-            Inline::Text(text) => escape(text),
+            Inline::Text(text) => escape(text).into_owned(),
             Inline::Unit(text) => format!("${}$", unit(text)),
             Inline::Code(text) => format!("\\texttt{{{}}}", escape(text)),
             Inline::Math(formula) => format!("${}$", formula.latex()),
         })
         .collect()
-}
-
-fn escape(text: &str) -> String {
-    let mut out = String::new();
-    for c in text.chars() {
-        match c {
-            '\\' => out.push_str("\\textbackslash{}"),
-            '^' => out.push_str("\\textasciicircum{}"),
-            '~' => out.push_str("\\textasciitilde{}"),
-            '{' | '}' | '$' | '&' | '#' | '_' | '%' => {
-                out.push('\\');
-                out.push(c);
-            }
-            c if (c as u32) < 0x250 => out.push(c),
-            // What the plain fonts lack.
-            _ => out.push('?'),
-        }
-    }
-    out
 }

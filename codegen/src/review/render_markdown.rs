@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use modelmill_boundary::text::{code_in_markdown, html, markdown as escape};
+
 use super::document::{Block, Document, Equation, Inline, Line};
 use super::render_latex;
 use super::render_text;
@@ -31,11 +33,7 @@ fn blocks(out: &mut String, blocks: &[Block]) {
             }
             Block::Equations(equations) => write_equations(out, equations),
             Block::Folded(summary, inner) => {
-                _ = writeln!(
-                    out,
-                    "<details><summary>{}</summary>\n",
-                    crate::expr::print::escape(summary)
-                );
+                _ = writeln!(out, "<details><summary>{}</summary>\n", html(summary));
                 self::blocks(out, inner);
                 out.push_str("</details>\n\n");
             }
@@ -60,21 +58,10 @@ fn write_equations(out: &mut String, equations: &[Equation]) {
 fn inlines(line: &Line) -> String {
     line.iter()
         .map(|inline| match inline {
-            Inline::Text(text) => escape(text),
+            Inline::Text(text) => escape(text).into_owned(),
             Inline::Unit(unit) => format!("${}$", render_latex::unit(unit)),
-            Inline::Code(text) => format!("`{text}`"),
+            Inline::Code(text) => code_in_markdown(text),
             Inline::Math(formula) => format!("${}$", formula.latex().replace('|', "\\vert ")),
         })
         .collect()
-}
-
-fn escape(text: &str) -> String {
-    let mut out = String::new();
-    for c in text.chars() {
-        if matches!(c, '\\' | '`' | '*' | '_' | '|' | '<' | '$') {
-            out.push('\\');
-        }
-        out.push(c);
-    }
-    out
 }

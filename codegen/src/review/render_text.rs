@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use modelmill_boundary::text;
+
 use super::document::{Block, Document, Equation, Inline, Line, Table};
 
 /// Width at which equations and paragraphs are broken.
@@ -15,6 +17,7 @@ pub(super) fn render(document: &Document) -> String {
 }
 
 fn underlined(out: &mut String, text: &str, with: char) {
+    let text = text::plain(text);
     let line: String = std::iter::repeat_n(with, text.chars().count()).collect();
     _ = writeln!(out, "{text}\n{line}\n");
 }
@@ -36,7 +39,7 @@ fn blocks(out: &mut String, blocks: &[Block]) {
                 out.push('\n');
             }
             Block::Folded(summary, inner) => {
-                _ = writeln!(out, "{summary}:\n");
+                _ = writeln!(out, "{}:\n", text::plain(summary));
                 self::blocks(out, inner);
             }
         }
@@ -47,7 +50,9 @@ fn blocks(out: &mut String, blocks: &[Block]) {
 pub(super) fn plain(line: &Line) -> String {
     line.iter()
         .map(|inline| match inline {
-            Inline::Text(text) | Inline::Code(text) | Inline::Unit(text) => text.clone(),
+            Inline::Text(text) | Inline::Code(text) | Inline::Unit(text) => {
+                text::plain(text).into_owned()
+            }
             Inline::Math(formula) => formula.text(),
         })
         .collect()

@@ -1,8 +1,8 @@
 //! Models and rigs of the paper's robot, which are part of the crate so that it needs no files.
 
-use std::io;
 use std::path::Path;
 
+use modelmill::files::{Files, Memory};
 use modelmill::{Error, Host, Model, Outcome};
 
 /// Model files by name.
@@ -29,31 +29,32 @@ const RIGS: [(&str, &str); 2] = [
     ),
 ];
 
-/// The text of a file that is part of the program.
-fn text(files: &[(&str, &str)], wanted: &Path) -> io::Result<String> {
-    files
-        .iter()
-        .find(|(name, _)| Path::new(name) == wanted)
-        .map(|(_, text)| (*text).to_owned())
-        .ok_or_else(|| io::Error::other("it is not part of the program"))
+/// Files that are part of the program.
+fn files(bundled: &[(&str, &str)]) -> Memory {
+    let all = bundled.iter();
+    all.fold(Memory::default(), |files, (name, text)| {
+        files.with(name, *text)
+    })
+}
+
+/// The text of one of them.
+fn text(bundled: &[(&str, &str)], wanted: &str) -> Outcome<String> {
+    let found = files(bundled).read_text(Path::new(wanted), u64::MAX);
+    found.map_err(Error::input)
 }
 
 /// Reads a bundled model file.
 pub(crate) fn model(host: &Host, name: &str) -> Outcome<Model> {
-    let own =
-        text(&MODELS, Path::new(name)).map_err(|error| Error::input(format!("{name}: {error}")))?;
-    variant(host, name, name, &own)
+    variant(host, name, name, &text(&MODELS, name)?)
 }
 
 /// Reads the text of a model file, called `file`, that may extend bundled ones; `name` is what the model is called.
 pub(crate) fn variant(host: &Host, name: &str, file: &str, own: &str) -> Outcome<Model> {
-    let loaded = modelmill_spec::load(file, own, &mut |path| text(&MODELS, path))?;
+    let loaded = modelmill_spec::load(file, own, &files(&MODELS))?;
     host.derive(name, loaded)
 }
 
 /// Reads a bundled rig file.
 pub(crate) fn rig(name: &str) -> Outcome<modelmill_rig::Rig> {
-    let own =
-        text(&RIGS, Path::new(name)).map_err(|error| Error::input(format!("{name}: {error}")))?;
-    Ok(modelmill_rig::load(name, &own, &mut |path| text(&RIGS, path))?.rig)
+    Ok(modelmill_rig::load(name, &text(&RIGS, name)?, &files(&RIGS))?.rig)
 }

@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use indexmap::IndexMap;
+use modelmill_boundary::files::{Disk, Files};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -12,6 +13,9 @@ use crate::figures::Figures;
 use crate::figures::fit_error::{FitFault, FitFileError};
 use crate::recording::Note;
 use crate::words::nearest;
+
+/// The most bytes that a fit is read of.
+const LONGEST_FIT: u64 = 64 << 20;
 
 /// A base parameter as the model describes it.
 #[derive(Debug, Clone, PartialEq)]
@@ -180,14 +184,20 @@ impl FitFile {
 
     /// Reads a fit; fails when the file cannot be read or is something else.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FitFileError> {
-        let path = path.as_ref();
+        Self::read_from(&Disk::default(), path.as_ref())
+    }
+
+    /// Reads a fit as [`FitFile::read`] does, from `files`.
+    pub fn read_from(files: &dyn Files, path: &Path) -> Result<Self, FitFileError> {
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|error| FitFileError {
-            file: file.clone(),
-            fault: FitFault::Unreadable {
-                reason: error.to_string(),
-            },
-        })?;
+        let text = files
+            .read_text(path, LONGEST_FIT)
+            .map_err(|error| FitFileError {
+                file: file.clone(),
+                fault: FitFault::Unreadable {
+                    reason: error.fault.to_string(),
+                },
+            })?;
         Self::parse(&text, &file)
     }
 

@@ -6,6 +6,7 @@
 
 mod column;
 mod error;
+mod file;
 mod formats;
 mod gaps;
 mod intake;
@@ -17,6 +18,7 @@ use indexmap::IndexMap;
 
 use crate::words::nearest;
 pub use error::{Fault, RecordingError};
+pub use file::RecordingFile;
 pub use notes::{Note, Severity};
 pub use options::{Computed, NotFinite, ReadOptions};
 pub use read::{name_of_bytes, place_word};

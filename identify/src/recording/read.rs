@@ -1,11 +1,13 @@
 //! From a file, bytes or a stream to a [`Recording`], whatever the format.
 
-use std::fs::File;
-use std::io::{Read, Seek};
+use std::io::Read;
 use std::path::Path;
 
-use crate::recording::error::{Fault, RecordingError};
-use crate::recording::formats::{FORMATS, Format, Input, TELLING_BYTES, format_of};
+use modelmill_boundary::files::Disk;
+
+use crate::recording::error::RecordingError;
+use crate::recording::file::RecordingFile;
+use crate::recording::formats::{FORMATS, Format, Input, format_of};
 use crate::recording::{ReadOptions, Recording};
 
 impl Recording {
@@ -33,20 +35,15 @@ impl Recording {
         path: impl AsRef<Path>,
         options: &ReadOptions,
     ) -> Result<Self, RecordingError> {
-        let (input, file, format) = open(path.as_ref())?;
-        let recording = format.read(input, &file, options);
-        recording.map_err(|fault| RecordingError { file, fault })
+        RecordingFile::open(&Disk::default(), path.as_ref())?.read(options)
     }
 
     /// The names of a file's columns as the file has them; fails when it cannot be read.
     pub fn names_in(path: impl AsRef<Path>) -> Result<Vec<String>, RecordingError> {
-        let (input, file, format) = open(path.as_ref())?;
-        let names = format.names(input);
-        names.map_err(|fault| RecordingError { file, fault })
+        RecordingFile::open(&Disk::default(), path.as_ref())?.names()
     }
 
-    /// [`Recording::read_with`] of a file that is in memory, as what came through a pipe must be; `file` is what messages
-    /// call it.
+    /// [`Recording::read_with`] of a file that is in memory; `file` is what messages call it.
     pub fn from_bytes(
         bytes: &[u8],
         file: &str,
@@ -114,28 +111,4 @@ pub fn place_word(file: &str) -> &'static str {
     } else {
         "line"
     }
-}
-
-/// Opens a file: what is read from, what messages call it, and its format.
-fn open(path: &Path) -> Result<(Input<'static>, String, &'static dyn Format), RecordingError> {
-    let file = path.display().to_string();
-    let unreadable = |reason: String| RecordingError {
-        file: path.display().to_string(),
-        fault: Fault::Unreadable { reason },
-    };
-    if path.is_dir() {
-        return Err(unreadable("it is a folder, not a file".to_owned()));
-    }
-    let mut stream = File::open(path).map_err(|error| unreadable(error.to_string()))?;
-    // What cannot be looked at twice, such as a pipe, can only be text.
-    if stream.stream_position().is_err() {
-        return Ok((Input::Stream(Box::new(stream)), file, format_of(b"")));
-    }
-    let mut first = Vec::new();
-    (&mut stream)
-        .take(TELLING_BYTES as u64)
-        .read_to_end(&mut first)
-        .and_then(|_| stream.rewind())
-        .map_err(|error| unreadable(error.to_string()))?;
-    Ok((Input::File(stream), file, format_of(&first)))
 }

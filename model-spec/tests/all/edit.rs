@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use modelmill_boundary::files::{Disk, Memory};
 use modelmill_spec::edit::{EditFailure, NewEffect, NewParameter, add_effect, add_to_model};
 use modelmill_spec::{Loaded, Mechanics, library, load};
 use proptest::prelude::*;
@@ -22,14 +23,10 @@ fn effect(kind: &str, at: &[&str]) -> NewEffect {
     }
 }
 
-fn read(path: &Path) -> std::io::Result<String> {
-    std::fs::read_to_string(path)
-}
-
 /// Adds an effect to a text that stands beside the bundled models.
 fn add(text: &str, effect: &NewEffect) -> Result<(String, Loaded), String> {
     let path = folder("models/here.toml");
-    add_to_model(&path.to_string_lossy(), text, effect, &[], &mut read)
+    add_to_model(&path.to_string_lossy(), text, effect, &[], &Disk::default())
         .map(|edited| (edited.text, edited.loaded))
         .map_err(|failure| failure.to_string())
 }
@@ -349,13 +346,8 @@ fn libraries_of_ones_own() {
     let text = with_effects(
         "library = \"kinds/mine.toml\"\neffect = [{ kind = \"lip_seal\", at = \"motor\" }]",
     );
-    let mut asked = Vec::new();
-    let mut fetch = |path: &Path| {
-        asked.push(path.to_owned());
-        Ok(seal.to_owned())
-    };
-    let loaded = load("some/arm.toml", &text, &mut fetch).unwrap();
-    assert_eq!(asked, [Path::new("some/kinds/mine.toml")]);
+    let library = |text: &str| Memory::default().with("some/kinds/mine.toml", text);
+    let loaded = load("some/arm.toml", &text, &library(seal)).unwrap();
     assert!(
         loaded
             .kinds
@@ -369,15 +361,13 @@ fn libraries_of_ones_own() {
     );
     // Faults have their place in the library.
     let faulty = seal.replace("tanh(rate/v0)", "tanh(rte/v0)");
-    let failure = load("some/arm.toml", &text, &mut |_| Ok(faulty.clone())).unwrap_err();
+    let failure = load("some/arm.toml", &text, &library(&faulty)).unwrap_err();
     let says = failure.render(false);
     assert!(
         says.contains("some/kinds/mine.toml:4") && says.contains("did you mean `rate`?"),
         "{says}"
     );
-    let failure = load("some/arm.toml", &text, &mut |_| {
-        Err(std::io::Error::other("no disk"))
-    });
+    let failure = load("some/arm.toml", &text, &Memory::default());
     let says = failure.unwrap_err().render(false);
     assert!(
         says.contains("cannot read `some/kinds/mine.toml`") && !says.contains("unknown kind"),

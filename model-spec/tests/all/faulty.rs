@@ -4,26 +4,31 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use modelmill_boundary::files::{Disk, Files, Memory};
 use modelmill_spec::{Failure, Severity, load};
 
 /// Reads a fixture under the path that messages should show.
 fn render(name: &str) -> String {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faulty");
     let text = std::fs::read_to_string(folder.join(name)).unwrap();
-    match load(name, &text, &mut |path| {
-        std::fs::read_to_string(folder.join(path))
-            .map_err(|_| std::io::Error::other("no such file"))
-    }) {
+    match load(name, &text, &beside(&folder)) {
         Ok(loaded) => format!("(no errors)\n\n{}", loaded.render(false)),
         Err(failure) => failure.render(false),
     }
 }
 
+/// The fixtures under their names alone.
+fn beside(folder: &Path) -> Memory {
+    let paths = Disk::default().list(folder).unwrap();
+    let files = paths.iter().filter(|path| path.is_file());
+    files.fold(Memory::default(), |files, path| {
+        files.with(path.file_name().unwrap(), std::fs::read(path).unwrap())
+    })
+}
+
 fn failure(text: &str) -> Failure {
     let start = Instant::now();
-    let result = load("model.toml", text, &mut |_| {
-        Err(std::io::Error::other("none"))
-    });
+    let result = load("model.toml", text, &Memory::default());
     let took = start.elapsed();
     assert!(took < Duration::from_secs(5), "took {took:?}");
     result.map(|_| ()).expect_err("the file is faulty")
@@ -69,7 +74,7 @@ fn a_file_that_is_no_text_in_utf_8() {
     let none = modelmill_spec::load_file(Path::new("no/such.toml")).unwrap_err();
     assert_eq!(
         none.render(false),
-        "error: cannot read `no/such.toml`: No such file or directory (os error 2)\n  \
+        "error: cannot read `no/such.toml`: no such file\n  \
          = help: give the path of a model file, such as `model-spec/models/two_link.toml`\n"
     );
 }
@@ -280,7 +285,7 @@ fn a_file_that_cannot_be_read() {
 fn line_ends_and_marks_of_other_systems() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/two_link.toml");
     let text = std::fs::read_to_string(path).unwrap().replace('\n', "\r\n");
-    let mut none = |_: &Path| Err(std::io::Error::other("none"));
-    assert!(load("model.toml", &text, &mut none).is_ok());
-    assert!(load("model.toml", &format!("\u{feff}{text}"), &mut none).is_ok());
+    let none = Memory::default();
+    assert!(load("model.toml", &text, &none).is_ok());
+    assert!(load("model.toml", &format!("\u{feff}{text}"), &none).is_ok());
 }

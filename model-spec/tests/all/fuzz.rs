@@ -7,6 +7,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use modelmill_boundary::files::Memory;
 use modelmill_spec::{Severity, load};
 
 /// Cases without `MODELMILL_FUZZ_SECONDS`.
@@ -214,18 +215,8 @@ fn mutate(text: &mut String, others: &[(String, String)], random: &mut Random) {
 }
 
 /// What must hold for any text.
-fn check(name: &str, text: &str, others: &[(String, String)]) -> bool {
-    let mut read = |path: &Path| {
-        let wanted = path
-            .file_name()
-            .map(|name| name.to_string_lossy().into_owned());
-        others
-            .iter()
-            .find(|(name, _)| Some(name) == wanted.as_ref())
-            .map(|(_, text)| text.clone())
-            .ok_or_else(|| std::io::Error::other("no such file"))
-    };
-    match load(name, text, &mut read) {
+fn check(name: &str, text: &str, others: &Memory) -> bool {
+    match load(name, text, others) {
         Ok(loaded) => {
             let _ = loaded.render(true);
             assert!(
@@ -279,6 +270,11 @@ fn no_text_makes_it_panic_or_hang() {
         .and_then(|text| text.parse::<u64>().ok());
     let mut random = Random(seed.unwrap_or(1).wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
     let others = corpus();
+    let files = others
+        .iter()
+        .fold(Memory::default(), |files, (name, text)| {
+            files.with(name, text.as_str())
+        });
     let start = Instant::now();
     let (mut cases, mut sound, mut slowest) = (0_u64, 0_u64, Duration::ZERO);
     while seconds.map_or(cases < CASES, |limit| start.elapsed().as_secs() < limit) {
@@ -288,7 +284,7 @@ fn no_text_makes_it_panic_or_hang() {
             mutate(&mut text, &others, &mut random);
         }
         let began = Instant::now();
-        let outcome = catch_unwind(AssertUnwindSafe(|| check(name, &text, &others)));
+        let outcome = catch_unwind(AssertUnwindSafe(|| check(name, &text, &files)));
         let took = began.elapsed();
         slowest = slowest.max(took);
         cases += 1;

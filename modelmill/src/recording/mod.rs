@@ -3,12 +3,11 @@
 
 mod columns;
 mod options;
-mod piped;
 
 use std::path::Path;
 use std::sync::Arc;
 
-use modelmill_identify::{Note, Recording as Raw, Run, name_of_bytes};
+use modelmill_identify::{Note, Recording as Raw, RecordingFile, Run};
 
 use crate::audit;
 use crate::error::{Error, Outcome};
@@ -21,27 +20,15 @@ use columns::read_options;
 pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER};
 pub use modelmill_identify::{Preparation, Smoothing};
 pub use options::Reading;
-use piped::piped;
 
 /// Reads a recording with the columns that a model needs.
 fn read_raw(model: &Model, path: &Path, reading: &Reading) -> Outcome<Raw> {
-    let piped = piped(path)?;
-    let name = path.display().to_string();
-    let name = piped
-        .as_ref()
-        .map_or(name.clone(), |bytes| name_of_bytes(&name, bytes));
-    let header = match &piped {
-        Some(bytes) => Raw::names_in_bytes(bytes, &name)?,
-        None => Raw::names_in(path)?,
-    };
-    let options = read_options(model, reading, &header, &name)?;
-    let read = || match &piped {
-        Some(bytes) => Raw::from_bytes(bytes, &name, &options),
-        None => Raw::read_with(path, &options),
-    };
+    let file = RecordingFile::open(model.host().files(), path)?;
+    let name = file.name();
+    let options = read_options(model, reading, &file.names()?, name)?;
     Ok(model
         .host()
-        .watched(&format!("reading {name}"), 0, |_| read())??)
+        .watched(&format!("reading {name}"), 0, |_| file.read(&options))??)
 }
 
 /// The stretches of a recording; where the model says that forces are read late, each force has the states of the moment at

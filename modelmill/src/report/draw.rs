@@ -244,7 +244,7 @@ impl Picture {
 
 /// Text within an attribute.
 pub(crate) fn attribute(text: &str) -> String {
-    escape(text).replace('"', "&quot;")
+    escape(text)
 }
 
 /// A curve over an axis, thinned to what can be seen; values that are no numbers are gaps.

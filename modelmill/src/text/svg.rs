@@ -174,7 +174,5 @@ pub fn thinned(values: &[f64], wanted: usize) -> Vec<(usize, f64)> {
 
 /// Text as HTML and SVG take it.
 pub fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
+    modelmill_boundary::text::html(text).into_owned()
 }

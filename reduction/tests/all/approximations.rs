@@ -1,11 +1,12 @@
 //! What is not exact is found and sized: each number here is worked out by hand.
 
+use modelmill_boundary::files::Memory;
 use modelmill_reduction::{Finding, Reduction, plan, plan_for, reduce, sampled_forces};
 use modelmill_rig::Rig;
 
 fn rig(text: &str) -> Rig {
     let text = format!("schema = 1\nname = \"test\"\ngravity = [0, -9.81, 0]\n{text}");
-    modelmill_rig::load("test.toml", &text, &mut |_| unreachable!())
+    modelmill_rig::load("test.toml", &text, &Memory::default())
         .unwrap_or_else(|f| panic!("{f}"))
         .rig
 }
@@ -153,8 +154,7 @@ fn a_rig_without_a_plan() {
     "#);
     let plan = plan_for(&rig).unwrap_or_else(|says| panic!("{says}"));
     let reduction = reduce(plan.rig(&rig), &plan).unwrap_or_else(|failure| panic!("{failure}"));
-    let none = &mut |_: &std::path::Path| Err(std::io::Error::other("none"));
-    let mechanism = modelmill_spec::load("model.toml", &reduction.model, none)
+    let mechanism = modelmill_spec::load("model.toml", &reduction.model, &Memory::default())
         .expect("a model")
         .mechanism;
     assert_eq!((mechanism.parts.len(), mechanism.loops.len()), (3, 1));

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use modelmill_boundary::files::Memory;
 use modelmill_codegen::{Derivation, Evaluator, States};
 use modelmill_reduction::{Reduction, plan_file, reduce};
 use modelmill_rig::{Rig, State, Tracker, forces};
@@ -24,9 +25,7 @@ fn reduced() -> Reduction {
 }
 
 fn derived(text: &str) -> Derivation {
-    let loaded = modelmill_spec::load("model.toml", text, &mut |_| {
-        Err(std::io::Error::other("none"))
-    });
+    let loaded = modelmill_spec::load("model.toml", text, &Memory::default());
     let loaded = loaded.unwrap_or_else(|failure| panic!("{failure}"));
     assert_eq!(loaded.render(false), "", "no warnings");
     modelmill_codegen::derive(&loaded.mechanism).expect("a derivation")

@@ -1,5 +1,6 @@
 //! A robot description of ROS as a starting point: its model must have the forces that another path gives.
 
+use modelmill_boundary::files::Memory;
 use modelmill_codegen::{Derivation, Evaluator, States};
 use modelmill_reduction::import_urdf;
 use modelmill_rig::{State, Tracker, forces};
@@ -140,15 +141,13 @@ fn rig() -> modelmill_rig::Rig {
         text.push_str(&named("drive", &format!("{name}_drive"), name));
     }
     text += "[[effect]]\nkind = \"viscous_friction\"\nat = [\"shoulder_drive\"]\nvalues = { Fv = 0.8 }\n";
-    modelmill_rig::load("arm.toml", &text, &mut |_| unreachable!())
+    modelmill_rig::load("arm.toml", &text, &Memory::default())
         .unwrap_or_else(|f| panic!("{f}"))
         .rig
 }
 
 fn derived(text: &str) -> Derivation {
-    let loaded = modelmill_spec::load("model.toml", text, &mut |_| {
-        Err(std::io::Error::other("none"))
-    });
+    let loaded = modelmill_spec::load("model.toml", text, &Memory::default());
     modelmill_codegen::derive(
         &loaded
             .unwrap_or_else(|failure| panic!("{failure}"))

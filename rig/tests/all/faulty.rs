@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use modelmill_boundary::files::{Disk, Files, Memory};
 use modelmill_rig::{Tracker, load};
 
 fn folder() -> std::path::PathBuf {
@@ -11,11 +12,13 @@ fn folder() -> std::path::PathBuf {
 /// Reads a fixture under the path that messages should show, and stands the rig up if it can be read.
 fn message(name: &str) -> String {
     let text = std::fs::read_to_string(folder().join(name)).expect("a fixture");
-    let mut read = |path: &Path| {
-        std::fs::read_to_string(folder().join(path))
-            .map_err(|_| std::io::Error::other("no such file"))
-    };
-    match load(name, &text, &mut read) {
+    let paths = Disk::default().list(&folder()).expect("fixtures");
+    let files = paths.iter().filter(|path| path.is_file());
+    let files = files.fold(Memory::default(), |files, path| {
+        let name = path.file_name().expect("a name");
+        files.with(name, std::fs::read(path).expect("a fixture"))
+    });
+    match load(name, &text, &files) {
         Ok(loaded) => match Tracker::new(&loaded.rig) {
             Ok(_) => panic!("{name} has no fault"),
             Err(error) => format!("{error}\n"),
@@ -66,7 +69,7 @@ fn a_file_that_cannot_be_read() {
 
 #[test]
 fn a_file_of_megabytes_and_one_of_nonsense() {
-    let none = &mut |_: &Path| Err(std::io::Error::other("none"));
+    let none = &Memory::default();
     let huge = load("rig.toml", &"x".repeat(5 << 20), none).expect_err("too large");
     assert!(huge.render(false).contains("too large"));
     for text in [
@@ -86,7 +89,7 @@ fn unfinished_files_give_an_answer() {
     let path =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/rigs/spidermill-full.toml");
     let text = std::fs::read_to_string(path).expect("a rig");
-    let none = &mut |_: &Path| Err(std::io::Error::other("none"));
+    let none = &Memory::default();
     let mut sound = 0;
     let lines: Vec<&str> = text.lines().collect();
     let without = (0..lines.len())

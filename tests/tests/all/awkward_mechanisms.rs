@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use modelmill_boundary::files::Memory;
 use modelmill_codegen::{DeriveError, Evaluator, Method, PassivePosition, States};
 use modelmill_spec::{DriveKind, FrameIdx, Mechanism, PointIdx};
 use modelmill_tests::fixtures::{derive, fixtures, model};
@@ -246,7 +247,7 @@ fn four_bars(n: usize, in_a_row: bool) -> Mechanism {
         }
     }
     text = text + &constants + &coordinates + &rest;
-    match modelmill_spec::load("four_bars.toml", &text, &mut |_| unreachable!()) {
+    match modelmill_spec::load("four_bars.toml", &text, &Memory::default()) {
         Ok(loaded) => loaded.mechanism,
         Err(failure) => panic!("{}", failure.render(false)),
     }
@@ -314,7 +315,7 @@ fn a_power_of_a_sum_of_parameters_is_refused_before_it_fills_the_memory() {
         "#,
         names.join("+")
     );
-    let loaded = modelmill_spec::load("sums.toml", &text, &mut |_| unreachable!()).unwrap();
+    let loaded = modelmill_spec::load("sums.toml", &text, &Memory::default()).unwrap();
     let error = modelmill_codegen::derive(&loaded.mechanism)
         .err()
         .expect("no derivation");

@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use modelmill_boundary::files::Disk;
 use modelmill_codegen::{Evaluator, Method, States};
 use modelmill_rig::{Rig, State, Tracker, forces};
 use modelmill_spec::Mechanism;
@@ -19,8 +20,7 @@ fn spidermill_rig() -> Rig {
 fn with(model: &str, more: &str) -> Mechanism {
     let path = model_file(model);
     let text = std::fs::read_to_string(&path).expect("a model") + "\n" + more;
-    let mut read = |path: &std::path::Path| std::fs::read_to_string(path);
-    modelmill_spec::load(&path.to_string_lossy(), &text, &mut read)
+    modelmill_spec::load(&path.to_string_lossy(), &text, &Disk::default())
         .unwrap_or_else(|failure| panic!("{failure}"))
         .mechanism
 }

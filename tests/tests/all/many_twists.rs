@@ -3,6 +3,7 @@
 
 use std::fmt::Write;
 
+use modelmill_boundary::files::Memory;
 use modelmill_codegen::Method;
 use modelmill_spec::Mechanism;
 use modelmill_tests::laws::{ACCURACY, Case};
@@ -39,7 +40,7 @@ fn twisted(n: usize) -> Mechanism {
         writeln!(text, "[[drive]]\nname = \"t{i}\"\njoint = \"q{i}\"").unwrap();
         on = format!("l{i}");
     }
-    let loaded = modelmill_spec::load("twisted.toml", &text, &mut |_| unreachable!());
+    let loaded = modelmill_spec::load("twisted.toml", &text, &Memory::default());
     let mut mechanism = match loaded {
         Ok(loaded) => loaded.mechanism,
         Err(failure) => panic!("{}", failure.render(false)),

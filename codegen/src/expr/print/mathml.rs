@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use modelmill_boundary::text::html as escape;
+
 use super::formula::{Formula, Function, digits};
 use super::symbol::{Glyphs, Symbol, typeset};
 
@@ -13,21 +15,6 @@ impl Formula {
         out.push_str("</mrow>");
         out
     }
-}
-
-/// Text with the characters of markup made harmless.
-pub fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            c => out.push(c),
-        }
-    }
-    out
 }
 
 /// Space between factors; the sign of the product stays invisible.

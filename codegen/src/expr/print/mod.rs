@@ -22,5 +22,4 @@ pub use formula::{Formula, Function};
 pub use from_exact::{angle, exact, exact_at, length};
 pub(crate) use from_graph::angle_sum;
 pub use from_graph::{atom, formula, tree_size};
-pub use mathml::escape;
 pub use symbol::Symbol;

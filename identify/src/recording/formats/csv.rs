@@ -2,7 +2,9 @@
 //!
 //! A UTF-8 byte order mark and CR LF are fine, and so are blank lines.
 
+use std::cell::Cell;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
+use std::rc::Rc;
 
 use crate::recording::column::Field;
 use crate::recording::error::Fault;
@@ -13,6 +15,8 @@ use crate::recording::{ReadOptions, Recording};
 
 /// The longest header line that is looked at; beyond it the file is no recording.
 const LONGEST_HEADER: u64 = 1 << 20;
+/// The most bytes of a line, or of lines that a quote makes one, that are kept in memory.
+const LONGEST_RECORD: usize = 64 << 20;
 
 /// CSV text, which everything is that no other format knows as its own.
 pub(crate) struct Csv;
@@ -36,13 +40,14 @@ impl Format for Csv {
     }
 
     fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault> {
-        let (mut reader, _, header_line) = open(input.stream())?;
+        let (mut reader, _, header_line) = open(input.stream(), Rc::default())?;
         names(&mut reader, header_line)
     }
 }
 
 fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<Recording, Fault> {
-    let (mut reader, separator, header_line) = open(stream)?;
+    let since = Rc::new(Cell::new(0));
+    let (mut reader, separator, header_line) = open(stream, since.clone())?;
     let theirs = names(&mut reader, header_line)?;
     let mut intake = Intake::new(theirs, options)?;
     if separator != b',' {
@@ -58,6 +63,7 @@ fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<Recordin
     let mut record = csv::ByteRecord::new();
     let mut sample = Vec::new();
     while reader.read_byte_record(&mut record).map_err(unreadable)? {
+        since.set(0);
         // The reader stands behind the line's end here; where it began, blank lines are not
         // passed over yet.
         let line = reader.position().line() - 1;
@@ -90,14 +96,18 @@ fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<Recordin
     intake.finish(file)
 }
 
-/// A reader that stands before the header, what separates the columns, and the line of the header.
-fn open(stream: impl Read) -> Result<(csv::Reader<impl Read>, u8, u64), Fault> {
+/// A reader that stands before the header, what separates the columns, and the line of the header;
+/// `since` counts the bytes that are read.
+fn open(
+    stream: impl Read,
+    since: Rc<Cell<usize>>,
+) -> Result<(csv::Reader<impl Read>, u8, u64), Fault> {
     let mut stream = BufReader::with_capacity(1 << 16, stream);
     let (header, first_lines) = read_header(&mut stream)?;
     let separator = find_separator(&header)?;
     let blank = first_lines.len() - first_lines.trim_ascii_start().len();
     let header_line = 1 + newlines(&first_lines[..blank]);
-    let lines_of_text = EvenLines::new(Cursor::new(first_lines).chain(stream));
+    let lines_of_text = EvenLines::new(Cursor::new(first_lines).chain(stream), since);
     let reader = csv::ReaderBuilder::new()
         .delimiter(separator)
         .flexible(true)
@@ -152,11 +162,14 @@ struct EvenLines<R> {
     inner: R,
     last: u8,
     ended: bool,
+    /// Bytes since a record was complete.
+    since: Rc<Cell<usize>>,
 }
 
 impl<R: Read> EvenLines<R> {
-    fn new(inner: R) -> Self {
+    fn new(inner: R, since: Rc<Cell<usize>>) -> Self {
         Self {
+            since,
             inner,
             last: b'\n',
             ended: false,
@@ -171,6 +184,12 @@ impl<R: Read> Read for EvenLines<R> {
         }
         loop {
             let have = self.inner.read(buffer)?;
+            self.since.set(self.since.get() + have);
+            if self.since.get() > LONGEST_RECORD {
+                return Err(io::Error::other(
+                    "a line, or a text from one quote to the next, takes more than 64 MB",
+                ));
+            }
             if have == 0 {
                 self.ended = true;
                 if self.last == b'\n' {

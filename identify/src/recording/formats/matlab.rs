@@ -3,17 +3,19 @@
 //! A vector `q1` is the column `q1`; the columns of a matrix `q` are `q_1`, `q_2` and so on. All must have the same
 //! number of samples; what has another length, and what is no real numeric array, is left aside and said.
 
-use std::io::{self, BufReader, Read, Seek, SeekFrom};
-
-use matfile::{Array, MatFile, NumericData};
+use std::io::{BufReader, Read, Seek};
 
 use crate::recording::column::Field;
 use crate::recording::error::Fault;
+use crate::recording::formats::matlab_arrays::Arrays;
 use crate::recording::formats::{Format, Input};
 use crate::recording::intake::{Flow, Intake};
 use crate::recording::notes::Note;
 use crate::recording::{ReadOptions, Recording};
 use crate::words::list;
+
+/// More columns than any recording has.
+const MOST_COLUMNS: usize = 1 << 17;
 
 /// What `save -v7` and `-v6` write.
 pub(crate) struct Matlab5;
@@ -41,8 +43,7 @@ impl Format for Matlab5 {
     }
 
     fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault> {
-        let columns = columns(input.seekable()?)?;
-        Ok(columns.sound.into_iter().map(|(name, _)| name).collect())
+        Ok(Columns::new(&open(input.seekable()?)?)?.names())
     }
 }
 
@@ -71,23 +72,10 @@ fn not_read() -> Fault {
     }
 }
 
-fn read(
-    mut stream: impl Read + Seek,
-    file: &str,
-    options: &ReadOptions,
-) -> Result<Recording, Fault> {
-    // The file is read as a whole, and its numbers take eight bytes each once read.
-    let bytes = stream.seek(SeekFrom::End(0)).unwrap_or(0);
-    if bytes / 8 > options.most_numbers as u64 {
-        return Err(Fault::Format {
-            format: "a MATLAB file",
-            says: "it is too large to be read as a whole; save it as CSV or Parquet, of which parts can be read"
-                .to_owned(),
-        });
-    }
-    let columns = columns(stream)?;
-    let names = columns.sound.iter().map(|(name, _)| name.clone()).collect();
-    let mut intake = Intake::new(names, options)?;
+fn read(stream: impl Read + Seek, file: &str, options: &ReadOptions) -> Result<Recording, Fault> {
+    let mut arrays = open(stream)?;
+    let columns = Columns::new(&arrays)?;
+    let mut intake = Intake::new(columns.names(), options)?;
     if !columns.others.is_empty() {
         intake.note(Note::info(format!(
             "{} of {file} {} not of as many samples as the others, or not real, and left aside.",
@@ -99,13 +87,45 @@ fn read(
             },
         )));
     }
-    let samples = columns.sound.first().map_or(0, |(_, values)| values.len());
+    let mut wanted = vec![false; arrays.arrays.len()];
+    for (place, column) in columns.sound.iter().enumerate() {
+        wanted[column.array] |= intake.reads(place);
+    }
+    // An array is read as a whole, and its numbers are kept twice until all are taken in.
+    let sizes = arrays
+        .arrays
+        .iter()
+        .zip(&wanted)
+        .filter(|(_, wanted)| **wanted);
+    let numbers: usize = sizes
+        .map(|(array, _)| array.size.iter().product::<usize>())
+        .sum();
+    if numbers > options.most_numbers / 2 {
+        return Err(broken(
+            "it is too large to be read as a whole; save it as CSV or Parquet, of which parts can be read",
+        ));
+    }
+    let mut values = Vec::new();
+    for (array, wanted) in arrays.arrays.clone().iter().zip(wanted) {
+        values.push(if wanted {
+            arrays.numbers(array).map_err(unreadable)?
+        } else {
+            Vec::new()
+        });
+    }
+    let value = |place: usize, k: usize| {
+        let column = &columns.sound[place];
+        let numbers = &values[column.array];
+        numbers
+            .get(column.first + k * column.step)
+            .copied()
+            .unwrap_or(0.0)
+    };
     let mut sample = Vec::new();
-    for k in 0..samples {
+    for k in 0..columns.samples {
         sample.clear();
-        let numbers = columns.sound.iter().map(|(_, values)| values[k]);
-        sample.extend(numbers.map(Field::of));
-        let text = |place: usize| columns.sound[place].1[k].to_string();
+        sample.extend((0..columns.sound.len()).map(|place| Field::of(value(place, k))));
+        let text = |place: usize| value(place, k).to_string();
         if intake.take(k as u64 + 1, &sample, &text)? == Flow::Stop {
             break;
         }
@@ -113,125 +133,88 @@ fn read(
     intake.finish(file)
 }
 
+fn open<R: Read + Seek>(stream: R) -> Result<Arrays<BufReader<R>>, Fault> {
+    Arrays::new(BufReader::new(stream)).map_err(unreadable)
+}
+
 /// The columns of a file, all of one length, and the names of what is none.
 struct Columns {
-    sound: Vec<(String, Vec<f64>)>,
+    samples: usize,
+    sound: Vec<Column>,
     others: Vec<String>,
 }
 
-fn columns(stream: impl Read + Seek) -> Result<Columns, Fault> {
-    let broken = |says: String| Fault::Format {
-        format: "a MATLAB file",
-        says,
-    };
-    let mut stream = BufReader::new(stream);
-    if !is_whole(&mut stream).map_err(|error| broken(format!("it cannot be read: {error}")))? {
-        return Err(broken(
-            "it breaks off within a variable; copy or save it again".to_owned(),
-        ));
-    }
-    let file = MatFile::parse(stream).map_err(|error| {
-        broken(format!(
-            "it cannot be read: {error}; save it again with `-v7`"
-        ))
-    })?;
-    // The number of samples is the longest side that any array has.
-    let longest = |array: &Array| array.size().iter().copied().max().unwrap_or(0);
-    let samples = file.arrays().iter().map(longest).max().unwrap_or(0);
-    if samples == 0 {
-        return Err(broken(
-            "it holds no numeric arrays at its top level; structures and tables cannot be read: save their fields as \
-             variables of their own, or as CSV or Parquet"
-                .to_owned(),
-        ));
-    }
-    let mut columns = Columns {
-        sound: Vec::new(),
-        others: Vec::new(),
-    };
-    for array in file.arrays() {
-        let (rows, cols) = match array.size().as_slice() {
-            [rows, cols] => (*rows, *cols),
-            _ => (0, 0),
-        };
-        let values = numbers(array.data()).filter(|values| values.len() == rows * cols);
-        let Some(values) = values.filter(|_| rows == samples || cols == samples) else {
-            columns.others.push(array.name().to_owned());
-            continue;
-        };
-        let is_upright = rows == samples;
-        let width = if is_upright { cols } else { rows };
-        for j in 0..width {
-            let name = if width == 1 {
-                array.name().to_owned()
-            } else {
-                format!("{}_{}", array.name(), j + 1)
-            };
-            let value = |k: usize| {
-                values[if is_upright {
-                    j * rows + k
-                } else {
-                    k * rows + j
-                }]
-            };
-            columns
-                .sound
-                .push((name, (0..samples).map(value).collect()));
-        }
-    }
-    Ok(columns)
+/// A column, and where its numbers stand: from `first` on, `step` apart.
+struct Column {
+    name: String,
+    array: usize,
+    first: usize,
+    step: usize,
 }
 
-/// Whether the last variable of a file is complete, which the library does not say; the stream ends at its beginning.
-///
-/// After a header of 128 bytes, whose last two tell the byte order, each variable has a tag of its type and its length
-/// (MathWorks, "MAT-File Format"); lengths are padded to eight bytes unless the variable is compressed.
-fn is_whole(stream: &mut (impl Read + Seek)) -> io::Result<bool> {
-    const HEADER: u64 = 128;
-    const COMPRESSED: u32 = 15;
-    let end = stream.seek(SeekFrom::End(0))?;
-    if end < HEADER {
-        return Ok(false);
-    }
-    stream.seek(SeekFrom::Start(HEADER - 2))?;
-    let mut order = [0; 2];
-    stream.read_exact(&mut order)?;
-    let number = |bytes: [u8; 4]| {
-        if order == *b"IM" {
-            u32::from_le_bytes(bytes)
-        } else {
-            u32::from_be_bytes(bytes)
+impl Columns {
+    fn new<R>(file: &Arrays<R>) -> Result<Self, Fault> {
+        // The number of samples is the longest side that any array has.
+        let sides = file.arrays.iter().flat_map(|array| &array.size);
+        let samples = sides.copied().max().unwrap_or(0);
+        if samples == 0 {
+            return Err(broken(
+                "it holds no numeric arrays at its top level; structures and tables cannot be read: save their fields as \
+                 variables of their own, or as CSV or Parquet",
+            ));
         }
-    };
-    let mut at = HEADER;
-    while at + 8 <= end {
-        stream.seek(SeekFrom::Start(at))?;
-        let (mut kind, mut length) = ([0; 4], [0; 4]);
-        stream.read_exact(&mut kind)?;
-        stream.read_exact(&mut length)?;
-        let length = u64::from(number(length));
-        at += 8 + if number(kind) == COMPRESSED {
-            length
-        } else {
-            length.next_multiple_of(8)
+        let mut columns = Self {
+            samples,
+            sound: Vec::new(),
+            others: Vec::new(),
         };
-    }
-    stream.rewind()?;
-    Ok(at == end)
-}
-
-/// The numbers of a real array, column by column.
-fn numbers(data: &NumericData) -> Option<Vec<f64>> {
-    macro_rules! of {
-        ($($variant:ident),*) => {
-            match data {
-                NumericData::Double { real, imag: None } => Some(real.clone()),
-                $(NumericData::$variant { real, imag: None } => Some(real.iter().map(|x| f64::from(*x)).collect()),)*
-                NumericData::Int64 { real, imag: None } => Some(real.iter().map(|x| *x as f64).collect()),
-                NumericData::UInt64 { real, imag: None } => Some(real.iter().map(|x| *x as f64).collect()),
-                _ => None,
+        for (i, array) in file.arrays.iter().enumerate() {
+            let (rows, cols) = match array.size.as_slice() {
+                [rows, cols] if array.is_sound => (*rows, *cols),
+                _ => (0, 0),
+            };
+            if rows != samples && cols != samples {
+                columns.others.push(array.name.clone());
+                continue;
             }
-        };
+            let is_upright = rows == samples;
+            let width = if is_upright { cols } else { rows };
+            if columns.sound.len() + width > MOST_COLUMNS {
+                return Err(broken("it has more columns than any recording"));
+            }
+            for j in 0..width {
+                columns.sound.push(Column {
+                    name: if width == 1 {
+                        array.name.clone()
+                    } else {
+                        format!("{}_{}", array.name, j + 1)
+                    },
+                    array: i,
+                    first: if is_upright { j * rows } else { j },
+                    step: if is_upright { 1 } else { rows },
+                });
+            }
+        }
+        Ok(columns)
     }
-    of!(Int8, UInt8, Int16, UInt16, Int32, UInt32, Single)
+
+    fn names(&self) -> Vec<String> {
+        self.sound
+            .iter()
+            .map(|column| column.name.clone())
+            .collect()
+    }
+}
+
+fn broken(says: impl Into<String>) -> Fault {
+    Fault::Format {
+        format: "a MATLAB file",
+        says: says.into(),
+    }
+}
+
+fn unreadable(error: std::io::Error) -> Fault {
+    broken(format!(
+        "it cannot be read: {error}; save it again with `-v7`"
+    ))
 }

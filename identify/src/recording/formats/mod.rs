@@ -4,7 +4,9 @@
 
 mod csv;
 mod matlab;
+mod matlab_arrays;
 mod parquet;
+mod parquet_pages;
 
 use std::fs::File;
 use std::io::{Cursor, Read, Seek};
@@ -94,13 +96,19 @@ impl<'a> Input<'a> {
     }
 }
 
-/// All bytes of a stream.
-pub(crate) fn all_of(mut stream: impl Read) -> Result<Vec<u8>, Fault> {
+/// The most bytes that are kept of what can be looked at once only.
+pub(crate) const LONGEST_STREAM: u64 = 3 << 27;
+
+/// All bytes of a stream, which must have an end.
+pub(crate) fn all_of(stream: impl Read) -> Result<Vec<u8>, Fault> {
+    let unreadable = |reason: String| Fault::Unreadable { reason };
     let mut bytes = Vec::new();
-    stream
-        .read_to_end(&mut bytes)
-        .map_err(|error| Fault::Unreadable {
-            reason: error.to_string(),
-        })?;
+    let read = stream.take(LONGEST_STREAM + 1).read_to_end(&mut bytes);
+    read.map_err(|error| unreadable(error.to_string()))?;
+    if bytes.len() as u64 > LONGEST_STREAM {
+        return Err(unreadable(format!(
+            "it holds more than {LONGEST_STREAM} bytes"
+        )));
+    }
     Ok(bytes)
 }

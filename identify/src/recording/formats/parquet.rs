@@ -2,16 +2,21 @@
 //!
 //! Time stamps and times of day become seconds from the first one on, exactly, before they are rounded to a float.
 
+use std::io;
+use std::sync::Arc;
+
 use bytes::Bytes;
-use parquet::basic::{ConvertedType, LogicalType, TimeUnit};
+use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit, Type};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
-use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
+use parquet::file::metadata::RowGroupMetaData;
+use parquet::file::reader::{ChunkReader, FileReader, Length, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
 use crate::recording::column::Field;
 use crate::recording::error::Fault;
+use crate::recording::formats::parquet_pages::{self, Packing};
 use crate::recording::formats::{Format, Input, all_of};
 use crate::recording::intake::{Flow, Intake};
 use crate::recording::notes::Note;
@@ -19,6 +24,10 @@ use crate::recording::{ReadOptions, Recording};
 
 /// Samples that are read at once.
 const BATCH: usize = 8192;
+/// Fields that are kept at once.
+const FIELDS: usize = 1 << 22;
+/// Bytes of pages that may be in memory at once.
+const MOST_UNPACKED: u64 = 256 << 20;
 
 /// Apache Parquet.
 pub(crate) struct Parquet;
@@ -63,7 +72,8 @@ fn read(
     file: &str,
     options: &ReadOptions,
 ) -> Result<Recording, Fault> {
-    let reader = SerializedFileReader::new(stream).map_err(fault)?;
+    let bytes = Arc::new(stream);
+    let reader = SerializedFileReader::new(Shared(bytes.clone())).map_err(fault)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let width = schema.num_columns();
     let mut intake = Intake::new(names(&reader), options)?;
@@ -76,14 +86,19 @@ fn read(
             )));
         }
     }
+    let is_read = |i: usize| intake.reads(i) && !matches!(kinds[i], Kind::Unusable);
+    let wanted: Vec<bool> = (0..width).map(is_read).collect();
+    // As many samples at once as keep the fields of all columns few.
+    let n_read = wanted.iter().filter(|is_read| **is_read).count();
+    let most = (FIELDS / n_read.max(1)).clamp(1, BATCH);
     let mut sample = vec![Field::Number(0.0); width];
     let mut row = 0;
     for group in 0..reader.num_row_groups() {
+        check_pages(bytes.as_ref(), reader.metadata().row_group(group), &wanted)?;
         let group = reader.get_row_group(group).map_err(fault)?;
         let mut columns = Vec::new();
         for i in 0..width {
-            let is_read = intake.reads(i) && !matches!(kinds[i], Kind::Unusable);
-            let column = if is_read {
+            let column = if wanted[i] {
                 Some(group.get_column_reader(i).map_err(fault)?)
             } else {
                 None
@@ -92,7 +107,7 @@ fn read(
         }
         let mut left = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
         while left > 0 {
-            let n = left.min(BATCH);
+            let n = left.min(most);
             let mut fields: Vec<Vec<Field>> = Vec::with_capacity(width);
             for (column, kind) in columns.iter_mut().zip(&mut kinds) {
                 fields.push(match column {
@@ -122,6 +137,68 @@ fn read(
         }
     }
     intake.finish(file)
+}
+
+/// Fails when pages of a row group would take more memory than there may be, before any is unpacked.
+fn check_pages<R: ChunkReader>(
+    bytes: &R,
+    group: &RowGroupMetaData,
+    wanted: &[bool],
+) -> Result<(), Fault> {
+    let refused = |error: io::Error| fault(ParquetError::General(error.to_string()));
+    let mut sum = 0;
+    for (column, _) in group
+        .columns()
+        .iter()
+        .zip(wanted)
+        .filter(|(_, is_wanted)| **is_wanted)
+    {
+        let packing = match column.compression() {
+            Compression::GZIP(_) => Packing::Gzip,
+            Compression::LZ4 => Packing::OldLz4,
+            _ => Packing::AsSaid,
+        };
+        let start = column
+            .dictionary_page_offset()
+            .unwrap_or_else(|| column.data_page_offset());
+        let (start, length) = (
+            u64::try_from(start),
+            u64::try_from(column.compressed_size()),
+        );
+        let (Ok(start), Ok(length)) = (start, length) else {
+            return Err(refused(io::Error::other("a column has a negative place")));
+        };
+        let stream = bytes.get_read(start).map_err(fault)?;
+        sum += parquet_pages::largest(stream, length, packing).map_err(refused)?;
+    }
+    // One page of every column is in memory at once.
+    if sum > MOST_UNPACKED {
+        return Err(refused(io::Error::other(
+            "its pages would take too much memory",
+        )));
+    }
+    Ok(())
+}
+
+/// A file of which the pages are looked at before they are read.
+struct Shared<R>(Arc<R>);
+
+impl<R: Length> Length for Shared<R> {
+    fn len(&self) -> u64 {
+        self.0.len()
+    }
+}
+
+impl<R: ChunkReader> ChunkReader for Shared<R> {
+    type T = R::T;
+
+    fn get_read(&self, start: u64) -> parquet::errors::Result<R::T> {
+        self.0.get_read(start)
+    }
+
+    fn get_bytes(&self, start: u64, length: usize) -> parquet::errors::Result<bytes::Bytes> {
+        self.0.get_bytes(start, length)
+    }
 }
 
 /// Names of the columns; those of nested ones hold points.
@@ -154,7 +231,12 @@ impl Kind {
             per_second,
             first: None,
         };
-        if column.max_rep_level() > 0 {
+        // Texts are no numbers, and a few bytes may stand for very long ones.
+        let is_text = matches!(
+            column.physical_type(),
+            Type::BYTE_ARRAY | Type::FIXED_LEN_BYTE_ARRAY
+        );
+        if column.max_rep_level() > 0 || is_text {
             return Self::Unusable;
         }
         match column.logical_type_ref() {
@@ -220,8 +302,10 @@ fn batch(column: &mut ColumnReader, kind: &mut Kind, n: usize) -> Result<Vec<Fie
             values(reader, n, |value| Field::of(f64::from(*value)))
         }
         ColumnReader::DoubleColumnReader(reader) => values(reader, n, |value| Field::of(*value)),
-        ColumnReader::ByteArrayColumnReader(reader) => values(reader, n, |_| Field::Text),
-        ColumnReader::FixedLenByteArrayColumnReader(reader) => values(reader, n, |_| Field::Text),
+        // Columns of texts are not read.
+        ColumnReader::ByteArrayColumnReader(_) | ColumnReader::FixedLenByteArrayColumnReader(_) => {
+            Ok(vec![Field::Text; n])
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use modelmill_boundary::files::Memory;
 use modelmill_rig::{Rig, Samples, State, Tracker, Trajectory, forces};
 
 fn workspace(path: &str) -> PathBuf {
@@ -19,7 +20,7 @@ pub(crate) fn load(name: &str) -> Rig {
 /// A rig from its text; `schema` and `name` are added.
 pub(crate) fn rig(text: &str) -> Rig {
     let text = format!("schema = 1\nname = \"test\"\n{text}");
-    modelmill_rig::load("test.toml", &text, &mut |_| unreachable!())
+    modelmill_rig::load("test.toml", &text, &Memory::default())
         .unwrap_or_else(|failure| panic!("{failure}"))
         .rig
 }

@@ -1,0 +1,314 @@
+//! The arrays of a MATLAB file of format 5: what each is called, how large it is, and its numbers one array at a time.
+//!
+//! After a header of 128 bytes, whose last two tell the byte order, a file is a row of elements. Each has a tag of its
+//! type and its length and is padded to eight bytes; one that is compressed holds another one (MathWorks, "MAT-File
+//! Format", R2023b, "Level 5 MAT-Files"). Nothing is unpacked further than it is looked at: a few bytes of a compressed
+//! array may stand for thousands of millions of numbers.
+
+use std::io::{self, Read, Seek, SeekFrom};
+
+use flate2::read::ZlibDecoder;
+
+/// Bytes before the first element.
+const HEADER: u64 = 128;
+/// Types of elements that hold others.
+const MATRIX: u32 = 14;
+const COMPRESSED: u32 = 15;
+/// The most sides of an array that are looked at.
+const MOST_SIDES: u32 = 64;
+/// The longest name that is read; MATLAB's own end at 63 letters.
+const LONGEST_NAME: u32 = 4096;
+/// Bytes of numbers that are read at once; a multiple of all their lengths.
+const CHUNK: usize = 1 << 16;
+
+/// A numeric array of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Array {
+    /// What the file calls it.
+    pub(super) name: String,
+    /// Rows, columns and whatever further sides it has.
+    pub(super) size: Vec<usize>,
+    /// Whether its numbers are real and as many as its size says.
+    pub(super) is_sound: bool,
+    /// Where its element begins in the file, and how long that is.
+    at: u64,
+    length: u64,
+    is_compressed: bool,
+}
+
+/// A file whose elements are known.
+pub(super) struct Arrays<R> {
+    stream: R,
+    is_little: bool,
+    /// The numeric arrays in the file's order.
+    pub(super) arrays: Vec<Array>,
+}
+
+impl<R: Read + Seek> Arrays<R> {
+    /// Looks through a file; fails when it breaks off or is no such file.
+    pub(super) fn new(mut stream: R) -> io::Result<Self> {
+        let end = stream.seek(SeekFrom::End(0))?;
+        if end < HEADER {
+            return Err(broken_off());
+        }
+        stream.seek(SeekFrom::Start(HEADER - 4))?;
+        let mut version = [0; 4];
+        stream.read_exact(&mut version)?;
+        let is_little = match version {
+            [0, 1, b'I', b'M'] => true,
+            [1, 0, b'M', b'I'] => false,
+            _ => return Err(io::Error::other("its header is that of no such file")),
+        };
+        let mut arrays = Vec::new();
+        let mut at = HEADER;
+        while at + 8 <= end {
+            stream.seek(SeekFrom::Start(at))?;
+            let tag = Element::new(&mut stream, is_little).tag()?;
+            let is_compressed = tag.kind == COMPRESSED;
+            let length = u64::from(tag.length);
+            at += 8;
+            if length > end - at {
+                return Err(broken_off());
+            }
+            if is_compressed || tag.kind == MATRIX {
+                let place = Place {
+                    at,
+                    length,
+                    is_compressed,
+                };
+                arrays.extend(place.open(&mut stream, is_little, |element| element.array(&place))?);
+            }
+            at += if is_compressed {
+                length
+            } else {
+                length.next_multiple_of(8)
+            };
+        }
+        if at != end {
+            return Err(broken_off());
+        }
+        Ok(Self {
+            stream,
+            is_little,
+            arrays,
+        })
+    }
+
+    /// The numbers of an array that is sound, column by column.
+    pub(super) fn numbers(&mut self, array: &Array) -> io::Result<Vec<f64>> {
+        let place = Place {
+            at: array.at,
+            length: array.length,
+            is_compressed: array.is_compressed,
+        };
+        place.open(&mut self.stream, self.is_little, |element| {
+            element.array(&place)?;
+            let tag = element.data.ok_or_else(broken_off)?;
+            element.numbers(&tag)
+        })
+    }
+}
+
+/// Where an element stands.
+struct Place {
+    at: u64,
+    length: u64,
+    is_compressed: bool,
+}
+
+impl Place {
+    /// Reads an element from its inside on, unpacked.
+    fn open<T>(
+        &self,
+        stream: &mut (impl Read + Seek),
+        is_little: bool,
+        read: impl FnOnce(&mut Element<'_>) -> io::Result<T>,
+    ) -> io::Result<T> {
+        stream.seek(SeekFrom::Start(self.at))?;
+        let mut inside = stream.take(self.length);
+        if !self.is_compressed {
+            return read(&mut Element::new(&mut inside, is_little));
+        }
+        let mut unpacked = ZlibDecoder::new(inside);
+        let mut element = Element::new(&mut unpacked, is_little);
+        // The tag of the one element within.
+        if element.tag()?.kind != MATRIX {
+            element.is_other = true;
+        }
+        read(&mut element)
+    }
+}
+
+/// Bytes of an element, read in order.
+struct Element<'a> {
+    stream: &'a mut dyn Read,
+    is_little: bool,
+    /// Whether it is known to be no array.
+    is_other: bool,
+    /// The tag of the real numbers, once the stream stands before them.
+    data: Option<Tag>,
+}
+
+/// Type and length of an element, and the bytes that fill it up behind.
+#[derive(Clone, Copy)]
+struct Tag {
+    kind: u32,
+    length: u32,
+    padding: u32,
+}
+
+impl<'a> Element<'a> {
+    fn new(stream: &'a mut dyn Read, is_little: bool) -> Self {
+        Self {
+            stream,
+            is_little,
+            is_other: false,
+            data: None,
+        }
+    }
+
+    fn word(&mut self) -> io::Result<u32> {
+        let mut bytes = [0; 4];
+        self.stream.read_exact(&mut bytes)?;
+        Ok(if self.is_little {
+            u32::from_le_bytes(bytes)
+        } else {
+            u32::from_be_bytes(bytes)
+        })
+    }
+
+    /// A tag; short elements of up to four bytes have both in one word.
+    fn tag(&mut self) -> io::Result<Tag> {
+        let first = self.word()?;
+        if first >> 16 == 0 {
+            let length = self.word()?;
+            let padding = length.wrapping_neg() % 8;
+            return Ok(Tag {
+                kind: first,
+                length,
+                padding,
+            });
+        }
+        let length = first >> 16;
+        let padding = 4_u32
+            .checked_sub(length)
+            .ok_or_else(|| io::Error::other("a short element is too long"))?;
+        Ok(Tag {
+            kind: first & 0xffff,
+            length,
+            padding,
+        })
+    }
+
+    /// The bytes of an element that has at most so many.
+    fn bytes(&mut self, tag: Tag, most: u32) -> io::Result<Vec<u8>> {
+        if tag.length > most {
+            return Err(io::Error::other("a name or a size is too long"));
+        }
+        let mut bytes = vec![0; (tag.length + tag.padding) as usize];
+        self.stream.read_exact(&mut bytes)?;
+        bytes.truncate(tag.length as usize);
+        Ok(bytes)
+    }
+
+    /// What an array says of itself, up to its numbers; none of what is not numeric, such as texts and structures.
+    fn array(&mut self, place: &Place) -> io::Result<Option<Array>> {
+        if self.is_other {
+            return Ok(None);
+        }
+        let flags = self.tag()?;
+        if flags.length != 8 {
+            return Err(io::Error::other("an array has no class"));
+        }
+        let class = self.word()?;
+        self.word()?;
+        // Classes of numbers go from `double` to `uint64`.
+        if !(6..=15).contains(&(class & 0xff)) {
+            return Ok(None);
+        }
+        let is_complex = class & 0x0800 != 0;
+        let sides = self.tag()?;
+        let sides = self.bytes(sides, 4 * MOST_SIDES)?;
+        let size = sides.chunks_exact(4).map(|side| {
+            let bytes = [side[0], side[1], side[2], side[3]];
+            let side = if self.is_little {
+                i32::from_le_bytes(bytes)
+            } else {
+                i32::from_be_bytes(bytes)
+            };
+            usize::try_from(side).map_err(|_| io::Error::other("an array has a negative size"))
+        });
+        let size = size.collect::<io::Result<Vec<usize>>>()?;
+        let name = self.tag()?;
+        let name = self.bytes(name, LONGEST_NAME)?;
+        let data = self.tag()?;
+        self.data = Some(data);
+        let numbers = size
+            .iter()
+            .try_fold(1, |n: usize, side| n.checked_mul(*side));
+        let bytes = numbers.and_then(|n| n.checked_mul(width(data.kind)?));
+        Ok(Some(Array {
+            name: String::from_utf8_lossy(&name).into_owned(),
+            is_sound: !is_complex && bytes == Some(data.length as usize),
+            size,
+            at: place.at,
+            length: place.length,
+            is_compressed: place.is_compressed,
+        }))
+    }
+
+    /// The numbers of an element, whatever type they are kept as.
+    fn numbers(&mut self, tag: &Tag) -> io::Result<Vec<f64>> {
+        let width = width(tag.kind).ok_or_else(|| io::Error::other("it holds no numbers"))?;
+        let mut numbers = Vec::new();
+        let mut left = tag.length as usize;
+        let mut chunk = vec![0; CHUNK.min(left)];
+        while left > 0 {
+            let chunk = &mut chunk[..CHUNK.min(left)];
+            self.stream.read_exact(chunk)?;
+            if !self.is_little {
+                chunk.chunks_exact_mut(width).for_each(<[u8]>::reverse);
+            }
+            push(tag.kind, chunk, &mut numbers);
+            left -= chunk.len();
+        }
+        Ok(numbers)
+    }
+}
+
+/// Bytes of a number of this type; none of types that are no numbers.
+fn width(kind: u32) -> Option<usize> {
+    match kind {
+        1 | 2 => Some(1),
+        3 | 4 => Some(2),
+        5..=7 => Some(4),
+        9 | 12 | 13 => Some(8),
+        _ => None,
+    }
+}
+
+/// Adds numbers of a type from their bytes, the least first.
+fn push(kind: u32, bytes: &[u8], numbers: &mut Vec<f64>) {
+    macro_rules! of {
+        ($number:ty, $float:expr) => {{
+            let (all, _) = bytes.as_chunks::<{ size_of::<$number>() }>();
+            numbers.extend(all.iter().map(|b| $float(<$number>::from_le_bytes(*b))));
+        }};
+    }
+    match kind {
+        1 => of!(i8, f64::from),
+        2 => of!(u8, f64::from),
+        3 => of!(i16, f64::from),
+        4 => of!(u16, f64::from),
+        5 => of!(i32, f64::from),
+        6 => of!(u32, f64::from),
+        7 => of!(f32, f64::from),
+        9 => of!(f64, f64::from),
+        12 => of!(i64, |x| x as f64),
+        _ => of!(u64, |x| x as f64),
+    }
+}
+
+fn broken_off() -> io::Error {
+    io::Error::other("it breaks off within a variable")
+}

@@ -1,0 +1,284 @@
+//! Pages of a Parquet file before they are unpacked: their headers alone say how large they become, and the library that
+//! reads them believes it.
+//!
+//! A column's pages stand one behind the other, each with a header in Thrift's compact protocol (apache/parquet-format,
+//! `parquet.thrift`, struct `PageHeader`). Only the few numbers that say a size are taken from it.
+
+use std::io::{self, BufReader, Read};
+
+use flate2::read::MultiGzDecoder;
+
+/// The largest page that is unpacked, bytes; writers make pages of one million.
+const LARGEST_PAGE: u64 = 128 << 20;
+/// The largest page in the old form of LZ4 as it stands in the file: it may grow 255 times before its size is compared
+/// with the header's.
+const LARGEST_OLD_LZ4: u64 = 2 << 20;
+/// Structures within one another in a header; Parquet has four.
+const DEEPEST: usize = 16;
+
+/// How pages are packed, as far as that tells how large they become.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Packing {
+    /// To the size that the header says, which the library holds to.
+    AsSaid,
+    /// To whatever is in it.
+    Gzip,
+    /// To whatever is in it, up to 255 times.
+    OldLz4,
+}
+
+/// Looks through the pages of a column that is `length` bytes long; the size of the largest unpacked.
+///
+/// Fails when a page is larger than any that makes sense, or does not keep to its header.
+pub(super) fn largest(stream: impl Read, length: u64, packing: Packing) -> io::Result<u64> {
+    let mut stream = BufReader::with_capacity(1 << 16, stream.take(length)).take(length);
+    let mut largest = 0;
+    while stream.limit() > 0 {
+        let page = Page::read(&mut stream)?;
+        if page.packed > stream.limit() {
+            return Err(io::Error::other("a page is longer than its column"));
+        }
+        // A dictionary's numbers have four bytes at least.
+        let is_too_large = page.unpacked > LARGEST_PAGE
+            || page.words.saturating_mul(4) > page.unpacked
+            || (packing == Packing::OldLz4 && page.packed > LARGEST_OLD_LZ4);
+        if is_too_large {
+            return Err(io::Error::other("a page would take too much memory"));
+        }
+        let mut body = (&mut stream).take(page.packed);
+        if packing == Packing::Gzip && page.is_packed {
+            io::copy(&mut (&mut body).take(page.levels), &mut io::sink())?;
+            let inside = page.unpacked.saturating_sub(page.levels);
+            let mut all = MultiGzDecoder::new(&mut body).take(inside + 1);
+            if io::copy(&mut all, &mut io::sink())? > inside {
+                return Err(io::Error::other("a page is larger than its header says"));
+            }
+        }
+        io::copy(&mut body, &mut io::sink())?;
+        largest = largest.max(page.unpacked);
+    }
+    Ok(largest)
+}
+
+/// What a header says of sizes.
+#[derive(Debug, Default, PartialEq)]
+struct Page {
+    /// Bytes in the file.
+    packed: u64,
+    /// Bytes in memory.
+    unpacked: u64,
+    /// Numbers of a dictionary.
+    words: u64,
+    /// Bytes at the beginning that are never packed.
+    levels: u64,
+    is_packed: bool,
+}
+
+impl Page {
+    fn read(stream: &mut impl Read) -> io::Result<Self> {
+        let mut page = Self {
+            is_packed: true,
+            ..Self::default()
+        };
+        let mut is_negative = false;
+        fields(stream, &mut Vec::new(), &mut |path, value| {
+            let size = || value.and_then(|n| u64::try_from(n).ok());
+            match path {
+                [2] => page.unpacked = size().unwrap_or(u64::MAX),
+                [3] => page.packed = size().unwrap_or(u64::MAX),
+                [7, 1] => page.words = size().unwrap_or(u64::MAX),
+                [8, 5 | 6] => match size() {
+                    Some(n) => page.levels = page.levels.saturating_add(n),
+                    None => is_negative = true,
+                },
+                [8, 7] => page.is_packed = value.is_some(),
+                _ => {}
+            }
+        })?;
+        if is_negative {
+            return Err(io::Error::other("a page has a negative size"));
+        }
+        Ok(page)
+    }
+}
+
+/// Types of Thrift's compact protocol.
+const TRUE: u8 = 1;
+const FALSE: u8 = 2;
+const BYTE: u8 = 3;
+const DOUBLE: u8 = 7;
+const BINARY: u8 = 8;
+const LIST: u8 = 9;
+const SET: u8 = 10;
+const STRUCT: u8 = 12;
+
+/// Reads a structure; `tell` hears of every whole number by the numbers of its fields, and of truths, of which a false one
+/// has no value.
+fn fields(
+    stream: &mut dyn Read,
+    path: &mut Vec<i64>,
+    tell: &mut dyn FnMut(&[i64], Option<i64>),
+) -> io::Result<()> {
+    if path.len() > DEEPEST {
+        return Err(io::Error::other("a page's header has no end"));
+    }
+    let mut field = 0_i64;
+    loop {
+        let head = byte(stream)?;
+        if head == 0 {
+            return Ok(());
+        }
+        field = match head >> 4 {
+            0 => signed(varint(stream)?),
+            step => field.wrapping_add(i64::from(step)),
+        };
+        path.push(field);
+        match head & 15 {
+            TRUE => tell(path, Some(1)),
+            FALSE => tell(path, None),
+            4..=6 => {
+                let number = signed(varint(stream)?);
+                tell(path, Some(number));
+            }
+            STRUCT => fields(stream, path, tell)?,
+            kind => pass(stream, kind, path)?,
+        }
+        path.pop();
+    }
+}
+
+/// Passes over a value of which nothing is wanted.
+fn pass(stream: &mut dyn Read, kind: u8, path: &mut Vec<i64>) -> io::Result<()> {
+    match kind {
+        // Within a list a truth takes a byte.
+        TRUE | FALSE | BYTE => skip(stream, 1),
+        4..=6 => varint(stream).map(drop),
+        DOUBLE => skip(stream, 8),
+        BINARY => {
+            let length = varint(stream)?;
+            skip(stream, length)
+        }
+        LIST | SET if path.len() <= DEEPEST => {
+            path.push(0);
+            let head = byte(stream)?;
+            let n = match head >> 4 {
+                15 => varint(stream)?,
+                n => u64::from(n),
+            };
+            for _ in 0..n {
+                pass(stream, head & 15, path)?;
+            }
+            path.pop();
+            Ok(())
+        }
+        STRUCT => fields(stream, path, &mut |_, _| {}),
+        _ => Err(io::Error::other("a page's header cannot be read")),
+    }
+}
+
+fn skip(stream: &mut dyn Read, n: u64) -> io::Result<()> {
+    if io::copy(&mut stream.take(n), &mut io::sink())? < n {
+        return Err(io::ErrorKind::UnexpectedEof.into());
+    }
+    Ok(())
+}
+
+fn byte(stream: &mut dyn Read) -> io::Result<u8> {
+    let mut one = [0];
+    stream.read_exact(&mut one)?;
+    Ok(one[0])
+}
+
+fn varint(stream: &mut dyn Read) -> io::Result<u64> {
+    let mut value = 0;
+    for shift in (0..64).step_by(7) {
+        let one = byte(stream)?;
+        value |= u64::from(one & 0x7f) << shift;
+        if one & 0x80 == 0 {
+            return Ok(value);
+        }
+    }
+    Err(io::Error::other("a number in a page's header has no end"))
+}
+
+/// The sign stands in the last bit.
+fn signed(value: u64) -> i64 {
+    (value >> 1).cast_signed() ^ -(value & 1).cast_signed()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use flate2::Compression;
+    use flate2::write::GzEncoder;
+
+    use super::*;
+
+    /// A small whole number as the protocol writes it.
+    fn whole(n: usize) -> Vec<u8> {
+        let mut left = 2 * n;
+        let mut bytes = Vec::new();
+        while left > 127 {
+            bytes.push(u8::try_from(left % 128).unwrap() | 128);
+            left /= 128;
+        }
+        bytes.push(u8::try_from(left).unwrap());
+        bytes
+    }
+
+    /// A page of data with its header: sizes, then how many values in which encodings.
+    fn page(unpacked: usize, body: &[u8]) -> Vec<u8> {
+        let mut bytes = vec![0x15, 0, 0x15];
+        bytes.extend(whole(unpacked));
+        bytes.push(0x15);
+        bytes.extend(whole(body.len()));
+        bytes.extend([0x2c, 0x15, 2, 0x15, 0, 0x15, 6, 0x15, 6, 0, 0]);
+        bytes.extend(body);
+        bytes
+    }
+
+    fn gzip(n: usize) -> Vec<u8> {
+        let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
+        packed.write_all(&vec![0; n]).unwrap();
+        packed.finish().unwrap()
+    }
+
+    fn look(bytes: &[u8], packing: Packing) -> Result<u64, String> {
+        largest(bytes, bytes.len() as u64, packing).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn honest_pages_tell_the_largest() {
+        let two = [page(5, b"abcde"), page(300, b"xyz")].concat();
+        assert_eq!(look(&two, Packing::AsSaid), Ok(300));
+        let three = [page(70_000, &gzip(70_000)), page(9, &gzip(9))].concat();
+        assert_eq!(look(&three, Packing::Gzip), Ok(70_000));
+        // The second form has its levels unpacked in front, and may leave all unpacked.
+        let mut second = vec![0x15, 6, 0x15];
+        second.extend(whole(6));
+        second.push(0x15);
+        second.extend(whole(6));
+        second.extend([
+            0x5c, 0x15, 2, 0x15, 0, 0x15, 2, 0x15, 0, 0x15, 4, 0x15, 0, 0x12, 0, 0,
+        ]);
+        second.extend(b"llabcd");
+        assert_eq!(look(&second, Packing::Gzip), Ok(6));
+    }
+
+    #[test]
+    fn pages_that_lie_are_refused() {
+        let huge = look(&page(1 << 30, b"abc"), Packing::AsSaid).unwrap_err();
+        assert!(huge.contains("too much memory"), "{huge}");
+        let bomb = look(&page(100, &gzip(1 << 20)), Packing::Gzip).unwrap_err();
+        assert!(bomb.contains("larger than its header"), "{bomb}");
+        let cut = page(100, b"abc");
+        assert!(look(&cut[..cut.len() - 1], Packing::AsSaid).is_err());
+        // A dictionary of more numbers than it has bytes for.
+        let mut dictionary = vec![0x15, 4, 0x15, 16, 0x15, 0, 0x4c, 0x15];
+        dictionary.extend(whole(1 << 20));
+        dictionary.extend([0x15, 0, 0, 0]);
+        assert!(look(&dictionary, Packing::AsSaid).is_err());
+        assert!(look(&[0x1c; 100], Packing::AsSaid).is_err());
+    }
+}
