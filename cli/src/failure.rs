@@ -1,7 +1,5 @@
 //! What ends a command early, and the exit status that goes with it.
 
-use std::fmt;
-
 /// Why a command ended early.
 #[derive(Debug)]
 pub(crate) enum Failure {
@@ -10,8 +8,6 @@ pub(crate) enum Failure {
     /// The input is at fault: exit status 1, and one message that says where, what was expected
     /// and what to do.
     Input(String),
-    /// A text that is printed already.
-    Said,
     /// The command line is at fault: exit status 2.
     Usage(String),
     /// The reader of standard output went away; nobody wants to hear more.
@@ -27,13 +23,8 @@ impl Failure {
         match self {
             Self::BrokenPipe => 0,
             Self::Usage(_) | Self::Library(modelmill::Error::Options(_)) => 2,
-            Self::Input(_) | Self::Said | Self::Library(_) => 1,
+            Self::Input(_) | Self::Library(_) => 1,
         }
-    }
-
-    /// A fault of the input, from anything that can say what it is.
-    pub(crate) fn input(says: impl fmt::Display) -> Self {
-        Self::Input(says.to_string())
     }
 }
 

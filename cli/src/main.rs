@@ -41,7 +41,7 @@ fn main() -> ExitCode {
                 }
                 Failure::Library(error) => terminal::error(&error.to_string()),
                 Failure::Input(says) | Failure::Usage(says) => terminal::error(says),
-                Failure::Said | Failure::BrokenPipe => {}
+                Failure::BrokenPipe => {}
             }
             ExitCode::from(failure.status())
         }
