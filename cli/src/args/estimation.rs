@@ -1,7 +1,7 @@
 //! Options that say how parameters are estimated.
 
 use clap::{Args, ValueEnum};
-use modelmill::identify::{Estimation, HUBER_BOUND, Weights};
+use modelmill::identify::{Estimation, HUBER_BOUND, Refinement, Weights};
 
 use super::preparation::parse_map;
 
@@ -69,9 +69,12 @@ impl EstimatorArgs {
                 WeightsArg::Variance => Weights::Variance,
             },
             robust: self.robust,
-            prior: self.prior,
-            physical: self.physical,
-            essential: self.essential,
+            refinement: match self.prior {
+                Some(sigma) => Refinement::Prior(sigma),
+                None if self.physical => Refinement::Physical,
+                None if self.essential => Refinement::Essential,
+                None => Refinement::None,
+            },
             standstill: standstill.standstill,
         }
     }

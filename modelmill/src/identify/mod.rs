@@ -1,8 +1,8 @@
 //! `identify`: base parameters from recordings by least squares, with what they are worth.
 
-mod consistent;
 mod instruments;
 mod options;
+pub mod refine;
 pub mod regression;
 mod standstill;
 
@@ -22,7 +22,8 @@ use crate::text::table::{count, number};
 pub use instruments::Instruments;
 pub use modelmill_identify::estimate::HUBER_BOUND;
 pub use options::{Estimation, Weights};
-use regression::{Identified, More};
+pub use refine::{Refined, Refinement};
+use regression::{Identified, InstrumentsFound};
 
 /// Instruments whose smallest canonical correlation with the regressor is below this deserve a warning.
 const WEAK_INSTRUMENTS: f64 = 0.2;
@@ -93,10 +94,8 @@ pub fn identify(
     let infos = model.infos();
     let unknown: Vec<ParameterInfo> = found.unknown.iter().map(|k| infos[*k].clone()).collect();
     let mut parameters = fit_parameters(&unknown, solution, &found.deviations);
-    if let More::Essential(dropped, _) = &found.more {
-        for one in dropped {
-            parameters[one.parameter].status = Status::NotEssential;
-        }
+    for one in found.refined.left_out() {
+        parameters[one].status = Status::NotEssential;
     }
     for (k, info) in infos.iter().enumerate() {
         if model.is_known(k) {
@@ -190,7 +189,7 @@ fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Ve
     }
     let unknown: Vec<&FitParameter> = found.unknown.iter().map(|k| &parameters[*k]).collect();
     let names: Vec<String> = unknown.iter().map(|p| p.expression.clone()).collect();
-    if let More::Instruments(strength, _) = &found.more
+    if let Some(InstrumentsFound { strength, .. }) = &found.instruments
         && *strength < WEAK_INSTRUMENTS
     {
         notes.push(Note::warning(format!(

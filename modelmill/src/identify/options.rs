@@ -1,5 +1,7 @@
 //! How parameters are estimated from the rows of a regressor.
 
+use crate::identify::refine::Refinement;
+
 /// How parameters are estimated; [`Estimation::default`] is plain least squares.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Estimation {
@@ -8,14 +10,8 @@ pub struct Estimation {
     /// Huber's robust estimate: residuals beyond this many standard deviations (taken from their median) count less; 1.345
     /// is usual.
     pub robust: Option<f64>,
-    /// Nominal values as soft constraints, with this relative standard deviation of each product of parameters.
-    pub prior: Option<f64>,
-    /// Only parameters that bodies can have (positive definite pseudo-inertias), nearest to the nominal ones; also gives
-    /// every physical parameter. Neither with `prior` nor with `essential`.
-    pub physical: bool,
-    /// Leave out base parameters that the recordings do not support, one by one, while none of them is missed. Not with
-    /// `prior`.
-    pub essential: bool,
+    /// What is made of the solution of least squares.
+    pub refinement: Refinement,
     /// Leave an equation out of the fit while its drive is slower than this part of its fastest, for at rest the friction
     /// takes any value; 0.01 is usual.
     pub standstill: Option<f64>,

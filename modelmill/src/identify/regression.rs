@@ -2,21 +2,18 @@
 //! they fit a modest memory; else they are made again for every pass.
 
 use modelmill_codegen::{Evaluator, PoseFault, States};
-use modelmill_identify::estimate::{
-    Dropped, EssentialOptions, Estimate, EstimateOptions, PhysicalParameters, Visit, Weighting,
-    essential, estimate, instrumental, with_prior,
-};
+use modelmill_identify::estimate::{EstimateOptions, Visit, Weighting, estimate, instrumental};
 use modelmill_identify::{Deviations, LeastSquaresError, Solution, decimate_table};
 
 use crate::along::{interleaved, measured};
 use crate::error::{Error, Outcome};
-use crate::identify::consistent;
 use crate::identify::options::{Estimation, Weights};
+use crate::identify::refine::{Refined, refine};
 use crate::model::Model;
 use crate::progress::Job;
 use crate::stretch::Stretch;
 use crate::stretch::variances;
-use crate::text::table::{count, percent};
+use crate::text::table::count;
 
 /// Numbers of the regressor that are kept between passes: 32 MB; beyond, making them again costs less than memory.
 const KEPT: usize = 1 << 22;
@@ -31,22 +28,18 @@ pub struct Identified {
     pub unknown: Vec<usize>,
     /// What the rows were multiplied by.
     pub weighting: Option<Weighting>,
-    /// What more was asked for.
-    pub more: More,
+    /// What came of refining them.
+    pub refined: Refined,
+    /// Instruments, if any were used.
+    pub instruments: Option<InstrumentsFound>,
 }
 
-/// What is beside least squares.
-pub enum More {
-    /// Nothing.
-    Nothing,
-    /// Parameters were left out; those by position among the unknown ones, and by how much the residual rose.
-    Essential(Vec<Dropped>, f64),
-    /// Nominal values counted as measurements.
-    Prior(usize),
-    /// Physical parameters that bodies can have, beside the residual norm of the solution without that demand.
-    Physical(Box<PhysicalParameters>, Vec<String>, f64),
-    /// Instrumental variables: how strong they are, and what least squares finds.
-    Instruments(f64, Vec<f64>),
+/// What instrumental variables say beside the solution.
+pub struct InstrumentsFound {
+    /// The smallest canonical correlation between instruments and regressor, 0 to 1.
+    pub strength: f64,
+    /// What least squares finds on the same rows.
+    pub least_squares: Vec<f64>,
 }
 
 /// Identifies the base parameters of a model from recordings, eq. (12). What is a number of the model file is no unknown:
@@ -107,13 +100,16 @@ pub fn identify(
             };
             if !instruments.is_empty() {
                 let found = instrumental(unknown.len(), channels, show)?;
-                let more = More::Instruments(found.strength, found.least_squares.values);
                 return Ok(Identified {
                     solution: found.solution,
                     deviations: found.deviations,
                     unknown: unknown.clone(),
                     weighting: None,
-                    more,
+                    refined: Refined::Nothing,
+                    instruments: Some(InstrumentsFound {
+                        strength: found.strength,
+                        least_squares: found.least_squares.values,
+                    }),
                 });
             }
             let options = EstimateOptions {
@@ -121,90 +117,19 @@ pub fn identify(
                 huber: args.robust,
                 ..EstimateOptions::default()
             };
-            let found = estimate(&nominal, channels, &options, show)?;
-            refine(model, found, &unknown, &nominal, args)
+            let mut found = estimate(&nominal, channels, &options, show)?;
+            let refined = refine(model, &mut found, &unknown, &nominal, args.refinement)?;
+            let weighting = found.weighting;
+            let is_weighted = weighting.by_channel || weighting.huber.is_some();
+            Ok(Identified {
+                solution: found.solution,
+                deviations: found.deviations,
+                unknown: unknown.clone(),
+                weighting: is_weighted.then_some(weighting),
+                refined,
+                instruments: None,
+            })
         })?
-}
-
-/// What is done with the reduced rows.
-fn refine(
-    model: &Model,
-    found: Estimate,
-    unknown: &[usize],
-    nominal: &[f64],
-    args: &Estimation,
-) -> Outcome<Identified> {
-    let Estimate {
-        mut solution,
-        mut deviations,
-        weighting,
-        triangle,
-    } = found;
-    let mut more = More::Nothing;
-    let asks = args.prior.is_some() || args.essential || args.physical;
-    if asks && solution.rows <= solution.rank {
-        return Err(Error::input(format!(
-            "{} for {}: no degree of freedom is left for the residuals, from which --prior, --essential and --physical learn \
-             what the recording is worth; use a longer recording",
-            count(solution.rows, "equation", "equations"),
-            count(solution.rank, "base parameter", "base parameters")
-        )));
-    }
-    if let Some(sigma) = args.prior {
-        let beliefs = model.beliefs(unknown, sigma);
-        if beliefs.is_empty() {
-            let parameters = &model.derivation.mechanism.parameters;
-            return Err(Error::input(format!(
-                "{}: --prior takes {} of each nominal value for its uncertainty, but the nominal values of {} are 0 or not \
-                 given, which says nothing of their size; write others in [parameters] (`nominal = ...`), or leave --prior out",
-                model.path,
-                percent(Some(sigma)),
-                match parameters.as_slice() {
-                    [one] => format!("the only parameter `{}`", one.name),
-                    all => format!("all {} parameters", all.len()),
-                }
-            )));
-        }
-        (solution, deviations) = with_prior(&triangle, &solution, &deviations, nominal, &beliefs)?;
-        more = More::Prior(beliefs.len());
-    } else if args.essential {
-        let found = essential(
-            &triangle,
-            &solution,
-            &deviations,
-            &EssentialOptions::default(),
-        )?;
-        solution.values = found.values;
-        solution.classical_std = found.classical_std;
-        solution.condition_number = found.condition_number;
-        solution.scaled_condition_number = found.scaled_condition_number;
-        // What is left out says so itself.
-        solution.undetermined.clear();
-        solution.determined = deviations.std.iter().map(|_| true).collect();
-        deviations.effective_samples = (found.std.iter().zip(&solution.classical_std))
-            .map(|(std, classical)| deviations.samples as f64 * (classical / std).powi(2))
-            .collect();
-        deviations.std = found.std;
-        more = More::Essential(found.dropped, found.rise);
-    } else if args.physical {
-        let before = solution.residual_norm;
-        let (found, bodies) = consistent::find(model, &triangle, &solution, &deviations, unknown)?;
-        solution.values.clone_from(&found.base);
-        solution.residual_norm = found.residual_norm;
-        deviations.std.clone_from(&found.base_std);
-        // Nominal values say what the recordings do not.
-        solution.undetermined.clear();
-        solution.determined = found.base.iter().map(|_| true).collect();
-        more = More::Physical(Box::new(found), bodies, before);
-    }
-    let is_weighted = weighting.by_channel || weighting.huber.is_some();
-    Ok(Identified {
-        solution,
-        deviations,
-        unknown: unknown.to_vec(),
-        weighting: is_weighted.then_some(weighting),
-        more,
-    })
 }
 
 /// Fails when there are fewer equations than unknown parameters.

@@ -5,8 +5,8 @@ use modelmill_identify::ParameterInfo;
 use modelmill_identify::estimate::PhysicalParameters;
 use serde_json::{Value, json};
 
-use crate::identify::Estimation;
-use crate::identify::regression::{Identified, More};
+use crate::identify::regression::{Identified, InstrumentsFound};
+use crate::identify::{Estimation, Refined};
 use crate::model::Model;
 use crate::text::table::{Align, count, number, percent, significant, table};
 
@@ -52,13 +52,12 @@ pub(crate) fn json(model: &Model, found: &Identified, args: &Estimation) -> Valu
             );
         }
     }
-    match &found.more {
-        More::Nothing => {}
-        More::Prior(beliefs) => put(
-            "prior",
-            json!({ "sigma": args.prior, "constraints": beliefs }),
-        ),
-        More::Essential(dropped, rise) => {
+    match &found.refined {
+        Refined::Nothing => {}
+        Refined::Prior(sigma, beliefs) => {
+            put("prior", json!({ "sigma": sigma, "constraints": beliefs }))
+        }
+        Refined::Essential(dropped, rise) => {
             let dropped: Vec<Value> = dropped
                 .iter()
                 .map(|one| {
@@ -74,7 +73,7 @@ pub(crate) fn json(model: &Model, found: &Identified, args: &Estimation) -> Valu
                 json!({ "dropped": dropped, "residual_rise": rise }),
             );
         }
-        More::Physical(physical, bodies, before) => {
+        Refined::Physical(physical, bodies, before) => {
             let parameters = &model.derivation.mechanism.parameters;
             let list: Vec<Value> = parameters
                 .iter()
@@ -96,15 +95,19 @@ pub(crate) fn json(model: &Model, found: &Identified, args: &Estimation) -> Valu
                 json!({ "parameters": list, "bodies": bodies, "residual_rise": physical.residual_norm / before - 1.0 }),
             );
         }
-        More::Instruments(strength, least_squares) => {
-            let bias: Vec<Value> = (0..found.unknown.len())
-                .map(|i| json!({ "name": model.base[found.unknown[i]].name, "least_squares": least_squares[i] }))
-                .collect();
-            put(
-                "instruments",
-                json!({ "strength": strength, "parameters": bias }),
-            );
-        }
+    }
+    if let Some(InstrumentsFound {
+        strength,
+        least_squares,
+    }) = &found.instruments
+    {
+        let bias: Vec<Value> = (0..found.unknown.len())
+            .map(|i| json!({ "name": model.base[found.unknown[i]].name, "least_squares": least_squares[i] }))
+            .collect();
+        put(
+            "instruments",
+            json!({ "strength": strength, "parameters": bias }),
+        );
     }
     value
 }
@@ -151,10 +154,10 @@ pub(crate) fn text(model: &Model, found: &Identified, infos: &[ParameterInfo]) -
         }
     }
     let name = |i: usize| infos[found.unknown[i]].name.clone();
-    match &found.more {
-        More::Nothing => {}
-        More::Prior(beliefs) => lines.push(prior_text(*beliefs, found.unknown.len())),
-        More::Essential(dropped, rise) => {
+    match &found.refined {
+        Refined::Nothing => {}
+        Refined::Prior(_, beliefs) => lines.push(prior_text(*beliefs, found.unknown.len())),
+        Refined::Essential(dropped, rise) => {
             let names: Vec<String> = dropped.iter().map(|one| name(one.parameter)).collect();
             lines.push(if names.is_empty() {
                 "all base parameters are essential".to_owned()
@@ -166,40 +169,44 @@ pub(crate) fn text(model: &Model, found: &Identified, infos: &[ParameterInfo]) -
                 )
             });
         }
-        More::Physical(physical, bodies, before) => {
+        Refined::Physical(physical, bodies, before) => {
             lines.extend(physical_text(model, physical, bodies, *before));
         }
-        More::Instruments(strength, least_squares) => {
-            lines.push(format!(
-                "instruments: smallest correlation with the regressor {} (1 is best, below 0.2 is weak)",
-                significant(*strength, 3)
-            ));
-            let rows: Vec<Vec<String>> = (0..found.unknown.len())
-                .map(|i| {
-                    let (value, std) = (found.solution.values[i], deviations.std[i]);
-                    vec![
-                        name(i),
-                        number(value),
-                        number(least_squares[i]),
-                        if std > 0.0 {
-                            significant((least_squares[i] - value) / std, 2)
-                        } else {
-                            "—".to_owned()
-                        },
-                    ]
-                })
-                .collect();
-            lines.extend(table(
-                0,
-                &[
-                    ("parameter", Align::Left),
-                    ("instruments", Align::Right),
-                    ("least squares", Align::Right),
-                    ("apart, std", Align::Right),
-                ],
-                &rows,
-            ));
-        }
+    }
+    if let Some(InstrumentsFound {
+        strength,
+        least_squares,
+    }) = &found.instruments
+    {
+        lines.push(format!(
+            "instruments: smallest correlation with the regressor {} (1 is best, below 0.2 is weak)",
+            significant(*strength, 3)
+        ));
+        let rows: Vec<Vec<String>> = (0..found.unknown.len())
+            .map(|i| {
+                let (value, std) = (found.solution.values[i], deviations.std[i]);
+                vec![
+                    name(i),
+                    number(value),
+                    number(least_squares[i]),
+                    if std > 0.0 {
+                        significant((least_squares[i] - value) / std, 2)
+                    } else {
+                        "—".to_owned()
+                    },
+                ]
+            })
+            .collect();
+        lines.extend(table(
+            0,
+            &[
+                ("parameter", Align::Left),
+                ("instruments", Align::Right),
+                ("least squares", Align::Right),
+                ("apart, std", Align::Right),
+            ],
+            &rows,
+        ));
     }
     lines
 }

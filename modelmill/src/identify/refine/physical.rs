@@ -2,18 +2,38 @@
 //! physical ones.
 
 use modelmill_identify::estimate::{
-    BaseMap, BodyMatrix, PhysicalParameters, physical_parameters, planar_pseudo_inertia,
+    BaseMap, BodyMatrix, Estimate, PhysicalParameters, physical_parameters, planar_pseudo_inertia,
     pseudo_inertia,
 };
 use modelmill_identify::{Deviations, Solution, Triangle};
 use modelmill_spec::{Exact, Inertial, Mechanism, Sign, Symbol};
 use nalgebra::{DMatrix, DVector};
 
+use super::Refined;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
+/// Takes the physical parameters that bodies can have and that fit the recordings best.
+pub(super) fn refine(model: &Model, found: &mut Estimate, unknown: &[usize]) -> Outcome<Refined> {
+    let Estimate {
+        solution,
+        deviations,
+        triangle,
+        ..
+    } = found;
+    let before = solution.residual_norm;
+    let (physical, bodies) = find(model, triangle, solution, deviations, unknown)?;
+    solution.values.clone_from(&physical.base);
+    solution.residual_norm = physical.residual_norm;
+    deviations.std.clone_from(&physical.base_std);
+    // Nominal values say what the recordings do not.
+    solution.undetermined.clear();
+    solution.determined = physical.base.iter().map(|_| true).collect();
+    Ok(Refined::Physical(Box::new(physical), bodies, before))
+}
+
 /// Physical parameters that bodies can have, with the names of the bodies.
-pub(crate) fn find(
+fn find(
     model: &Model,
     triangle: &Triangle,
     solution: &Solution,

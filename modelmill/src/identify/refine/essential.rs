@@ -1,0 +1,29 @@
+//! Only what the recordings support.
+
+use modelmill_identify::estimate::{EssentialOptions, Estimate, essential};
+
+use super::Refined;
+use crate::error::Outcome;
+
+/// Leaves out parameters until all others are needed.
+pub(super) fn refine(found: &mut Estimate) -> Outcome<Refined> {
+    let Estimate {
+        solution,
+        deviations,
+        triangle,
+        ..
+    } = found;
+    let kept = essential(triangle, solution, deviations, &EssentialOptions::default())?;
+    solution.values = kept.values;
+    solution.classical_std = kept.classical_std;
+    solution.condition_number = kept.condition_number;
+    solution.scaled_condition_number = kept.scaled_condition_number;
+    // What is left out says so itself.
+    solution.undetermined.clear();
+    solution.determined = deviations.std.iter().map(|_| true).collect();
+    deviations.effective_samples = (kept.std.iter().zip(&solution.classical_std))
+        .map(|(std, classical)| deviations.samples as f64 * (classical / std).powi(2))
+        .collect();
+    deviations.std = kept.std;
+    Ok(Refined::Essential(kept.dropped, kept.rise))
+}

@@ -1,0 +1,78 @@
+//! What is made of reduced rows once least squares has its solution: one list, with a file for each entry.
+//!
+//! To add one, write its file, put it into [`Refinement`], [`Refined`] and [`refine`], say what it tells in
+//! `print/estimation`, and give the program its option in `args/estimation`.
+
+mod essential;
+mod physical;
+mod prior;
+
+use modelmill_identify::estimate::{Dropped, Estimate, PhysicalParameters};
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::text::table::count;
+
+/// What is made of the reduced rows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Refinement {
+    /// Nothing: the solution of least squares.
+    #[default]
+    None,
+    /// Nominal values as soft constraints, with this relative standard deviation of each product of parameters.
+    Prior(f64),
+    /// Only parameters that bodies can have (positive definite pseudo-inertias), nearest to the nominal ones; also gives
+    /// every physical parameter.
+    Physical,
+    /// Base parameters that the recordings do not support are left out, one by one, while none of them is missed.
+    Essential,
+}
+
+/// What a refinement found beside solution and deviations.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Refined {
+    /// Nothing.
+    Nothing,
+    /// Parameters were left out; those by position among the unknown ones, and by how much the residual rose.
+    Essential(Vec<Dropped>, f64),
+    /// Nominal values of this relative standard deviation counted as measurements, as many as said.
+    Prior(f64, usize),
+    /// Physical parameters that bodies can have, beside the residual norm of the solution without that demand.
+    Physical(Box<PhysicalParameters>, Vec<String>, f64),
+}
+
+impl Refined {
+    /// The parameters that were left out, by position among the unknown ones.
+    pub fn left_out(&self) -> impl Iterator<Item = usize> + '_ {
+        let dropped = match self {
+            Self::Essential(dropped, _) => dropped.as_slice(),
+            _ => &[],
+        };
+        dropped.iter().map(|one| one.parameter)
+    }
+}
+
+/// Refines what least squares found of the base parameters `unknown`, whose nominal values are given.
+pub(crate) fn refine(
+    model: &Model,
+    found: &mut Estimate,
+    unknown: &[usize],
+    nominal: &[f64],
+    refinement: Refinement,
+) -> Outcome<Refined> {
+    let solution = &found.solution;
+    if refinement != Refinement::None && solution.rows <= solution.rank {
+        return Err(Error::input(format!(
+            "{} for {}: no degree of freedom is left for the residuals, from which --prior, --essential and --physical learn \
+             what the recording is worth; use a longer recording",
+            count(solution.rows, "equation", "equations"),
+            count(solution.rank, "base parameter", "base parameters")
+        )));
+    }
+    match refinement {
+        Refinement::None => Ok(Refined::Nothing),
+        Refinement::Prior(sigma) => prior::refine(model, found, unknown, nominal, sigma),
+        Refinement::Essential => essential::refine(found),
+        Refinement::Physical => physical::refine(model, found, unknown),
+    }
+}

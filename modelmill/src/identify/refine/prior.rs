@@ -1,0 +1,40 @@
+//! Nominal values as soft constraints.
+
+use modelmill_identify::estimate::{Estimate, with_prior};
+
+use super::Refined;
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::text::table::percent;
+
+/// Lets nominal values count as measurements of the relative standard deviation `sigma`.
+pub(super) fn refine(
+    model: &Model,
+    found: &mut Estimate,
+    unknown: &[usize],
+    nominal: &[f64],
+    sigma: f64,
+) -> Outcome<Refined> {
+    let beliefs = model.beliefs(unknown, sigma);
+    if beliefs.is_empty() {
+        let parameters = &model.derivation.mechanism.parameters;
+        return Err(Error::input(format!(
+            "{}: --prior takes {} of each nominal value for its uncertainty, but the nominal values of {} are 0 or not \
+             given, which says nothing of their size; write others in [parameters] (`nominal = ...`), or leave --prior out",
+            model.path,
+            percent(Some(sigma)),
+            match parameters.as_slice() {
+                [one] => format!("the only parameter `{}`", one.name),
+                all => format!("all {} parameters", all.len()),
+            }
+        )));
+    }
+    (found.solution, found.deviations) = with_prior(
+        &found.triangle,
+        &found.solution,
+        &found.deviations,
+        nominal,
+        &beliefs,
+    )?;
+    Ok(Refined::Prior(sigma, beliefs.len()))
+}
