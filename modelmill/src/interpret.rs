@@ -167,7 +167,7 @@ impl Interpreted {
         directions
             .map(|direction| match direction.changes.as_slice() {
                 [(i, _)] => format!("{} has no effect on the base parameters", names[*i]),
-                _ => direction.says(&names).replace(
+                _ => direction.describe(&names).replace(
                     "changes nothing",
                     "changes no base parameter (near the nominal values)",
                 ),

@@ -135,7 +135,7 @@ impl Bench<'_> {
             return true;
         }
         // Bodies of other channels may be the same beside the base; friction is not.
-        if !self.candidate(one).bears {
+        if !self.candidate(one).is_part_of_load {
             let reached = self.acted_on(std::slice::from_ref(other));
             let acted = self.acted_on(std::slice::from_ref(one));
             if acted.iter().any(|d| !reached.contains(d)) {

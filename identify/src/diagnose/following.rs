@@ -23,15 +23,17 @@ impl Bench<'_> {
         let (factors, _) = solve(&self.pool.gram(&which, &self.weights, On::All));
         let of_picks = picks.iter().flat_map(|pick| {
             let candidate = self.candidate(pick);
-            pick.columns.iter().map(|_| candidate.bears)
+            pick.columns.iter().map(|_| candidate.is_part_of_load)
         });
-        let bears: Vec<bool> = (self.problem.base_bears.iter().copied())
+        let is_part_of_load: Vec<bool> = (self.problem.base_is_part_of_load.iter().copied())
             .chain(of_picks)
             .collect();
         let mut load = self.problem.held.clone().unwrap_or_default();
         load.0.resize(self.weights.len(), None);
-        for ((k, factor), bears) in which[..n].iter().zip(factors.iter()).zip(bears) {
-            if bears {
+        for ((k, factor), is_part_of_load) in
+            which[..n].iter().zip(factors.iter()).zip(is_part_of_load)
+        {
+            if is_part_of_load {
                 load.add(*factor, self.pool.column(*k));
             }
         }

@@ -152,7 +152,7 @@ pub struct Candidate {
     /// Constants that are searched for; they count as parameters.
     pub searched: usize,
     /// Whether what it adds is part of what the drives carry: masses and weight, rather than friction.
-    pub bears: bool,
+    pub is_part_of_load: bool,
     /// A simpler kind that it holds as a special case and that comes before it.
     pub refines: Option<String>,
     /// Its columns.
@@ -171,7 +171,7 @@ pub struct Problem {
     /// Columns of the parameters that are free.
     pub base: Vec<Column>,
     /// Which of them are part of what the drives carry.
-    pub base_bears: Vec<bool>,
+    pub base_is_part_of_load: Vec<bool>,
     /// Friction of every drive by itself, beside which the load is estimated.
     pub friction: Vec<Column>,
     /// What may be missing.

@@ -92,7 +92,7 @@ pub fn essential(
     let information = r.transpose() * &r;
     // The covariance of the gradients is a property of the residuals; each choice of columns sees its own part.
     let scores = &information * &deviations.covariance * &information;
-    let full = Choice::of(triangle, &scores, kept)?;
+    let full = Choice::fit(triangle, &scores, kept)?;
     let mut effective: Vec<f64> = deviations
         .effective_samples
         .iter()
@@ -133,7 +133,7 @@ pub fn essential(
         });
         let mut columns = choice.columns.clone();
         columns.remove(worst);
-        choice = Choice::of(triangle, &scores, columns)?;
+        choice = Choice::fit(triangle, &scores, columns)?;
     }
     let mut found = Essential {
         kept: choice.columns.clone(),
@@ -165,7 +165,7 @@ struct Choice {
 }
 
 impl Choice {
-    fn of(
+    fn fit(
         triangle: &Triangle,
         scores: &DMatrix<f64>,
         columns: Vec<usize>,
@@ -317,7 +317,7 @@ mod tests {
             let solution = regression.solve().unwrap();
             let deviations: Result<_, LeastSquaresError> =
                 autocorrelated_deviations(&solution, 1, |visit| visit(&w, &y));
-            let triangle = Triangle::of(&regression);
+            let triangle = Triangle::new(&regression);
             let found = essential(
                 &triangle,
                 &solution,

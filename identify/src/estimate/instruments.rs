@@ -121,7 +121,7 @@ fn solve(regression: &LeastSquares, n: usize) -> Result<Solved, LeastSquaresErro
     for row in triangle.chunks_exact(width) {
         plain.add_rows(&row[n..2 * n], &row[2 * n..])?;
     }
-    let mut least_squares = crate::Triangle::of(&plain);
+    let mut least_squares = crate::Triangle::new(&plain);
     least_squares.count_rows(regression.row_count());
     let least_squares = least_squares.solve_near(&vec![0.0; n])?;
     let weak = |correlation| LeastSquaresError::WeakInstruments { correlation };
@@ -144,7 +144,7 @@ fn solve(regression: &LeastSquares, n: usize) -> Result<Solved, LeastSquaresErro
         .ok_or(weak(strength))?;
     let values = b.lu().solve(&right).ok_or(weak(strength))?;
     let mut solution = least_squares.clone();
-    let r_w = crate::Triangle::of(&plain);
+    let r_w = crate::Triangle::new(&plain);
     let misfit = r_w.right() - r_w.r() * &values;
     solution.residual_norm = misfit.norm().hypot(r_w.corner());
     solution.values = values.iter().copied().collect();

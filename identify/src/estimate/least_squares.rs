@@ -447,7 +447,7 @@ mod tests {
         assert!(solution.classical_std[0].is_infinite() && solution.classical_std[1].is_finite());
         assert!(solution.condition_number.is_infinite());
         let names: Vec<String> = ["p1", "p2", "p3", "p4"].map(str::to_owned).into();
-        let mut says = solution.says_undetermined(&names);
+        let mut says = solution.describe_undetermined(&names);
         says.sort();
         assert_eq!(
             says,

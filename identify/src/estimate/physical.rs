@@ -274,7 +274,7 @@ mod tests {
         let deviations: Result<Deviations, LeastSquaresError> =
             autocorrelated_deviations(&solution, 1, |visit| visit(&case.w, &case.y));
         (
-            Triangle::of(&case.regression),
+            Triangle::new(&case.regression),
             solution,
             deviations.unwrap(),
         )

@@ -117,7 +117,7 @@ pub fn estimate<E: From<LeastSquaresError>>(
             });
         }
     }
-    let triangle = Triangle::of(&regression);
+    let triangle = Triangle::new(&regression);
     if weighting.huber.is_some() {
         let curvature = reweighted(
             &solution.values,

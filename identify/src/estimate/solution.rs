@@ -85,14 +85,14 @@ impl Solution {
     /// let mut regression = LeastSquares::new(2);
     /// regression.add_rows(&[1.0, 2.0, 3.0, 6.0], &[1.0, 3.0])?;
     /// let names = ["a".to_owned(), "b".to_owned()];
-    /// let says = regression.solve()?.says_undetermined(&names);
+    /// let says = regression.solve()?.describe_undetermined(&names);
     /// assert_eq!(says, ["only a combination of a and b is determined: a + 1 with b - 0.5 changes nothing"]);
     /// # Ok::<(), modelmill_identify::LeastSquaresError>(())
     /// ```
-    pub fn says_undetermined(&self, names: &[String]) -> Vec<String> {
+    pub fn describe_undetermined(&self, names: &[String]) -> Vec<String> {
         self.undetermined
             .iter()
-            .map(|direction| direction.says(names))
+            .map(|direction| direction.describe(names))
             .collect()
     }
 }

@@ -17,7 +17,7 @@ pub struct Triangle {
 
 impl Triangle {
     /// What a regression has reduced.
-    pub fn of(regression: &LeastSquares) -> Self {
+    pub fn new(regression: &LeastSquares) -> Self {
         Self {
             n: regression.n_parameters(),
             rows: regression.row_count(),
@@ -71,7 +71,7 @@ impl Triangle {
         }
         Ok(Self {
             rows: self.rows,
-            ..Self::of(&regression)
+            ..Self::new(&regression)
         })
     }
 
@@ -86,7 +86,7 @@ impl Triangle {
         regression.add_rows(regressor, right)?;
         Ok(Self {
             rows: self.rows,
-            ..Self::of(&regression)
+            ..Self::new(&regression)
         })
     }
 }

@@ -13,7 +13,7 @@ pub struct Direction {
 
 impl Direction {
     /// One sentence with the parameters' names; a parameter beyond the list is called `#index`.
-    pub fn says(&self, names: &[String]) -> String {
+    pub fn describe(&self, names: &[String]) -> String {
         let name = |i: usize| names.get(i).cloned().unwrap_or_else(|| format!("#{i}"));
         let list: Vec<String> = self.changes.iter().map(|(i, _)| name(*i)).collect();
         match list.as_slice() {

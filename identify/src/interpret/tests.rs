@@ -86,7 +86,7 @@ fn what_is_not_determined_is_named() {
     assert_eq!(determined, [false, false, true]);
     let names = ["x", "y", "z"].map(str::to_owned);
     assert_eq!(
-        directions[0].says(&names),
+        directions[0].describe(&names),
         "only a combination of x and y is determined: x + 1 with y - 0.5 changes nothing"
     );
 }

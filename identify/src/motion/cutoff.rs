@@ -50,7 +50,7 @@ pub(crate) fn choose_cutoff(signals: &[Signal<'_>], rate_hz: f64, order: usize) 
     }
     let spectra: Vec<Spectrum> = signals
         .iter()
-        .filter_map(|signal| Spectrum::of(*signal, rate_hz))
+        .filter_map(|signal| Spectrum::new(*signal, rate_hz))
         .collect();
     if spectra.is_empty() {
         return None;
@@ -100,7 +100,7 @@ struct Spectrum {
 
 impl Spectrum {
     /// `None` where no motion stands above the noise.
-    fn of(signal: Signal<'_>, rate_hz: f64) -> Option<Self> {
+    fn new(signal: Signal<'_>, rate_hz: f64) -> Option<Self> {
         let mut differences = signal.values.to_vec();
         for _ in 0..signal.times {
             differences = differences

@@ -108,13 +108,13 @@ impl Recording {
             prepared.period = Some(period);
         }
         if let Some(found) = &found {
-            notes.push(Note::info(self.says_series(found, &incomplete)));
+            notes.push(Note::info(self.describe_series(found, &incomplete)));
         } else {
             notes.push(Note::info(format!(
                 "Derivatives of {} in {} are prepared: {}.",
                 list(&prepared.coordinates),
                 self.file(),
-                way.says(cutoff, prepared.cutoff_chosen),
+                way.describe(cutoff, prepared.cutoff_chosen),
             )));
         }
         let states = self.smoothed(time, columns, cutoff, way)?;

@@ -32,7 +32,7 @@ impl Recording {
     }
 
     /// Says that the motion is taken for a series, and what that leaves of it.
-    pub(crate) fn says_series(&self, found: &Periodic, columns: &[&Recorded<'_>]) -> String {
+    pub(crate) fn describe_series(&self, found: &Periodic, columns: &[&Recorded<'_>]) -> String {
         let names: Vec<String> = columns.iter().map(|column| column.name.clone()).collect();
         let left = columns.iter().zip(&found.noise).map(|(column, noise)| {
             let derivative = if column.qd.is_some() { "_d" } else { "" };

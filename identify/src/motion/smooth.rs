@@ -95,7 +95,7 @@ pub(crate) enum Way {
 }
 
 impl Way {
-    pub(crate) fn says(self, cutoff: f64, is_chosen: bool) -> String {
+    pub(crate) fn describe(self, cutoff: f64, is_chosen: bool) -> String {
         let chosen = if is_chosen {
             " (chosen from the signal)"
         } else {

@@ -16,7 +16,7 @@ pub(crate) enum Field {
 
 impl Field {
     /// A number, unless it is none that can be computed with.
-    pub(crate) fn of(value: f64) -> Self {
+    pub(crate) fn finite(value: f64) -> Self {
         if value.abs() <= LARGEST {
             Self::Number(value)
         } else {

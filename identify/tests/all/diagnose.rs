@@ -88,7 +88,7 @@ fn candidate(kind: &str, columns: &[&[f64]], sign: Sign) -> Candidate {
         },
         parameters: (0..columns.len()).map(parameter).collect(),
         searched: 0,
-        bears: false,
+        is_part_of_load: false,
         refines: None,
         source: Source::Columns(vec![Choice {
             constants: Vec::new(),
@@ -131,7 +131,7 @@ fn problem(random: &mut Random, hidden: &[f64], candidates: Vec<Candidate>) -> P
         measured: column(&measured),
         held: None,
         base: base.iter().map(|values| column(values)).collect(),
-        base_bears: vec![true; 3],
+        base_is_part_of_load: vec![true; 3],
         friction: Vec::new(),
         candidates,
         variables: vec![

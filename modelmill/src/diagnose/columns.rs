@@ -179,7 +179,7 @@ fn changed(
         },
         parameters,
         searched: 0,
-        bears: bears(&candidates.kinds[change.kind]),
+        is_part_of_load: is_part_of_load(&candidates.kinds[change.kind]),
         refines: None,
         source,
     }
@@ -250,7 +250,7 @@ fn candidate(
 ) -> Option<(Candidate, Vec<bool>)> {
     let first = &candidates.singles[entry.singles[0]];
     let kind = &candidates.kinds[first.kind];
-    let bears = bears(kind);
+    let is_part_of_load = is_part_of_load(kind);
     let mut parameters: Vec<EffectParameter> = (first.parameters.iter())
         .filter_map(|(symbol, _)| {
             let parameter = kind.parameters.iter().find(|p| p.symbol == *symbol)?;
@@ -270,7 +270,7 @@ fn candidate(
             effect,
             parameters,
             searched: 0,
-            bears,
+            is_part_of_load,
             refines: kind.refines.clone(),
             source: Source::Carried,
         };
@@ -336,7 +336,7 @@ fn candidate(
         effect,
         parameters,
         searched: usize::from(searched.is_some()),
-        bears,
+        is_part_of_load,
         refines: kind.refines.clone(),
         source: Source::Columns(choices),
     };
@@ -344,7 +344,7 @@ fn candidate(
 }
 
 /// Whether what a kind adds is part of what the drives carry.
-fn bears(kind: &EffectKind) -> bool {
+fn is_part_of_load(kind: &EffectKind) -> bool {
     kind.on.contains(&ActsOn::Point)
         || matches!(
             kind.mechanics,

@@ -147,7 +147,7 @@ fn problem(
         measured: Column::new(measured),
         base: regressor(all, &Evaluator::new(&model.derivation), model)?,
         candidates: made.candidates,
-        base_bears: (0..model.base.len()).map(|k| !model.is_effect(k)).collect(),
+        base_is_part_of_load: (0..model.base.len()).map(|k| !model.is_effect(k)).collect(),
         friction: friction(model, all)?,
         variables: variables(model, all),
         held: None,
@@ -159,13 +159,13 @@ fn problem(
 fn hold(problem: &mut Problem, model: &Model, held: Held) {
     let is_held = |k: usize| held == Held::All || model.is_known(k);
     let mut known = Column(vec![None; model.drives().len()]);
-    let (mut free, mut bears) = (Vec::new(), Vec::new());
+    let (mut free, mut is_part_of_load) = (Vec::new(), Vec::new());
     for (k, column) in std::mem::take(&mut problem.base).into_iter().enumerate() {
         if is_held(k) {
             known.add(model.nominal[k], &column);
         } else {
             free.push(column);
-            bears.push(problem.base_bears[k]);
+            is_part_of_load.push(problem.base_is_part_of_load[k]);
         }
     }
     for candidate in &mut problem.candidates {
@@ -184,7 +184,7 @@ fn hold(problem: &mut Problem, model: &Model, held: Held) {
         }
     }
     problem.base = free;
-    problem.base_bears = bears;
+    problem.base_is_part_of_load = is_part_of_load;
     if !known.is_zero() {
         problem.measured.add(-1.0, &known);
         problem.held = Some(known);

@@ -2,7 +2,7 @@
 
 mod instruments;
 mod options;
-pub mod refine;
+mod refine;
 pub mod regression;
 mod standstill;
 
@@ -134,7 +134,7 @@ pub fn identify(
                 .iter()
                 .map(|c| (c.name.clone(), c.value))
                 .collect(),
-            undetermined: solution.says_undetermined(&names),
+            undetermined: solution.describe_undetermined(&names),
             fit,
             check,
             data: all_notes,
@@ -221,7 +221,7 @@ fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Ve
         };
         notes.push(Note::warning(format!(
             "{}; {how} {}.",
-            direction.says(&names),
+            direction.describe(&names),
             kept.join(", ")
         )));
     }

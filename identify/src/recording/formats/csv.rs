@@ -151,7 +151,7 @@ fn parse(bytes: &[u8]) -> Field {
         .ok()
         .and_then(|text| text.parse::<f64>().ok())
     {
-        Some(number) => Field::of(number),
+        Some(number) => Field::finite(number),
         None => Field::Text,
     }
 }

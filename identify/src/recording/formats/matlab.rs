@@ -124,7 +124,7 @@ fn read(stream: impl Read + Seek, file: &str, options: &ReadOptions) -> Result<R
     let mut sample = Vec::new();
     for k in 0..columns.samples {
         sample.clear();
-        sample.extend((0..columns.sound.len()).map(|place| Field::of(value(place, k))));
+        sample.extend((0..columns.sound.len()).map(|place| Field::finite(value(place, k))));
         let text = |place: usize| value(place, k).to_string();
         if intake.take(k as u64 + 1, &sample, &text)? == Flow::Stop {
             break;

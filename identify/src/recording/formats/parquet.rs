@@ -77,7 +77,9 @@ fn read(
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let width = schema.num_columns();
     let mut intake = Intake::new(names(&reader), options)?;
-    let mut kinds: Vec<Kind> = (0..width).map(|i| Kind::of(&schema.column(i))).collect();
+    let mut kinds: Vec<Kind> = (0..width)
+        .map(|i| Kind::in_column(&schema.column(i)))
+        .collect();
     for (i, kind) in kinds.iter().enumerate() {
         if intake.reads(i) && matches!(kind, Kind::Ticks { .. }) {
             intake.note(Note::info(format!(
@@ -226,7 +228,7 @@ enum Kind {
 }
 
 impl Kind {
-    fn of(column: &ColumnDescriptor) -> Self {
+    fn in_column(column: &ColumnDescriptor) -> Self {
         let ticks = |per_second| Self::Ticks {
             per_second,
             first: None,
@@ -280,11 +282,11 @@ fn batch(column: &mut ColumnReader, kind: &mut Kind, n: usize) -> Result<Vec<Fie
         ColumnReader::BoolColumnReader(reader) => values(reader, n, |value| {
             Field::Number(f64::from(u8::from(*value)))
         }),
-        ColumnReader::Int32ColumnReader(reader) => {
-            values(reader, n, |value| Field::of(kind.whole(i64::from(*value))))
-        }
+        ColumnReader::Int32ColumnReader(reader) => values(reader, n, |value| {
+            Field::finite(kind.whole(i64::from(*value)))
+        }),
         ColumnReader::Int64ColumnReader(reader) => {
-            values(reader, n, |value| Field::of(kind.whole(*value)))
+            values(reader, n, |value| Field::finite(kind.whole(*value)))
         }
         ColumnReader::Int96ColumnReader(reader) => {
             let mut ticks = Kind::Ticks {
@@ -294,14 +296,18 @@ fn batch(column: &mut ColumnReader, kind: &mut Kind, n: usize) -> Result<Vec<Fie
                     _ => None,
                 },
             };
-            let fields = values(reader, n, |value| Field::of(ticks.whole(value.to_nanos())));
+            let fields = values(reader, n, |value| {
+                Field::finite(ticks.whole(value.to_nanos()))
+            });
             *kind = ticks;
             fields
         }
         ColumnReader::FloatColumnReader(reader) => {
-            values(reader, n, |value| Field::of(f64::from(*value)))
+            values(reader, n, |value| Field::finite(f64::from(*value)))
         }
-        ColumnReader::DoubleColumnReader(reader) => values(reader, n, |value| Field::of(*value)),
+        ColumnReader::DoubleColumnReader(reader) => {
+            values(reader, n, |value| Field::finite(*value))
+        }
         // Columns of texts are not read.
         ColumnReader::ByteArrayColumnReader(_) | ColumnReader::FixedLenByteArrayColumnReader(_) => {
             Ok(vec![Field::Text; n])
