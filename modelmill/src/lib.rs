@@ -169,7 +169,6 @@ pub mod host;
 pub mod identify;
 pub mod import;
 pub mod interpret;
-mod kinds_of_files;
 pub mod model;
 pub mod print;
 pub mod progress;

@@ -11,7 +11,7 @@ use modelmill_identify::{Note, Recording as Raw, RecordingFile, Run};
 
 use crate::audit;
 use crate::error::{Error, Outcome};
-use crate::kinds_of_files;
+use crate::host::kinds_of_files;
 use crate::model::Model;
 use crate::stretch::{Stretch, variances};
 

@@ -1,5 +1,7 @@
 //! What verbs get from outside: files, libraries of effects, and somebody who watches.
 
+pub(crate) mod kinds_of_files;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,7 +11,6 @@ use modelmill_spec::edit::{EditFailure, Edited, NewEffect, add_to_model};
 use modelmill_spec::{EffectKind, Loaded};
 
 use crate::error::{Error, Outcome};
-use crate::kinds_of_files;
 use crate::progress::{Job, Progress, Silent, watched};
 
 /// Where files come from, which kinds of effects there are besides the library's, and who hears what goes on.
