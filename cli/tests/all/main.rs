@@ -4,6 +4,8 @@
 
 #[allow(dead_code, reason = "what only the run of the benchmark calls")]
 mod benchmark;
+#[cfg(unix)]
+mod boundary;
 mod cloos;
 mod common;
 mod diagnose;
@@ -29,6 +31,7 @@ mod reduce;
 mod report;
 mod separate;
 mod simulate;
+mod sound;
 mod tx40;
 mod usage;
 mod weights;

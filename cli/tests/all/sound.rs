@@ -1,11 +1,9 @@
 //! Nothing is called sound that is not: bases that lose the digits, numbers that are none, reductions that hold for one
 //! geometry only.
 
-mod common;
-
 use std::fmt::Write as _;
 
-use common::{json, model, printed, ran, refused, run, scratch, workspace};
+use crate::common::{json, model, printed, ran, refused, run, scratch, workspace};
 
 /// Two links; the second carries masses at four corners of a rectangle before the body to which they belong. In general
 /// four places tell four columns apart, on a circle only three.

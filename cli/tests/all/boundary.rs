@@ -1,13 +1,10 @@
 //! What comes in has an end and goes nowhere else, and what goes out replaces a file as a whole or not at all.
-#![cfg(unix)]
-
-mod common;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-use common::{modelmill, ran};
+use crate::common::{modelmill, ran};
 
 /// A pendulum whose remarks make the file longer than a kilobyte; `{more}` comes behind its name.
 fn pendulum(more: &str) -> String {
@@ -77,7 +74,7 @@ fn a_model_stays_whole_when_the_first_write_is_the_last() {
     let folder = folder("limit");
     let old = pendulum("");
     let model = written(&folder, "pendulum.toml", &old);
-    let args = [&["add", &model], &ADD[..]].concat();
+    let args = [&["add", model.as_str()][..], &ADD[..]].concat();
     // No byte may be written: the system ends the program at its first one, unless the signal is turned off.
     let killed = after("ulimit -f 0", &args);
     assert!(!killed.status.success());
@@ -274,7 +271,7 @@ fn nothing_is_told_of_files_that_are_no_models() {
         let ran = ran(&["check", &model]);
         assert_eq!(ran.status, 1, "{named}");
         assert!(ran.err.contains("something else"), "{named}: {}", ran.err);
-        for word in ["root", "hunter2", "abc123", "token"] {
+        for word in ["root:x", "hunter2", "abc123", "token"] {
             assert!(
                 !ran.err.contains(word) && !ran.out.contains(word),
                 "{named}: {}",
@@ -336,8 +333,9 @@ fn hostile_text_is_harmless_in_every_output() {
         assert_eq!(outputs[i].status, 0, "{}", outputs[i].err);
         outputs[i].out.as_str()
     });
+    assert!(!markdown.contains("[a]("), "{markdown}");
     assert!(
-        !markdown.contains("[a](") && !markdown.contains("<script>alert"),
+        !markdown.replace("\\<", "").contains("<script"),
         "{markdown}"
     );
     assert!(!latex.contains("\\input{x}"), "{latex}");
