@@ -201,10 +201,13 @@ impl Builder<'_> {
                 continue;
             }
             self.value(i, &mut once);
-            let own = !is_leaf(&self.program.ops[i]);
-            if own
+        }
+        // A cosine has its name only once the sine after it is written.
+        for (i, value) in self.values.iter().enumerate() {
+            if self.program.stages[i] == Stage::Fixed
+                && !is_leaf(&self.program.ops[i])
                 && self.by_state[i]
-                && let Some(Expression::Name(name)) = &self.values[i]
+                && let Some(Expression::Name(name)) = value
             {
                 kept.push(name.clone());
             }

@@ -101,6 +101,11 @@ pub(super) fn model(derivation: &Derivation, scope: &Scope) -> TokenStream {
     };
     quote! {
         #owner
+        impl<T: Real> Default for Model<T> {
+            fn default() -> Self {
+                Self::new(&Geometry::default())
+            }
+        }
         #newton_items
         #of_many
     }

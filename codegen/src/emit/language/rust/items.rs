@@ -323,7 +323,14 @@ pub(super) fn nominal<'a>(
 fn base_parameters(derivation: &Derivation, scope: &Scope) -> TokenStream {
     let (values, read) = crate::emit::tree::base_parameters(derivation, scope);
     let n_base = values.len();
-    let (geometry, parameters) = (quote! { geometry }, quote! { parameters });
+    // An argument that nothing reads is called so.
+    let argument = |name: &str, is_its: fn(&Atom) -> bool| {
+        let unread = if read.iter().any(is_its) { "" } else { "_" };
+        let name = format_ident!("{unread}{name}");
+        quote! { #name }
+    };
+    let geometry = argument("geometry", |atom| matches!(atom, Atom::Constant(_)));
+    let parameters = argument("parameters", |atom| matches!(atom, Atom::Parameter(_)));
     let given = super::program::given(derivation, scope, &read, &geometry, &parameters, "");
     let names: Vec<_> = (0..n_base)
         .map(|k| of_field(scope.name(Atom::Base(k))))
@@ -333,7 +340,7 @@ fn base_parameters(derivation: &Derivation, scope: &Scope) -> TokenStream {
     let written = lines(&written.collect::<Vec<String>>());
     quote! {
         /// Base parameters of given physical parameters, eq. (16).
-        pub fn base_parameters<T: Real>(geometry: &Geometry<T>, parameters: &Parameters<T>) -> [T; N_BASE] {
+        pub fn base_parameters<T: Real>(#geometry: &Geometry<T>, #parameters: &Parameters<T>) -> [T; N_BASE] {
             let n = &One::<T>::new();
             #given
             #written
