@@ -38,7 +38,10 @@ fn a_sound_model_becomes_a_module_and_the_same_one_every_time() {
     let folder = folder("sound", &[("pendulum.toml", PENDULUM)]);
     let first = generate(&folder).unwrap();
     assert!(first.contains("pub mod pendulum {"));
-    assert!(first.contains("expression: \"ZZ1\""), "{first}");
+    assert!(
+        first.contains(r#"BaseParameter::new("p1_min", "ZZ1""#),
+        "{first}"
+    );
     assert_eq!(generate(&folder).unwrap(), first);
 }
 

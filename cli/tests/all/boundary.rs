@@ -144,7 +144,7 @@ fn an_input_is_not_overwritten_however_it_is_reached() {
     let model = written(
         &folder,
         "model.toml",
-        "schema = 1\nextends = \"base.toml\"\n",
+        "schema = 1\nname = \"variant\"\nextends = \"base.toml\"\n",
     );
     let data = written(
         &folder,

@@ -3,6 +3,8 @@
 use std::path::Path;
 
 use modelmill_algebra::field::{Element, Stream};
+use proc_macro2::{Delimiter, TokenStream, TokenTree};
+use quote::ToTokens as _;
 
 use super::{Op, PASSES, Stage, cost};
 use crate::expr::{Atom, ExprId, FieldPoint, Graph, Tape};
@@ -136,7 +138,7 @@ fn the_printed_count_equals_a_recount_of_the_emitted_source() {
     }
 }
 
-/// Additions with subtractions, multiplications and divisions in the `let` statements of a method.
+/// Additions with subtractions, multiplications and divisions in a method of the source.
 fn recount(file: &syn::File, method: &str) -> (usize, usize, usize) {
     let mut count = (0, 0, 0);
     let methods = file.items.iter().filter_map(|item| {
@@ -147,34 +149,38 @@ fn recount(file: &syn::File, method: &str) -> (usize, usize, usize) {
         }
     });
     for item in methods.flat_map(|i| &i.items) {
-        let syn::ImplItem::Fn(function) = item else {
-            continue;
-        };
-        if function.sig.ident != method {
-            continue;
-        }
-        for statement in &function.block.stmts {
-            let syn::Stmt::Local(local) = statement else {
-                continue;
-            };
-            let Some(init) = &local.init else { continue };
-            if let syn::Expr::Binary(binary) = &*init.expr {
-                match binary.op {
-                    syn::BinOp::Add(_) | syn::BinOp::Sub(_) => count.0 += 1,
-                    syn::BinOp::Mul(_) => count.1 += 1,
-                    syn::BinOp::Div(_) => count.2 += 1,
-                    _ => panic!("an operation that no program has"),
-                }
-            }
-            // A product in the only sum that needs it.
-            if let syn::Expr::MethodCall(call) = &*init.expr {
-                let name = call.method.to_string();
-                if ["mul_add", "mul_sub", "sub_mul"].contains(&name.as_str()) {
-                    count.0 += 1;
-                    count.1 += 1;
-                }
-            }
+        if let syn::ImplItem::Fn(function) = item
+            && function.sig.ident == method
+        {
+            recount_tokens(function.block.to_token_stream(), &mut count);
         }
     }
     count
+}
+
+/// An operator between two operands counts; a sign in front of one does not.
+fn recount_tokens(tokens: TokenStream, count: &mut (usize, usize, usize)) {
+    let mut after_operand = false;
+    for token in tokens {
+        match token {
+            TokenTree::Group(group) => {
+                recount_tokens(group.stream(), count);
+                after_operand = group.delimiter() != Delimiter::Brace;
+            }
+            TokenTree::Ident(_) | TokenTree::Literal(_) => after_operand = true,
+            TokenTree::Punct(punct) => {
+                let counted = match punct.as_char() {
+                    '+' | '-' => &mut count.0,
+                    '*' => &mut count.1,
+                    '/' => &mut count.2,
+                    _ => {
+                        after_operand = false;
+                        continue;
+                    }
+                };
+                *counted += usize::from(after_operand);
+                after_operand = false;
+            }
+        }
+    }
 }

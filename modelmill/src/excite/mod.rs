@@ -110,9 +110,6 @@ impl Model {
         let notes = asked
             .as_ref()
             .map_or_else(Vec::new, |asked| asked.notes.clone());
-        for note in &notes {
-            self.host().note(note);
-        }
         let separating = asked.as_ref().map(|asked| asked.plant(&plant, self));
         if separating.is_some() {
             options.criterion = Criterion::Separation;

@@ -65,6 +65,11 @@ pub(crate) fn ask(
     recordings: &[&Recording],
 ) -> Outcome<Asked> {
     let mut notes = Vec::new();
+    // Whoever watches hears a remark even where there is no answer in the end.
+    let mut note = |note: Note| {
+        model.host().note(&note);
+        notes.push(note);
+    };
     let mut pair = Pair::new(model, &asked.effect, &asked.from, &asked.beside)?;
     if let Some(size) = asked.noise {
         pair.set_noise(size, model.drives().len());
@@ -74,7 +79,7 @@ pub(crate) fn ask(
         pair.learn(model, &data)?;
     }
     if let [first, ..] = pair.wrong_signs()[..] {
-        notes.push(Note::warning(format!(
+        note(Note::warning(format!(
             "the value of `{first}` has a sign that makes no sense for `{}`",
             pair.effect().kind
         )));
@@ -114,7 +119,7 @@ pub(crate) fn ask(
         }
         if all.iter().all(|one| one.figures.is_mimicked()) {
             let rival = words::effect(pair.rivals[k].effect());
-            notes.push(Note::warning(format!(
+            note(Note::warning(format!(
                 "no motion tells {name} from {rival}, which can say all that it says beside the base parameters{}; it is left \
                  out",
                 if pair.beside().next().is_some() {

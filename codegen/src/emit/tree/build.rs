@@ -252,13 +252,14 @@ impl Builder<'_> {
             self.put(i, &puts[i], &mut state);
         }
         let (read_once, read) = self.reads();
+        let results = self.results();
         Routine {
             once,
             kept,
-            state: in_groups(state, &[]),
+            state: in_groups(without_unread(state, &results), &[]),
             read_once,
             read,
-            results: self.results(),
+            results,
             n_outputs: self.program.outputs.len(),
         }
     }
@@ -449,6 +450,28 @@ impl Builder<'_> {
             Guard::Finite(v) => Check::Finite(self.of(v)),
         }
     }
+}
+
+/// The statements without names that nothing reads: a value may be written out in all places that use it, its sign turned.
+fn without_unread(statements: Vec<Statement>, results: &[Expression]) -> Vec<Statement> {
+    let mut read = BTreeSet::new();
+    for result in results {
+        result.for_each_name(&mut |name| {
+            read.insert(name.to_owned());
+        });
+    }
+    let mut kept = Vec::with_capacity(statements.len());
+    for statement in statements.into_iter().rev() {
+        if matches!(&statement, Statement::Let { name, .. } if !read.contains(name)) {
+            continue;
+        }
+        statement.for_each_name_read(&mut |name| {
+            read.insert(name.to_owned());
+        });
+        kept.push(statement);
+    }
+    kept.reverse();
+    kept
 }
 
 /// Long programs in groups of statements, each a block that hands on what later ones need: every name opens a scope inside
