@@ -84,15 +84,19 @@ pub(crate) fn refuse_dash(path: &Path) -> Outcome {
 
 /// Writes a file as a whole, but not over one that was read; the reason and what to do if it cannot be.
 pub(crate) fn write(path: &Path, text: &str) -> Outcome {
-    disk().write(path, text.as_bytes()).map_err(not_written)
+    disk()
+        .write(path, text.as_bytes())
+        .map_err(|error| not_written(&error))
 }
 
 /// Writes a file as a whole over one that was read, as the user asks for.
 pub(crate) fn replace(path: &Path, text: &str) -> Outcome {
-    disk().replace(path, text.as_bytes()).map_err(not_written)
+    disk()
+        .replace(path, text.as_bytes())
+        .map_err(|error| not_written(&error))
 }
 
-fn not_written(error: FileError) -> Failure {
+fn not_written(error: &FileError) -> Failure {
     let path = error.path.display();
     Failure::Input(match &error.fault {
         FileFault::Missing => format!(

@@ -49,7 +49,7 @@ pub trait Value:
     #[allow(clippy::inline_always, reason = "an instruction or two")]
     #[inline(always)]
     #[must_use]
-    fn from_product(self, a: Self, b: Self) -> Self {
+    fn product_less(self, a: Self, b: Self) -> Self {
         a * b - self
     }
     /// `self - a * b`, as [`Self::plus_product`].
@@ -200,7 +200,7 @@ operators! {
     Product Add::add Product = Var, |a, b| Var(a.get().plus_product(b.0, b.1));
     Var Sub::sub Var = Var, |a, b| Var(a.0 - b.0);
     Var Sub::sub Product = Var, |a, b| Var(a.0.less_product(b.0, b.1));
-    Product Sub::sub Var = Var, |a, b| Var(b.0.from_product(a.0, a.1));
+    Product Sub::sub Var = Var, |a, b| Var(b.0.product_less(a.0, a.1));
     Product Sub::sub Product = Var, |a, b| Var(a.get().less_product(b.0, b.1));
     Var Mul::mul Var = Product, |a, b| Product(a.0, b.0);
     Var Mul::mul Product = Product, |a, b| Product(a.0, b.get());

@@ -129,7 +129,7 @@ macro_rules! wide {
                 self.with(self.simd.$fused(a.v, b.v, self.v))
             }
             #[inline(always)]
-            fn from_product(self, a: Self, b: Self) -> Self {
+            fn product_less(self, a: Self, b: Self) -> Self {
                 self.with(self.simd.$fused(a.v, b.v, self.simd.$neg(self.v)))
             }
             #[inline(always)]

@@ -16,7 +16,7 @@ pub(crate) fn run(host: &Host, args: &DiagnoseArgs) -> Outcome {
         held: args.ask.held(),
         ..Question::default()
     };
-    let findings = commands::diagnose(host, &args.ask, &question)?;
+    let findings = commands::diagnose(host, &args.ask, question)?;
     if args.json {
         return terminal::print_json(&findings.json(&flags));
     }

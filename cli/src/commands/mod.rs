@@ -85,13 +85,13 @@ pub(crate) fn recordings(
 }
 
 /// Diagnoses what the command line names.
-pub(crate) fn diagnose(host: &Host, args: &AskArgs, question: &Question) -> Outcome<Findings> {
+pub(crate) fn diagnose(host: &Host, args: &AskArgs, question: Question) -> Outcome<Findings> {
     let model = self::model(host, &args.model)?;
     let reading = args.preparation.reading();
     let fit = recordings(&model, &args.data, &reading)?;
     let check = recordings(&model, &args.check, &reading)?;
     let [fit, check] = [&fit, &check].map(|all| all.iter().collect::<Vec<_>>());
-    Ok(model.diagnose(&fit, &check, question)?)
+    Ok(model.diagnose(&fit, &check, &question)?)
 }
 
 impl AskArgs {

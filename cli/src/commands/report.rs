@@ -27,7 +27,7 @@ pub(crate) fn run(host: &Host, args: &ReportArgs) -> Outcome {
         held: args.ask.held(),
         again_with_nominal: false,
     };
-    let findings = commands::diagnose(host, &args.ask, &question)?;
+    let findings = commands::diagnose(host, &args.ask, question)?;
     target.write(&page(&findings, &Flags::of(&args.ask))?)?;
     let says = words::verdict(&findings.diagnosis, findings.channels(), findings.judged);
     terminal::print(&format!(

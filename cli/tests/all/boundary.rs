@@ -233,7 +233,7 @@ fn what_never_ends_has_an_end() {
         .spawn()
         .expect("the program starts");
     let mut stdin = child.stdin.take().expect("standard input");
-    let line = [b'#'; 1 << 16];
+    let line = vec![b'#'; 1 << 16];
     // It stops listening when there is more than any model holds.
     while stdin.write_all(&line).is_ok() {}
     let output = child.wait_with_output().expect("an end");

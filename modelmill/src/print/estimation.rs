@@ -55,7 +55,7 @@ pub(crate) fn json(model: &Model, found: &Identified, args: &Estimation) -> Valu
     match &found.refined {
         Refined::Nothing => {}
         Refined::Prior(sigma, beliefs) => {
-            put("prior", json!({ "sigma": sigma, "constraints": beliefs }))
+            put("prior", json!({ "sigma": sigma, "constraints": beliefs }));
         }
         Refined::Essential(dropped, rise) => {
             let dropped: Vec<Value> = dropped

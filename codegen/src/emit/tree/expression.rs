@@ -135,8 +135,9 @@ impl Expression {
         let of = |f: &Formula| Self::of_formula(f, rename);
         match formula {
             Formula::Number(value) => Self::number(value),
-            Formula::Symbol(symbol) => Self::Name(rename(&symbol.text())),
-            Formula::Indexed(symbol, _) => Self::Name(rename(&symbol.text())),
+            Formula::Symbol(symbol) | Formula::Indexed(symbol, _) => {
+                Self::Name(rename(&symbol.text()))
+            }
             Formula::Sum(terms) => {
                 let mut sum: Option<Self> = None;
                 for term in terms {

@@ -87,13 +87,13 @@ fn read(stream: impl Read + Seek, file: &str, options: &ReadOptions) -> Result<R
             },
         )));
     }
-    let mut wanted = vec![false; arrays.arrays.len()];
+    let mut wanted = vec![false; arrays.found.len()];
     for (place, column) in columns.sound.iter().enumerate() {
         wanted[column.array] |= intake.reads(place);
     }
     // An array is read as a whole, and its numbers are kept twice until all are taken in.
     let sizes = arrays
-        .arrays
+        .found
         .iter()
         .zip(&wanted)
         .filter(|(_, wanted)| **wanted);
@@ -106,9 +106,9 @@ fn read(stream: impl Read + Seek, file: &str, options: &ReadOptions) -> Result<R
         ));
     }
     let mut values = Vec::new();
-    for (array, wanted) in arrays.arrays.clone().iter().zip(wanted) {
+    for (array, wanted) in arrays.found.clone().iter().zip(wanted) {
         values.push(if wanted {
-            arrays.numbers(array).map_err(unreadable)?
+            arrays.numbers(array).map_err(|error| unreadable(&error))?
         } else {
             Vec::new()
         });
@@ -134,7 +134,7 @@ fn read(stream: impl Read + Seek, file: &str, options: &ReadOptions) -> Result<R
 }
 
 fn open<R: Read + Seek>(stream: R) -> Result<Arrays<BufReader<R>>, Fault> {
-    Arrays::new(BufReader::new(stream)).map_err(unreadable)
+    Arrays::new(BufReader::new(stream)).map_err(|error| unreadable(&error))
 }
 
 /// The columns of a file, all of one length, and the names of what is none.
@@ -155,7 +155,7 @@ struct Column {
 impl Columns {
     fn new<R>(file: &Arrays<R>) -> Result<Self, Fault> {
         // The number of samples is the longest side that any array has.
-        let sides = file.arrays.iter().flat_map(|array| &array.size);
+        let sides = file.found.iter().flat_map(|array| &array.size);
         let samples = sides.copied().max().unwrap_or(0);
         if samples == 0 {
             return Err(broken(
@@ -168,7 +168,7 @@ impl Columns {
             sound: Vec::new(),
             others: Vec::new(),
         };
-        for (i, array) in file.arrays.iter().enumerate() {
+        for (i, array) in file.found.iter().enumerate() {
             let (rows, cols) = match array.size.as_slice() {
                 [rows, cols] if array.is_sound => (*rows, *cols),
                 _ => (0, 0),
@@ -213,7 +213,7 @@ fn broken(says: impl Into<String>) -> Fault {
     }
 }
 
-fn unreadable(error: std::io::Error) -> Fault {
+fn unreadable(error: &std::io::Error) -> Fault {
     broken(format!(
         "it cannot be read: {error}; save it again with `-v7`"
     ))

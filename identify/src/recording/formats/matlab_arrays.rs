@@ -41,7 +41,7 @@ pub(super) struct Arrays<R> {
     stream: R,
     is_little: bool,
     /// The numeric arrays in the file's order.
-    pub(super) arrays: Vec<Array>,
+    pub(super) found: Vec<Array>,
 }
 
 impl<R: Read + Seek> Arrays<R> {
@@ -90,7 +90,7 @@ impl<R: Read + Seek> Arrays<R> {
         Ok(Self {
             stream,
             is_little,
-            arrays,
+            found: arrays,
         })
     }
 

@@ -94,6 +94,10 @@ struct Function<'a> {
 }
 
 impl<'a> Unit<'a> {
+    #[allow(
+        clippy::too_many_lines,
+        reason = "a list of functions, one after the other"
+    )]
     fn new(source: &'a Source<'a>) -> Self {
         let derivation = source.derivation;
         let mechanism = &derivation.mechanism;

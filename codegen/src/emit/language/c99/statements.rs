@@ -1,5 +1,7 @@
 //! Statements and expressions as text of C.
 
+use std::fmt::Write as _;
+
 use crate::emit::language::syntax::Syntax;
 use crate::emit::tree::{Check, Statement};
 use crate::expr::Unary;
@@ -113,7 +115,7 @@ impl Syntax for C<'_> {
             if c.is_ascii_alphanumeric() {
                 spelled.push(c);
             } else {
-                spelled.push_str(&format!("_{:x}_", u32::from(c)));
+                let _ = write!(spelled, "_{:x}_", u32::from(c));
             }
         }
         spelled

@@ -94,7 +94,7 @@ pub(super) fn dynamics(derivation: &Derivation, scope: &Scope, dynamics: &Dynami
         },
         prepares: "Prepares the equation of motion: what does not depend on the state is computed once.",
         is_public: true,
-        made: Made::OfBase,
+        made: Made::Base,
         functions: functions.into(),
         more: More {
             methods: forward(derivation, dynamics),

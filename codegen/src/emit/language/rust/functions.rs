@@ -89,7 +89,7 @@ pub(super) fn model(derivation: &Derivation, scope: &Scope) -> TokenStream {
         },
         prepares: "Prepares the model of a geometry.",
         is_public: true,
-        made: Made::OfGeometry,
+        made: Made::Geometry,
         functions,
         more,
     };
@@ -134,7 +134,7 @@ pub(super) fn inverse_dynamics(derivation: &Derivation, scope: &Scope) -> TokenS
         },
         prepares: "Prepares the recursion: what does not depend on the state is computed once.",
         is_public: true,
-        made: Made::OfBase,
+        made: Made::Base,
         functions: vec![function],
         more: More::default(),
     };

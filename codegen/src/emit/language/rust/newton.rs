@@ -17,6 +17,7 @@ pub(super) struct Newton<'a> {
 }
 
 /// The model's loops and its passive coordinates, where there is no closed form.
+#[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
 pub(super) fn newton<'a>(derivation: &'a Derivation, scope: &Scope) -> Option<Newton<'a>> {
     let PassivePosition::Newton(loops) = &derivation.programs.passive_position else {
         return None;

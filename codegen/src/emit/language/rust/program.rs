@@ -16,27 +16,27 @@ use crate::lower::Program;
 /// What a program is made of besides the geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Made {
-    OfGeometry,
-    OfBase,
-    OfParameters,
+    Geometry,
+    Base,
+    Parameters,
 }
 
 impl Made {
     /// What is wrong with what it is made of.
     fn check(self) -> TokenStream {
         match self {
-            Self::OfGeometry => quote! { geometry.check() },
-            Self::OfBase => quote! { geometry.check().and(check_base(base, &BASE_PARAMETERS)) },
-            Self::OfParameters => quote! { geometry.check().and(parameters.check()) },
+            Self::Geometry => quote! { geometry.check() },
+            Self::Base => quote! { geometry.check().and(check_base(base, &BASE_PARAMETERS)) },
+            Self::Parameters => quote! { geometry.check().and(parameters.check()) },
         }
     }
 
     /// The parameters by which it is made.
     fn parameters(self) -> TokenStream {
         match self {
-            Self::OfGeometry => quote! { geometry: &Geometry<T> },
-            Self::OfBase => quote! { geometry: &Geometry<T>, base: &[T; N_BASE] },
-            Self::OfParameters => {
+            Self::Geometry => quote! { geometry: &Geometry<T> },
+            Self::Base => quote! { geometry: &Geometry<T>, base: &[T; N_BASE] },
+            Self::Parameters => {
                 quote! { geometry: &Geometry<T>, parameters: &Parameters<T> }
             }
         }
@@ -304,7 +304,7 @@ impl Owner<'_> {
 
     fn model(&self) -> TokenStream {
         match self.made {
-            Made::OfGeometry if self.name == "Model" => quote! { self },
+            Made::Geometry if self.name == "Model" => quote! { self },
             _ => quote! { self.model },
         }
     }

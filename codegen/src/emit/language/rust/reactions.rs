@@ -62,7 +62,7 @@ pub(super) fn reactions(
         },
         prepares: "Prepares the recursion: what does not depend on the state is computed once.",
         is_public: true,
-        made: Made::OfParameters,
+        made: Made::Parameters,
         functions: vec![function],
         more: More::default(),
     };

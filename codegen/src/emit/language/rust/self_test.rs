@@ -37,7 +37,7 @@ pub(super) fn self_test(derivation: &Derivation, scope: &Scope) -> TokenStream {
         },
         prepares: "Prepares what depends on the geometry alone.",
         is_public: false,
-        made: Made::OfGeometry,
+        made: Made::Geometry,
         functions: vec![function],
         more: More::default(),
     };
