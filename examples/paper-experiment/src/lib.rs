@@ -22,7 +22,7 @@ use serde_json::json;
 use runs::Periodic;
 use study::Bench;
 
-/// How the experiment is made; [`Request::default`] is the page that comes with the project.
+/// How the experiment is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Request {
     /// Random trajectories within the limits that the search for the excitation tries first.
