@@ -2,7 +2,7 @@
 //! parameters, to the effect that a model lacks, and to a page that shows it.
 //!
 //! The library owns no terminal, no path and no global. Files, libraries of effects and progress come from a [`Host`]; results
-//! are values; [`print`] and [`report`] make text, JSON and pages of them. What a reader of a text is advised to do is spelled
+//! are values; [`mod@print`] and [`report`] make text, JSON and pages of them. What a reader of a text is advised to do is spelled
 //! by a [`print::Spelling`], since a command line, a notebook and a Rust program ask for it in different words.
 //!
 //! Units are SI throughout (m, rad, kg, s, N, N m); a recording or a model file may say otherwise of itself.
@@ -154,7 +154,7 @@
 //!
 //! In the order of the flow, each standing on those before it: [`text`], [`error`], [`progress`], [`host`], [`model`],
 //! [`stretch`], [`along`], [`audit`], [`recording`], [`compare`], [`evaluate`], [`identify`], [`diagnose`], [`add`],
-//! [`interpret`], [`excite`], [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`print`], [`report`].
+//! [`interpret`], [`excite`], [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@print`], [`report`].
 
 pub mod add;
 pub mod along;
