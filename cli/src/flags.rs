@@ -1,5 +1,6 @@
 //! How the command line asks for what the library advises.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -9,6 +10,8 @@ use modelmill::edit::NewEffect;
 use modelmill::print::Spelling;
 use modelmill::recording::Reading;
 use modelmill::text::table::significant;
+use modelmill_boundary::text::{self, Advised};
+use serde_json::Value;
 
 use crate::args::AskArgs;
 
@@ -103,6 +106,57 @@ impl Spelling for Flags {
     fn held(&self) -> String {
         "--held".to_owned()
     }
+
+    fn text<'a>(&self, text: &'a str) -> Cow<'a, str> {
+        spelled(text)
+    }
+}
+
+/// Fields of the library's options whose flags are called otherwise.
+const FLAGS: [(&str, &str); 3] = [
+    ("columns", "map"),
+    ("cutoff_hz", "cutoff"),
+    ("source", "derivatives"),
+];
+
+/// A text of the library with its options as flags and its verbs as commands.
+pub(crate) fn spelled(text: &str) -> Cow<'_, str> {
+    let spelled = text::spelled(text, |advised| match advised {
+        Advised::Option(name, None) => flag(name),
+        Advised::Option(name, Some(value)) if value.contains(' ') => {
+            format!("`{} \"{value}\"`", flag(name))
+        }
+        Advised::Option(name, Some(value)) => format!("`{} {value}`", flag(name)),
+        Advised::Verb(name) => format!("`modelmill {name}`"),
+    });
+    // Flags side by side are one piece of a command line.
+    match spelled {
+        Cow::Owned(text) => Cow::Owned(text.replace("` `--", " --")),
+        borrowed => borrowed,
+    }
+}
+
+fn flag(field: &str) -> String {
+    let other = FLAGS.iter().find(|(ours, _)| *ours == field);
+    other.map_or_else(
+        || format!("--{}", field.replace('_', "-")),
+        |(_, flag)| format!("--{flag}"),
+    )
+}
+
+/// A JSON value with all its texts spelled as [`spelled`] does.
+pub(crate) fn spelled_in(value: &Value) -> Value {
+    match value {
+        Value::String(text) => Value::String(spelled(text).into_owned()),
+        Value::Array(values) => values.iter().map(spelled_in).collect(),
+        Value::Object(members) => {
+            let members = members.iter();
+            members
+                .map(|(name, value)| (name.clone(), spelled_in(value)))
+                .collect()
+        }
+        Value::Null | Value::Bool(_) | Value::Number(_) => value.clone(),
+    }
 }
 
 /// The command that adds an effect to a model file.
@@ -155,9 +209,77 @@ pub(crate) fn quoted(word: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
+    use clap::CommandFactory;
     use modelmill::edit::NewParameter;
 
     use super::*;
+    use crate::args::Cli;
+
+    #[test]
+    fn options_of_texts_become_flags() {
+        let says = "map it: option `columns` = `q=q [deg]` option `columns` = `w=w/2`, or leave option `skip_bad_samples` \
+                    out; verb `identify` makes one";
+        assert_eq!(
+            spelled(says),
+            "map it: `--map \"q=q [deg]\" --map w=w/2`, or leave --skip-bad-samples out; `modelmill identify` makes one"
+        );
+    }
+
+    /// Every option and verb that a text of the library names is a flag or a command of the program.
+    #[test]
+    fn what_texts_advise_exists() {
+        let commands: Vec<clap::Command> = Cli::command().get_subcommands().cloned().collect();
+        let flags: Vec<String> = commands
+            .iter()
+            .flat_map(clap::Command::get_arguments)
+            .filter_map(|a| Some(format!("--{}", a.get_long()?)))
+            .collect();
+        let mut count = 0;
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        for package in ["model-spec", "identify", "reduction", "modelmill"] {
+            for (file, text) in sources(&root.join(package).join("src")) {
+                text::spelled(&text, |advised| {
+                    count += 1;
+                    match advised {
+                        Advised::Option(name, _) => {
+                            let flag = flag(name);
+                            assert!(flags.contains(&flag), "{}: {flag}", file.display());
+                        }
+                        Advised::Verb(verb) => {
+                            let is_verb = commands.iter().any(|c| c.get_name() == verb);
+                            assert!(is_verb, "{}: {verb}", file.display());
+                        }
+                    }
+                    String::new()
+                });
+                for line in text.lines().map(str::trim_start) {
+                    let names_a_flag = flags.iter().any(|flag| {
+                        let mut places = line.match_indices(flag.as_str());
+                        places.any(|(at, _)| !line[..at].ends_with('-'))
+                    });
+                    let is_text = !line.starts_with("//");
+                    assert!(!(is_text && names_a_flag), "{}: {line}", file.display());
+                }
+            }
+        }
+        assert!(count > 40, "{count}");
+    }
+
+    fn sources(folder: &Path) -> Vec<(PathBuf, String)> {
+        let mut found = Vec::new();
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                found.extend(sources(&path));
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                let text = std::fs::read_to_string(&path).unwrap();
+                found.push((path, text));
+            }
+        }
+        found
+    }
 
     #[test]
     fn commands_say_what_is_added() {

@@ -148,7 +148,7 @@ fn parse_closed(text: &str, file: usize, log: &mut Log) -> Table {
             log.push(
                 Diagnostic::error(first, "this is no model file")
                     .label("expected TOML, such as `schema = 1`")
-                    .help("a recording goes behind `--data`, a model file before it"),
+                    .help("a recording goes where recordings are asked for (option `data`)"),
             );
             return Table::new();
         }

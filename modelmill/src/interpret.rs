@@ -64,14 +64,14 @@ pub fn unknown(model: &Model, names: &[String]) -> Outcome<Vec<usize>> {
         let Some(i) = parameters.iter().position(|p| p.name == name) else {
             let all: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
             return Err(Error::input(format!(
-                "--unknown {name}: {} declares no such parameter; its parameters are {}",
+                "option `unknown` = `{name}`: {} declares no such parameter; its parameters are {}",
                 model.path,
                 all.join(", ")
             )));
         };
         if found.contains(&i) {
             return Err(Error::options(format!(
-                "--unknown names `{name}` twice; name each parameter once"
+                "option `unknown` names `{name}` twice; name each parameter once"
             )));
         }
         found.push(i);

@@ -46,7 +46,7 @@ impl Host {
             .map_err(|failure| match plan {
                 Some(_) => failure.into(),
                 None => Error::input(format!(
-                    "{}\nnote: no plan was given, so that every body became a part of its own; a plan (--plan) can make one \
+                    "{}\nnote: no plan was given, so that every body became a part of its own; a plan (option `plan`) can make one \
                      part of bodies that move alike, such as parallel cranks, whose joints are redundant",
                     failure.render(false).trim_end()
                 )),

@@ -51,7 +51,7 @@ impl Host {
             if self.load(path).is_ok() {
                 return Error::input(format!(
                     "{} is a model file; a rig file is expected, which describes the whole machine (rig/README.md; \
-                     model-spec/rigs holds some). Forces of a model along a motion come from `evaluate`",
+                     model-spec/rigs holds some). Forces of a model along a motion come from verb `evaluate`",
                     path.display()
                 ));
             }

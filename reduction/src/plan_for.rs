@@ -21,7 +21,7 @@ pub fn plan_for(rig: &Rig) -> Result<Plan, String> {
         .collect();
     if let Some(other) = (0..rig.joints.len()).find(|j| rig.hinge(*j).is_none()) {
         return Err(format!(
-            "`{}` is no revolute joint: reducing this rig takes a plan (--plan), in which parts and lumped masses stand \
+            "`{}` is no revolute joint: reducing this rig takes a plan (option `plan`), in which parts and lumped masses stand \
              for what other joints hold",
             rig.joints[other].name
         ));

@@ -4,10 +4,12 @@
 //! writing, the end of a comment. Each output has one function that leaves ordinary text as it is and makes the rest
 //! harmless.
 
+mod advice;
 mod escape;
 
 use std::borrow::Cow;
 
+pub use advice::{Advised, spelled};
 pub use escape::{code_in_markdown, comment, csv_field, html, json, latex, markdown};
 
 /// Text on one line: line ends and tabs become blanks, and what steers a terminal or the direction of writing becomes

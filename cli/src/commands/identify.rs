@@ -8,6 +8,7 @@ use modelmill::recording::{Reading, Recording};
 
 use crate::args::IdentifyArgs;
 use crate::failure::{Failure, Outcome};
+use crate::flags::spelled_in;
 use crate::output::Target;
 use crate::{commands, terminal};
 
@@ -55,7 +56,7 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> Outcome {
     let found = model.identify_with(&data, &instruments, &check, &options)?;
     let object = found.json(&model)?;
     if let Some(target) = &target {
-        target.write(&format!("{object:#}\n"))?;
+        target.write(&format!("{:#}\n", spelled_in(&object)))?;
     }
     if args.json {
         return terminal::print_json(&object);

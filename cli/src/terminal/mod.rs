@@ -11,6 +11,7 @@ use modelmill::{Note, Severity};
 use modelmill_boundary::text;
 
 use crate::failure::{Failure, Outcome};
+use crate::flags::{spelled, spelled_in};
 
 /// Whether the user allows colours at all: `NO_COLOR` (no-color.org) and dumb terminals forbid them.
 fn colours_allowed() -> bool {
@@ -38,7 +39,8 @@ pub(crate) fn errors_in_colour() -> bool {
 
 /// Writes the result of a command to standard output, with one line feed at its end.
 pub(crate) fn print(text: &str) -> Outcome {
-    let text = text::terminal(text, colours_allowed() && io::stdout().is_terminal());
+    let text = spelled(text);
+    let text = text::terminal(&text, colours_allowed() && io::stdout().is_terminal());
     let mut out = io::stdout().lock();
     let end = if text.ends_with('\n') { "" } else { "\n" };
     out.write_all(text.as_bytes())
@@ -52,12 +54,13 @@ pub(crate) fn print(text: &str) -> Outcome {
 
 /// Prints one JSON object to standard output.
 pub(crate) fn print_json(value: &serde_json::Value) -> Outcome {
-    print(&text::json(&format!("{value:#}")))
+    print(&text::json(&format!("{:#}", spelled_in(value))))
 }
 
 /// Writes to standard error; who does not read it is not bothered.
 pub(crate) fn say(text: &str) {
-    let text = text::terminal(text, errors_in_colour());
+    let text = spelled(text);
+    let text = text::terminal(&text, errors_in_colour());
     let _ = writeln!(io::stderr(), "{text}");
 }
 

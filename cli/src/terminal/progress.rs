@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use modelmill::Note;
 use modelmill::progress::{Job, Progress};
+use modelmill_boundary::text;
 
 use crate::terminal;
 
@@ -100,5 +101,6 @@ fn new_bar(message: &str, total: usize) -> ProgressBar {
     };
     let style =
         ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_spinner());
-    bar.with_style(style).with_message(message.to_owned())
+    bar.with_style(style)
+        .with_message(text::plain(message).into_owned())
 }

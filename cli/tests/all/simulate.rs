@@ -109,7 +109,7 @@ fn faults_have_their_places() {
     );
     let says = simulate(&model("two_link.toml"), &run("plain-fit.csv"));
     assert!(
-        says.contains("two_link.toml is a model file") && says.contains("`evaluate`"),
+        says.contains("two_link.toml is a model file") && says.contains("`modelmill evaluate`"),
         "{says}"
     );
     let says = simulate(&rig("spidermill-full.toml"), "no/such.csv");

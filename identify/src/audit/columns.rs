@@ -33,7 +33,7 @@ impl Run {
             return Vec::new();
         }
         vec![Note::warning(format!(
-            "The measured force of {} in {} is 0 throughout: nothing was measured, or the column is another one (--map); \
+            "The measured force of {} in {} is 0 throughout: nothing was measured, or the column is another one (option `columns`); \
              errors relative to it have no value, and it pulls parameters to 0.",
             list(&idle),
             self.file
@@ -84,7 +84,8 @@ impl Recording {
     /// The options that read an angle recorded in degrees, and with it those of its recorded derivatives that are in
     /// degrees too: all but those that are the derivatives in rad of what stands beside them.
     pub fn maps_from_degrees(&self, name: &str) -> String {
-        let map = |column: &str, unit: &str| format!("--map \"{column}={column} [{unit}]\"");
+        let map =
+            |column: &str, unit: &str| format!("option `columns` = `{column}={column} [{unit}]`");
         let mut maps = vec![map(name, "deg")];
         for (of, order, unit) in [("", "_d", "deg/s"), ("_d", "_dd", "deg/s^2")] {
             let [of, rate] = [of, order].map(|suffix| format!("{name}{suffix}"));
@@ -179,13 +180,13 @@ impl Recording {
                 ("are", "the derivatives")
             };
             let how = if why.is_empty() {
-                "nor a multiple of it: check which column is which (--map)".to_owned()
+                "nor a multiple of it: check which column is which (option `columns`)".to_owned()
             } else {
                 format!("but about {} times as large: {why}", with_digits(ratio, 3))
             };
             Note::warning(format!(
                 "{} in {} {is} not {derivative} of {} with respect to `t`, {how}. Mend the columns, or take derivatives \
-                 from positions (--derivatives positions).",
+                 from positions (option `source` = `positions`).",
                 list(&rates),
                 self.file(),
                 list(&ofs),
@@ -266,7 +267,7 @@ fn explain(ratio: f64, is_angle: bool) -> String {
     } else if is(0.5 / PI) && is_angle {
         "it seems to be in revolutions per second, and must be in rad/s".to_owned()
     } else {
-        "check the units (rad, m, s) and which column is which (--map)".to_owned()
+        "check the units (rad, m, s) and which column is which (option `columns`)".to_owned()
     };
     if ratio < 0.0 {
         let and = if why.is_empty() { "" } else { ", and " };

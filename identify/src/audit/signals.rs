@@ -54,7 +54,7 @@ impl Recording {
             Note::warning(format!(
                 "`{name}` in {} changes only every {usual} samples: each value is repeated, so it was recorded at a lower \
                  rate than it is written. Rates from such steps are wrong: keep one sample of each, or a lower cut-off \
-                 (--cutoff).",
+                 (option `cutoff_hz`).",
                 self.file()
             ))
         })
@@ -69,7 +69,7 @@ impl Recording {
         (largest > LARGE_ANGLE).then(|| {
             Note::warning(format!(
                 "`{name}` in {} reaches {}, which is {} turns if it is in rad, as it must be; if it is in \
-                 degrees, say so: `{}`.",
+                 degrees, say so: {}.",
                 self.file(),
                 rounded(largest),
                 rounded(largest / (2.0 * PI)),
@@ -122,7 +122,7 @@ impl Recording {
         Some(Note::warning(format!(
             "The force of `{name}` in {} stays exactly at {} for {} while the mechanism moves, first in {} {}{other}: \
              the drive or its measurement seems to be saturated. The true force is not known there; use a gentler motion, \
-             or leave these times out (--between).",
+             or leave these times out (option `between`).",
             self.file(),
             plain(limit),
             count_of(count, "sample", "samples"),
@@ -214,9 +214,9 @@ mod tests {
         };
         assert_eq!(
             of(1.0),
-            "--map \"q=q [deg]\" --map \"q_d=q_d [deg/s]\" --map \"q_dd=q_dd [deg/s^2]\""
+            "option `columns` = `q=q [deg]` option `columns` = `q_d=q_d [deg/s]` option `columns` = `q_dd=q_dd [deg/s^2]`"
         );
-        assert_eq!(of(PI / 180.0), "--map \"q=q [deg]\"");
+        assert_eq!(of(PI / 180.0), "option `columns` = `q=q [deg]`");
     }
 
     #[test]
@@ -231,7 +231,7 @@ mod tests {
         );
         let degrees = says(|t| 90.0 * (3.0 * t).sin(), |t| (5.0 * t).sin());
         assert!(
-            degrees.len() == 1 && degrees[0].ends_with("say so: `--map \"q=q [deg]\"`."),
+            degrees.len() == 1 && degrees[0].ends_with("say so: option `columns` = `q=q [deg]`."),
             "{degrees:?}"
         );
         let dead = says(|t| (3.0 * t).sin(), |_| 4.0);

@@ -79,7 +79,7 @@ impl fmt::Display for FitFileError {
             FitFault::Unreadable { reason } => {
                 write!(
                     f,
-                    "{file}: the fit cannot be read: {reason}; make it with `modelmill identify ... --json > {file}`"
+                    "{file}: the fit cannot be read: {reason}; make it with verb `identify`"
                 )
             }
             FitFault::NotAFit {
@@ -88,13 +88,12 @@ impl fmt::Display for FitFileError {
                 reason,
             } => write!(
                 f,
-                "{file}, line {line}, column {column}: this is not the JSON that `modelmill identify --json` prints: \
+                "{file}, line {line}, column {column}: this is not the JSON that verb `identify` writes: \
                  {reason}"
             ),
             FitFault::NoJson => write!(
                 f,
-                "{file} is no fit: the JSON that `modelmill identify ... --out FIT.json` writes is expected; recordings go \
-                 to --data, the model file comes first"
+                "{file} is no fit: the JSON that verb `identify` writes is expected"
             ),
             FitFault::MissingParameter {
                 name,

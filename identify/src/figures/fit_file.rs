@@ -399,7 +399,7 @@ mod tests {
         );
         let absent = FitFile::read("no/such/fit.json").unwrap_err().to_string();
         assert!(
-            absent.contains("no/such/fit.json") && absent.contains("modelmill identify"),
+            absent.contains("no/such/fit.json") && absent.contains("verb `identify`"),
             "{absent}"
         );
     }

@@ -40,7 +40,7 @@ impl Recording {
         });
         format!(
             "Derivatives of {} in {} are those of a Fourier series of period {} s with {}, since it leaves nothing but \
-             white noise: {} (RMS). `--smoothing butterworth` filters instead.",
+             white noise: {} (RMS); option `smoothing` = `butterworth` filters instead.",
             list(&names),
             self.file(),
             seven_digits(found.period),
@@ -102,7 +102,7 @@ impl Recording {
         if !resting.is_empty() {
             run.notes.push(Note::info(format!(
                 "In {} there is standstill, a rate below a hundredth of the fastest: {} of the samples. Friction takes any \
-                 value there; `--standstill 0.01` leaves such equations out of a fit.",
+                 value there; option `standstill` = `0.01` leaves such equations out of a fit.",
                 self.file(),
                 resting.join(", ")
             )));

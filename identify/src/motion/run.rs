@@ -276,7 +276,7 @@ impl Recording {
             notes.push(Note::warning(format!(
                 "The steps of {} are uneven, from {shortest:.6} s to {longest:.6} s; \
                  differences use the true times, the low-pass takes the steps as even \
-                 (`--smoothing savitzky-golay` uses the true times there too).",
+                 (option `smoothing` = `savitzky-golay` uses the true times there too).",
                 self.file()
             )));
         }
@@ -291,7 +291,7 @@ impl Recording {
                 have,
                 need: start.saturating_add(end).saturating_add(1),
                 purpose: if run.prepared.trim_asked_for {
-                    "dropping as many at both ends as `--trim` asks for"
+                    "dropping as many at both ends as option `trim` asks for"
                 } else {
                     "dropping the filter's transients at both ends"
                 },
@@ -321,7 +321,7 @@ impl Recording {
             "The first {start} and the last {end} of {have} samples of {} are dropped ({}).",
             self.file(),
             if run.prepared.trim_asked_for {
-                "as asked for by --trim"
+                "as asked for by option `trim`"
             } else {
                 "transients of the filter"
             }

@@ -248,14 +248,14 @@ impl fmt::Display for Fault {
                 match until {
                     Some((from, to)) => write!(
                         f,
-                        "take a part of it, for example `--between {from},{to}`, or several such parts one after the other"
+                        "take a part of it, for example option `between` = `{from},{to}`, or several such parts one after the other"
                     ),
-                    None => f.write_str("take a part of it with `--between FROM,TO` (s)"),
+                    None => f.write_str("take a part of it with option `between` = `FROM,TO` (s)"),
                 }
             }
             Self::NoneBetween { from, to } => write!(
                 f,
-                "no sample lies between t = {from} s and {to} s, as `--between` asks; give times that the recording has"
+                "no sample lies between t = {from} s and {to} s, as option `between` asks; give times that the recording has"
             ),
             Self::NoHeader => f.write_str(
                 "the first line holds numbers, but column names are expected there; \
@@ -291,7 +291,7 @@ impl fmt::Display for Fault {
             Self::DuplicateRenaming { name } => {
                 write!(
                     f,
-                    "`{name}` is renamed twice; give each name and each column one renaming (`--map ours=theirs`)"
+                    "`{name}` is renamed twice; give each name and each column one renaming (option `columns` = `ours=theirs`)"
                 )
             }
             Self::RaggedLine { have, expected, .. } => write!(
@@ -324,11 +324,11 @@ impl fmt::Display for Fault {
                     )?;
                 }
                 if *by_renaming {
-                    f.write_str(" Renamings read `--map ours=theirs`.")
+                    f.write_str(" Renamings read option `columns` = `ours=theirs`.")
                 } else {
                     write!(
                         f,
-                        " Map one onto it with `--map {name}={}`.",
+                        " Map one onto it with option `columns` = `{name}={}`.",
                         nearest.as_deref().unwrap_or("THEIRS")
                     )
                 }
@@ -369,12 +369,12 @@ impl fmt::Display for Fault {
                     )?;
                 }
                 others(f, *count, "fields of the column are not finite or empty")?;
-                f.write_str("; repair the recording, or leave such samples out with `--skip-bad-samples` (they are counted)")
+                f.write_str("; repair the recording, or leave such samples out with option `skip_bad_samples` (they are counted)")
             }
             Self::MissingForce { drives } => write!(
                 f,
                 "the measured force of {} is needed, but there is no such column; \
-                 map one onto it with `--map {}=THEIRS`",
+                 map one onto it with option `columns` = `{}=THEIRS`",
                 list(drives),
                 drives.first().map_or("DRIVE", String::as_str)
             ),
@@ -403,7 +403,7 @@ impl fmt::Display for Fault {
             ),
             Self::NoPeriod => f.write_str(
                 "the motion does not repeat itself within the recording, so no period can be found; give it with \
-                 `--period S`, or take another smoothing",
+                 option `period` = `S`, or take another smoothing",
             ),
             Self::Period {
                 period,
@@ -421,7 +421,7 @@ impl fmt::Display for Fault {
             } => write!(
                 f,
                 "a cut-off of {cutoff_hz} Hz is too low for a recording of {duration:.4} s, of which no motion would be \
-                 left; choose one above {lowest_hz:.4} Hz, or leave `--cutoff` away and have it chosen from the signal"
+                 left; choose one above {lowest_hz:.4} Hz, or leave option `cutoff_hz` away and have it chosen from the signal"
             ),
             Self::Filter { column, error } => write!(f, "`{column}` cannot be filtered: {error}"),
         }

@@ -220,7 +220,8 @@ fn only_the_time_that_is_asked_for_is_read() {
     );
     let says = part((0.0, 20.0)).unwrap_err().to_string();
     assert!(
-        says.contains("too large to be kept in memory") && says.contains("--between 0,10"),
+        says.contains("too large to be kept in memory")
+            && says.contains("option `between` = `0,10`"),
         "{says}"
     );
 }

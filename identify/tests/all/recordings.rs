@@ -407,7 +407,7 @@ fn a_preparation_of_ones_own_is_kept_to() {
             .states_with(&names(&["q"]), &[], &bad)
             .unwrap_err()
             .to_string()
-            .contains("--trim")
+            .contains("option `trim`")
     );
     let bad = Preparation {
         cutoff_hz: Some(1e-9),

@@ -81,7 +81,7 @@ fn findings(model: &Model, data: &Stretch) -> Vec<Note> {
             };
             notes.push(Note::warning(format!(
                 "{what}: the best fit of the model is off by {} as the columns are, and by {} then. Check which column is \
-                 which (--map).",
+                 which (option `columns`).",
                 percent(Some(before)),
                 percent(Some(after))
             )));
@@ -222,7 +222,7 @@ fn suspects_of_motion(
             if motions[a].1 == motions[b].1 {
                 hypotheses.push((
                     format!(
-                        "The coordinates `{}` and `{}` in {file} seem to be exchanged: check which column is which (--map)",
+                        "The coordinates `{}` and `{}` in {file} seem to be exchanged: check which column is which (option `columns`)",
                         motions[a].0, motions[b].0
                     ),
                     Box::new(move |states| {

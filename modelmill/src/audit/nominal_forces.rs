@@ -76,11 +76,14 @@ fn says(mechanism: &Mechanism, drives: &[&Drive], which: Oddity, file: &str) -> 
         .map(|drive| {
             let name = &drive.name;
             match which {
-                Oddity::Turned => format!("--map \"{name}=-{name}\""),
+                Oddity::Turned => format!("option `columns` = `{name}=-{name}`"),
                 Oddity::TooSmall => {
-                    format!("--map \"{name}={name} [k{}]\"", unit(mechanism, drive))
+                    format!(
+                        "option `columns` = `{name}={name} [k{}]`",
+                        unit(mechanism, drive)
+                    )
                 }
-                Oddity::TooLarge => format!("--map \"{name}={name}/1000\""),
+                Oddity::TooLarge => format!("option `columns` = `{name}={name}/1000`"),
             }
         })
         .collect();
@@ -90,7 +93,7 @@ fn says(mechanism: &Mechanism, drives: &[&Drive], which: Oddity, file: &str) -> 
         Oddity::TooLarge => format!("about 1000 times as large; if {they_are} in mN or mN m"),
     };
     format!(
-        "Beside what the nominal values give, the {forces} of {} in {file} {are} {what}, say `{}`.",
+        "Beside what the nominal values give, the {forces} of {} in {file} {are} {what}, say {}.",
         names.join(", "),
         maps.join(" ")
     )

@@ -57,7 +57,7 @@ pub fn limits(model: &Model, given: &[Limit]) -> Outcome<Limits> {
         if name == "singularity" {
             if !(limit.value > 0.0 && limit.value < 1.0) {
                 return Err(Error::options(
-                    "--limits singularity: expected a share of the nominal pose's value between 0 and 1, such as 0.3"
+                    "option `limits` = `singularity`: expected a share of the nominal pose's value between 0 and 1, such as 0.3"
                         .to_owned(),
                 ));
             }
@@ -95,7 +95,7 @@ fn coordinate(model: &Model, limits: &mut Limits, limit: &Limit) -> Outcome {
     };
     let Some(i) = coordinates.iter().position(|c| c.name == stem) else {
         return Err(Error::input(format!(
-            "--limits {name}: {} has no such coordinate, drive or point; expected one of {}, with _d for a rate and _dd \
+            "option `limits` = `{name}`: {} has no such coordinate, drive or point; expected one of {}, with _d for a rate and _dd \
              for an acceleration, a drive such as {}, a point with .x, .y or .z, or `singularity`",
             model.path,
             coordinates
@@ -108,12 +108,12 @@ fn coordinate(model: &Model, limits: &mut Limits, limit: &Limit) -> Outcome {
     };
     if coordinates[i].passive && derivative > 0 {
         return Err(Error::input(format!(
-            "--limits {name}: `{stem}` is passive, and only its position can be limited; limit rates of active coordinates"
+            "option `limits` = `{name}`: `{stem}` is passive, and only its position can be limited; limit rates of active coordinates"
         )));
     }
     if derivative > 0 && !(limit.ends[0] < 0.0 && limit.ends[1] > 0.0) {
         return Err(Error::input(format!(
-            "--limits {name}: the range must contain 0, for periodic motion turns back; one number means both directions"
+            "option `limits` = `{name}`: the range must contain 0, for periodic motion turns back; one number means both directions"
         )));
     }
     let position = limits.coordinates.iter().position(|(c, _)| c.0 == i);
@@ -152,7 +152,7 @@ pub fn of_active(model: &Model, limits: &Limits) -> Outcome<Vec<CoordinateLimits
         return Err(Error::input(format!(
             "{}: the positions of {} have no limits, and excitation would grow without end; add \
              `[limits.coordinates]` with `{first} = {{ position = [low, high], rate = ..., acceleration = ... }}` to the \
-             model file, or give --limits {first}=LOW:HIGH",
+             model file, or give option `limits` = `{first}=LOW:HIGH`",
             model.path,
             missing.join(", ")
         )));

@@ -140,7 +140,7 @@ impl Model {
                 let apart = separating.along(&motion, &separating.which);
                 Some(apart.ok_or_else(|| {
                     Error::input(format!(
-                        "{}: nothing is left of the difference at {} samples per second; give a higher --rate",
+                        "{}: nothing is left of the difference at {} samples per second; give a higher rate (option `rate`)",
                         self.path, request.rate
                     ))
                 })?)

@@ -71,7 +71,7 @@ impl Pair {
         for (k, one) in all.iter().enumerate() {
             if all[..k].iter().any(|known| is_same(known, one)) {
                 return Err(Error::input(format!(
-                    "{} is named twice; --separate, --from and --beside take different effects",
+                    "{} is named twice; option `separate`, option `from` and option `beside` take different effects",
                     words::effect(&one.effect)
                 )));
             }

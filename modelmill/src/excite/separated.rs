@@ -123,7 +123,7 @@ pub(crate) fn ask(
                 "no motion tells {name} from {rival}, which can say all that it says beside the base parameters{}; it is left \
                  out",
                 if pair.beside().next().is_some() {
-                    " and the effects of --beside"
+                    " and the effects of option `beside`"
                 } else {
                     ""
                 }
@@ -383,7 +383,7 @@ impl Separated {
                     "no more than one period".to_owned()
                 }
             ),
-            _ => "With --noise SIZE, or --data RUN, it says how many periods it takes.".to_owned(),
+            _ => "With option `noise` = `SIZE`, or option `data` = `RUN`, it says how many periods it takes.".to_owned(),
         });
         for k in &self.asked.which {
             let rival = &pair.rivals[*k];

@@ -30,7 +30,7 @@ pub(crate) fn along(
     }
     if options.weights == Weights::Channels {
         return Err(Error::options(
-            "--instruments goes with --weights none or variance: weights from residuals would depend on the estimate that \
+            "option `instruments` goes with option `weights` = `none` or `variance`: weights from residuals would depend on the estimate that \
              the instruments are to mend",
         ));
     }
@@ -52,7 +52,7 @@ pub(crate) fn along(
 fn in_step(data: &[Stretch], instruments: &[Stretch]) -> Outcome {
     if data.len() != instruments.len() {
         return Err(Error::options(format!(
-            "--instruments gives {} for {} of --data (recordings count once for each stretch between gaps); give one for \
+            "option `instruments` gives {} for {} of option `data` (recordings count once for each stretch between gaps); give one for \
              each, in the same order",
             instruments.len(),
             data.len()

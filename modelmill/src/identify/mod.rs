@@ -204,8 +204,8 @@ fn remarks(model: &Model, found: &Identified, parameters: &[FitParameter]) -> Ve
         .is_some_and(|weighting| !weighting.settled)
     {
         notes.push(Note::warning(
-            "The weights have not settled: residuals depend on the weights from one solution to the next; leave out --weights \
-             or --robust.",
+            "The weights have not settled: residuals depend on the weights from one solution to the next; leave out \
+             option `weights` or option `robust`.",
         ));
     }
     for direction in &solution.undetermined {

@@ -169,7 +169,7 @@ fn not_idle(data: &[Stretch], runs: &[Rows<'_>]) -> Outcome {
 pub fn nothing_measured(files: &str) -> String {
     format!(
         "{files}: the measured forces are zero throughout, so that there is nothing to explain; record the forces of the \
-         drives, or name their columns with --map"
+         drives, or name their columns with option `columns`"
     )
 }
 
@@ -206,8 +206,8 @@ impl<'a> Rows<'a> {
                     .map(|d| format!("`{}`", variances::column(d)))
                     .collect();
                 return Err(Error::input(format!(
-                    "{}: --weights variance needs the variance of every drive's force, in the columns {}; name yours with \
-                     --map, or use --weights channels",
+                    "{}: option `weights` = `variance` needs the variance of every drive's force, in the columns {}; name yours \
+                     with option `columns`, or use option `weights` = `channels`",
                     data.run.file,
                     columns.join(", ")
                 )));

@@ -48,14 +48,14 @@ pub(crate) fn leave_out(model: &Model, data: &mut [Stretch], part: f64) -> Outco
     for (drive, out) in drives.iter().zip(out) {
         if out == of {
             return Err(Error::input(format!(
-                "`{drive}` stands still in all recordings of the fit, so --standstill leaves nothing of it; \
-                 use a recording in which it moves, or leave --standstill out"
+                "`{drive}` stands still in all recordings of the fit, so option `standstill` leaves nothing of it; \
+                 use a recording in which it moves, or leave option `standstill` out"
             )));
         }
         if out > 0 {
             data[0].note(model, Note::info(format!(
                 "Of the {} of `{drive}` {out} are left out of the fit: it is slower there than {part} of its fastest \
-                 (--standstill). Error figures count them.",
+                 (option `standstill`). Error figures count them.",
                 count(of, "equation", "equations"),
             )));
         }

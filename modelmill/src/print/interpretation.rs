@@ -96,7 +96,7 @@ impl Interpreted {
         }
         if !self.directions().is_empty() {
             lines.push(
-                "  Hold one parameter of each line at its nominal value, that is, leave it out of --unknown."
+                "  Hold one parameter of each line at its nominal value, that is, leave it out of option `unknown`."
                     .to_owned(),
             );
         }

@@ -1,5 +1,6 @@
 //! How the reader of a text asks for what the text advises: on a command line, in a notebook, in Rust.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 
 use modelmill_spec::edit::NewEffect;
@@ -20,6 +21,12 @@ pub trait Spelling {
 
     /// Holds all parameters at their nominal values in a diagnosis.
     fn held(&self) -> String;
+
+    /// A text of the library, which names options by their fields ("option `columns` = `q=angle`") and verbs by their
+    /// names ("verb `identify`").
+    fn text<'a>(&self, text: &'a str) -> Cow<'a, str> {
+        Cow::Borrowed(text)
+    }
 }
 
 /// Plain words, for whoever calls the library.

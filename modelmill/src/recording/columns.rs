@@ -25,7 +25,7 @@ pub(crate) fn read_options(
         };
         if args.columns[..k].iter().any(|(other, _)| other == ours) {
             return Err(Error::options(format!(
-                "--map {ours}=...: `{ours}` is mapped twice; give each name one mapping"
+                "option `columns` = `{ours}=...`: `{ours}` is mapped twice; give each name one mapping"
             )));
         }
         match read(model, text, quantity, header) {
@@ -36,12 +36,14 @@ pub(crate) fn read_options(
             }
             Err(fault @ ColumnFault::Missing { .. }) => {
                 return Err(Error::input(format!(
-                    "{file}: --map {ours}={text}: {fault} {}",
+                    "{file}: option `columns` = `{ours}={text}`: {fault} {}",
                     listed(header)
                 )));
             }
             Err(fault) => {
-                return Err(Error::options(format!("--map {ours}={text}: {fault}")));
+                return Err(Error::options(format!(
+                    "option `columns` = `{ours}={text}`: {fault}"
+                )));
             }
         }
     }
@@ -61,7 +63,7 @@ pub(crate) fn read_options(
             Err(fault) => {
                 return Err(Error::input(format!(
                     "{file}: the model file takes `{ours}` from `{text}`, but {fault} {} \
-                     Map one onto it with `--map {ours}=THEIRS`",
+                     Map one onto it with option `columns` = `{ours}=THEIRS`",
                     listed(header)
                 )));
             }
@@ -146,7 +148,7 @@ fn unknown(model: &Model, known: &[(String, Quantity)], ours: &str) -> Error {
     };
     let known: Vec<&str> = known.iter().map(|(name, _)| name.as_str()).collect();
     Error::options(format!(
-        "--map {ours}=...: `{ours}` {why}; expected one of {}",
+        "option `columns` = `{ours}=...`: `{ours}` {why}; expected one of {}",
         known.join(", ")
     ))
 }

@@ -131,8 +131,8 @@ fn prepare(model: &Model, recording: &Raw, args: &Reading, delay: f64) -> Outcom
 fn note_idle_options(data: &mut [Stretch], args: &Reading) {
     let usual = Preparation::default();
     let given: Vec<&str> = [
-        args.preparation.cutoff_hz.map(|_| "--cutoff"),
-        (args.preparation.order != usual.order).then_some("--order"),
+        args.preparation.cutoff_hz.map(|_| "option `cutoff_hz`"),
+        (args.preparation.order != usual.order).then_some("option `order`"),
     ]
     .into_iter()
     .flatten()
@@ -144,7 +144,7 @@ fn note_idle_options(data: &mut [Stretch], args: &Reading) {
         let does = if given.len() == 1 { "does" } else { "do" };
         one.run.notes.push(Note::warning(format!(
             "{} {does} nothing to {}: it holds all rates and accelerations, so none are made from positions; ask for \
-             that with `--derivatives positions`.",
+             that with option `source` = `positions`.",
             given.join(" and "),
             one.run.file
         )));

@@ -52,7 +52,7 @@ pub fn page(findings: &Findings, spelling: &dyn Spelling) -> Outcome<String> {
         (
             "data",
             "What was done to the recordings",
-            tables::data(findings),
+            tables::data(findings, spelling),
         ),
         ("equations", "Equations", embedded(findings, &equations)),
     ];
@@ -132,7 +132,7 @@ fn found(findings: &Findings, spelling: &dyn Spelling) -> String {
             }
             _ => {
                 "No effect of the library may be added in good faith. Below it says where the error lives; a kind of your own \
-                 can be given in the model file or a library (<code>modelmill help diagnose</code>)."
+                 can be given in the model file or a library."
             }
         };
         return format!("<p>{says}</p>\n");

@@ -8,6 +8,7 @@ use modelmill_identify::{FitParameter, Severity, Status};
 use super::draw::attribute;
 use super::units::{force_unit, pretty};
 use super::{Findings, Version, words};
+use crate::print::Spelling;
 use crate::text::svg::escape;
 use crate::text::table::{percent, significant};
 
@@ -331,7 +332,7 @@ pub(crate) fn parameters(version: &Version) -> String {
 }
 
 /// Recordings and what was done to them.
-pub(crate) fn data(findings: &Findings) -> String {
+pub(crate) fn data(findings: &Findings, spelling: &dyn Spelling) -> String {
     let rows: Vec<Vec<Cell>> = findings
         .before
         .runs
@@ -374,7 +375,7 @@ pub(crate) fn data(findings: &Findings) -> String {
         let _ = writeln!(
             html,
             "<li class=\"{class}\">{word}{}</li>",
-            escape(&note.says)
+            escape(&spelling.text(&note.says))
         );
     }
     html.push_str("</ul>\n");

@@ -115,7 +115,7 @@ impl Stretch {
         }
         Err(Error::input(format!(
             "{}: {} depends on the load that the drives carry, but the recording lacks the measured force of {}; \
-             record it, or name its column with --map",
+             record it, or name its column with option `columns`",
             self.run.file,
             effects.join(", "),
             self.run.missing_force.join(", ")
@@ -144,7 +144,7 @@ impl Stretch {
             PoseReason::OutOfReach => (
                 "the loops cannot close at this pose",
                 "check the units (rad, m) and the signs of the positions, which column is which \
-                 coordinate (--map), and the lengths in the model file",
+                 coordinate (option `columns`), and the lengths in the model file",
             ),
             PoseReason::Undefined => (
                 "a term of the model has no finite value at this state",
@@ -152,7 +152,7 @@ impl Stretch {
             ),
             PoseReason::Singular => (
                 "the mechanism is singular at this pose, so that forces are not determined",
-                "leave the poses around it out of the recording, and check which column is which coordinate (--map)",
+                "leave the poses around it out of the recording, and check which column is which coordinate (option `columns`)",
             ),
         };
         Error::input(format!(

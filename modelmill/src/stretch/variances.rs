@@ -26,8 +26,8 @@ pub fn of(recording: &Recording, run: &Run, drives: &[String]) -> Outcome<Option
         .collect();
     let Some(places) = places else {
         return Err(Error::input(format!(
-            "{}: the variances cannot be matched with the samples that are left after preparation; leave out --weights \
-             variance",
+            "{}: the variances cannot be matched with the samples that are left after preparation; leave out \
+             option `weights` = `variance`",
             run.file
         )));
     };
@@ -56,7 +56,7 @@ pub fn factors(
             let value = values[sample];
             if !(value > 0.0 && value.is_finite()) {
                 return Err(Error::input(format!(
-                    "{}, {} {}: {} = {value}, but a variance must be a positive number for --weights variance; leave such \
+                    "{}, {} {}: {} = {value}, but a variance must be a positive number for option `weights` = `variance`; leave such \
                      samples out of the recording",
                     run.file,
                     place_word(&run.file),

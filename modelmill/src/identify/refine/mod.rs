@@ -63,8 +63,8 @@ pub(crate) fn refine(
     let solution = &found.solution;
     if refinement != Refinement::None && solution.rows <= solution.rank {
         return Err(Error::input(format!(
-            "{} for {}: no degree of freedom is left for the residuals, from which --prior, --essential and --physical learn \
-             what the recording is worth; use a longer recording",
+            "{} for {}: no degree of freedom is left for the residuals, from which option `prior`, option `essential` \
+             and option `physical` learn what the recording is worth; use a longer recording",
             count(solution.rows, "equation", "equations"),
             count(solution.rank, "base parameter", "base parameters")
         )));

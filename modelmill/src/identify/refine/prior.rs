@@ -19,8 +19,8 @@ pub(super) fn refine(
     if beliefs.is_empty() {
         let parameters = &model.derivation.mechanism.parameters;
         return Err(Error::input(format!(
-            "{}: --prior takes {} of each nominal value for its uncertainty, but the nominal values of {} are 0 or not \
-             given, which says nothing of their size; write others in [parameters] (`nominal = ...`), or leave --prior out",
+            "{}: option `prior` takes {} of each nominal value for its uncertainty, but the nominal values of {} are 0 or not \
+             given, which says nothing of their size; write others in [parameters] (`nominal = ...`), or leave option `prior` out",
             model.path,
             percent(Some(sigma)),
             match parameters.as_slice() {

@@ -1,0 +1,107 @@
+//! Options and verbs that a text of the library advises, spelled as each program does.
+//!
+//! The library names an option by its field, as in "leave out option `robust`", with a value as in
+//! "option `columns` = `q=angle [deg]`", and a verb as in "verb `identify`". These words are all that a program looks for.
+
+use std::borrow::Cow;
+
+/// What a text advises.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Advised<'a> {
+    /// An option, with its value where the text gives one.
+    Option(&'a str, Option<&'a str>),
+    /// A verb.
+    Verb(&'a str),
+}
+
+/// The text with everything that it advises spelled in another manner.
+///
+/// ```
+/// use modelmill_boundary::text::{Advised, spelled};
+/// let text = "check the unit: option `columns` = `q=q [deg]`";
+/// let flags = |advised: Advised| match advised {
+///     Advised::Option(name, Some(value)) => format!("--{name} '{value}'"),
+///     Advised::Option(name, None) | Advised::Verb(name) => name.to_owned(),
+/// };
+/// assert_eq!(spelled(text, flags), "check the unit: --columns 'q=q [deg]'");
+/// ```
+pub fn spelled(text: &str, mut spell: impl FnMut(Advised) -> String) -> Cow<'_, str> {
+    let mut out = String::new();
+    let mut rest = text;
+    while let Some((before, advised, behind)) = next(rest) {
+        out.push_str(before);
+        out.push_str(&spell(advised));
+        rest = behind;
+    }
+    if out.is_empty() && rest.len() == text.len() {
+        return Cow::Borrowed(text);
+    }
+    out.push_str(rest);
+    Cow::Owned(out)
+}
+
+/// The first thing that a text advises, with the text before and behind it.
+fn next(text: &str) -> Option<(&str, Advised<'_>, &str)> {
+    let mut from = 0;
+    while let Some(found) = text[from..].find(['o', 'v']) {
+        let at = from + found;
+        if let Some((advised, behind)) = advised(&text[at..]) {
+            return Some((&text[..at], advised, behind));
+        }
+        from = at + 1;
+    }
+    None
+}
+
+/// What a text begins with, if it is advice, and the text behind it.
+fn advised(text: &str) -> Option<(Advised<'_>, &str)> {
+    if let Some(rest) = text.strip_prefix("verb") {
+        let (name, behind) = quoted(rest)?;
+        return Some((Advised::Verb(name), behind));
+    }
+    let (name, behind) = quoted(text.strip_prefix("option")?)?;
+    let value = behind.trim_start().strip_prefix('=').and_then(quoted);
+    Some(match value {
+        Some((value, behind)) => (Advised::Option(name, Some(value)), behind),
+        None => (Advised::Option(name, None), behind),
+    })
+}
+
+/// A word between grave accents behind white space, which may hold a line's end where the text was wrapped.
+fn quoted(text: &str) -> Option<(&str, &str)> {
+    let word = text.trim_start();
+    let is_apart = word.len() < text.len();
+    word.strip_prefix('`').filter(|_| is_apart)?.split_once('`')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn upper(advised: Advised) -> String {
+        match advised {
+            Advised::Option(name, None) => name.to_uppercase(),
+            Advised::Option(name, Some(value)) => format!("{}({value})", name.to_uppercase()),
+            Advised::Verb(name) => format!("<{name}>"),
+        }
+    }
+
+    #[test]
+    fn all_that_is_advised_is_spelled_and_the_rest_stays() {
+        let text = "Give verb `identify` with option `between` = `1,2`, or leave out option `prior`; verb `compare` reads it.";
+        assert_eq!(
+            spelled(text, upper),
+            "Give <identify> with BETWEEN(1,2), or leave out PRIOR; <compare> reads it."
+        );
+        assert!(matches!(
+            spelled("an option without a name", upper),
+            Cow::Borrowed(_)
+        ));
+        assert_eq!(
+            spelled("with option\n  `noise` =\n  `0.1`", upper),
+            "with NOISE(0.1)"
+        );
+        // A mark that is cut off is text like any other.
+        assert_eq!(spelled("option `pri", upper), "option `pri");
+    }
+}
