@@ -299,11 +299,22 @@ mod tests {
             .mechanism
     }
 
+    fn read(text: &str) -> Mechanism {
+        let files = modelmill_boundary::files::Memory::default();
+        let loaded = modelmill_spec::load("made.toml", text, &files);
+        loaded
+            .unwrap_or_else(|failure| panic!("{failure}"))
+            .mechanism
+    }
+
     /// A pendulum whose masses at `a` and `a + gap` are declared before the body that carries them, so that they are
     /// retained and the body's products written by them.
     fn pendulum(gap: f64, head: &str) -> Mechanism {
-        let a = 0.3;
-        let text = format!(
+        pendulum_at(0.3, 0.3 + gap, head)
+    }
+
+    fn pendulum_at(a: f64, b: f64, head: &str) -> Mechanism {
+        read(&format!(
             r#"
             schema = 1
             name = "pendulum"
@@ -336,17 +347,8 @@ mod tests {
             [[drive]]
             name = "motor"
             joint = "q"
-            "#,
-            b = a + gap,
-        );
-        let loaded = modelmill_spec::load(
-            "pendulum.toml",
-            &text,
-            &modelmill_boundary::files::Memory::default(),
-        );
-        loaded
-            .unwrap_or_else(|failure| panic!("{failure}"))
-            .mechanism
+            "#
+        ))
     }
 
     /// Error of the pendulum's torque by p_min beside the formula of a textbook, relative to its size; p_min as the evaluator
@@ -435,6 +437,72 @@ mod tests {
         assert_eq!(dependent, ["ZZ1", "MX1"]);
         let mended = derive(&pendulum(1e-14, "retain = [\"ZZ1\", \"MX1\"]")).unwrap();
         assert!(errors_by_hand(&mended).iter().all(|error| *error < 1e-12));
+    }
+
+    /// Two numbers that a reader takes for one, as a spreadsheet writes 3 * 0.1.
+    #[test]
+    fn neighbouring_numbers_are_refused() {
+        let found = derive(&pendulum_at(0.300_000_000_000_000_04, 0.3, "")).map(|_| ());
+        let is_refused = matches!(
+            found,
+            Err(DeriveError::DigitsLost { .. } | DeriveError::NotFinite { .. })
+        );
+        assert!(is_refused, "{found:?}");
+    }
+
+    /// A body that moves freely, with four rotors at the height `z` each that are declared before it.
+    fn drone(z: [f64; 4]) -> Mechanism {
+        let joints = [
+            ("x", "d = \"x\""),
+            ("y", "alpha = \"pi/2\", theta = \"pi/2\", d = \"y\""),
+            ("z", "alpha = \"pi/2\", d = \"z\""),
+            ("a", "theta = \"a\""),
+            ("b", "alpha = \"pi/2\", theta = \"b\""),
+            ("c", "alpha = \"pi/2\", theta = \"c\""),
+        ];
+        let mut text = "schema = 1\nname = \"drone\"\ngravity = [0, 0, \"-g\"]\n\
+                        [constants]\ng = { value = 9.81, unit = \"m/s^2\" }\nl = { value = 0.2, unit = \"m\" }\n"
+            .to_owned();
+        for (i, z) in z.iter().enumerate() {
+            text += &format!("h{i} = {{ value = {z:?}, unit = \"m\" }}\n");
+        }
+        text += "[parameters]\n";
+        for i in 0..z.len() {
+            text += &format!("m{i} = {{ nominal = 0.1, unit = \"kg\" }}\n");
+        }
+        text += "[coordinates]\n";
+        for (k, (q, _)) in joints.iter().enumerate() {
+            text += &format!("{q} = {{ nominal = {} }}\n", 0.3 + 0.1 * k as f64);
+        }
+        let mut on = "base".to_owned();
+        for (q, dh) in &joints {
+            text +=
+                &format!("[[frame]]\nname = \"f{q}\"\non = \"{on}\"\nmodified_dh = {{ {dh} }}\n");
+            text += &format!("[[drive]]\nname = \"d{q}\"\njoint = \"{q}\"\n");
+            on = format!("f{q}");
+        }
+        for (i, at) in ["[\"l\", 0", "[0, \"l\"", "[\"-l\", 0", "[0, \"-l\""]
+            .iter()
+            .enumerate()
+        {
+            text +=
+                &format!("[[lumped_mass]]\nmass = \"m{i}\"\non = \"fc\"\nat = {at}, \"h{i}\"]\n");
+        }
+        text += "[[part]]\non = \"fc\"\nlinear = { all = 1, nominal = { XX = 0.02, YY = 0.02, ZZ = 0.03, M = 1.5 } }\n";
+        read(&text)
+    }
+
+    /// Four points span all moments of a body, unless they lie in one plane.
+    #[test]
+    fn four_rotors_carry_a_body_unless_they_are_coplanar() {
+        let apart = drone([0.05, -0.05, 0.1, 0.02]);
+        derive(&apart).unwrap_or_else(|error| panic!("{error}"));
+        let coplanar = derive(&drone([0.05; 4])).map(|_| ());
+        let is_refused = matches!(
+            coplanar,
+            Err(DeriveError::DigitsLost { .. } | DeriveError::NotFinite { .. })
+        );
+        assert!(is_refused, "{coplanar:?}");
     }
 
     /// What parameters are worth does not hide what factors lose.
