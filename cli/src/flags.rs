@@ -122,8 +122,8 @@ const FLAGS: [(&str, &str); 3] = [
 /// A text of the library with its options as flags and its verbs as commands.
 pub(crate) fn spelled(text: &str) -> Cow<'_, str> {
     let spelled = text::spelled(text, |advised| match advised {
-        Advised::Option(name, None) => flag(name),
-        Advised::Option(name, Some(value)) if value.contains(' ') => {
+        Advised::Option(name, None) => format!("`{}`", flag(name)),
+        Advised::Option(name, Some(value)) if needs_quotes(value) => {
             format!("`{} \"{value}\"`", flag(name))
         }
         Advised::Option(name, Some(value)) => format!("`{} {value}`", flag(name)),
@@ -134,6 +134,11 @@ pub(crate) fn spelled(text: &str) -> Cow<'_, str> {
         Cow::Owned(text) => Cow::Owned(text.replace("` `--", " --")),
         borrowed => borrowed,
     }
+}
+
+/// Whether a value is more than a word, a number or a name for another.
+fn needs_quotes(value: &str) -> bool {
+    value.contains([' ', '/']) || value.contains("=-")
 }
 
 fn flag(field: &str) -> String {
@@ -223,7 +228,7 @@ mod tests {
                     out; verb `identify` makes one";
         assert_eq!(
             spelled(says),
-            "map it: `--map \"q=q [deg]\" --map w=w/2`, or leave --skip-bad-samples out; `modelmill identify` makes one"
+            "map it: `--map \"q=q [deg]\" --map w=w/2`, or leave `--skip-bad-samples` out; `modelmill identify` makes one"
         );
     }
 

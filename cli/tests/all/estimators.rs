@@ -323,7 +323,7 @@ fn what_cannot_be_estimated_so_is_said() {
     assert!(refused(2, &["--instruments", "period=soon"]).contains("seconds"));
     assert!(
         refused(2, &["--instruments", "period=2", "--weights", "channels"])
-            .contains("--weights none or variance")
+            .contains("`--weights none` or `variance`")
     );
     let rows = std::fs::read_to_string(&data).unwrap();
     let short = scratch("two-rows.csv");

@@ -203,7 +203,7 @@ fn suspects_of_motion(
         let angles = angles.clone();
         hypotheses.push((
             format!(
-                "The angles in {file} seem to be in degrees; they must be in rad: say `{}`",
+                "The angles in {file} seem to be in degrees; they must be in rad: say {}",
                 data.maps_from_degrees
             ),
             Box::new(move |states| {
