@@ -50,7 +50,7 @@ impl Host {
         modelmill_rig::load_file_with(path, self.files()).map_err(|failure| {
             if self.load(path).is_ok() {
                 return Error::input(format!(
-                    "{} is a model file; a rig file is expected, which describes the whole machine (rig/README.md; \
+                    "{} is a model file; a rig file is expected, which describes the whole machine (docs/guide/src/rigs.md; \
                      model-spec/rigs holds some). Forces of a model along a motion come from verb `evaluate`",
                     path.display()
                 ));

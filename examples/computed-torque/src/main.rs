@@ -67,7 +67,7 @@ fn report(rig: &modelmill_rig::Rig, task: &Reference) -> Result<Vec<String>, Box
 mod tests {
     use super::*;
 
-    /// As the figures in the README, over a shorter time.
+    /// As the figures in the guide, over a shorter time.
     #[test]
     fn each_step_lowers_the_error() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("rig.toml");

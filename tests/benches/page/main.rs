@@ -1,4 +1,4 @@
-//! The page of benchmarks, `docs/benchmarks.md`: operations, generation time and run time of every bundled model, beside
+//! The page of benchmarks, `docs/guide/src/benchmarks.md`: operations, generation time and run time of every bundled model, beside
 //! the peers that can be installed, all measured in one run.
 //!
 //! `cargo bench -p modelmill-tests --bench page` writes the page (some ten minutes); with names of models, as in
@@ -129,7 +129,7 @@ fn compare(names: &[&str]) -> Result<(), String> {
         println!("{page}");
         return Ok(());
     }
-    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/guide/src");
     let keep = |name: &str, text: &str| {
         let file = docs.join(name);
         std::fs::write(&file, text).map_err(|error| format!("{}: {error}", file.display()))
@@ -138,7 +138,7 @@ fn compare(names: &[&str]) -> Result<(), String> {
         keep("pictures/benchmarks.svg", &picture::bars(panda))?;
     }
     keep("benchmarks.md", &page)?;
-    eprintln!("written: docs/benchmarks.md and its picture");
+    eprintln!("written: docs/guide/src/benchmarks.md and its picture");
     Ok(())
 }
 

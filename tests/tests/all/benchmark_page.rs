@@ -7,7 +7,7 @@ use modelmill_tests::fixtures::derived;
 
 #[test]
 fn the_page_of_benchmarks_has_the_operations_that_are_counted_now() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/benchmarks.md");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/guide/src/benchmarks.md");
     let page = std::fs::read_to_string(&file)
         .unwrap_or_else(|error| panic!("{}: {error}", file.display()));
     let rows = counts::read(&page, &HEADINGS);

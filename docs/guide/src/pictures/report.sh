@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes report.png: the whole robot with things hidden in it is simulated, and the model without them is held against it.
 set -euo pipefail
-cd "$(dirname "$0")/../.."
+cd "$(dirname "$0")/../../../.."
 run() { cargo run --quiet --release -- "$@"; }
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
@@ -12,4 +12,4 @@ done
 run report model-spec/models/spidermill.toml --data "$folder/fit.csv" --check "$folder/check.csv" --out "$folder"
 sed -i "s#$folder/##g" "$folder/report.html"
 chromium --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=1100,1480 --virtual-time-budget=3000 \
-    --screenshot="$PWD/docs/pictures/report.png" "file://$folder/report.html"
+    --screenshot="$PWD/docs/guide/src/pictures/report.png" "file://$folder/report.html"
