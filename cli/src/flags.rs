@@ -55,7 +55,7 @@ impl Flags {
     }
 
     /// What a command asked.
-    pub(crate) fn of(args: &AskArgs) -> Self {
+    pub(crate) fn from_args(args: &AskArgs) -> Self {
         Self::new(&args.data, &args.check, &args.preparation.reading())
     }
 }

@@ -32,7 +32,7 @@ impl Model {
         reading: &Reading,
         values: &[f64],
     ) -> Outcome<Evaluated> {
-        let mut found = Evaluated::of(self.drives(), Vec::new());
+        let mut found = Evaluated::new(self.drives(), Vec::new());
         for stretch in &recording::read_as_recorded(self, path.as_ref(), reading)? {
             found.extend(&stretch.time(), along::forces(self, stretch, values)?);
         }
@@ -51,7 +51,7 @@ impl Model {
         let derived = self.derivation.reactions();
         let reactions = derived.map_err(|error| Error::derivation(&self.path, error))?;
         let components = components(&reactions);
-        let mut found = Evaluated::of(components.told, components.left_out);
+        let mut found = Evaluated::new(components.determined, components.left_out);
         for stretch in &recording::read_as_recorded(self, path.as_ref(), reading)? {
             found.extend(
                 &stretch.time(),
@@ -63,7 +63,7 @@ impl Model {
 }
 
 impl Evaluated {
-    fn of(names: Vec<String>, left_out: Vec<String>) -> Self {
+    fn new(names: Vec<String>, left_out: Vec<String>) -> Self {
         Self {
             time: Vec::new(),
             columns: names.into_iter().map(|name| (name, Vec::new())).collect(),
@@ -95,21 +95,21 @@ impl Evaluated {
 
 /// Names of the components of all reactions, such as `elbow.Fx`, `elbow.Mz`, and of a loop `closure.Fx`.
 struct Components {
-    /// Those that are determined, in the order of the program's outputs.
-    told: Vec<String>,
+    /// Those that equations of motion determine, in the order of the program's outputs.
+    determined: Vec<String>,
     left_out: Vec<String>,
 }
 
 fn components(reactions: &Reactions) -> Components {
     let mut found = Components {
-        told: Vec::new(),
+        determined: Vec::new(),
         left_out: Vec::new(),
     };
     let mut sort = |name: &str, kind: char, places: &[Option<usize>; 3]| {
         for (axis, place) in ['x', 'y', 'z'].into_iter().zip(places) {
             let column = format!("{name}.{kind}{axis}");
             match place {
-                Some(_) => found.told.push(column),
+                Some(_) => found.determined.push(column),
                 None => found.left_out.push(column),
             }
         }

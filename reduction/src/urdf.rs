@@ -172,7 +172,7 @@ impl Import {
         let (frame, carried) = parent.map_or((None, Placed::identity()), |(_, frame, placed)| {
             (frame.clone(), *placed)
         });
-        let origin = Placed::of(&joint.origin);
+        let origin = Placed::from_pose(&joint.origin);
         let numbers = origin
             .p
             .iter()
@@ -303,7 +303,7 @@ impl Import {
             return Ok(());
         };
         let (mass, matrix) = (link.mass, link.inertia);
-        let placed = at.then(&Placed::of(&link.origin));
+        let placed = at.then(&Placed::from_pose(&link.origin));
         if !(mass.is_finite()
             && mass >= 0.0
             && matrix

@@ -19,7 +19,7 @@ impl Placed {
         }
     }
 
-    pub(crate) fn of(pose: &Pose) -> Self {
+    pub(crate) fn from_pose(pose: &Pose) -> Self {
         Self {
             p: pose.xyz,
             r: rotation(pose.rpy),

@@ -59,7 +59,7 @@ enum ActsAt {
 }
 
 impl ActsAt {
-    fn of(kind: &str) -> Self {
+    fn for_kind(kind: &str) -> Self {
         match kind {
             "load_friction" => Self::Drives,
             "coupled_drive" => Self::TwoDrivesOrJoints,
@@ -188,7 +188,7 @@ impl Rig {
     }
 
     fn places(&self, kind: &str, at: &[&str], faults: &mut Vec<EffectFault>) -> Vec<Place> {
-        let acts = ActsAt::of(kind);
+        let acts = ActsAt::for_kind(kind);
         let mut places = Vec::new();
         for (i, name) in at.iter().enumerate() {
             let Some(place) = self.place(acts, name) else {

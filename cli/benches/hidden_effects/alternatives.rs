@@ -57,7 +57,7 @@ impl Case {
             }
             let same = self.hidden.iter().filter(|h| h.placed.kind == claim.kind);
             tried.extend(same.filter_map(Hidden::constant));
-            let mut others = Span::of(base.clone());
+            let mut others = Span::from_columns(base.clone());
             let rest = all.iter().enumerate().filter(|(j, _)| *j != k);
             others.extend(rest.flat_map(|(_, columns)| columns.clone()));
             let mut least = f64::INFINITY;
@@ -79,7 +79,7 @@ impl Case {
             let signs = must_be_positive(&claim.kind).iter().copied();
             claimed.extend(columns.into_iter().zip(signs.chain(repeat(false))));
         }
-        let mut span = Span::of(base.clone());
+        let mut span = Span::from_columns(base.clone());
         span.extend(claimed.iter().map(|(column, _)| column.clone()));
         if self.has_wrong_sign(&base, &claimed, &total) {
             return Ok(f64::INFINITY);
@@ -100,7 +100,7 @@ impl Case {
             if !positive {
                 return false;
             }
-            let mut others = Span::of(base.to_vec());
+            let mut others = Span::from_columns(base.to_vec());
             let rest = claimed.iter().enumerate().filter(|(j, _)| *j != k);
             others.extend(rest.map(|(_, (column, _))| column.clone()));
             let own = others.rest(column);

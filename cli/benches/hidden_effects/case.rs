@@ -200,7 +200,7 @@ impl Case {
             self.coarse[0].base(&plant.derivation)?,
             self.coarse[1].base(&plant.derivation)?,
         ];
-        let spans = base.map(Span::of);
+        let spans = base.map(Span::from_columns);
         for (span, along) in spans.iter().zip(&self.coarse) {
             let error = rms(&span.rest(&along.plain)) / rms(&along.plain);
             if error > AGREEMENT {

@@ -11,7 +11,7 @@ pub(crate) struct Span {
 
 impl Span {
     /// The span of some columns.
-    pub(crate) fn of(columns: impl IntoIterator<Item = Vec<f64>>) -> Self {
+    pub(crate) fn from_columns(columns: impl IntoIterator<Item = Vec<f64>>) -> Self {
         let mut span = Self::default();
         span.extend(columns);
         span

@@ -11,7 +11,7 @@ use crate::terminal;
 
 /// Prints what is missing, or that nothing is, or that nothing known explains it.
 pub(crate) fn run(host: &Host, args: &DiagnoseArgs) -> Outcome {
-    let flags = Flags::of(&args.ask);
+    let flags = Flags::from_args(&args.ask);
     let question = Question {
         held: args.ask.held(),
         ..Question::default()

@@ -77,7 +77,7 @@ fn a_recording_with_nothing_hidden_is_the_model_and_noise() {
         .zip(right)
         .flat_map(|(l, r)| [l, r])
         .collect();
-    let span = Span::of(along.base(&plant.derivation).expect("columns"));
+    let span = Span::from_columns(along.base(&plant.derivation).expect("columns"));
     let left = norm(&span.rest(&measured));
     let share = left / norm(&measured) / recorded.floor;
     assert!((share - 1.0).abs() < 2e-3, "{share}");
@@ -96,7 +96,7 @@ fn no_library_says_what_is_outside() {
         let case = Case::draw(&plant, SEED, number).expect("a case");
         let along = &case.coarse[0];
         let forces = case.forces(along, &case.courses[0]).expect("forces");
-        let mut all = Span::of(along.base(&plant.derivation).expect("columns"));
+        let mut all = Span::from_columns(along.base(&plant.derivation).expect("columns"));
         all.extend(columns::library(along));
         let rest = span::rms(&all.rest(&forces));
         assert!(rest > 1.9 * case.noise, "{}: {rest}", case.truth());

@@ -33,7 +33,11 @@ pub(crate) struct Size {
 }
 
 impl Size {
-    pub(crate) fn of(graph: &mut Graph, mechanism: &Mechanism, residual: &[ExprId]) -> Self {
+    pub(crate) fn from_residual(
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        residual: &[ExprId],
+    ) -> Self {
         let mut known = HashMap::new();
         let terms: Vec<ExprId> = residual
             .iter()

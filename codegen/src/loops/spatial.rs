@@ -191,7 +191,7 @@ fn ways_for(
         Motion::Revolute => {
             let linear: Vec<Circular> = own
                 .iter()
-                .filter_map(|e| Circular::of(graph, *e, coordinate))
+                .filter_map(|e| Circular::from_equation(graph, *e, coordinate))
                 .collect();
             let mut solved: Vec<Solved> = linear
                 .iter()
@@ -229,7 +229,7 @@ struct Circular {
 
 impl Circular {
     /// Writes an equation in this form, if it has it: shown in the field.
-    fn of(graph: &mut Graph, equation: ExprId, coordinate: usize) -> Option<Self> {
+    fn from_equation(graph: &mut Graph, equation: ExprId, coordinate: usize) -> Option<Self> {
         let atom = Atom::Coordinate(coordinate);
         let slope = graph.differentiate(&[equation], atom);
         let bend = graph.differentiate(&slope, atom);

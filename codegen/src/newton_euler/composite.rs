@@ -25,7 +25,7 @@ impl Moments {
         mixed: vector::ZERO,
     };
 
-    fn of(graph: &mut Graph, body: &Body) -> Self {
+    fn from_body(graph: &mut Graph, body: &Body) -> Self {
         let square = match body.spread {
             Spread::Flat([x, y]) => [x, y, Graph::ZERO],
             Spread::Moments(moments) => std::array::from_fn(|i| {
@@ -159,7 +159,7 @@ pub(crate) fn mass_matrix(
     let n = tree.links.len();
     let mut composite = vec![Moments::NONE; n];
     for (link, body) in bodies {
-        let moments = Moments::of(graph, body);
+        let moments = Moments::from_body(graph, body);
         composite[*link] = composite[*link].plus(graph, &moments);
     }
     for i in (0..n).rev() {

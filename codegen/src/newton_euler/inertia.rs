@@ -64,7 +64,7 @@ impl InertiaByProduct {
     }
 
     /// The inertia of each link that belongs to one product.
-    pub(crate) fn of(&self, product: &Monomial) -> impl Iterator<Item = (usize, &Inertia)> {
+    pub(crate) fn by_link(&self, product: &Monomial) -> impl Iterator<Item = (usize, &Inertia)> {
         self.0
             .get(product)
             .into_iter()

@@ -133,7 +133,7 @@ pub(crate) fn forward(graph: &mut Graph, tree: &Tree, gravity: &Vector, style: S
 }
 
 impl Motion {
-    fn of(&self, link: Option<usize>) -> &LinkMotion {
+    fn of_link(&self, link: Option<usize>) -> &LinkMotion {
         link.map_or(&self.base, |p| &self.links[p])
     }
 
@@ -141,7 +141,7 @@ impl Motion {
         let style = self.style;
         let link = &tree.links[i];
         let first = &tree.links[style.first(tree, i)];
-        let fixed = self.of(first.parent);
+        let fixed = self.of_link(first.parent);
         let turn = style.turn(link);
         let carried = turn_in_all(graph, &first.pre, &fixed.omega);
         let mut omega = graph.turn_in(turn, &carried);
@@ -195,7 +195,7 @@ impl Motion {
     /// Acceleration of the point that a link's position leads to across its axis, on the fixed side of its joint.
     fn acceleration_before(&self, graph: &mut Graph, tree: &Tree, i: usize) -> Vector {
         let link = &tree.links[i];
-        let parent = self.of(link.parent);
+        let parent = self.of_link(link.parent);
         let (across, _) = self.style.split_position(link);
         let mut there = parent.acceleration;
         for row in 0..3 {
@@ -242,7 +242,7 @@ impl Motion {
         if !link.pre.iter().all(quarter) || !link.slides.is_empty() {
             return None;
         }
-        let parent = self.of(link.parent);
+        let parent = self.of_link(link.parent);
         let columns: [Vector; 3] = std::array::from_fn(|j| {
             let column = parent.field.map(|row| row[j]);
             turn_in_all(graph, &link.pre, &column)

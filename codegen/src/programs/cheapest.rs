@@ -65,7 +65,7 @@ fn improve<F: Copy>(
 struct Written(Vec<((Style, bool), Frames)>);
 
 impl Written {
-    fn of(
+    fn frames(
         &mut self,
         graph: &mut Graph,
         equations: &Equations,
@@ -151,7 +151,7 @@ pub(crate) fn columns(
     let n_drives = mechanism.drives.len();
     let outputs = improve(graph, ColumnForm::PLAIN, &steps, weigh, |graph, form| {
         let key = (form.style, form.fixed_axes);
-        let frames = written.of(graph, equations, &equations.gravity, key);
+        let frames = written.frames(graph, equations, &equations.gravity, key);
         let columns = equations.columns_of(graph, mechanism, frames, products, form)?;
         Ok(columns.into_iter().flatten().collect())
     })?;
@@ -172,7 +172,7 @@ pub(crate) fn total(
     let mut written = Written::default();
     improve(graph, TotalForm::PLAIN, &steps, weigh, |graph, form| {
         let key = (form.style, form.fixed_axes);
-        let frames = written.of(graph, equations, &equations.gravity, key);
+        let frames = written.frames(graph, equations, &equations.gravity, key);
         equations.inverse_dynamics(graph, mechanism, frames, value, form)
     })
 }
@@ -196,7 +196,7 @@ pub(crate) fn best_total(
         weigh,
         |graph, form| {
             let key = (form.style, form.fixed_axes);
-            let frames = written.of(graph, equations, &gravity, key);
+            let frames = written.frames(graph, equations, &gravity, key);
             let wrenches = form.wrenches(graph, &equations.inertia, &equations.tree, frames, value);
             let on_tree = newton_euler::backward(graph, &frames.tree, form.style, n, wrenches);
             Ok(finish(graph, &on_tree))

@@ -70,7 +70,7 @@ impl Closing {
             solved: Vec::new(),
             angle_of: BTreeMap::new(),
             regular: Vec::new(),
-            size: Size::of(graph, mechanism, &equations.projection.loops.residual),
+            size: Size::from_residual(graph, mechanism, &equations.projection.loops.residual),
             may_be_undefined: checks::may_be_undefined(mechanism),
             passes: &PASSES,
         };

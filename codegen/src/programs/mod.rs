@@ -129,7 +129,7 @@ pub(crate) fn programs(
         .iter()
         .any(|c| c.motion != Motion::Revolute);
     let scale = (slides && !projection.loops.residual.is_empty()).then(|| {
-        let scale = Size::of(graph, mechanism, &projection.loops.residual).scale(graph);
+        let scale = Size::from_residual(graph, mechanism, &projection.loops.residual).scale(graph);
         plain(graph, &[scale])
     });
     let mut program = |outputs: &[ExprId]| closing.program(graph, equations, outputs);

@@ -203,7 +203,8 @@ impl Related {
 
     /// Dependent columns whose relations to others that depend are not known, or hold quotients other than by lengths.
     pub(super) fn unwieldy(&self) -> Vec<usize> {
-        let is_simple = |f: &Option<RationalFunction>| f.as_ref().and_then(Quotient::of).is_some();
+        let is_simple =
+            |f: &Option<RationalFunction>| f.as_ref().and_then(Quotient::from_function).is_some();
         let lines = self.0.iter();
         let unwieldy =
             lines.filter(|(r, factors)| !r.is_direct() && !factors.iter().all(is_simple));
@@ -236,7 +237,7 @@ impl Related {
         let mut expanded: BTreeMap<usize, Line> = BTreeMap::new();
         for (relation, factors) in &self.0 {
             let line = if relation.is_direct() {
-                Line::of(relation, factors)
+                Line::from_relation(relation, factors)
             } else if are_independent(roots) {
                 Line::sum(relation, factors, &expanded)
             } else {
@@ -296,9 +297,10 @@ struct Line {
 }
 
 impl Line {
-    fn of(relation: &ColumnRelation, factors: &[Option<RationalFunction>]) -> Self {
+    fn from_relation(relation: &ColumnRelation, factors: &[Option<RationalFunction>]) -> Self {
         let pairs = relation.retained.iter().zip(factors);
-        let quotients = (pairs.clone()).map(|(p, f)| Some((*p, Quotient::of(f.as_ref()?)?)));
+        let quotients =
+            (pairs.clone()).map(|(p, f)| Some((*p, Quotient::from_function(f.as_ref()?)?)));
         Self {
             quotients: quotients.collect(),
             functions: pairs.filter_map(|(p, f)| Some((*p, f.clone()?))).collect(),
@@ -312,7 +314,7 @@ impl Line {
     ) -> Self {
         let mut line: BTreeMap<usize, Quotient> = BTreeMap::new();
         for (k, factor) in relation.columns().zip(factors) {
-            let Some(factor) = factor.as_ref().and_then(Quotient::of) else {
+            let Some(factor) = factor.as_ref().and_then(Quotient::from_function) else {
                 return Self::default();
             };
             let Some(known) = expanded.get(&k) else {
@@ -343,7 +345,7 @@ struct Quotient {
 
 impl Quotient {
     /// `None` if the denominator is something else.
-    fn of(function: &RationalFunction) -> Option<Self> {
+    fn from_function(function: &RationalFunction) -> Option<Self> {
         let mut terms = function.denominator.iter();
         let (Some((powers, scale)), None) = (terms.next(), terms.next()) else {
             return None;

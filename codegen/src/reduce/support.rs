@@ -33,8 +33,8 @@ pub(super) fn support<O: Oracle>(
         let [top, bottom] = [(numerator, &kept[0]), (denominator, &kept[1])].map(|(all, kept)| {
             let candidates: BTreeSet<Powers> = all
                 .iter()
-                .filter(|m| kept.contains(&of(m, &variables[..n - 1])))
-                .map(|m| of(m, loose))
+                .filter(|m| kept.contains(&part_in(m, &variables[..n - 1])))
+                .map(|m| part_in(m, loose))
                 .collect();
             candidates.into_iter().collect::<Vec<Powers>>()
         });
@@ -72,7 +72,7 @@ pub(super) fn support<O: Oracle>(
 }
 
 /// What a monomial is of some variables alone.
-fn of(powers: &Powers, variables: &[Occurrence]) -> Powers {
+fn part_in(powers: &Powers, variables: &[Occurrence]) -> Powers {
     let is_in = |variable: &Variable| match variable {
         Variable::Constant(i) => variables.contains(&(*i, false)),
         Variable::Cos(i) | Variable::Sin(i) => variables.contains(&(*i, true)),

@@ -45,7 +45,7 @@ impl ColumnForm {
         products: &[Monomial],
     ) -> Vec<(usize, Side, Wrench)> {
         let bodies: Vec<(usize, Inertia)> = inertia
-            .of(product)
+            .by_link(product)
             .map(|(link, inertia)| (link, *inertia))
             .collect();
         let (tree, motion) = (&frames.tree, &frames.motion);
@@ -196,7 +196,7 @@ fn single_moment(inertia: &Inertia) -> Option<usize> {
 /// Whether one of some products is the moment of inertia of a link about its joint's axis.
 fn has_axial_column(inertia: &InertiaByProduct, link: usize, products: &[Monomial]) -> bool {
     products.iter().any(|product| {
-        let mut bodies = inertia.of(product);
+        let mut bodies = inertia.by_link(product);
         let only = bodies.next();
         only.is_some_and(|(l, inertia)| l == link && single_moment(inertia) == Some(2))
             && bodies.next().is_none()

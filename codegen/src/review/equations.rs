@@ -87,7 +87,7 @@ pub struct NumericMethod {
 
 impl NumericMethod {
     /// The method of a reduction, if it is numeric.
-    pub fn of(reduction: &Reduction) -> Option<Self> {
+    pub fn from_reduction(reduction: &Reduction) -> Option<Self> {
         let Method::Numeric {
             least_kept,
             most_dropped,
@@ -171,7 +171,7 @@ impl Equations {
                     .then_some(reduction.retained.len()),
                 numeric: numeric.map(|n| n.rank),
                 samples: numeric.map(|n| n.samples),
-                method: NumericMethod::of(reduction),
+                method: NumericMethod::from_reduction(reduction),
             },
             operations: Operations {
                 regressor: programs.regressor.count(Stage::State),

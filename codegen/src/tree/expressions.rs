@@ -269,7 +269,7 @@ fn polynomial_at(
         }
         Exact::Apply(function, a) => {
             if let (Function::Sin | Function::Cos, Some((sum, pi12))) =
-                (function, AngleParts::of(a))
+                (function, AngleParts::angle(a))
             {
                 let (c, s) = graph.cos_sin(&sum, pi12);
                 return Ok(ParameterPolynomial::constant(
@@ -330,7 +330,7 @@ struct AngleParts {
 
 impl AngleParts {
     /// An expression as an exact angle; `None` if it is no sum of integer multiples of angles and of pi/12.
-    fn of(exact: &Exact) -> Option<(AngleSum, i32)> {
+    fn angle(exact: &Exact) -> Option<(AngleSum, i32)> {
         /// Sines of larger multiples are no polynomials that anyone wants to see.
         const MOST: u32 = 100;
         let mut parts = Self::default();

@@ -34,7 +34,7 @@ impl Changes {
             .collect();
         let side = |model: &Model| {
             let mut side = json!({ "model": model.name, "base": base(model) });
-            if let Some(method) = NumericMethod::of(&model.derivation.reduction) {
+            if let Some(method) = NumericMethod::from_reduction(&model.derivation.reduction) {
                 side["reduction"] = json!(method);
             }
             side

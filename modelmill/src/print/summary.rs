@@ -189,7 +189,7 @@ impl Summary {
 
 /// How columns were reduced to a base.
 fn reduction(reduction: &Reduction) -> Value {
-    match NumericMethod::of(reduction) {
+    match NumericMethod::from_reduction(reduction) {
         Some(method) => json!(method),
         None => json!({ "name": "exact" }),
     }

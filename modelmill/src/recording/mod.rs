@@ -115,7 +115,7 @@ fn prepare(model: &Model, recording: &Raw, args: &Reading, delay: f64) -> Outcom
         pair(run, delay)?;
     }
     let with_variance = runs.into_iter().map(|run| {
-        let variance = variances::of(recording, &run, &model.drives())?;
+        let variance = variances::recorded(recording, &run, &model.drives())?;
         Ok(Stretch {
             run,
             variance,

@@ -11,7 +11,11 @@ pub fn column(drive: &str) -> String {
 }
 
 /// Variances for the samples of a run, `[drive][sample]`; nothing unless all drives have them.
-pub fn of(recording: &Recording, run: &Run, drives: &[String]) -> Outcome<Option<Vec<Vec<f64>>>> {
+pub fn recorded(
+    recording: &Recording,
+    run: &Run,
+    drives: &[String],
+) -> Outcome<Option<Vec<Vec<f64>>>> {
     if drives.is_empty() || !drives.iter().all(|drive| recording.has(&column(drive))) {
         return Ok(None);
     }

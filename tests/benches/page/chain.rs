@@ -71,7 +71,10 @@ impl Body {
 
 impl Chain {
     /// The chain of a mechanism with given values of its parameters; the reason why there is none.
-    pub(crate) fn of(mechanism: &Mechanism, parameters: &[f64]) -> Result<Self, String> {
+    pub(crate) fn from_mechanism(
+        mechanism: &Mechanism,
+        parameters: &[f64],
+    ) -> Result<Self, String> {
         if !mechanism.loops.is_empty() || mechanism.coordinates.iter().any(|c| c.passive) {
             return Err("it has loops".to_owned());
         }

@@ -222,7 +222,7 @@ fn peers_chain(name: &str, derivation: &Derivation) -> Result<String, String> {
     for term in mechanism.effects.iter().flat_map(|e| &e.terms) {
         parameters[term.parameter.0] = 0.0;
     }
-    let chain = Chain::of(mechanism, &parameters)?;
+    let chain = Chain::from_mechanism(mechanism, &parameters)?;
     let motion = models::motion(name, mechanism)?;
     let forces = models::forces(name, &motion, Some(&base(derivation, &parameters)))?;
     let mut torques = vec![vec![0.0; models::STATES]; mechanism.coordinates.len()];
