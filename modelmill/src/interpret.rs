@@ -1,7 +1,7 @@
 //! `interpret`: physical parameters from identified base parameters, the others held at their nominal values.
 
 use modelmill_identify::interpret::{
-    Interpretation, Physical, Polynomial, Problem, exact, interpret,
+    Interpretation, Physical, Polynomial, System, exact, interpret,
 };
 use modelmill_identify::{Direction, FitFile, Note, Status};
 use modelmill_spec::Sign;
@@ -33,11 +33,11 @@ impl Model {
     pub fn interpret(&self, fit: &FitFile, file: &str, unknown: &[String]) -> Outcome<Interpreted> {
         let unknown = self::unknown(self, unknown)?;
         let values = self.values_of(fit, file)?;
-        let (problem, used) = problem(self, &unknown, &values.values, fit);
+        let (system, used) = system(self, &unknown, &values.values, fit);
         let found = self
             .host()
             .watched("solving for the unknown parameters", 0, |_| {
-                interpret(&problem)
+                interpret(&system)
             })?
             .map_err(|error| Error::input(format!("{}: {error}", self.path)))?;
         let mut interpreted = Interpreted {
@@ -80,12 +80,12 @@ pub fn unknown(model: &Model, names: &[String]) -> Outcome<Vec<usize>> {
 }
 
 /// The equations in the unknowns alone, and which base parameters hold an unknown.
-pub fn problem(
+pub fn system(
     model: &Model,
     unknown: &[usize],
     values: &[f64],
     fit: &FitFile,
-) -> (Problem, Vec<usize>) {
+) -> (System, Vec<usize>) {
     let mechanism = &model.derivation.mechanism;
     let constants: Vec<_> = mechanism.constants.iter().map(|c| exact(c.value)).collect();
     let nominal: Vec<_> = mechanism
@@ -123,7 +123,7 @@ pub fn problem(
             fit.parameters.iter().position(|p| p.name == *name)
         })
         .collect();
-    let problem = Problem {
+    let system = System {
         equations: used.iter().map(|k| equations[*k].clone()).collect(),
         values: used.iter().map(|k| values[*k]).collect(),
         covariance: fit.covariance_of(&at).map(|(covariance, _)| covariance),
@@ -132,7 +132,7 @@ pub fn problem(
             .map(|u| mechanism.parameters[*u].nominal)
             .collect(),
     };
-    (problem, used)
+    (system, used)
 }
 
 impl Interpreted {

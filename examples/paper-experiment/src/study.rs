@@ -233,8 +233,8 @@ fn physical(model: &Model, fit: &FitFile) -> Outcome<Vec<Physical>> {
     let names = UNKNOWN.map(str::to_owned);
     let unknown = table_1::unknown(model, &names)?;
     let values: Vec<f64> = fit.parameters.iter().map(|p| p.value).collect();
-    let (problem, _) = table_1::problem(model, &unknown, &values, fit);
-    match interpret(&problem) {
+    let (system, _) = table_1::system(model, &unknown, &values, fit);
+    match interpret(&system) {
         Ok(
             Interpretation::Exact { solutions } | Interpretation::LeastSquares { solutions, .. },
         ) => Ok(solutions),

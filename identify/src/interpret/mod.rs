@@ -21,7 +21,7 @@ pub use modelmill_algebra::polynomial::{Polynomial, exact};
 
 /// What is to be solved.
 #[derive(Clone, Debug)]
-pub struct Problem {
+pub struct System {
     /// Each base parameter as a polynomial in the unknowns, all in equally many unknowns.
     pub equations: Vec<Polynomial>,
     /// Identified values of the base parameters.
@@ -93,69 +93,67 @@ impl fmt::Display for InterpretError {
 
 impl std::error::Error for InterpretError {}
 
-/// Solves for the unknowns. Lists of the problem must be of matching lengths (asserted), values finite.
+/// Solves for the unknowns. Lists of the system must be of matching lengths (asserted), values finite.
 ///
 /// ```
-/// use modelmill_identify::interpret::{Interpretation, Polynomial, Problem, exact, interpret};
+/// use modelmill_identify::interpret::{Interpretation, Polynomial, System, exact, interpret};
 /// // p1 = m c and p2 = m c^2, with m = 2 kg and c = 0.5 m.
 /// let product = |powers: &[(usize, u32)]| {
 ///     let mut p = Polynomial::new(2);
 ///     p.add_term(powers, &exact(1.0));
 ///     p
 /// };
-/// let problem = Problem {
+/// let system = System {
 ///     equations: vec![product(&[(0, 1), (1, 1)]), product(&[(0, 1), (1, 2)])],
 ///     values: vec![1.0, 0.5],
 ///     covariance: None,
 ///     nominal: vec![1.0, 1.0],
 /// };
-/// let Ok(Interpretation::Exact { solutions }) = interpret(&problem) else { panic!() };
+/// let Ok(Interpretation::Exact { solutions }) = interpret(&system) else { panic!() };
 /// assert_eq!(solutions[0].values, [2.0, 0.5]);
 /// ```
-pub fn interpret(problem: &Problem) -> Result<Interpretation, InterpretError> {
-    let n = problem.nominal.len();
+pub fn interpret(system: &System) -> Result<Interpretation, InterpretError> {
+    let n = system.nominal.len();
     assert_eq!(
-        problem.equations.len(),
-        problem.values.len(),
+        system.equations.len(),
+        system.values.len(),
         "one value per equation"
     );
     assert!(
-        problem.equations.iter().all(|p| p.n == n),
+        system.equations.iter().all(|p| p.n == n),
         "one nominal value per unknown"
     );
-    let used: Vec<usize> = (0..problem.equations.len())
-        .filter(|k| (0..n).any(|i| problem.equations[*k].mentions(i)))
+    let used: Vec<usize> = (0..system.equations.len())
+        .filter(|k| (0..n).any(|i| system.equations[*k].mentions(i)))
         .collect();
     let jacobian = |k: &usize| -> Vec<Polynomial> {
-        (0..n)
-            .map(|i| problem.equations[*k].derivative(i))
-            .collect()
+        (0..n).map(|i| system.equations[*k].derivative(i)).collect()
     };
     let jacobian: Vec<Vec<Polynomial>> = used.iter().map(jacobian).collect();
     let rank = generic_rank(&jacobian, n);
     if rank < n {
-        return Ok(undetermined(problem, &jacobian, n - rank));
+        return Ok(undetermined(system, &jacobian, n - rank));
     }
     if used.len() > n {
-        return Ok(nearest::nearest(problem, &used));
+        return Ok(nearest::nearest(system, &used));
     }
-    let equations: Vec<Polynomial> = used.iter().map(|k| equation(problem, *k)).collect();
+    let equations: Vec<Polynomial> = used.iter().map(|k| equation(system, *k)).collect();
     let points = match roots::solve(&equations, n).map_err(|_| InterpretError::TooHard)? {
         roots::RealSolutions::Finite(points) => points,
         // Curves of solutions beside a generic rank that is full: the values are special, and so is what can be said.
-        roots::RealSolutions::Infinite => return Ok(undetermined(problem, &jacobian, 0)),
+        roots::RealSolutions::Infinite => return Ok(undetermined(system, &jacobian, 0)),
     };
     let mut solutions: Vec<Physical> = points
         .into_iter()
         .map(|values| Physical {
-            std: deviations(problem, &used, &values),
-            residuals: residuals(problem, &values),
-            chi_squared: problem.covariance.is_some().then_some(0.0),
+            std: deviations(system, &used, &values),
+            residuals: residuals(system, &values),
+            chi_squared: system.covariance.is_some().then_some(0.0),
             values,
         })
         .collect();
     let distance = |one: &Physical| -> f64 {
-        let pairs = one.values.iter().zip(&problem.nominal);
+        let pairs = one.values.iter().zip(&system.nominal);
         pairs
             .map(|(x, x0)| ((x - x0) / (x0.abs() + x.abs()).max(f64::MIN_POSITIVE)).powi(2))
             .sum()
@@ -165,28 +163,28 @@ pub fn interpret(problem: &Problem) -> Result<Interpretation, InterpretError> {
 }
 
 /// `base parameter - value` as a polynomial.
-fn equation(problem: &Problem, k: usize) -> Polynomial {
-    let mut equation = problem.equations[k].clone();
-    equation.add_term(&[], &-exact(problem.values[k]));
+fn equation(system: &System, k: usize) -> Polynomial {
+    let mut equation = system.equations[k].clone();
+    equation.add_term(&[], &-exact(system.values[k]));
     equation
 }
 
-fn residuals(problem: &Problem, at: &[f64]) -> Vec<f64> {
-    let pairs = problem.equations.iter().zip(&problem.values);
+fn residuals(system: &System, at: &[f64]) -> Vec<f64> {
+    let pairs = system.equations.iter().zip(&system.values);
     pairs.map(|(p, value)| value - p.value(at)).collect()
 }
 
 /// The Jacobian of some equations at a point.
-fn jacobian_at(problem: &Problem, equations: &[usize], at: &[f64]) -> DMatrix<f64> {
+fn jacobian_at(system: &System, equations: &[usize], at: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(equations.len(), at.len(), |r, i| {
-        problem.equations[equations[r]].derivative(i).value(at)
+        system.equations[equations[r]].derivative(i).value(at)
     })
 }
 
 /// Standard deviations of a solution of as many equations as unknowns: `J x' = p'` gives `cov x = J^-1 cov p J^-T`.
-fn deviations(problem: &Problem, used: &[usize], at: &[f64]) -> Option<Vec<f64>> {
-    let covariance = problem.covariance.as_ref()?;
-    let mut jacobian = jacobian_at(problem, used, at);
+fn deviations(system: &System, used: &[usize], at: &[f64]) -> Option<Vec<f64>> {
+    let covariance = system.covariance.as_ref()?;
+    let mut jacobian = jacobian_at(system, used, at);
     // Units must not decide what counts as singular.
     let scales: Vec<f64> = (0..used.len()).map(|r| jacobian.row(r).norm()).collect();
     for (r, scale) in scales.iter().enumerate() {
@@ -267,14 +265,10 @@ fn exact_rank(mut rows: Vec<Vec<BigRational>>) -> usize {
 }
 
 /// What is not determined, at the nominal values; these are moved a little where they hide something.
-fn undetermined(
-    problem: &Problem,
-    jacobian: &[Vec<Polynomial>],
-    at_least: usize,
-) -> Interpretation {
-    let n = problem.nominal.len();
+fn undetermined(system: &System, jacobian: &[Vec<Polynomial>], at_least: usize) -> Interpretation {
+    let n = system.nominal.len();
     // A product of two unknowns, one of them nominally zero, says nothing there.
-    let point: Vec<f64> = problem
+    let point: Vec<f64> = system
         .nominal
         .iter()
         .map(|x| if *x == 0.0 { 1.0 } else { *x })

@@ -7,8 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::roots::{RealSolutions, solve};
 use super::{
-    Interpretation, Physical, Problem, equation, jacobian_at, residuals, roots_of_diagonal,
-    whitened,
+    Interpretation, Physical, System, equation, jacobian_at, residuals, roots_of_diagonal, whitened,
 };
 use modelmill_algebra::polynomial::Polynomial;
 
@@ -17,14 +16,14 @@ const MOST_SUBSETS: usize = 40;
 const MOST_STEPS: usize = 500;
 
 /// Solutions of least squares; `used` are the equations in which unknowns stand.
-pub(crate) fn nearest(problem: &Problem, used: &[usize]) -> Interpretation {
-    let n = problem.nominal.len();
-    let (weights, is_weighted) = whitened(problem.covariance.as_ref(), used, &problem.values);
-    let is_linear = used.iter().all(|k| problem.equations[*k].degree() <= 1);
-    let mut starts = vec![problem.nominal.clone()];
+pub(crate) fn nearest(system: &System, used: &[usize]) -> Interpretation {
+    let n = system.nominal.len();
+    let (weights, is_weighted) = whitened(system.covariance.as_ref(), used, &system.values);
+    let is_linear = used.iter().all(|k| system.equations[*k].degree() <= 1);
+    let mut starts = vec![system.nominal.clone()];
     if !is_linear {
         for subset in subsets(used, n).into_iter().take(MOST_SUBSETS) {
-            let equations: Vec<Polynomial> = subset.iter().map(|k| equation(problem, *k)).collect();
+            let equations: Vec<Polynomial> = subset.iter().map(|k| equation(system, *k)).collect();
             // A subset that is too hard or has no isolated solutions gives no start, and nothing is lost.
             if let Ok(RealSolutions::Finite(points)) = solve(&equations, n) {
                 starts.extend(points);
@@ -33,19 +32,19 @@ pub(crate) fn nearest(problem: &Problem, used: &[usize]) -> Interpretation {
     }
     let mut solutions: Vec<Physical> = Vec::new();
     for start in &starts {
-        let Some((values, error, covariance)) = descend(problem, used, &weights, start) else {
+        let Some((values, error, covariance)) = descend(system, used, &weights, start) else {
             continue;
         };
         let is_known = solutions.iter().any(|known| {
             let pairs = known.values.iter().zip(&values);
             pairs
-                .zip(&problem.nominal)
+                .zip(&system.nominal)
                 .all(|((a, b), x0)| (a - b).abs() <= 1e-6 * (a.abs() + b.abs() + 1e-3 * x0.abs()))
         });
         if !is_known {
             solutions.push(Physical {
                 std: is_weighted.then(|| roots_of_diagonal(&covariance)),
-                residuals: residuals(problem, &values),
+                residuals: residuals(system, &values),
                 chi_squared: is_weighted.then_some(error),
                 values,
             });
@@ -65,7 +64,7 @@ pub(crate) fn nearest(problem: &Problem, used: &[usize]) -> Interpretation {
 
 /// A local minimum with its error and covariance; `None` where none is reached.
 fn descend(
-    problem: &Problem,
+    system: &System,
     used: &[usize],
     weights: &DMatrix<f64>,
     start: &[f64],
@@ -74,14 +73,14 @@ fn descend(
     let errors = |x: &[f64]| {
         let e = used
             .iter()
-            .map(|k| problem.values[*k] - problem.equations[*k].value(x));
+            .map(|k| system.values[*k] - system.equations[*k].value(x));
         weights * DVector::from_iterator(used.len(), e)
     };
     let mut x = start.to_vec();
     let mut e = errors(&x);
     let mut damping = 1e-3;
     for _ in 0..MOST_STEPS {
-        let jacobian = weights * jacobian_at(problem, used, &x);
+        let jacobian = weights * jacobian_at(system, used, &x);
         let gradient = jacobian.transpose() * &e;
         let normal = jacobian.transpose() * &jacobian;
         let mut damped = normal.clone();
@@ -106,7 +105,7 @@ fn descend(
             break;
         }
     }
-    let jacobian = weights * jacobian_at(problem, used, &x);
+    let jacobian = weights * jacobian_at(system, used, &x);
     // A point that is no minimum but where the descent came to rest is none of the answers.
     let gradient = jacobian.transpose() * &e;
     let scale = jacobian.norm() * e.norm();

@@ -3,7 +3,7 @@ use super::*;
 /// `sum of factor * product of powers` for each equation.
 type Equations<'a> = &'a [&'a [(f64, &'a [(usize, u32)])]];
 
-fn problem(n: usize, equations: Equations<'_>, values: &[f64], std: Option<f64>) -> Problem {
+fn system(n: usize, equations: Equations<'_>, values: &[f64], std: Option<f64>) -> System {
     let polynomial = |terms: &&[(f64, &[(usize, u32)])]| {
         let mut p = Polynomial::new(n);
         for (factor, powers) in *terms {
@@ -12,7 +12,7 @@ fn problem(n: usize, equations: Equations<'_>, values: &[f64], std: Option<f64>)
         p
     };
     let k = values.len();
-    Problem {
+    System {
         equations: equations.iter().map(polynomial).collect(),
         values: values.to_vec(),
         covariance: std.map(|s| DMatrix::identity(k, k) * s * s),
@@ -23,7 +23,7 @@ fn problem(n: usize, equations: Equations<'_>, values: &[f64], std: Option<f64>)
 #[test]
 fn both_solutions_of_a_quadratic_are_found_with_their_deviations() {
     // x y = 6, x + y = 5: (2, 3) and (3, 2). J = [y x; 1 1], inverse 1/(y - x) [1 -x; -1 y].
-    let found = interpret(&problem(
+    let found = interpret(&system(
         2,
         &[
             &[(1.0, &[(0, 1), (1, 1)])],
@@ -47,7 +47,7 @@ fn both_solutions_of_a_quadratic_are_found_with_their_deviations() {
 #[test]
 fn a_double_solution_has_no_deviation() {
     // x^2 = 2 x - 1 touches the axis at 1.
-    let found = interpret(&problem(
+    let found = interpret(&system(
         1,
         &[&[(1.0, &[(0, 2)]), (-2.0, &[(0, 1)])]],
         &[-1.0],
@@ -65,7 +65,7 @@ fn a_double_solution_has_no_deviation() {
 #[test]
 fn what_is_not_determined_is_named() {
     // Only x + 2 y and z are seen.
-    let found = interpret(&problem(
+    let found = interpret(&system(
         3,
         &[
             &[(1.0, &[(0, 1)]), (2.0, &[(1, 1)])],
@@ -94,7 +94,7 @@ fn what_is_not_determined_is_named() {
 #[test]
 fn more_equations_than_unknowns_are_weighed() {
     // x seen twice: the mean.
-    let found = interpret(&problem(
+    let found = interpret(&system(
         1,
         &[&[(1.0, &[(0, 1)])], &[(1.0, &[(0, 1)])]],
         &[1.0, 2.0],
@@ -113,7 +113,7 @@ fn more_equations_than_unknowns_are_weighed() {
     assert!((solutions[0].std.as_ref().unwrap()[0] - 0.5 / 2.0_f64.sqrt()).abs() < 1e-12);
     assert!((solutions[0].chi_squared.unwrap() - 2.0).abs() < 1e-9);
     // x^2 = 4 and x^4 = 16 agree at both 2 and -2.
-    let found = interpret(&problem(
+    let found = interpret(&system(
         1,
         &[&[(1.0, &[(0, 2)])], &[(1.0, &[(0, 4)])]],
         &[4.0, 16.0],
