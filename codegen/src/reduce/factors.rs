@@ -3,8 +3,8 @@
 
 use modelmill_algebra::field::{Element, Stream};
 
+use super::dependences::Dependences;
 use super::oracle::{Budget, Occurrence, Oracle};
-use super::pattern::Pattern;
 use super::rational_function::RationalFunction;
 use super::reconstruct::{self, Survey};
 use super::relations::{self, ColumnRelation, Related};
@@ -18,19 +18,19 @@ pub(super) const MOST_OPERATIONS: u64 = 20_000_000_000;
 /// Factors of no more constants than this are found at once.
 const FEW: usize = 6;
 
-/// The wanted factors of a pattern; those that resist are `None`.
+/// The wanted factors of the dependences; those that resist are `None`.
 pub(super) fn find(
-    pattern: &Pattern,
+    dependences: &Dependences,
     regressor: &SampledRegressor,
     variables: &[Occurrence],
     roots: &[i64],
     operations: u64,
     stream: &mut Stream,
 ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
-    if pattern.wanted.is_empty() {
+    if dependences.wanted.is_empty() {
         return Ok(Vec::new());
     }
-    let direct: Vec<ColumnRelation> = (pattern.relations.iter())
+    let direct: Vec<ColumnRelation> = (dependences.relations.iter())
         .filter(|relation| relation.is_direct())
         .cloned()
         .collect();
@@ -38,7 +38,7 @@ pub(super) fn find(
     let mut by = |relations: &[ColumnRelation]| {
         by_relations(
             relations,
-            pattern,
+            dependences,
             regressor,
             variables,
             roots,
@@ -46,9 +46,9 @@ pub(super) fn find(
             stream,
         )
     };
-    match by(&pattern.relations) {
+    match by(&dependences.relations) {
         // Which columns are near may depend on the constants, as with roots that take either sign.
-        Err(DeriveError::RankChanged) if direct.len() < pattern.relations.len() => by(&direct),
+        Err(DeriveError::RankChanged) if direct.len() < dependences.relations.len() => by(&direct),
         found => found,
     }
 }
@@ -56,7 +56,7 @@ pub(super) fn find(
 /// The wanted factors by some relations, those to retained columns among them.
 fn by_relations(
     all: &[ColumnRelation],
-    pattern: &Pattern,
+    dependences: &Dependences,
     regressor: &SampledRegressor,
     variables: &[Occurrence],
     roots: &[i64],
@@ -65,7 +65,7 @@ fn by_relations(
 ) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
     let mut oracle = FromMotion {
         regressor,
-        pivots: &pattern.pivots,
+        pivots: &dependences.pivots,
         relations: all,
         sampling: stream.clone(),
         budget,
@@ -117,7 +117,7 @@ fn by_relations(
     if !direct.is_empty() && !related.is_lost() {
         related.replace(found(&direct, stream)?);
     }
-    let mut written = related.written_out(&pattern.wanted, roots);
+    let mut written = related.written_out(&dependences.wanted, roots);
     let missing: Vec<usize> = (0..written.len())
         .filter(|k| written[*k].is_none())
         .collect();
@@ -125,7 +125,7 @@ fn by_relations(
         let mut rest = FromRelations {
             related: &related,
             regressor,
-            wanted: missing.iter().map(|k| pattern.wanted[*k]).collect(),
+            wanted: missing.iter().map(|k| dependences.wanted[*k]).collect(),
             budget: &mut *oracle.budget,
         };
         let found = reconstruct::reconstruct(&mut rest, variables, roots, stream)?;
@@ -261,12 +261,12 @@ mod tests {
         let regressor = sampled(&mut graph, mechanism, projection, &outputs, columns.len())?;
         let mut stream = Stream::new(SEED);
         let order: Vec<usize> = (0..columns.len()).collect();
-        let mut pattern = Pattern::find(&regressor, &order, &mut stream)?;
+        let mut dependences = Dependences::find(&regressor, &order, &mut stream)?;
         let variables = occurrences(&graph, &outputs, &projection.loops.residual);
         let roots = root_radicands(&graph, &outputs, &projection.loops.residual);
-        let mut factors = |pattern: &Pattern| {
+        let mut factors = |dependences: &Dependences| {
             find(
-                pattern,
+                dependences,
                 &regressor,
                 &variables,
                 &roots,
@@ -274,13 +274,13 @@ mod tests {
                 &mut stream,
             )
         };
-        let near = factors(&pattern)?;
+        let near = factors(&dependences)?;
         assert!(
-            pattern.relations.iter().any(|r| !r.is_direct()),
+            dependences.relations.iter().any(|r| !r.is_direct()),
             "nothing is near"
         );
-        pattern.relations.retain(ColumnRelation::is_direct);
-        Ok([near, factors(&pattern)?])
+        dependences.relations.retain(ColumnRelation::is_direct);
+        Ok([near, factors(&dependences)?])
     }
 
     #[test]

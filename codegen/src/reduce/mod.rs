@@ -6,11 +6,11 @@
 
 pub(crate) mod base;
 mod constants;
+mod dependences;
 mod factors;
 mod fit;
 mod numeric;
 mod oracle;
-mod pattern;
 mod print;
 mod rational_function;
 mod reconstruct;
@@ -32,7 +32,7 @@ use crate::regressor::Equations;
 use crate::regressor::projection::Projection;
 use crate::tree::expressions::Monomial;
 use constants::{occurrences, root_radicands};
-use pattern::Pattern;
+use dependences::Dependences;
 use sample::sampled;
 
 /// Reduces the columns `columns[k][d]` (product by drive) to a base.
@@ -99,11 +99,11 @@ fn reduce_exactly(
 ) -> Result<Reduction, DeriveError> {
     let regressor = sampled(graph, mechanism, projection, outputs, effective.len())?;
     let mut stream = Stream::new(SEED);
-    let pattern = Pattern::find(&regressor, order, &mut stream)?;
+    let dependences = Dependences::find(&regressor, order, &mut stream)?;
     let roots = root_radicands(graph, outputs, &projection.loops.residual);
     let variables = occurrences(graph, outputs, &projection.loops.residual);
     let factors = factors::find(
-        &pattern,
+        &dependences,
         &regressor,
         &variables,
         &roots,
@@ -111,8 +111,8 @@ fn reduce_exactly(
         &mut stream,
     )?;
     let names = |k: usize| candidates[effective[k]].clone();
-    let reduction = pattern.reduction(mechanism, candidates, &names, factors)?;
-    reduction.confirm(&regressor, &pattern.shown, &mut stream)?;
+    let reduction = dependences.reduction(mechanism, candidates, &names, factors)?;
+    reduction.confirm(&regressor, &dependences.shown, &mut stream)?;
     Ok(reduction)
 }
 

@@ -82,7 +82,7 @@ impl ColumnRelation {
     }
 }
 
-/// Relations for every dependent column of a pattern, in an order in which each needs earlier columns only: to retained
+/// Relations for every dependent column, in an order in which each needs earlier columns only: to retained
 /// columns, then, if they are fewer, to the columns before it that come last.
 ///
 /// `order` is that in which columns are retained.

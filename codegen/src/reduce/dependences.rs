@@ -15,7 +15,7 @@ const CONFIRMED_WITH: usize = 4;
 const CONFIRMED_AT: usize = 2;
 
 /// Which columns depend on which, as seen for one random set of constants; columns by position among the effective ones.
-pub(super) struct Pattern {
+pub(super) struct Dependences {
     /// Columns that are not identically zero.
     pub(super) shown: Vec<usize>,
     /// Retained columns, sorted.
@@ -28,7 +28,7 @@ pub(super) struct Pattern {
     pub(super) relations: Vec<ColumnRelation>,
 }
 
-impl Pattern {
+impl Dependences {
     pub(super) fn find(
         regressor: &SampledRegressor,
         order: &[usize],
