@@ -3,7 +3,7 @@
 #[cfg(any(test, feature = "json"))]
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
-use super::base::{base_expression, factor_text};
+use super::base_parameters::{base_expression, factor_text};
 use super::rank::NumericRank;
 use crate::reduce::base::name as base_name;
 use crate::{Derivation, Method, OperationCount, Reduction, Stage};

@@ -3,7 +3,7 @@
 //!
 //! Equation numbers 5, 6 and 16 are those of the paper on the parameter-minimal model of the SpiderMill.
 
-mod base;
+mod base_parameters;
 mod document;
 mod effects;
 mod equations;
@@ -21,7 +21,7 @@ mod render_text;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use base::{base_expression, base_grouped};
+pub use base_parameters::{base_expression, base_grouped};
 pub use equations::{BaseLine, DependencyLine, Equations, NumericMethod, Operations, Rank};
 pub use rank::NumericRank;
 
@@ -74,9 +74,9 @@ fn write(derivation: &Derivation, numeric: Option<&NumericRank>) -> Document {
     loops::loops(&mut page, derivation);
     loops::drives(&mut page, derivation);
     effects::effects(&mut page, mechanism);
-    base::products(&mut page, derivation);
-    base::dependencies(&mut page, derivation);
-    base::base_parameters(&mut page, derivation, numeric);
+    base_parameters::products(&mut page, derivation);
+    base_parameters::dependencies(&mut page, derivation);
+    base_parameters::base_parameters(&mut page, derivation, numeric);
     programs::programs(&mut page, derivation);
     page
 }

@@ -2,7 +2,7 @@
 //! against a model's regressor.
 
 mod columns;
+mod delay_and_exchange;
 mod signals;
-mod suspects;
 
-pub use suspects::{ForceAudit, ForceDelay, Suspect};
+pub use delay_and_exchange::{ForceAudit, ForceDelay, Suspect};
