@@ -345,12 +345,18 @@ fn what_is_shown_as_printed_is_printed() {
     assert!(shown >= 8, "{shown} answers are shown");
 }
 
-/// Whether two lines have the same words, and numbers that are close; those near zero are rounding.
+/// Whether two lines have the same words, and numbers that are close: to a thousandth, or to the last digit where that is
+/// coarser. Those near zero are rounding.
 fn same_words(a: &str, b: &str) -> bool {
     let same = |a: &str, b: &str| {
-        let number = |word: &str| word.trim_end_matches(['.', ',', ';']).parse::<f64>().ok();
+        let bare = |word: &str| word.trim_end_matches(['.', ',', ';']).to_owned();
+        let number = |word: &str| bare(word).parse::<f64>().ok();
+        let decimals = bare(a).split_once('.').map(|(_, digits)| digits.len());
+        let last_digit = decimals.map_or(0.0, |n| 0.1_f64.powi(n.try_into().unwrap_or(i32::MAX)));
         match (number(a), number(b)) {
-            (Some(x), Some(y)) if x.abs() > 1e-3 => (x - y).abs() <= 1e-3 * x.abs(),
+            (Some(x), Some(y)) if x.abs() > 1e-3 => {
+                (x - y).abs() <= (1e-3 * x.abs()).max(1.1 * last_digit)
+            }
             (Some(_), Some(y)) => y.abs() < 1e-3,
             _ => a == b,
         }
