@@ -171,12 +171,19 @@ fn fresh(name: &str) -> PathBuf {
     folder
 }
 
+/// Whether the name of a file has that ending.
+fn ends_in(name: &str, ending: &str) -> bool {
+    Path::new(name).extension().is_some_and(|e| e == ending)
+}
+
 /// Writes the whole files of the pages into a folder and gives their names.
 fn write_files(pages: &[Page], folder: &Path) -> BTreeSet<String> {
     let mut names = BTreeSet::new();
     for block in pages.iter().flat_map(|page| &page.blocks) {
         let first = block.text.lines().next().unwrap_or_default();
-        let name = first.strip_prefix("# ").filter(|n| n.ends_with(".toml"));
+        let name = first
+            .strip_prefix("# ")
+            .filter(|name| ends_in(name, "toml"));
         if let Some(name) = name.filter(|_| block.language == "toml") {
             assert!(names.insert(name.to_owned()), "{name} is shown twice");
             fs::write(folder.join(name), &block.text).expect("written");
@@ -194,7 +201,7 @@ fn every_chapter_is_a_file_and_every_file_a_chapter() {
         .expect("the folder of the guide")
         .map(|entry| entry.expect("an entry").file_name())
         .filter_map(|name| name.into_string().ok())
-        .filter(|name| name.ends_with(".md") && name != "SUMMARY.md")
+        .filter(|name| ends_in(name, "md") && name != "SUMMARY.md")
         .collect();
     assert_eq!(listed, files);
 }
