@@ -132,7 +132,7 @@ pub(crate) fn spelled(text: &str) -> Cow<'_, str> {
     // Flags side by side are one piece of a command line.
     match spelled {
         Cow::Owned(text) => Cow::Owned(text.replace("` `--", " --")),
-        borrowed => borrowed,
+        Cow::Borrowed(text) => Cow::Borrowed(text),
     }
 }
 

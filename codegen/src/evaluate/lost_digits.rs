@@ -287,6 +287,8 @@ fn culprits(derivation: &Derivation, found: &Lost) -> DeriveError {
 
 #[cfg(test)]
 mod tests {
+    use std::fmt::Write as _;
+
     use super::*;
     use crate::derive;
 
@@ -464,29 +466,33 @@ mod tests {
                         [constants]\ng = { value = 9.81, unit = \"m/s^2\" }\nl = { value = 0.2, unit = \"m\" }\n"
             .to_owned();
         for (i, z) in z.iter().enumerate() {
-            text += &format!("h{i} = {{ value = {z:?}, unit = \"m\" }}\n");
+            let _ = writeln!(text, "h{i} = {{ value = {z:?}, unit = \"m\" }}");
         }
         text += "[parameters]\n";
         for i in 0..z.len() {
-            text += &format!("m{i} = {{ nominal = 0.1, unit = \"kg\" }}\n");
+            let _ = writeln!(text, "m{i} = {{ nominal = 0.1, unit = \"kg\" }}");
         }
         text += "[coordinates]\n";
         for (k, (q, _)) in joints.iter().enumerate() {
-            text += &format!("{q} = {{ nominal = {} }}\n", 0.3 + 0.1 * k as f64);
+            let _ = writeln!(text, "{q} = {{ nominal = {} }}", 0.3 + 0.1 * k as f64);
         }
         let mut on = "base".to_owned();
         for (q, dh) in &joints {
-            text +=
-                &format!("[[frame]]\nname = \"f{q}\"\non = \"{on}\"\nmodified_dh = {{ {dh} }}\n");
-            text += &format!("[[drive]]\nname = \"d{q}\"\njoint = \"{q}\"\n");
+            let _ = writeln!(
+                text,
+                "[[frame]]\nname = \"f{q}\"\non = \"{on}\"\nmodified_dh = {{ {dh} }}"
+            );
+            let _ = writeln!(text, "[[drive]]\nname = \"d{q}\"\njoint = \"{q}\"");
             on = format!("f{q}");
         }
         for (i, at) in ["[\"l\", 0", "[0, \"l\"", "[\"-l\", 0", "[0, \"-l\""]
             .iter()
             .enumerate()
         {
-            text +=
-                &format!("[[lumped_mass]]\nmass = \"m{i}\"\non = \"fc\"\nat = {at}, \"h{i}\"]\n");
+            let _ = writeln!(
+                text,
+                "[[lumped_mass]]\nmass = \"m{i}\"\non = \"fc\"\nat = {at}, \"h{i}\"]"
+            );
         }
         text += "[[part]]\non = \"fc\"\nlinear = { all = 1, nominal = { XX = 0.02, YY = 0.02, ZZ = 0.03, M = 1.5 } }\n";
         read(&text)
