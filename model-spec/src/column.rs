@@ -11,7 +11,8 @@ use num_traits::ToPrimitive;
 use crate::diagnostic::{Log, Span};
 use crate::exact::Function;
 use crate::formula::{Ast, AstKind};
-use crate::mechanism::{DriveKind, Mechanism, Motion};
+use crate::kinds::Carries;
+use crate::mechanism::Mechanism;
 use crate::parser::parse;
 use crate::suggest;
 
@@ -126,24 +127,18 @@ impl Mechanism {
         let mut columns = vec![("t".to_owned(), Quantity::Time)];
         for coordinate in self.coordinates.iter().filter(|c| !c.passive) {
             for (order, suffix) in (0..).zip(["", "_d", "_dd"]) {
-                let quantity = match coordinate.motion {
-                    Motion::Revolute => Quantity::Angle(order),
-                    Motion::Prismatic => Quantity::Length(order),
+                let quantity = if coordinate.motion.is_angle() {
+                    Quantity::Angle(order)
+                } else {
+                    Quantity::Length(order)
                 };
                 columns.push((format!("{}{suffix}", coordinate.name), quantity));
             }
         }
         for drive in &self.drives {
-            let is_torque = match &drive.kind {
-                DriveKind::Joint(coordinate) => {
-                    self.coordinates[coordinate.0].motion == Motion::Revolute
-                }
-                DriveKind::Linear { .. } => false,
-            };
-            let (force, variance) = if is_torque {
-                (Quantity::Torque, Quantity::TorqueVariance)
-            } else {
-                (Quantity::Force, Quantity::ForceVariance)
+            let (force, variance) = match drive.kind.carries(&self.coordinates) {
+                Carries::Torque => (Quantity::Torque, Quantity::TorqueVariance),
+                _ => (Quantity::Force, Quantity::ForceVariance),
             };
             columns.push((drive.name.clone(), force));
             columns.push((format!("{}_var", drive.name), variance));

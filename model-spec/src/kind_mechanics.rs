@@ -2,10 +2,10 @@
 
 use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::document::Key;
-use crate::kinds::{Carries, acts_on, may_carry};
+use crate::kinds::{ActsOn, Carries, may_carry};
+use crate::mechanics::Symbols;
 use crate::schema::EffectKindEntry;
-use crate::unit::Dimension;
-use crate::values::{MechanicsName, PlaceKind, UnitByPlace};
+use crate::values::UnitByPlace;
 
 /// Checks what a kind adds: an expression at places that have one, or mechanics with their own symbols and places.
 /// False if it has mechanics or is faulty, so that there is no expression to check.
@@ -23,9 +23,7 @@ pub(crate) fn check_way(entry: &EffectKindEntry, log: &mut Log) -> bool {
             }
             return false;
         };
-        let elsewhere = places
-            .find(|on| matches!(on, PlaceKind::Part | PlaceKind::Base | PlaceKind::Force))
-            .map(|on| acts_on(*on));
+        let elsewhere = places.find(|on| matches!(on, ActsOn::Part | ActsOn::Base | ActsOn::Force));
         if let (Some(found), Some(on)) = (elsewhere, &entry.on) {
             log.push(
                 Diagnostic::error(on.span, "an expression cannot act here")
@@ -49,59 +47,20 @@ pub(crate) fn check_way(entry: &EffectKindEntry, log: &mut Log) -> bool {
                 .label("expected either `expression` or `mechanics`"),
         );
     }
-    let (on, parameters, constants) = symbols_of(way);
+    let way = way.entry();
+    let on = way.on();
     if let Some(found) = &entry.on
         && places.any(|place| *place != on)
     {
         log.push(
             Diagnostic::error(found.span, "these mechanics act elsewhere")
-                .label(format!("expected only {}", acts_on(on).words())),
+                .label(format!("expected only {}", on.words())),
         );
     }
-    check_symbols(entry, "parameters", parameters, name_span, log);
-    check_symbols(entry, "constants", constants, name_span, log);
+    check_symbols(entry, "parameters", way.parameters(), name_span, log);
+    check_symbols(entry, "constants", way.constants(), name_span, log);
     false
 }
-
-/// A symbol with its dimension.
-type Symbols = &'static [(&'static str, Dimension)];
-
-/// Where mechanics act, and the symbols of their parameters and constants.
-fn symbols_of(way: MechanicsName) -> (PlaceKind, Symbols, Symbols) {
-    const TILT: Symbols = &[
-        ("tx", Dimension::ONE),
-        ("ty", Dimension::ONE),
-        ("tz", Dimension::ONE),
-    ];
-    match way {
-        MechanicsName::Rod => (PlaceKind::Drive, ROD, &[]),
-        MechanicsName::Placement => (PlaceKind::Point, &[("m", Dimension::MASS)], &[]),
-        MechanicsName::Part => (PlaceKind::Part, PART, &[]),
-        MechanicsName::Tilt => (PlaceKind::Base, &[], TILT),
-        MechanicsName::Delay => (PlaceKind::Force, &[], &[("T", Dimension::TIME)]),
-    }
-}
-
-/// Moments of a rod's mass along itself, of second, first and no order.
-const ROD: Symbols = &[
-    ("Jr", Dimension::INERTIA),
-    ("Sr", Dimension::FIRST_MOMENT),
-    ("mr", Dimension::MASS),
-];
-
-/// Differences of a part: mass, first moment and inertia about its frame's origin.
-pub(crate) const PART: Symbols = &[
-    ("dm", Dimension::MASS),
-    ("dmx", Dimension::FIRST_MOMENT),
-    ("dmy", Dimension::FIRST_MOMENT),
-    ("dmz", Dimension::FIRST_MOMENT),
-    ("dJxx", Dimension::INERTIA),
-    ("dJxy", Dimension::INERTIA),
-    ("dJxz", Dimension::INERTIA),
-    ("dJyy", Dimension::INERTIA),
-    ("dJyz", Dimension::INERTIA),
-    ("dJzz", Dimension::INERTIA),
-];
 
 /// Holds the symbols of a kind with mechanics against those that the mechanics have.
 fn check_symbols(

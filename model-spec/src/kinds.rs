@@ -11,10 +11,12 @@ use crate::exact::{ConstantIdx, Exact, PlaceQuantity, Symbol};
 use crate::finite;
 use crate::kind_mechanics::check_way;
 use crate::kind_terms::{factors, lacking_units};
+use crate::mechanics::Mechanics;
 use crate::schema::{EffectKindEntry, LibraryEntry, ModelEntry};
 use crate::scope::Scope;
 use crate::unit::{Dimension, Unit};
-use crate::values::{self, MechanicsName, PlaceKind, ScaleName, SignName, Text, UnitByPlace};
+use crate::values::{self, Text, UnitByPlace};
+use crate::words::words;
 
 /// The library of kinds as the program brings it along.
 pub const LIBRARY: &str = include_str!("../library/effects.toml");
@@ -67,32 +69,34 @@ impl Carries {
     }
 }
 
-/// The sign that a parameter must have to make physical sense.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Sign {
+words! {
+    /// The sign that a parameter must have to make physical sense.
+    #[derive(PartialOrd, Ord, Hash)]
+    pub Sign as "SignName": "a sign",
     /// Not below zero, as friction and masses.
-    Positive,
+    "positive" => Positive,
     /// Not above zero.
-    Negative,
+    "negative" => Negative,
     /// Either.
-    Any,
+    "any" => Any,
 }
 
-/// Where a kind may act.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum ActsOn {
+words! {
+    /// Where a kind may act.
+    #[derive(PartialOrd, Ord, Hash)]
+    pub ActsOn as "PlaceKind": "a place",
     /// A drive.
-    Drive,
+    "drive" => Drive,
     /// A joint coordinate, also a passive one.
-    Coordinate,
+    "coordinate" => Coordinate,
     /// A point.
-    Point,
+    "point" => Point,
     /// A part.
-    Part,
+    "part" => Part,
     /// The base as a whole, named `base`.
-    Base,
+    "base" => Base,
     /// The measured forces as a whole, named `force`.
-    Force,
+    "force" => Force,
 }
 
 impl ActsOn {
@@ -109,43 +113,16 @@ impl ActsOn {
     }
 }
 
-/// What a kind does that no expression at its place can say.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Mechanics {
-    /// A slender rod along a linear drive, see [`crate::Action::Rod`].
-    Rod,
-    /// The moments of lumped masses are taken where their forces are.
-    Placement,
-    /// Differences of one part from what the model file says of it.
-    Part,
-    /// A turn of the base against gravity.
-    Tilt,
-    /// A delay of the measured forces.
-    Delay,
-}
-
-impl Mechanics {
-    /// What it does, for people, where other kinds have an expression.
-    pub fn words(self) -> &'static str {
-        match self {
-            Self::Rod => "a rod along the drive, about its first point",
-            Self::Placement => "m times the moments at the point, less those at `moment_at`",
-            Self::Part => "mass, first moments and inertia of this part alone",
-            Self::Tilt => "gravity turned back by Rz(tz) Ry(ty) Rx(tx)",
-            Self::Delay => "forces of recordings are those of T before",
-        }
-    }
-}
-
-/// What the values of a search are relative to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Scale {
+words! {
+    /// What the values of a search are relative to.
+    #[derive(PartialOrd, Ord, Hash)]
+    pub Scale as "ScaleName": "what a range is relative to",
     /// The largest rate of the place.
-    Rate,
+    "rate" => Rate,
     /// The travel of the place's coordinate: the largest value less the smallest.
-    Travel,
+    "travel" => Travel,
     /// Nothing: they are in SI units.
-    One,
+    "one" => One,
 }
 
 /// How a constant's value is found where it is not known.
@@ -292,22 +269,18 @@ pub(crate) fn describe(entry: &EffectKindEntry, is_own: bool) -> EffectKind {
             .on
             .iter()
             .flat_map(|on| &on.entries)
-            .map(|on| acts_on(*on))
+            .copied()
             .collect(),
         expression: entry
             .expression
             .as_ref()
             .map_or_else(String::new, |expression| expression.text.clone()),
-        mechanics: entry.mechanics.map(mechanics),
+        mechanics: entry.mechanics,
         places: n_places(entry),
         parameters: parameters
             .map(|(key, parameter)| KindParameter {
                 symbol: key.name.clone(),
-                sign: match parameter.sign {
-                    Some(SignName::Positive) => Sign::Positive,
-                    Some(SignName::Negative) => Sign::Negative,
-                    Some(SignName::Any) | None => Sign::Any,
-                },
+                sign: parameter.sign.unwrap_or(Sign::Any),
                 units: units(&parameter.unit),
                 note: words(&parameter.note),
             })
@@ -328,28 +301,6 @@ pub(crate) fn describe(entry: &EffectKindEntry, is_own: bool) -> EffectKind {
     }
 }
 
-/// A place of the schema as other crates see it.
-pub(crate) fn acts_on(on: PlaceKind) -> ActsOn {
-    match on {
-        PlaceKind::Drive => ActsOn::Drive,
-        PlaceKind::Coordinate => ActsOn::Coordinate,
-        PlaceKind::Point => ActsOn::Point,
-        PlaceKind::Part => ActsOn::Part,
-        PlaceKind::Base => ActsOn::Base,
-        PlaceKind::Force => ActsOn::Force,
-    }
-}
-
-fn mechanics(name: MechanicsName) -> Mechanics {
-    match name {
-        MechanicsName::Rod => Mechanics::Rod,
-        MechanicsName::Placement => Mechanics::Placement,
-        MechanicsName::Part => Mechanics::Part,
-        MechanicsName::Tilt => Mechanics::Tilt,
-        MechanicsName::Delay => Mechanics::Delay,
-    }
-}
-
 fn search(entry: &values::Search) -> Search {
     match entry {
         values::Search::Linear => Search::Linear,
@@ -357,11 +308,7 @@ fn search(entry: &values::Search) -> Search {
             // What is missing is reported where it is read.
             from: range.from.map_or(0.0, |number| number.value),
             to: range.to.map_or(0.0, |number| number.value),
-            of: match range.of {
-                Some(ScaleName::Rate) => Scale::Rate,
-                Some(ScaleName::Travel) => Scale::Travel,
-                Some(ScaleName::One) | None => Scale::One,
-            },
+            of: range.of.unwrap_or(Scale::One),
         },
     }
 }
@@ -369,8 +316,7 @@ fn search(entry: &values::Search) -> Search {
 /// How many places a kind must have; any number if `None`.
 pub(crate) fn n_places(entry: &EffectKindEntry) -> Option<usize> {
     match entry.mechanics {
-        Some(MechanicsName::Part | MechanicsName::Tilt | MechanicsName::Delay) => Some(1),
-        Some(MechanicsName::Rod | MechanicsName::Placement) => None,
+        Some(mechanics) => mechanics.entry().n_places(),
         None => {
             let expression = entry.expression.as_ref()?;
             PlaceQuantity::ALL
@@ -384,11 +330,11 @@ pub(crate) fn n_places(entry: &EffectKindEntry) -> Option<usize> {
 pub(crate) fn may_carry(entry: &EffectKindEntry, carries: Carries) -> bool {
     let mut places = entry.on.iter().flat_map(|on| &on.entries);
     places.any(|on| match on {
-        PlaceKind::Drive | PlaceKind::Coordinate => {
+        ActsOn::Drive | ActsOn::Coordinate => {
             matches!(carries, Carries::Force | Carries::Torque)
         }
-        PlaceKind::Point => carries == Carries::Mass,
-        PlaceKind::Part | PlaceKind::Base | PlaceKind::Force => carries == Carries::Elsewhere,
+        ActsOn::Point => carries == Carries::Mass,
+        ActsOn::Part | ActsOn::Base | ActsOn::Force => carries == Carries::Elsewhere,
     })
 }
 

@@ -1,7 +1,7 @@
 //! Positions of frames and points in the base frame, in double precision, and how they move with the coordinates.
 
 use crate::exact::{CoordinateIdx, Symbol};
-use crate::mechanism::{Axis, Mechanism, Motion, PointIdx, Step};
+use crate::mechanism::{Axis, Mechanism, PointIdx, Step};
 
 pub(crate) type Vec3 = [f64; 3];
 
@@ -9,7 +9,8 @@ pub(crate) type Vec3 = [f64; 3];
 pub(crate) struct Moved {
     pub(crate) coordinate: CoordinateIdx,
     pub(crate) factor: f64,
-    pub(crate) motion: Motion,
+    /// Whether it turns about the axis; else it slides along it.
+    pub(crate) turns: bool,
     pub(crate) axis: Vec3,
     pub(crate) origin: Vec3,
 }
@@ -45,7 +46,7 @@ pub(crate) fn frame_poses(mechanism: &Mechanism) -> Vec<FramePose> {
                             own.push(Moved {
                                 coordinate,
                                 factor: f64::from(factor),
-                                motion: Motion::Revolute,
+                                turns: true,
                                 axis: direction,
                                 origin,
                             });
@@ -59,7 +60,7 @@ pub(crate) fn frame_poses(mechanism: &Mechanism) -> Vec<FramePose> {
                         own.push(Moved {
                             coordinate: *coordinate,
                             factor: crate::print::to_f64(factor),
-                            motion: Motion::Prismatic,
+                            turns: false,
                             axis: direction,
                             origin,
                         });
@@ -126,12 +127,11 @@ pub(crate) fn jacobian(
     let mut frame = mechanism.points[point.0].frame.0;
     while frame != 0 {
         for moved in &poses[frame].own {
-            let velocity = match moved.motion {
-                Motion::Prismatic => moved.axis,
-                Motion::Revolute => {
-                    let arm: Vec3 = std::array::from_fn(|k| at[k] - moved.origin[k]);
-                    cross(moved.axis, arm)
-                }
+            let velocity = if moved.turns {
+                let arm: Vec3 = std::array::from_fn(|k| at[k] - moved.origin[k]);
+                cross(moved.axis, arm)
+            } else {
+                moved.axis
             };
             for k in 0..3 {
                 rows[k][moved.coordinate.0] += moved.factor * velocity[k];

@@ -18,11 +18,13 @@ mod exact;
 mod exact_tests;
 mod finite;
 mod formula;
+mod joint_motion;
 mod kind_mechanics;
 mod kind_terms;
 mod kinds;
 mod kinematics;
 mod load;
+mod mechanics;
 mod mechanism;
 mod merge;
 mod motion;
@@ -41,16 +43,18 @@ mod suggest;
 mod unclosed;
 mod unit;
 mod values;
+mod words;
 
 pub use column::{ColumnFault, ColumnSum, Quantity, read_column};
 pub use diagnostic::{Diagnostic, Severity, SourceFile, Sources, Span};
 pub use document::LARGEST_FILE;
 pub use exact::*;
+pub use joint_motion::Motion;
 pub use kinds::{
-    ActsOn, Carries, EffectKind, KindConstant, KindParameter, LIBRARY, Mechanics, Scale, Search,
-    Sign, library,
+    ActsOn, Carries, EffectKind, KindConstant, KindParameter, LIBRARY, Scale, Search, Sign, library,
 };
 pub use load::{Failure, Loaded, kinds_with, load, load_file, load_file_with, load_with};
+pub use mechanics::Mechanics;
 pub use mechanism::*;
 pub use motion::{Kinematics, Poses};
 pub use reading::{read_named, read_text};

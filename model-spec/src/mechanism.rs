@@ -5,6 +5,8 @@
 use num_rational::BigRational;
 
 use crate::exact::{Angle, CoordinateIdx, Exact, Length, ParameterIdx};
+use crate::joint_motion::Motion;
+use crate::mechanics::Mechanics;
 
 /// Index of a frame in [`Mechanism::frames`]; 0 is the base.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -86,15 +88,6 @@ pub struct Parameter {
     pub unit: String,
     /// Remark of the author.
     pub note: Option<String>,
-}
-
-/// Kind of motion of a coordinate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Motion {
-    /// Angle in rad.
-    Revolute,
-    /// Length in m.
-    Prismatic,
 }
 
 /// A joint coordinate.
@@ -271,12 +264,15 @@ pub struct Effect {
     pub kind: String,
     /// Where it acts; its parameters are shared by all places.
     pub places: Vec<Place>,
-    /// How its parameters act.
-    pub action: Action,
+    /// Mechanics of its own. Without them the effect is `sum of parameter * expression`, the same at every place: a force
+    /// or torque on drives and coordinates; at points the parameter is a mass and the expression its factor.
+    pub mechanics: Option<Mechanics>,
     /// Its parameters; none where the effect only has constants.
     pub terms: Vec<EffectTerm>,
     /// The values of its kind's constants by their symbols; expressions over constants.
     pub constants: Vec<(String, Exact)>,
+    /// Bodies that join those of the mechanism; their parameters are those of the terms.
+    pub bodies: Bodies,
 }
 
 /// One parameter of an effect with what it multiplies.
@@ -286,33 +282,17 @@ pub struct EffectTerm {
     pub symbol: String,
     /// The parameter, listed in [`Mechanism::parameters`] after those that the file declares.
     pub parameter: ParameterIdx,
-    /// Expression over constants and [`crate::PlaceQuantity`]; 1 where the action is not local.
+    /// Expression over constants and [`crate::PlaceQuantity`]; 1 where it has mechanics.
     pub expression: Exact,
 }
 
-/// How the parameters of an effect act.
-#[derive(Clone, Debug)]
-pub enum Action {
-    /// The effect is `sum of parameter * expression`, the same at every place.
-    /// On drives and coordinates the sum is a force or torque;
-    /// at points the parameter is a mass and the expression its factor.
-    Local,
-    /// A slender rod along each of the linear drives that turns about the drive's first point and slides through its
-    /// second. The terms are moments of its mass along itself about the first point: of second order (kg m^2), of
-    /// first order (kg m), and the mass (kg). With `a` the first point and `u` the unit vector along the drive, the
-    /// generalised force is `du'(Jr u'' + Sr (a'' - g)) + da'(Sr u'' + mr (a'' - g))` (d'Alembert).
-    Rod,
-    /// Bodies that join those of the mechanism; the terms say which parameters they have.
-    Bodies {
-        /// Parts.
-        parts: Vec<Part>,
-        /// Lumped masses.
-        lumped_masses: Vec<LumpedMass>,
-    },
-    /// Gravity is turned; [`Mechanism::gravity`] holds the result.
-    Tilt,
-    /// Forces are read later than they act; [`Mechanism::force_delay`] holds the time.
-    Delay,
+/// Bodies of an effect.
+#[derive(Clone, Debug, Default)]
+pub struct Bodies {
+    /// Parts.
+    pub parts: Vec<Part>,
+    /// Lumped masses.
+    pub lumped_masses: Vec<LumpedMass>,
 }
 
 /// What planned motion must keep; ranges are `[low, high]`, and what is not named is not limited.

@@ -8,7 +8,7 @@ use crate::build::Places;
 use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::exact::Symbol;
 use crate::kinematics::{Vec3, frame_poses, jacobian, position};
-use crate::mechanism::{DriveKind, Mechanism, Motion, Step};
+use crate::mechanism::{DriveKind, Mechanism, Step};
 use crate::numeric::{Rows, least_squares, rank};
 
 /// Passive angles may move this far, in rad, before it counts as another assembly.
@@ -229,9 +229,11 @@ fn check_same_assembly(
     let mut fine = true;
     for (&i, given) in passive.iter().zip(given) {
         let coordinate = &mechanism.coordinates[i];
-        let (farthest, unit) = match coordinate.motion {
-            Motion::Revolute => (FARTHEST_TURN, "rad"),
-            Motion::Prismatic => (0.3 * size, "m"),
+        let unit = coordinate.motion.unit();
+        let farthest = if coordinate.motion.is_angle() {
+            FARTHEST_TURN
+        } else {
+            0.3 * size
         };
         let way = (coordinate.nominal - given).abs();
         if way <= farthest {

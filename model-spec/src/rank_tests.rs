@@ -8,7 +8,7 @@ use std::path::Path;
 
 use crate::exact::{Exact, ParameterIdx, PlaceQuantity, Symbol};
 use crate::kinematics::{FramePose, Vec3, frame_poses, position};
-use crate::mechanism::{Inertial, Mechanism, Motion, Place};
+use crate::mechanism::{Inertial, Mechanism, Place};
 use crate::numeric::{Rows, least_squares, rank};
 use crate::pose::gaps;
 
@@ -59,13 +59,12 @@ fn velocity(
         for moved in &poses[up].own {
             let rate = moved.factor * rates[moved.coordinate.0];
             let axis = moved.axis.map(|x| x * rate);
-            match moved.motion {
-                Motion::Revolute => {
-                    angular = add(angular, axis);
-                    let arm = std::array::from_fn(|k| at[k] - moved.origin[k]);
-                    linear = add(linear, cross(axis, arm));
-                }
-                Motion::Prismatic => linear = add(linear, axis),
+            if moved.turns {
+                angular = add(angular, axis);
+                let arm = std::array::from_fn(|k| at[k] - moved.origin[k]);
+                linear = add(linear, cross(axis, arm));
+            } else {
+                linear = add(linear, axis);
             }
         }
         up = mechanism.frames[up].parent.0;

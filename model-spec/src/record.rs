@@ -136,7 +136,7 @@ macro_rules! need {
     };
 }
 macro_rules! first {
-    ($first:literal $(, $rest:literal)*) => {
+    ($first:tt $(, $rest:tt)*) => {
         $first
     };
 }

@@ -1,12 +1,13 @@
 //! The tables of a model file as types; readers and the JSON Schema for editors derive from them.
 
 use crate::formula::Formula;
+use crate::kinds::{ActsOn, Scale, Sign};
+use crate::mechanics::Mechanics;
 use crate::range::Range;
 use crate::record::{List, Named, OneOrMany, record};
 use crate::unit::Unit;
 use crate::values::{
-    AxisName, Flag, MechanicsName, Name, Number, PlaceKind, ScaleName, Search, SignName, Spot,
-    Suffix, Text, UnitByPlace, Vector, Version,
+    AxisName, Flag, Name, Number, Search, Spot, Suffix, Text, UnitByPlace, Vector, Version,
 };
 
 record! {
@@ -369,14 +370,14 @@ record! {
         /// Name of the kind.
         "name" name: required Name,
         /// The places that it may act on.
-        "on" on: required OneOrMany<PlaceKind>,
+        "on" on: required OneOrMany<ActsOn>,
         /// The force, torque or, at a point, mass that it adds: an expression in the kind's parameters,
         /// linear in them, and in `coordinate`, `rate`, `acceleration` and `load` of the place. A kind that uses
         /// `other_coordinate`, `other_rate` or `other_acceleration` acts on two places, at each with the other's.
         "expression" expression: optional Formula,
         /// What it does in place of an expression: a swinging `rod` along a linear drive, another `placement` of
         /// lumped masses, differences of a `part`, a `tilt` of gravity, a `delay` of the measured forces.
-        "mechanics" mechanics: optional MechanicsName,
+        "mechanics" mechanics: optional Mechanics,
         /// Its parameters.
         "parameters" parameters: optional Named<KindParameterEntry>,
         /// Quantities that give its shape and are known.
@@ -406,7 +407,7 @@ record! {
         /// Its unit, or its units where the place carries a force, a torque, or a mass at a point.
         "unit" unit: required UnitByPlace,
         /// The sign that it must have to make physical sense; any if left away.
-        "sign" sign: optional SignName,
+        "sign" sign: optional Sign,
         /// Remark.
         "note" note: optional Text,
     }
@@ -435,7 +436,7 @@ record! {
         "to" to: required Number,
         /// What both are multiples of: the largest `rate` of the place, the `travel` of its coordinate, or `one`,
         /// for values in SI units; `one` if left away.
-        "of" of: optional ScaleName,
+        "of" of: optional Scale,
     }
 }
 

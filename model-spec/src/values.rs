@@ -1,4 +1,4 @@
-//! The small values of a model file: names, texts, numbers, vectors, and words from a fixed choice.
+//! The small values of a model file: names, texts, numbers, vectors, and the words for an axis.
 
 #[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
@@ -12,6 +12,7 @@ use crate::formula::Formula;
 use crate::record::{Read, wrong_type};
 use crate::schema::{SearchRangeEntry, UnitTable};
 use crate::unit::Unit;
+use crate::words::words;
 
 /// Words that mean something in expressions and so name nothing else.
 const RESERVED: [&str; 17] = [
@@ -482,77 +483,10 @@ impl JsonSchema for Suffix {
     }
 }
 
-/// Declares a type with a fixed choice of words.
-macro_rules! words {
-    ($(#[doc = $about:literal])* $name:ident: $expected:literal, $($word:literal => $variant:ident),*) => {
-        $(#[doc = $about])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub(crate) enum $name {
-            $(#[doc = $word] $variant),*
-        }
-
-        impl Read for $name {
-            const EXPECTED: &'static str = $expected;
-            const EXAMPLE: &'static str = concat!("\"", crate::record::first!($($word),*), "\"");
-
-            fn read(node: &Node, log: &mut Log) -> Option<Self> {
-                let Value::Text { text, .. } = &node.value else {
-                    return wrong_type::<Self>(node, log);
-                };
-                match text.as_str() {
-                    $($word => Some(Self::$variant),)*
-                    _ => {
-                        log.push(
-                            Diagnostic::error(
-                                node.span,
-                                format!("`{}` is not {}", quote(text), $expected),
-                            )
-                            .label(format!("expected one of {}", [$(concat!("`", $word, "`")),*].join(", ")))
-                            .help_if(crate::suggest::nearest(text, [$($word),*])
-                                .map(|near| format!("did you mean `{near}`?"))),
-                        );
-                        None
-                    }
-                }
-            }
-        }
-
-        #[cfg(any(test, feature = "schema"))]
-        impl JsonSchema for $name {
-            fn schema_name() -> Cow<'static, str> {
-                stringify!($name).into()
-            }
-
-            fn json_schema(_: &mut SchemaGenerator) -> Schema {
-                json_schema!({ "enum": [$($word),*] })
-            }
-        }
-    };
-}
-
 words! {
     /// An axis with its direction.
-    AxisName: "an axis",
+    pub(crate) AxisName: "an axis",
     "x" => X, "y" => Y, "z" => Z, "-x" => MinusX, "-y" => MinusY, "-z" => MinusZ
-}
-
-words! {
-    /// What a kind of effect may act on.
-    PlaceKind: "a place",
-    "drive" => Drive, "coordinate" => Coordinate, "point" => Point, "part" => Part, "base" => Base,
-    "force" => Force
-}
-
-words! {
-    /// Mechanics of a kind that no expression at its place can say.
-    MechanicsName: "mechanics",
-    "rod" => Rod, "placement" => Placement, "part" => Part, "tilt" => Tilt, "delay" => Delay
-}
-
-words! {
-    /// What a range of search is relative to.
-    ScaleName: "what a range is relative to",
-    "rate" => Rate, "travel" => Travel, "one" => One
 }
 
 /// How a constant's value is found where it is not known.
@@ -602,10 +536,4 @@ impl JsonSchema for Search {
         let range = generator.subschema_for::<SearchRangeEntry>();
         json_schema!({ "anyOf": [{ "const": "linear" }, range] })
     }
-}
-
-words! {
-    /// The sign that a parameter must have.
-    SignName: "a sign",
-    "positive" => Positive, "negative" => Negative, "any" => Any
 }

@@ -10,7 +10,7 @@ use modelmill::diagnose::{Question, Verdict};
 use modelmill::identify::Estimation;
 use modelmill::recording::Reading;
 use modelmill_codegen::{Derivation, Evaluator, States};
-use modelmill_spec::{Mechanism, Motion};
+use modelmill_spec::Mechanism;
 
 /// Noise of each force beside its root mean square.
 const NOISE: f64 = 0.01;
@@ -46,9 +46,10 @@ fn motion(mechanism: &Mechanism, reach: f64) -> Moving {
     let mut draws = Draws(7);
     let mut moving: Moving = Default::default();
     for coordinate in mechanism.coordinates.iter().filter(|c| !c.passive) {
-        let size = match coordinate.motion {
-            Motion::Revolute => reach,
-            Motion::Prismatic => 0.3 * reach,
+        let size = if coordinate.motion.is_angle() {
+            reach
+        } else {
+            0.3 * reach
         };
         let mut columns = [(); 3].map(|()| vec![0.0; SAMPLES]);
         columns[0].fill(coordinate.nominal);

@@ -7,7 +7,7 @@
 use std::ops::{Add, Mul, Neg, Sub};
 
 use modelmill_spec::{
-    Action, Axis, DriveKind, Exact, Function, Inertial, LumpedMass, Mechanism, Motion, Place,
+    Axis, DriveKind, Exact, Function, Inertial, LumpedMass, Mechanics, Mechanism, Place,
     PlaceQuantity, PointIdx, Step, Symbol,
 };
 use nalgebra::{DMatrix, Matrix3, Matrix4, Vector3};
@@ -310,8 +310,9 @@ impl<'a> Numbers<'a> {
         let mut parts: Vec<&modelmill_spec::Part> = self.mechanism.parts.iter().collect();
         let mut points = Vec::new();
         for effect in &self.mechanism.effects {
-            if let Action::Bodies { parts: more, .. } = &effect.action {
-                parts.extend(more);
+            parts.extend(&effect.bodies.parts);
+            if effect.mechanics.is_some() {
+                continue;
             }
             for place in &effect.places {
                 let Place::Point(p) = place else { continue };
@@ -333,9 +334,7 @@ impl<'a> Numbers<'a> {
     pub fn lumps(&self) -> Vec<(usize, f64, [f64; 3], [f64; 3])> {
         let mut lumps: Vec<&LumpedMass> = self.mechanism.lumped_masses.iter().collect();
         for effect in &self.mechanism.effects {
-            if let Action::Bodies { lumped_masses, .. } = &effect.action {
-                lumps.extend(lumped_masses);
-            }
+            lumps.extend(&effect.bodies.lumped_masses);
         }
         let one = |lump: &LumpedMass| {
             let mass = self.value(&lump.mass) * rational(&lump.share);
@@ -378,7 +377,7 @@ impl<'a> Numbers<'a> {
         let mut rods = Vec::new();
         for effect in &self.mechanism.effects {
             for place in &effect.places {
-                if let (Action::Rod, Place::Drive(d)) = (&effect.action, place) {
+                if let (Some(Mechanics::Rod), Place::Drive(d)) = (effect.mechanics, place) {
                     let moments = |k: usize| self.parameters[effect.terms[k].parameter.0];
                     rods.push((d.0, [0, 1, 2].map(moments)));
                 }
@@ -461,21 +460,14 @@ impl<'a> Numbers<'a> {
         }
         let (drives, drive_rates) = (self.drives(coordinates), self.drives(&moved));
         for effect in &self.mechanism.effects {
-            if let Action::Bodies {
-                parts,
-                lumped_masses,
-            } = &effect.action
-            {
-                for part in parts {
-                    let inertia = self.pseudo_inertia(&part.inertial);
-                    let (pose, change) = (&poses[part.frame.0], &displaced[part.frame.0]);
-                    add_body(&mut balance, pose, change, &inertia, &gravity);
-                }
-                for lump in lumped_masses {
-                    let (pose, change) = (&poses[lump.frame.0], &displaced[lump.frame.0]);
-                    self.add_lump(&mut balance, pose, change, lump, &gravity);
-                }
-                continue;
+            for part in &effect.bodies.parts {
+                let inertia = self.pseudo_inertia(&part.inertial);
+                let (pose, change) = (&poses[part.frame.0], &displaced[part.frame.0]);
+                add_body(&mut balance, pose, change, &inertia, &gravity);
+            }
+            for lump in &effect.bodies.lumped_masses {
+                let (pose, change) = (&poses[lump.frame.0], &displaced[lump.frame.0]);
+                self.add_lump(&mut balance, pose, change, lump, &gravity);
             }
             let motions: Vec<Option<Jet>> = (effect.places.iter())
                 .map(|place| match place {
@@ -487,11 +479,13 @@ impl<'a> Numbers<'a> {
             for (p, place) in effect.places.iter().enumerate() {
                 let other = motions[(p + 1) % motions.len()];
                 let other = other.unwrap_or(Jet::constant(f64::NAN));
-                if let (Action::Rod, Place::Drive(d)) = (&effect.action, place) {
+                if let (Some(Mechanics::Rod), Place::Drive(d)) = (effect.mechanics, place) {
                     let [second, first, mass] =
                         [0, 1, 2].map(|i| self.parameters[effect.terms[i].parameter.0]);
                     let ends = self.ends(d.0, [&poses, &displaced]);
                     add_rod(&mut balance, ends, [second, first, mass], &gravity);
+                }
+                if effect.mechanics.is_some() {
                     continue;
                 }
                 for term in &effect.terms {
@@ -639,7 +633,7 @@ pub fn along(coordinates: &[f64], i: usize) -> Vec<Jet> {
 
 /// Whether a coordinate is an angle.
 pub fn is_angle(mechanism: &Mechanism, coordinate: usize) -> bool {
-    mechanism.coordinates[coordinate].motion == Motion::Revolute
+    mechanism.coordinates[coordinate].motion.is_angle()
 }
 
 /// A rod as three particles along it that have its moments: jets do the rest.

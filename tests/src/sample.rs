@@ -1,7 +1,7 @@
 //! States of motion to evaluate a model at.
 
 use modelmill_codegen::{Evaluator, States};
-use modelmill_spec::{Mechanism, Motion};
+use modelmill_spec::Mechanism;
 
 use crate::fixtures::Table;
 use crate::stream::Stream;
@@ -24,9 +24,10 @@ impl Sample {
     pub fn random(mechanism: &Mechanism, n: usize, reach: f64, stream: &mut Stream) -> Self {
         let mut sample = Self::default();
         for coordinate in mechanism.coordinates.iter().filter(|c| !c.passive) {
-            let reach = match coordinate.motion {
-                Motion::Revolute => reach,
-                Motion::Prismatic => 0.5 * reach,
+            let reach = if coordinate.motion.is_angle() {
+                reach
+            } else {
+                0.5 * reach
             };
             let mut draw = |centre: f64, reach: f64| -> Vec<f64> {
                 (0..n)

@@ -1,6 +1,6 @@
 //! The same mechanism in another unit of length.
 
-use modelmill_spec::{Mechanism, Motion};
+use modelmill_spec::Mechanism;
 
 /// A mechanism all of whose lengths are `unit` times as long, under a name of its own.
 pub fn scaled(mechanism: &Mechanism, name: &str, unit: f64) -> Mechanism {
@@ -10,7 +10,7 @@ pub fn scaled(mechanism: &Mechanism, name: &str, unit: f64) -> Mechanism {
         constant.value *= unit;
     }
     for coordinate in &mut scaled.coordinates {
-        if coordinate.motion == Motion::Prismatic {
+        if !coordinate.motion.is_angle() {
             coordinate.nominal *= unit;
         }
     }

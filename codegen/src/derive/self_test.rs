@@ -1,7 +1,5 @@
 //! How far from the nominal pose an emitted self-test looks.
 
-use modelmill_spec::Motion;
-
 use crate::Derivation;
 use crate::loops::magnitude;
 
@@ -12,11 +10,12 @@ pub(crate) fn reaches(derivation: &Derivation) -> Vec<f64> {
     let mut graph = derivation.graph.clone();
     let size = magnitude::at_nominal(&mut graph, mechanism, residual);
     let (active, _) = derivation.coordinates();
-    let reach = |i: &usize| match (mechanism.coordinates[*i].motion, residual.is_empty()) {
-        (Motion::Revolute, true) => 3.0,
-        (Motion::Prismatic, true) => 0.5,
-        (Motion::Revolute, false) => 0.25,
-        (Motion::Prismatic, false) => 0.05 * size,
+    let is_open = residual.is_empty();
+    let reach = |i: &usize| match (mechanism.coordinates[*i].motion.is_angle(), is_open) {
+        (true, true) => 3.0,
+        (false, true) => 0.5,
+        (true, false) => 0.25,
+        (false, false) => 0.05 * size,
     };
     active.iter().map(reach).collect()
 }

@@ -6,7 +6,7 @@
 //! terms beside their sum the relative error of the forces is about `g` roundings of 1.1e-16 (N. J. Higham, "Accuracy and
 //! Stability of Numerical Algorithms", 2nd ed. 2002, 4.2).
 
-use modelmill_spec::{Mechanism, Motion};
+use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
 use super::{Evaluator, States};
@@ -207,9 +207,10 @@ impl State {
             .filter(|c| !c.passive)
             .collect();
         let q = active.iter().map(|c| {
-            let one = match c.motion {
-                Motion::Prismatic if c.nominal != 0.0 => c.nominal.abs(),
-                _ => 1.0,
+            let one = if c.motion.is_angle() || c.nominal == 0.0 {
+                1.0
+            } else {
+                c.nominal.abs()
             };
             c.nominal + reach * one * symmetric(stream)
         });

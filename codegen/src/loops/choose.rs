@@ -1,7 +1,7 @@
 //! For which coordinates loops that hang together may be solved one unknown at a time: a choice among all sets, made from
 //! which coordinates occur in which equations before anything is derived.
 
-use modelmill_spec::{Mechanism, Motion};
+use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
 use crate::expr::{Atom, ExprId, Graph, coordinates_of};
@@ -35,7 +35,7 @@ pub(crate) fn promising(
             let all = coordinates_of(graph, &[*e]);
             let slides: Vec<(u64, u64)> = all
                 .iter()
-                .filter(|c| mechanism.coordinates[**c].motion == Motion::Prismatic)
+                .filter(|c| !mechanism.coordinates[**c].motion.is_angle())
                 .map(|c| {
                     let slope = graph.differentiate(&[*e], Atom::Coordinate(*c));
                     (bit(c), mask(&coordinates_of(graph, &slope)))

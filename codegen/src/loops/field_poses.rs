@@ -2,7 +2,7 @@
 //! in the field.
 
 use modelmill_algebra::field::{Element, Number, Stream};
-use modelmill_spec::{Mechanism, Motion};
+use modelmill_spec::Mechanism;
 
 use super::solve_step::{Plan, SolveStep};
 use crate::DeriveError;
@@ -13,7 +13,7 @@ pub(crate) const MOST_DRAWS: usize = 4000;
 
 /// Draws poses that a plan solves for.
 pub(crate) struct FieldPoses {
-    coordinates: Vec<(usize, Motion)>,
+    coordinates: Vec<(usize, bool)>,
     n_constants: usize,
     /// Functions of constants that exist only for some of them.
     of_constants: Tape,
@@ -36,7 +36,7 @@ impl FieldPoses {
             .collect();
         let coordinates = mechanism.coordinates.iter().enumerate();
         Self {
-            coordinates: coordinates.map(|(i, c)| (i, c.motion)).collect(),
+            coordinates: coordinates.map(|(i, c)| (i, c.motion.is_angle())).collect(),
             n_constants: mechanism.constants.len(),
             of_constants: functions_of_constants(graph, &all),
             steps,
@@ -74,8 +74,8 @@ impl FieldPoses {
         stream: &mut Stream,
     ) -> FieldPoint<N> {
         let mut point = constants.extended();
-        for (i, motion) in &self.coordinates {
-            if *motion == Motion::Revolute {
+        for (i, is_angle) in &self.coordinates {
+            if *is_angle {
                 let angle = N::draw_circle(stream);
                 point.angles.insert(Atom::Coordinate(*i), angle);
             }

@@ -1,7 +1,7 @@
 //! Poses in floating point: loops closed by Newton's method from the nominal pose.
 
 use modelmill_algebra::field::Stream;
-use modelmill_spec::{Mechanism, Motion};
+use modelmill_spec::Mechanism;
 use nalgebra::{DMatrix, DVector};
 
 use crate::expr::{Atom, ExprId, F64, Graph, Tape};
@@ -37,9 +37,12 @@ impl<'a> NumericLoops<'a> {
         moved: &[usize],
     ) -> Self {
         let size = magnitude::at_nominal(graph, mechanism, residual);
-        let one = |i: usize| match mechanism.coordinates[i].motion {
-            Motion::Revolute => 1.0,
-            Motion::Prismatic => size,
+        let one = |i: usize| {
+            if mechanism.coordinates[i].motion.is_angle() {
+                1.0
+            } else {
+                size
+            }
         };
         let mut roots = residual.to_vec();
         for p in &unknown {

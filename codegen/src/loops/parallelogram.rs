@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use modelmill_algebra::field::{Element, Stream};
-use modelmill_spec::{Mechanism, Motion};
+use modelmill_spec::Mechanism;
 use nalgebra::{DMatrix, DVector};
 
 use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Node, Tape, coordinates_of};
@@ -197,9 +197,9 @@ fn turning(
     let others: Vec<usize> = given
         .iter()
         .copied()
-        .filter(|c| mechanism.coordinates[*c].motion == Motion::Revolute)
+        .filter(|c| mechanism.coordinates[*c].motion.is_angle())
         .collect();
-    if mechanism.coordinates[p].motion != Motion::Revolute {
+    if !mechanism.coordinates[p].motion.is_angle() {
         return None;
     }
     let (nominal, moved) = poses.split_first()?;

@@ -8,7 +8,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use modelmill_algebra::field::{Element, Stream};
-use modelmill_spec::{Mechanism, Motion};
+use modelmill_spec::Mechanism;
 
 use crate::expr::vector::{Turn, push_turn};
 use crate::expr::{
@@ -155,7 +155,7 @@ fn eliminable(
     order.into_iter().find_map(|(equation, all)| {
         let inside = all.intersection(left).copied();
         let slides: Vec<usize> = inside
-            .filter(|c| mechanism.coordinates[*c].motion == Motion::Prismatic)
+            .filter(|c| !mechanism.coordinates[*c].motion.is_angle())
             .collect();
         slides.into_iter().find_map(|slide| {
             let slope = graph.differentiate(&[*equation], Atom::Coordinate(slide))[0];
@@ -183,27 +183,25 @@ fn ways_for(
     coordinate: usize,
     own: &[ExprId],
 ) -> Vec<Way> {
-    let solved: Vec<Solved> = match mechanism.coordinates[coordinate].motion {
-        Motion::Prismatic => own
+    let solved: Vec<Solved> = if mechanism.coordinates[coordinate].motion.is_angle() {
+        let linear: Vec<Circular> = own
             .iter()
-            .filter_map(|e| slide(graph, mechanism, *e, coordinate))
-            .collect(),
-        Motion::Revolute => {
-            let linear: Vec<Circular> = own
-                .iter()
-                .filter_map(|e| Circular::from_equation(graph, *e, coordinate))
-                .collect();
-            let mut solved: Vec<Solved> = linear
-                .iter()
-                .filter_map(|e| e.solve(graph, mechanism, coordinate))
-                .collect();
-            for (i, first) in linear.iter().enumerate() {
-                for second in &linear[i + 1..] {
-                    solved.extend(both(graph, mechanism, first, second, coordinate));
-                }
+            .filter_map(|e| Circular::from_equation(graph, *e, coordinate))
+            .collect();
+        let mut solved: Vec<Solved> = linear
+            .iter()
+            .filter_map(|e| e.solve(graph, mechanism, coordinate))
+            .collect();
+        for (i, first) in linear.iter().enumerate() {
+            for second in &linear[i + 1..] {
+                solved.extend(both(graph, mechanism, first, second, coordinate));
             }
-            solved
         }
+        solved
+    } else {
+        own.iter()
+            .filter_map(|e| slide(graph, mechanism, *e, coordinate))
+            .collect()
     };
     let size = |graph: &Graph, solved: &Solved| {
         let mut roots: Vec<ExprId> = solved.angles.iter().flat_map(|(_, cs)| *cs).collect();

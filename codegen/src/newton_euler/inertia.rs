@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modelmill_spec::{Action, EffectTerm, Exact, Inertial, LumpedMass, Mechanism, Place, Point};
+use modelmill_spec::{EffectTerm, Exact, Inertial, LumpedMass, Mechanism, Place, Point};
 
 use crate::DeriveError;
 use crate::expr::{ExprId, Graph, Rational};
@@ -30,19 +30,15 @@ impl InertiaByProduct {
             by_product.add(graph, tree.link_of(lump.frame), elements);
         }
         for effect in &mechanism.effects {
-            if let Action::Bodies {
-                parts,
-                lumped_masses,
-            } = &effect.action
-            {
-                for part in parts {
-                    let elements = part_elements(graph, &part.inertial)?;
-                    by_product.add(graph, tree.link_of(part.frame), elements);
-                }
-                for lump in lumped_masses {
-                    let elements = lump_elements(graph, lump)?;
-                    by_product.add(graph, tree.link_of(lump.frame), elements);
-                }
+            for part in &effect.bodies.parts {
+                let elements = part_elements(graph, &part.inertial)?;
+                by_product.add(graph, tree.link_of(part.frame), elements);
+            }
+            for lump in &effect.bodies.lumped_masses {
+                let elements = lump_elements(graph, lump)?;
+                by_product.add(graph, tree.link_of(lump.frame), elements);
+            }
+            if effect.mechanics.is_some() {
                 continue;
             }
             for place in &effect.places {

@@ -9,7 +9,7 @@ mod scales;
 
 use std::collections::BTreeMap;
 
-use modelmill_spec::{Mechanism, Motion};
+use modelmill_spec::Mechanism;
 
 use crate::DeriveError;
 use crate::expr::{Atom, ExprId, Graph};
@@ -124,10 +124,7 @@ pub(crate) fn programs(
     let regressor = row_by_row(&regressor);
     let inverse_dynamics =
         cheapest::total(graph, mechanism, equations, &base_value, all_passes, &weigh)?;
-    let slides = mechanism
-        .coordinates
-        .iter()
-        .any(|c| c.motion != Motion::Revolute);
+    let slides = mechanism.coordinates.iter().any(|c| !c.motion.is_angle());
     let scale = (slides && !projection.loops.residual.is_empty()).then(|| {
         let scale = Size::from_residual(graph, mechanism, &projection.loops.residual).scale(graph);
         plain(graph, &[scale])

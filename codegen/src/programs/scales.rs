@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use modelmill_spec::{Mechanism, Motion};
+use modelmill_spec::Mechanism;
 
 use crate::expr::{ExprId, Graph, coordinates_of};
 use crate::loops::Loops;
@@ -28,9 +28,11 @@ pub(crate) fn scales(graph: &mut Graph, mechanism: &Mechanism, loops: &Loops) ->
     for i in loops.passive.iter().chain(&loops.active) {
         let rows = residuals.iter().zip(&of).filter(|(_, of)| of.contains(i));
         let rows: Vec<ExprId> = rows.map(|(scale, _)| *scale).collect();
-        scales.push(match mechanism.coordinates[*i].motion {
-            Motion::Revolute if !rows.is_empty() => Graph::ONE,
-            _ => graph.add_all(&rows),
+        let is_angle = mechanism.coordinates[*i].motion.is_angle();
+        scales.push(if is_angle && !rows.is_empty() {
+            Graph::ONE
+        } else {
+            graph.add_all(&rows)
         });
     }
     scales

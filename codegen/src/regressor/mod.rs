@@ -1,14 +1,13 @@
 //! The regressor H of eq. (4): one column per product of dynamic parameters, one row per drive.
 
 pub(crate) mod form;
+pub(crate) mod mechanics;
 pub(crate) mod projection;
-pub(crate) mod rod;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use modelmill_spec::{
-    Action, CoordinateIdx, DriveKind, Effect, EffectTerm, Mechanism, Motion as JointMotion, Place,
-    PlaceQuantity,
+    CoordinateIdx, DriveKind, Effect, EffectTerm, Mechanism, Place, PlaceQuantity,
 };
 
 use crate::DeriveError;
@@ -27,8 +26,8 @@ pub(crate) struct Equations {
     pub(crate) gravity: crate::expr::vector::Vector,
     pub(crate) inertia: InertiaByProduct,
     pub(crate) projection: Projection,
-    /// For every effect that is a rod, and each of its places: generalised forces of its three terms.
-    rods: BTreeMap<(usize, usize), [Vec<ExprId>; 3]>,
+    /// For every effect what [`mechanics::generalised_forces`] says of it.
+    of_mechanics: Vec<Vec<Vec<Vec<ExprId>>>>,
     /// Products of parameters that occur anywhere, in the order of eq. (5).
     pub(crate) products: Vec<Monomial>,
     /// `columns[k][d]`: force of drive `d` for product `k`.
@@ -54,20 +53,21 @@ pub(crate) fn equations(
     ];
     let inertia = InertiaByProduct::new(graph, mechanism, &tree)?;
     let projection = Projection::new(graph, mechanism, &tree)?;
-    let mut rods = BTreeMap::new();
-    for (e, effect) in mechanism.effects.iter().enumerate() {
-        for (p, place) in effect.places.iter().enumerate() {
-            if let (Action::Rod, Place::Drive(d)) = (&effect.action, place) {
-                let forces =
-                    rod::generalised_forces(graph, mechanism, &tree, &projection, &gravity, d.0)?;
-                rods.insert((e, p), forces);
-            }
-        }
+    let mut of_mechanics = Vec::new();
+    for effect in &mechanism.effects {
+        of_mechanics.push(mechanics::generalised_forces(
+            graph,
+            mechanism,
+            &tree,
+            &projection,
+            &gravity,
+            effect,
+        )?);
     }
     let mut products: BTreeSet<Monomial> = inertia.products();
     // Bodies of effects are among the inertia already.
-    let forces = |effect: &&Effect| matches!(effect.action, Action::Local | Action::Rod);
-    for effect in mechanism.effects.iter().filter(forces) {
+    let all = mechanism.effects.iter().zip(&of_mechanics);
+    for (effect, _) in all.filter(|(e, forces)| e.mechanics.is_none() || !forces.is_empty()) {
         products.extend(
             effect
                 .terms
@@ -81,7 +81,7 @@ pub(crate) fn equations(
         gravity,
         inertia,
         projection,
-        rods,
+        of_mechanics,
         products,
         columns: Vec::new(),
     };
@@ -187,18 +187,24 @@ impl Equations {
     ) -> Result<EffectForces, DeriveError> {
         let mut on_tree = vec![Graph::ZERO; mechanism.coordinates.len()];
         let mut on_drives = vec![Graph::ZERO; mechanism.drives.len()];
-        for (e, effect) in mechanism.effects.iter().enumerate() {
-            for (p, place) in effect.places.iter().enumerate() {
-                for (t, term) in effect.terms.iter().enumerate() {
-                    let value = value(&Monomial(vec![(term.parameter.0, 1)]));
-                    if value == Graph::ZERO {
-                        continue;
+        let value = |term: &EffectTerm| value(&Monomial(vec![(term.parameter.0, 1)]));
+        for (effect, of_mechanics) in mechanism.effects.iter().zip(&self.of_mechanics) {
+            for by_term in of_mechanics {
+                for (term, factors) in effect.terms.iter().zip(by_term) {
+                    let value = value(term);
+                    for (slot, factor) in on_tree.iter_mut().zip(factors) {
+                        let force = graph.mul(*factor, value);
+                        *slot = graph.add(*slot, force);
                     }
-                    if let Some(rod) = self.rods.get(&(e, p)) {
-                        for (slot, factor) in on_tree.iter_mut().zip(&rod[t]) {
-                            let force = graph.mul(*factor, value);
-                            *slot = graph.add(*slot, force);
-                        }
+                }
+            }
+            if effect.mechanics.is_some() {
+                continue;
+            }
+            for (p, place) in effect.places.iter().enumerate() {
+                for term in &effect.terms {
+                    let value = value(term);
+                    if value == Graph::ZERO {
                         continue;
                     }
                     let slot = match place {
@@ -291,5 +297,6 @@ fn turning(mechanism: &Mechanism, place: Place) -> Option<CoordinateIdx> {
         },
         Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => return None,
     };
-    (mechanism.coordinates[coordinate.0].motion == JointMotion::Revolute).then_some(coordinate)
+    let motion = mechanism.coordinates[coordinate.0].motion;
+    motion.is_angle().then_some(coordinate)
 }

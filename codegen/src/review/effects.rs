@@ -1,6 +1,6 @@
 //! Effects with what they add.
 
-use modelmill_spec::{Action, DriveKind, Effect, Mechanism, Place};
+use modelmill_spec::{DriveKind, Effect, Mechanism, Place};
 
 use super::document::{Document, Inline, Line, Table, cell, code, text};
 use crate::expr::Rational;
@@ -69,62 +69,43 @@ pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
     page.table("effects", Table { head, rows });
 }
 
-/// What an effect adds, as a formula where it is one.
+/// What an effect adds, as a formula where it is one, else in words.
 fn adds(mechanism: &Mechanism, effect: &Effect, each: &str, other: &str) -> Line {
     let names: Vec<Formula> = (effect.terms.iter())
         .map(|term| Formula::name(&*mechanism.parameters[term.parameter.0].name))
         .collect();
-    let listed = |lead: &str| -> Line {
-        let mut line = vec![text(lead)];
-        for (i, name) in names.iter().enumerate() {
-            if i > 0 {
-                line.push(text(", "));
-            }
-            line.push(Inline::Math(name.clone()));
-        }
-        line
+    let Some(mechanics) = effect.mechanics else {
+        let x = match effect.places.as_slice() {
+            [Place::Drive(d)] => match mechanism.drives[d.0].kind {
+                DriveKind::Joint(c) => &*mechanism.coordinates[c.0].name,
+                DriveKind::Linear { .. } => &*mechanism.drives[d.0].name,
+            },
+            [Place::Coordinate(c)] => &*mechanism.coordinates[c.0].name,
+            _ => each,
+        };
+        let terms = effect.terms.iter().zip(&names);
+        let sum = Formula::sum(terms.map(|(term, parameter)| {
+            let factor = exact_at(mechanism, &term.expression, [x, other]);
+            Formula::product(Rational::ONE, [parameter.clone(), factor])
+        }));
+        return cell(Inline::Math(sum));
     };
-    match &effect.action {
-        Action::Local => {
-            let x = match effect.places.as_slice() {
-                [Place::Drive(d)] => match mechanism.drives[d.0].kind {
-                    DriveKind::Joint(c) => &*mechanism.coordinates[c.0].name,
-                    DriveKind::Linear { .. } => &*mechanism.drives[d.0].name,
-                },
-                [Place::Coordinate(c)] => &*mechanism.coordinates[c.0].name,
-                _ => each,
-            };
-            let terms = effect.terms.iter().zip(&names);
-            let sum = Formula::sum(terms.map(|(term, parameter)| {
-                let factor = exact_at(mechanism, &term.expression, [x, other]);
-                Formula::product(Rational::ONE, [parameter.clone(), factor])
-            }));
-            cell(Inline::Math(sum))
+    let listed: Vec<(&str, Formula)> = if names.is_empty() {
+        let constants = effect.constants.iter().map(|(symbol, value)| {
+            let value = exact_at(mechanism, value, [each, other]);
+            (mechanics.constant_label(symbol), value)
+        });
+        constants.collect()
+    } else {
+        names.into_iter().map(|name| ("", name)).collect()
+    };
+    let mut line = vec![text(mechanics.lead())];
+    for (i, (label, formula)) in listed.into_iter().enumerate() {
+        let comma = if i == 0 { "" } else { ", " };
+        if i > 0 || !label.is_empty() {
+            line.push(text(format!("{comma}{label}")));
         }
-        Action::Rod => listed(
-            "a rod that turns about the first point and slides through the second; its second and first moment about \
-             the first point, and its mass: ",
-        ),
-        Action::Bodies { parts, .. } if parts.is_empty() => {
-            listed("the moments of lumped masses at the point where their forces act; the mass: ")
-        }
-        Action::Bodies { .. } => listed("differences of this part: "),
-        Action::Tilt => {
-            let mut line = vec![text("turns the base by ")];
-            for (i, (symbol, angle)) in effect.constants.iter().enumerate() {
-                let about = symbol.trim_start_matches('t');
-                let lead = if i == 0 { "" } else { ", " };
-                line.push(text(format!("{lead}{about}: ")));
-                line.push(Inline::Math(exact_at(mechanism, angle, [each, other])));
-            }
-            line
-        }
-        Action::Delay => {
-            let mut line = vec![text("lets forces be read later than they act, s: ")];
-            for (_, time) in &effect.constants {
-                line.push(Inline::Math(exact_at(mechanism, time, [each, other])));
-            }
-            line
-        }
+        line.push(Inline::Math(formula));
     }
+    line
 }

@@ -1,6 +1,6 @@
 //! Loops and drives: closure equations, how they are solved, and what the drives see.
 
-use modelmill_spec::{DriveKind, Mechanism, Motion};
+use modelmill_spec::{Carries, DriveKind, Mechanism};
 
 use super::document::{Block, Document, Equation, Inline, Line, Table, cell, code, text};
 use crate::expr::print::{Formula, angle_sum, formula, tree_size};
@@ -186,9 +186,9 @@ pub(super) fn drives(page: &mut Document, derivation: &Derivation) {
             let acts = match drive.kind {
                 DriveKind::Joint(i) => {
                     let coordinate = &mechanism.coordinates[i.0];
-                    let kind = match coordinate.motion {
-                        Motion::Revolute => "torque on ",
-                        Motion::Prismatic => "force on ",
+                    let kind = match coordinate.motion.carries() {
+                        Carries::Torque => "torque on ",
+                        _ => "force on ",
                     };
                     vec![text(kind), Inline::Math(Formula::name(&*coordinate.name))]
                 }

@@ -1,6 +1,6 @@
 //! What the model is, and the tables of its constants, parameters and coordinates.
 
-use modelmill_spec::{Mechanism, Motion};
+use modelmill_spec::Mechanism;
 
 use super::document::{Document, Inline, Table, cell, code, name, number, text, unit};
 use crate::Derivation;
@@ -94,9 +94,11 @@ pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
         .coordinates
         .iter()
         .map(|c| {
-            let (kind, in_unit) = match c.motion {
-                Motion::Revolute => ("angle", "rad"),
-                Motion::Prismatic => ("length", "m"),
+            let in_unit = c.motion.unit();
+            let kind = if c.motion.is_angle() {
+                "angle"
+            } else {
+                "length"
             };
             let role = if c.passive {
                 "passive, follows from the loops"

@@ -5,25 +5,25 @@ use crate::build::symbols::Symbols;
 use crate::diagnostic::{Diagnostic, Log};
 use crate::exact::CoordinateIdx;
 use crate::kind_terms::lacking_units;
-use crate::kinds::{Carries, acts_on, n_places};
-use crate::mechanism::{Drive, DriveIdx, DriveKind, LumpedMass, Motion, Part, PartIdx, Place};
+use crate::kinds::{ActsOn, Carries, n_places};
+use crate::mechanism::{Drive, DriveIdx, DriveKind, LumpedMass, Part, PartIdx, Place};
 use crate::record::OneOrMany;
 use crate::schema::EffectKindEntry;
 use crate::suggest;
-use crate::values::{Name, PlaceKind};
+use crate::values::Name;
 
 /// What an effect may act on, beside the coordinates.
-pub(super) struct Scene<'a> {
-    pub(super) drives: &'a [Drive],
-    pub(super) points: &'a Points,
-    pub(super) parts: &'a [Part],
-    pub(super) lumped_masses: &'a [LumpedMass],
+pub(crate) struct Scene<'a> {
+    pub(crate) drives: &'a [Drive],
+    pub(crate) points: &'a Points,
+    pub(crate) parts: &'a [Part],
+    pub(crate) lumped_masses: &'a [LumpedMass],
 }
 
 /// Finds a place by its name; where several things bear it, the one that the kind may act on.
 pub(super) fn place(
     name: &Name,
-    allowed: &[PlaceKind],
+    allowed: &[ActsOn],
     symbols: &Symbols,
     scene: &Scene<'_>,
     log: &mut Log,
@@ -33,15 +33,15 @@ pub(super) fn place(
         Some(Place::Part(PartIdx(at)))
     };
     let whole = match name.text.as_str() {
-        "base" => Some((PlaceKind::Base, Place::Base)),
-        "force" => Some((PlaceKind::Force, Place::Force)),
+        "base" => Some((ActsOn::Base, Place::Base)),
+        "force" => Some((ActsOn::Force, Place::Force)),
         _ => None,
     };
     // Parts and the whole have names of their own, which a drive or a point may bear as well: the kind tells.
     if let Some((_, place)) = whole.filter(|(sort, _)| allowed.contains(sort)) {
         return Some(place);
     }
-    if allowed.contains(&PlaceKind::Part)
+    if allowed.contains(&ActsOn::Part)
         && let Some(place) = part()
     {
         return Some(place);
@@ -68,15 +68,15 @@ pub(super) fn place(
     }
     let mut known: Vec<&str> = Vec::new();
     let expected = match allowed {
-        [PlaceKind::Part] => {
+        [ActsOn::Part] => {
             known.extend(scene.parts.iter().map(|part| part.name.as_str()));
             "the name of a part"
         }
-        [PlaceKind::Base] => {
+        [ActsOn::Base] => {
             known.push("base");
             "`base`"
         }
-        [PlaceKind::Force] => {
+        [ActsOn::Force] => {
             known.push("force");
             "`force`"
         }
@@ -109,33 +109,26 @@ pub(super) fn common_load(
     drives: &[Drive],
     log: &mut Log,
 ) -> Option<Carries> {
-    let motion = |idx: CoordinateIdx| match symbols.coordinates.get(idx.0).map(|one| one.motion) {
-        Some(Motion::Prismatic) => Carries::Force,
-        Some(Motion::Revolute) | None => Carries::Torque,
-    };
+    let carried = |kind: DriveKind| kind.carries(&symbols.coordinates);
     let names = &at.entries;
     let kind_name = kind.name.as_ref().map_or("", |name| name.text.as_str());
     let mut common: Option<Carries> = None;
     let mut fine = true;
     for (i, (name, place)) in names.iter().zip(places).enumerate() {
         let (sort, carries) = match place {
-            Place::Drive(idx) => match drives[idx.0].kind {
-                DriveKind::Joint(joint) => (PlaceKind::Drive, motion(joint)),
-                DriveKind::Linear { .. } => (PlaceKind::Drive, Carries::Force),
-            },
-            Place::Coordinate(idx) => (PlaceKind::Coordinate, motion(*idx)),
-            Place::Point(_) => (PlaceKind::Point, Carries::Mass),
-            Place::Part(_) => (PlaceKind::Part, Carries::Elsewhere),
-            Place::Base => (PlaceKind::Base, Carries::Elsewhere),
-            Place::Force => (PlaceKind::Force, Carries::Elsewhere),
+            Place::Drive(idx) => (ActsOn::Drive, carried(drives[idx.0].kind)),
+            Place::Coordinate(idx) => (ActsOn::Coordinate, carried(DriveKind::Joint(*idx))),
+            Place::Point(_) => (ActsOn::Point, Carries::Mass),
+            Place::Part(_) => (ActsOn::Part, Carries::Elsewhere),
+            Place::Base => (ActsOn::Base, Carries::Elsewhere),
+            Place::Force => (ActsOn::Force, Carries::Elsewhere),
         };
-        let word = |sort: PlaceKind| acts_on(sort).words();
-        let allowed: Vec<PlaceKind> = kind.on.iter().flat_map(|on| on.entries.clone()).collect();
+        let allowed: Vec<ActsOn> = kind.on.iter().flat_map(|on| on.entries.clone()).collect();
         if !allowed.contains(&sort) {
-            let list: Vec<&str> = allowed.iter().map(|sort| word(*sort)).collect();
+            let list: Vec<&str> = allowed.iter().map(|sort| sort.words()).collect();
             log.push(
                 Diagnostic::error(name.span, format!("`{kind_name}` cannot act here"))
-                    .label(format!("this is {}", word(sort)))
+                    .label(format!("this is {}", sort.words()))
                     .help(format!("`{kind_name}` acts on {}", list.join(" or "))),
             );
             fine = false;

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use crate::build::bodies::check_unique;
 use crate::build::effect_places::{Scene, common_load, place};
 use crate::build::frames::twice;
-use crate::build::mechanics;
 use crate::build::symbols::{Shared, Symbols};
 use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::document::Key;
@@ -13,13 +12,14 @@ use crate::exact::{Exact, ParameterIdx};
 use crate::finite::{self, Why};
 use crate::formula::AstKind;
 use crate::kind_terms::{factors, unit_at};
-use crate::kinds::{Carries, check, library_entries, n_places};
-use crate::mechanism::{Action, Effect, EffectTerm, Parameter, Place};
+use crate::kinds::{ActsOn, Carries, Sign, check, library_entries, n_places};
+use crate::mechanics::Mechanics;
+use crate::mechanism::{Bodies, Effect, EffectTerm, Parameter, Place};
 use crate::schema::{EffectEntry, EffectKindEntry, KindParameterEntry, ModelEntry};
 use crate::scope::{Sort, Wanted};
 use crate::suggest;
 use crate::unit::{Dimension, Unit};
-use crate::values::{MechanicsName, Name, PlaceKind, SignName};
+use crate::values::Name;
 
 /// Reads the effects; their parameters join those of the file.
 pub(super) fn effects(
@@ -51,17 +51,18 @@ pub(super) fn effects(
         .collect()
 }
 
-/// Reports a second tilt or delay: each is one property of the whole.
+/// Reports what is one property of the whole, such as a tilt, and acts twice.
 fn check_single<'a>(
     entries: impl Iterator<Item = &'a EffectEntry>,
     kinds: &Kinds<'_>,
     log: &mut Log,
 ) {
-    let mut seen: Vec<(MechanicsName, Span)> = Vec::new();
+    let mut seen: Vec<(Mechanics, Span)> = Vec::new();
     for name in entries.filter_map(|entry| entry.kind.as_ref()) {
-        let Some(way @ (MechanicsName::Tilt | MechanicsName::Delay)) = kinds
-            .get(name.text.as_str())
+        let kind = kinds.get(name.text.as_str());
+        let Some(way) = kind
             .and_then(|(kind, _)| kind.mechanics)
+            .filter(|way| way.is_of_the_whole())
         else {
             continue;
         };
@@ -187,7 +188,7 @@ fn effect(
         .kind
         .as_ref()
         .and_then(|name| kinds.get(name.text.as_str()));
-    let allowed: &[PlaceKind] = known
+    let allowed: &[ActsOn] = known
         .and_then(|(kind, _)| kind.on.as_ref())
         .map_or(&[], |on| on.entries.as_slice());
     let places: Vec<Place> = at
@@ -230,10 +231,15 @@ fn effect(
     let shapes = match kind.mechanics {
         None => factors(kind, carries, &constants, log)?,
         Some(way) => {
-            mechanics::check_places(way, &at.entries, &places, scene, log)?;
-            if way == MechanicsName::Tilt {
-                constants = mechanics::named_tilt(constants, kind_name, symbols, log)?;
+            let before = log.n_errors();
+            for (name, place) in at.entries.iter().zip(&places) {
+                way.entry().check_place(name, *place, scene, log);
             }
+            if log.n_errors() > before {
+                return None;
+            }
+            let entry = way.entry();
+            constants = entry.named_constants(constants, kind_name, symbols, log)?;
             Vec::new()
         }
     };
@@ -243,14 +249,16 @@ fn effect(
         .map(|name| name.text.as_str())
         .collect::<Vec<_>>()
         .join("_");
-    let parts_own = mechanics::declared(kind.mechanics, &places, scene);
+    let own = kind.mechanics.zip(places.first());
+    let own =
+        own.and_then(|(way, place)| Some((way, way.entry().parameters_at(*place, scene.parts)?)));
     let mut terms = Vec::new();
     let parameters = kind.parameters.iter().flat_map(|table| &table.entries);
     for (i, (key, parameter)) in parameters.enumerate() {
-        if let Some(declared) = &parts_own
-            && !declared.contains(&key.name.as_str())
+        if let Some((way, those)) = &own
+            && !those.contains(&key.name.as_str())
         {
-            mechanics::refuse_undeclared(entry, &key.name, declared, log);
+            way.entry().refuse_parameter(entry, &key.name, those, log);
             continue;
         }
         let unit = unit_at(parameter.unit.as_ref(), carries)?;
@@ -260,16 +268,20 @@ fn effect(
             expression: shapes.get(i).cloned().unwrap_or_else(Exact::one),
         });
     }
-    let action = match kind.mechanics {
-        None => Action::Local,
-        Some(way) => mechanics::action(way, &mut terms, &places, scene),
-    };
+    let mut bodies = Bodies::default();
+    if let Some(way) = kind.mechanics.map(Mechanics::entry) {
+        // A file of one's own may list them in another order.
+        let listed = way.parameters().iter().map(|(symbol, _)| *symbol);
+        terms.sort_by_key(|term| listed.clone().position(|symbol| symbol == term.symbol));
+        bodies = way.bodies(&terms, &places, scene);
+    }
     (log.n_errors() == before).then(|| Effect {
         kind: kind_name.text.clone(),
         places,
-        action,
+        mechanics: kind.mechanics,
         terms,
         constants,
+        bodies,
     })
 }
 
@@ -335,11 +347,11 @@ fn term_parameter(
 }
 
 /// Warns of a nominal value whose sign makes no physical sense.
-fn warn_of_sign(parameter: &Parameter, sign: Option<SignName>, span: Span, log: &mut Log) {
+fn warn_of_sign(parameter: &Parameter, sign: Option<Sign>, span: Span, log: &mut Log) {
     let value = parameter.nominal;
     let expected = match sign {
-        Some(SignName::Positive) if value < 0.0 => "positive",
-        Some(SignName::Negative) if value > 0.0 => "negative",
+        Some(Sign::Positive) if value < 0.0 => "positive",
+        Some(Sign::Negative) if value > 0.0 => "negative",
         _ => return,
     };
     log.push(

@@ -366,8 +366,8 @@ fn without_zeros(steps: Vec<Step>) -> Vec<Step> {
 }
 
 /// The points with their names.
-pub(super) struct Points {
-    pub(super) points: Vec<Point>,
+pub(crate) struct Points {
+    pub(crate) points: Vec<Point>,
     names: BTreeMap<String, PointIdx>,
 }
 

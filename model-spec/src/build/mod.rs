@@ -5,18 +5,18 @@
 
 mod actuation;
 mod bodies;
-mod effect_places;
+pub(crate) mod effect_places;
 mod effects;
 mod frames;
 mod joints;
 mod limits;
-mod mechanics;
 mod retain;
-mod symbols;
+pub(crate) mod symbols;
 
 use crate::build::effect_places::Scene;
 use crate::diagnostic::{Log, Span};
 use crate::kinds::{EffectKind, describe, library_entries};
+use crate::mechanics;
 use crate::mechanism::{Mechanism, Recording};
 use crate::pose;
 use crate::schema::{EffectKindEntry, ModelEntry};

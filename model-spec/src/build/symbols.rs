@@ -6,7 +6,8 @@ use crate::build::Places;
 use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::exact::{ConstantIdx, CoordinateIdx, Exact, ParameterIdx, Symbol};
 use crate::formula::{Ast, AstKind, Formula};
-use crate::mechanism::{Constant, Coordinate, Motion, Parameter};
+use crate::joint_motion::Motion;
+use crate::mechanism::{Constant, Coordinate, Parameter};
 use crate::schema::{LinearEntry, LinearNominalEntry, ModelEntry};
 use crate::scope::{Meaning, Scope, Sort, Wanted, meaning};
 use crate::unit::Dimension;
@@ -16,9 +17,9 @@ use crate::values::Vector;
 const MOST_COORDINATES: usize = 100;
 
 /// What the names of a file stand for.
-pub(super) struct Symbols {
-    pub(super) scope: Scope,
-    pub(super) constants: Vec<Constant>,
+pub(crate) struct Symbols {
+    pub(crate) scope: Scope,
+    pub(crate) constants: Vec<Constant>,
     pub(super) parameters: Vec<Parameter>,
     /// Where each parameter got its nominal value; those of effects and shorthands may get one later.
     pub(super) nominal_given: Vec<Option<Span>>,
@@ -386,17 +387,16 @@ fn declare_coordinates(
                 None
             }
         };
-        let dimension = motion.map(|motion| match motion {
-            Motion::Revolute => Dimension::ONE,
-            Motion::Prismatic => Dimension::LENGTH,
-        });
+        let dimension = motion.map(Motion::dimension);
         let motion = motion.unwrap_or(Motion::Revolute);
-        let unit = match motion {
-            Motion::Revolute => "rad",
-            Motion::Prismatic => "m",
-        };
         let symbol = Symbol::Coordinate(CoordinateIdx(symbols.coordinates.len()));
-        let meaning = meaning(Sort::Coordinate, symbol, dimension, unit, Some(key.span));
+        let meaning = meaning(
+            Sort::Coordinate,
+            symbol,
+            dimension,
+            motion.unit(),
+            Some(key.span),
+        );
         if symbols.scope.declare(&key.name, meaning, log) {
             places.coordinates.push(key.span);
             symbols.coordinates.push(Coordinate {

@@ -2,7 +2,7 @@
 //! forces point the other way or are in another unit come out, with the option that mends it. A fit alone does not show
 //! either, since parameters may take any sign and size.
 
-use modelmill_spec::{Drive, DriveKind, Mechanism, Motion};
+use modelmill_spec::{Drive, Mechanism};
 
 /// Below this correlation with the nominal forces nothing is said: friction and wrong nominal values may be behind it.
 const CLEAR: f64 = 0.8;
@@ -80,7 +80,7 @@ fn says(mechanism: &Mechanism, drives: &[&Drive], which: Oddity, file: &str) -> 
                 Oddity::TooSmall => {
                     format!(
                         "option `columns` = `{name}={name} [k{}]`",
-                        unit(mechanism, drive)
+                        drive.kind.force_unit(&mechanism.coordinates)
                     )
                 }
                 Oddity::TooLarge => format!("option `columns` = `{name}={name}/1000`"),
@@ -97,13 +97,6 @@ fn says(mechanism: &Mechanism, drives: &[&Drive], which: Oddity, file: &str) -> 
         names.join(", "),
         maps.join(" ")
     )
-}
-
-fn unit(mechanism: &Mechanism, drive: &Drive) -> &'static str {
-    match drive.kind {
-        DriveKind::Joint(i) if mechanism.coordinates[i.0].motion == Motion::Revolute => "N m",
-        _ => "N",
-    }
 }
 
 #[cfg(test)]

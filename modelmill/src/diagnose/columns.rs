@@ -70,7 +70,7 @@ pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) ->
     for (k, entry) in candidates.entries.iter().enumerate() {
         if let Some((candidate, felt)) = candidate(candidates, entry, &found, &grids) {
             made.push(candidate);
-            origins.push(Origin::Entry(k, felt));
+            origins.push(Some((k, felt)));
         } else if entry
             .singles
             .iter()
@@ -89,7 +89,7 @@ pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) ->
             };
             let parameters = tilt.axes.iter().map(angle).collect();
             made.push(changed(candidates, change, parameters, Source::Tilt(tilt)));
-            origins.push(Origin::Tilt);
+            origins.push(None);
         }
     }
     if let Some(change) = &candidates.delay {
@@ -99,7 +99,7 @@ pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) ->
             sign: Sign::Any,
         };
         made.push(changed(candidates, change, vec![parameter], Source::Delay));
-        origins.push(Origin::Delay);
+        origins.push(None);
     }
     Ok(Made {
         candidates: made,
@@ -155,16 +155,9 @@ pub(crate) struct Made {
     pub(crate) undefined: Vec<Effect>,
 }
 
-/// Where a candidate comes from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Origin {
-    /// An entry of the candidates, and which of its parameters have an effect.
-    Entry(usize, Vec<bool>),
-    /// A tilt of the base.
-    Tilt,
-    /// A delay of the forces.
-    Delay,
-}
+/// The entry of the candidates that a candidate in numbers comes from, and which of its parameters have an effect; `None`
+/// where it changes the model rather than adds columns.
+pub(crate) type Origin = Option<(usize, Vec<bool>)>;
 
 fn changed(
     candidates: &Candidates,
@@ -345,11 +338,7 @@ fn candidate(
 
 /// Whether what a kind adds is part of what the drives carry.
 fn is_part_of_load(kind: &EffectKind) -> bool {
-    kind.on.contains(&ActsOn::Point)
-        || matches!(
-            kind.mechanics,
-            Some(Mechanics::Rod | Mechanics::Part | Mechanics::Placement | Mechanics::Tilt)
-        )
+    kind.on.contains(&ActsOn::Point) || kind.mechanics.is_some_and(Mechanics::is_part_of_load)
 }
 
 /// Columns of all candidates that depend on what the drives carry, for loads that are stacked and decimated like the forces.

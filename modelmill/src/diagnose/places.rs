@@ -1,8 +1,7 @@
 //! Places at which effects of a kind may act, alone, in pairs, and alike at several.
 
 use modelmill_spec::{
-    ActsOn, Carries, DriveIdx, DriveKind, EffectKind, Exact, Inertial, Mechanics, Mechanism,
-    Motion, PartIdx, Place, PointIdx, Symbol,
+    ActsOn, Carries, DriveIdx, DriveKind, EffectKind, Mechanism, PartIdx, Place, PointIdx,
 };
 
 /// A place with its name and what it carries.
@@ -16,10 +15,6 @@ pub(crate) struct Spot {
 
 /// All places of a mechanism.
 pub(crate) fn spots(mechanism: &Mechanism) -> Vec<Spot> {
-    let carries = |motion: Motion| match motion {
-        Motion::Revolute => Carries::Torque,
-        Motion::Prismatic => Carries::Force,
-    };
     let spot = |name: &str, carries: Carries, sort: ActsOn, place: Place| Spot {
         name: name.to_owned(),
         carries,
@@ -29,13 +24,10 @@ pub(crate) fn spots(mechanism: &Mechanism) -> Vec<Spot> {
     let mut spots = Vec::new();
     let mut driven = Vec::new();
     for (d, drive) in mechanism.drives.iter().enumerate() {
-        let carries = match drive.kind {
-            DriveKind::Joint(i) => {
-                driven.push(i.0);
-                carries(mechanism.coordinates[i.0].motion)
-            }
-            DriveKind::Linear { .. } => Carries::Force,
-        };
+        if let DriveKind::Joint(i) = drive.kind {
+            driven.push(i.0);
+        }
+        let carries = drive.kind.carries(&mechanism.coordinates);
         let place = Place::Drive(DriveIdx(d));
         spots.push(spot(&drive.name, carries, ActsOn::Drive, place));
     }
@@ -43,7 +35,7 @@ pub(crate) fn spots(mechanism: &Mechanism) -> Vec<Spot> {
     for (i, coordinate) in mechanism.coordinates.iter().enumerate() {
         if !driven.contains(&i) {
             let place = Place::Coordinate(modelmill_spec::CoordinateIdx(i));
-            let carries = carries(coordinate.motion);
+            let carries = coordinate.motion.carries();
             spots.push(spot(&coordinate.name, carries, ActsOn::Coordinate, place));
         }
     }
@@ -75,20 +67,17 @@ pub(crate) fn fits(mechanism: &Mechanism, kind: &EffectKind, spot: &Spot) -> boo
     if !kind.on.contains(&spot.sort) {
         return false;
     }
-    match (kind.mechanics, spot.place) {
-        (Some(Mechanics::Rod), Place::Drive(d)) => {
-            matches!(mechanism.drives[d.0].kind, DriveKind::Linear { .. })
-        }
-        (Some(Mechanics::Placement), Place::Point(p)) => !displaced(mechanism, p).is_empty(),
-        (Some(Mechanics::Part), Place::Part(p)) => is_tied(mechanism, p),
-        (Some(Mechanics::Tilt | Mechanics::Delay), _) => true,
+    if let Some(mechanics) = kind.mechanics {
+        return mechanics.has_effect_at(mechanism, spot.place);
+    }
+    match spot.place {
         // Of the points that a loop joins one is enough.
-        (None, Place::Point(p)) => {
+        Place::Point(p) => {
             let mut loops = mechanism.loops.iter();
             has_units && loops.all(|l| l.joins[1] != p)
         }
         // Waves along the travel come from drives.
-        (None, Place::Coordinate(_)) => has_units && !is_wave(kind),
+        Place::Coordinate(_) => has_units && !is_wave(kind),
         _ => has_units,
     }
 }
@@ -105,41 +94,6 @@ pub(crate) fn is_wave(kind: &EffectKind) -> bool {
             })
         )
     })
-}
-
-/// Masses of the lumped masses at a point whose moments are taken elsewhere.
-fn displaced(mechanism: &Mechanism, point: PointIdx) -> Vec<&Exact> {
-    let point = &mechanism.points[point.0];
-    let masses = mechanism.lumped_masses.iter().filter(|lump| {
-        lump.frame == point.frame && lump.force_at == point.at && lump.moment_at != lump.force_at
-    });
-    masses.map(|lump| &lump.mass).collect()
-}
-
-/// Whether a part shares its parameters with another one.
-fn is_tied(mechanism: &Mechanism, part: PartIdx) -> bool {
-    let parameters = |inertial: &Inertial| {
-        let (Inertial::AboutCentre { mass, inertia, .. } | Inertial::Linear { mass, inertia, .. }) =
-            inertial;
-        let mut found = Vec::new();
-        for exact in std::iter::once(mass).chain(inertia) {
-            exact.for_each_symbol(&mut |symbol| {
-                if let Symbol::Parameter(p) = symbol {
-                    found.push(p);
-                }
-            });
-        }
-        found
-    };
-    let own = parameters(&mechanism.parts[part.0].inertial);
-    let mut others = mechanism.parts.iter().enumerate();
-    let tied = others.any(|(i, other)| {
-        let theirs = parameters(&other.inertial);
-        i != part.0 && own.iter().any(|p| theirs.contains(p))
-    });
-    let names = mechanism.parts.iter();
-    let same = |other: &&modelmill_spec::Part| other.name == mechanism.parts[part.0].name;
-    tied && names.filter(same).count() == 1
 }
 
 /// Sets of places at which a kind may act with shared parameters, and how each is to be written: one effect at all of them,
@@ -165,22 +119,11 @@ pub(crate) fn sets<'a>(
         let sets = (0..pairs.len()).map(|k| vec![k]).collect();
         return (pairs, sets);
     }
-    if kind.mechanics == Some(Mechanics::Placement) {
-        // Shares of one mass are misplaced together.
-        let mut groups: Vec<(Vec<&Exact>, Vec<&Spot>)> = Vec::new();
-        for spot in spots {
-            let Place::Point(p) = spot.place else {
-                continue;
-            };
-            let masses = displaced(mechanism, p);
-            match groups.iter_mut().find(|(known, _)| *known == masses) {
-                Some((_, group)) => group.push(spot),
-                None => groups.push((masses, vec![spot])),
-            }
-        }
-        let groups: Vec<Vec<&Spot>> = groups.into_iter().map(|(_, group)| group).collect();
+    let places: Vec<Place> = spots.iter().map(|spot| spot.place).collect();
+    if let Some(groups) = (kind.mechanics).and_then(|one| one.groups(mechanism, &places)) {
         let sets = (0..groups.len()).map(|k| vec![k]).collect();
-        return (groups, sets);
+        let of_group = |group: Vec<usize>| group.into_iter().map(|i| spots[i]).collect();
+        return (groups.into_iter().map(of_group).collect(), sets);
     }
     let singles: Vec<Vec<&Spot>> = spots.iter().map(|spot| vec![*spot]).collect();
     let mut sets: Vec<Vec<usize>> = (0..singles.len()).map(|k| vec![k]).collect();

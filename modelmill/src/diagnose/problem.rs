@@ -94,9 +94,7 @@ struct Made<'a> {
 
 impl Supply for Made<'_> {
     fn finer(&self, candidate: usize, constant: f64) -> Option<Vec<Column>> {
-        let Origin::Entry(k, felt) = &self.origins[candidate] else {
-            return None;
-        };
+        let (k, felt) = self.origins[candidate].as_ref()?;
         let entry = &self.candidates.entries[*k];
         let columns = finer(self.candidates, self.model, self.all, entry, constant)?;
         let kept = columns.into_iter().zip(felt).filter(|(_, felt)| **felt);
@@ -107,7 +105,7 @@ impl Supply for Made<'_> {
         // Poses without answer were reported when the recordings were evaluated for the first time.
         let made = carried(self.candidates, self.model, self.all, load).unwrap_or_default();
         let place = |entry: usize| {
-            let is_its = |origin: &Origin| matches!(origin, Origin::Entry(k, _) if *k == entry);
+            let is_its = |origin: &Origin| origin.as_ref().is_some_and(|(k, _)| *k == entry);
             self.origins.iter().position(is_its)
         };
         made.into_iter()

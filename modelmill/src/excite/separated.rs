@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use modelmill_identify::Note;
 use modelmill_identify::diagnose::Effect;
 use modelmill_identify::excite::{CoordinateLimits, Options, random_motions};
-use modelmill_spec::Motion as Joint;
+use modelmill_spec::Carries;
 use serde_json::{Map, Value, json};
 
 use crate::diagnose::words;
@@ -202,16 +202,11 @@ impl Asked {
 /// What forces of a model are measured in.
 pub(crate) fn unit(model: &Model) -> &'static str {
     let mechanism = &model.derivation.mechanism;
-    let is_force = |drive: &modelmill_spec::Drive| match drive.kind {
-        modelmill_spec::DriveKind::Joint(i) => {
-            mechanism.coordinates[i.0].motion == Joint::Prismatic
-        }
-        modelmill_spec::DriveKind::Linear { .. } => true,
-    };
+    let carries = |drive: &modelmill_spec::Drive| drive.kind.carries(&mechanism.coordinates);
     let forces = mechanism
         .drives
         .iter()
-        .filter(|drive| is_force(drive))
+        .filter(|drive| carries(drive) == Carries::Force)
         .count();
     match forces {
         0 => "N m",

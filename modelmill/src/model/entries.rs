@@ -1,8 +1,8 @@
 //! The entries of a model as pairs of a name and a text, so that two models can be compared.
 
 use modelmill_spec::{
-    Action, Angle, Axis, Convention, DriveKind, Effect, Exact, Inertial, Length, Mechanism, Motion,
-    Place, PlaceQuantity, Step, Symbol,
+    Angle, Axis, Convention, DriveKind, Effect, Exact, Inertial, Length, Mechanism, Place,
+    PlaceQuantity, Step, Symbol,
 };
 
 /// Entries as they are collected.
@@ -41,10 +41,7 @@ fn quantities(m: &Mechanism, entries: &mut Entries) {
         entries.add("parameter", &p.name, format!("{} {}", p.nominal, p.unit));
     }
     for c in &m.coordinates {
-        let motion = match c.motion {
-            Motion::Revolute => "revolute",
-            Motion::Prismatic => "prismatic",
-        };
+        let motion = c.motion.name();
         let passive = if c.passive { ", passive" } else { "" };
         let what = format!("{motion}{passive}, nominal {}", c.nominal);
         entries.add("coordinate", &c.name, what);
@@ -258,7 +255,7 @@ fn at_place(m: &Mechanism, effect: &Effect, symbol: Symbol) -> String {
 }
 
 fn terms(m: &Mechanism, effect: &Effect) -> String {
-    if !matches!(effect.action, Action::Local) {
+    if effect.mechanics.is_some() {
         let names = effect.terms.iter().map(|term| {
             let parameter = &m.parameters[term.parameter.0];
             format!("{} {}", term.symbol, parameter.name)

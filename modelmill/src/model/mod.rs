@@ -15,7 +15,7 @@ use modelmill_codegen::{BaseParameter, Derivation, Monomial};
 use modelmill_identify::estimate::Belief;
 use modelmill_identify::{Note, ParameterInfo};
 use modelmill_spec::{
-    EffectKind, Exact, Inertial, Mechanism, Motion, ParameterIdx, PlaceQuantity, Sign, Symbol,
+    EffectKind, Exact, Inertial, Mechanism, ParameterIdx, PlaceQuantity, Sign, Symbol,
 };
 
 use crate::error::{Error, Outcome};
@@ -248,7 +248,7 @@ impl Model {
         let coordinates = self.derivation.mechanism.coordinates.iter();
         coordinates
             .filter(|c| !c.passive)
-            .map(|c| (c.name.clone(), c.motion == Motion::Revolute))
+            .map(|c| (c.name.clone(), c.motion.is_angle()))
             .collect()
     }
 

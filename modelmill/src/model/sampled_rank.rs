@@ -7,7 +7,6 @@ use std::cmp::Ordering;
 use modelmill_codegen::review::NumericRank;
 use modelmill_codegen::{Evaluator, Method, PoseFault, PoseReason, States};
 use modelmill_identify::estimate::{condition_number, numeric_rank};
-use modelmill_spec::Motion;
 use nalgebra::DMatrix;
 
 use crate::error::Outcome;
@@ -231,7 +230,7 @@ fn stacked(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
 /// Random states at which the mechanism can stand.
 struct Sampling {
     /// Nominal values and motions of the active coordinates.
-    active: Vec<(f64, Motion)>,
+    active: Vec<(f64, bool)>,
     n_drives: usize,
     draws: Draws,
     /// Positions, rates, accelerations and loads, each as columns of samples.
@@ -246,9 +245,9 @@ struct Sampling {
 impl Sampling {
     fn new(model: &Model, n_drives: usize) -> Self {
         let coordinates = model.derivation.mechanism.coordinates.iter();
-        let active: Vec<(f64, Motion)> = coordinates
+        let active: Vec<(f64, bool)> = coordinates
             .filter(|c| !c.passive)
-            .map(|c| (c.nominal, c.motion))
+            .map(|c| (c.nominal, c.motion.is_angle()))
             .collect();
         let n = active.len();
         Self {
@@ -271,10 +270,11 @@ impl Sampling {
             let q: Vec<f64> = self
                 .active
                 .iter()
-                .map(|(nominal, motion)| {
-                    let reach = match motion {
-                        Motion::Revolute => self.reach,
-                        Motion::Prismatic => 0.5 * self.reach,
+                .map(|(nominal, is_angle)| {
+                    let reach = if *is_angle {
+                        self.reach
+                    } else {
+                        0.5 * self.reach
                     };
                     nominal + reach * self.draws.next()
                 })

@@ -196,12 +196,15 @@ fn reduction(reduction: &Reduction) -> Value {
 }
 
 fn joint(motion: Motion, name: &str, passive: bool) -> String {
-    match (motion, passive) {
-        (Motion::Revolute, false) => name.to_owned(),
-        (Motion::Revolute, true) => format!("{name} (passive)"),
-        (Motion::Prismatic, false) => format!("{name} (prismatic)"),
-        (Motion::Prismatic, true) => format!("{name} (prismatic, passive)"),
+    let unusual = (motion != Motion::Revolute).then(|| motion.name());
+    let remarks: Vec<&str> = unusual
+        .into_iter()
+        .chain(passive.then_some("passive"))
+        .collect();
+    if remarks.is_empty() {
+        return name.to_owned();
     }
+    format!("{name} ({})", remarks.join(", "))
 }
 
 fn drives(m: &Mechanism) -> Vec<String> {

@@ -1,16 +1,12 @@
 //! Units of what a model's recordings hold.
 
-use modelmill_spec::{DriveKind, Motion};
-
 use crate::model::Model;
 
 /// Unit of a drive's force.
 pub(crate) fn force_unit(model: &Model, drive: usize) -> &'static str {
     let mechanism = &model.derivation.mechanism;
-    match mechanism.drives[drive].kind {
-        DriveKind::Joint(i) if mechanism.coordinates[i.0].motion == Motion::Revolute => "N m",
-        _ => "N",
-    }
+    let kind = mechanism.drives[drive].kind;
+    kind.force_unit(&mechanism.coordinates)
 }
 
 /// Unit of a variable by its name: a coordinate or the length of a drive, their rates and accelerations, a force, the time.
@@ -31,10 +27,7 @@ pub(crate) fn variable_unit(model: &Model, name: &str) -> String {
     };
     let of = of.strip_suffix("_length").unwrap_or(of);
     let coordinate = mechanism.coordinates.iter().find(|c| c.name == of);
-    let unit = match coordinate {
-        Some(c) if c.motion == Motion::Revolute => "rad",
-        _ => "m",
-    };
+    let unit = coordinate.map_or("m", |c| c.motion.unit());
     format!("{unit}{per}")
 }
 

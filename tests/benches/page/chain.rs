@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use modelmill_spec::{
-    Action, Axis, CoordinateIdx, DriveKind, Exact, FrameIdx, Inertial, LumpedMass, Mechanism, Part,
-    Step, Symbol,
+    Axis, CoordinateIdx, DriveKind, Exact, FrameIdx, Inertial, LumpedMass, Mechanism, Part, Step,
+    Symbol,
 };
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
@@ -85,8 +85,7 @@ impl Chain {
         {
             return Err("a drive acts between points".to_owned());
         }
-        let local = |action: &Action| matches!(action, Action::Local);
-        if !mechanism.effects.iter().all(|e| local(&e.action)) {
+        if mechanism.effects.iter().any(|e| e.mechanics.is_some()) {
             return Err("its effects have mechanics of their own".to_owned());
         }
         let value = |symbol: Symbol| match symbol {

@@ -7,7 +7,7 @@ pub use planar_loop::{planar_loop, regularity_at};
 pub use tree::tree;
 
 use modelmill_spec::{
-    Action, Axis, Constant, ConstantIdx, Convention, Coordinate, CoordinateIdx, Drive, DriveIdx,
+    Axis, Bodies, Constant, ConstantIdx, Convention, Coordinate, CoordinateIdx, Drive, DriveIdx,
     DriveKind, Effect, EffectTerm, Exact, Frame, FrameIdx, Function, Inertial, Length, Limits,
     LumpedMass, Mechanism, Motion, Parameter, ParameterIdx, Part, Place, PlaceQuantity, Point,
     PointIdx, Recording, Step, Symbol,
@@ -114,9 +114,10 @@ impl Draft {
 
     fn coordinate(&mut self, motion: Motion) -> CoordinateIdx {
         let i = self.mechanism.coordinates.len();
-        let nominal = match motion {
-            Motion::Revolute => self.stream.between(-3.0, 3.0),
-            Motion::Prismatic => self.stream.between(0.2, 1.2),
+        let nominal = if motion.is_angle() {
+            self.stream.between(-3.0, 3.0)
+        } else {
+            self.stream.between(0.2, 1.2)
         };
         self.mechanism.coordinates.push(Coordinate {
             name: format!("q{i}"),
@@ -421,13 +422,14 @@ impl Draft {
         self.mechanism.effects.push(Effect {
             kind: kind.to_owned(),
             places,
-            action: Action::Local,
+            mechanics: None,
             terms: vec![EffectTerm {
                 symbol: "p".to_owned(),
                 parameter,
                 expression,
             }],
             constants: Vec::new(),
+            bodies: Bodies::default(),
         });
     }
 }

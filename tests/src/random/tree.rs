@@ -102,15 +102,12 @@ impl Draft {
             terms: vec![(Symbol::Coordinate(coordinate), 1)],
         };
         let mut steps = vec![Step::Rotate(about, twist), shift(along, a)];
-        match motion {
-            Motion::Revolute => {
-                steps.push(Step::Rotate(joint, turn));
-                steps.push(shift(last, d));
-            }
-            Motion::Prismatic => {
-                steps.push(slide(joint, d, coordinate));
-                steps.push(Step::Rotate(last, self.twist(false)));
-            }
+        if motion.is_angle() {
+            steps.push(Step::Rotate(joint, turn));
+            steps.push(shift(last, d));
+        } else {
+            steps.push(slide(joint, d, coordinate));
+            steps.push(Step::Rotate(last, self.twist(false)));
         }
         (coordinate, self.frame(parent, steps))
     }

@@ -7,7 +7,6 @@ use crate::fixture_models as fixtures;
 use modelmill_codegen::{Derivation, Evaluator, PoseFault, PoseReason, States};
 use modelmill_generated::{spidermill, three_rrr};
 use modelmill_runtime::{Loops, PoseError};
-use modelmill_spec::Motion;
 use modelmill_tests::base_parameters;
 use modelmill_tests::fixtures::{derive, derived, model};
 use modelmill_tests::sample::Sample;
@@ -430,7 +429,7 @@ macro_rules! any_size {
         let name = stringify!($model).replace("spidermill_paper", "spidermill-paper");
         let derivation = derived(&name);
         let active = derivation.mechanism.coordinates.iter().filter(|c| !c.passive);
-        let slides: Vec<bool> = active.map(|c| c.motion == Motion::Prismatic).collect();
+        let slides: Vec<bool> = active.map(|c| !c.motion.is_angle()).collect();
         let drawn = Sample::random(&derivation.mechanism, 40, $reach, &mut Stream::new(4));
         let regressors = |unit: f64| -> Vec<Vec<f64>> {
             let default = module::Geometry::<f64>::default();

@@ -1,17 +1,17 @@
-//! Loads on the tree besides its bodies: forces at the cuts of loops, along linear drives, and at the ends of rods.
+//! Loads on the tree besides its bodies: forces at the cuts of loops, along linear drives, and of effects with mechanics.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modelmill_spec::{Action, Axis, DriveKind, Mechanism, Place, PointIdx};
+use modelmill_spec::{Axis, DriveKind, Mechanism, PointIdx};
 
 use super::through;
 use crate::DeriveError;
 use crate::expr::vector::{self, Turn, Vector, push_turn};
 use crate::expr::{Atom, ExprId, Graph};
-use crate::loops::stretch::{self, Between, fixed_turns, inverse, point_at, sum_of};
+use crate::loops::stretch::{Between, fixed_turns, inverse, point_at, sum_of};
 use crate::newton_euler::{Load, Wrench, turn_in_all};
 use crate::regressor::Equations;
-use crate::regressor::rod;
+use crate::regressor::mechanics::point_forces;
 use crate::tree::Tree;
 use crate::tree::expressions::Monomial;
 
@@ -252,46 +252,36 @@ pub(super) fn drives(
     Ok(loads)
 }
 
-/// What rods along drives need at their ends.
-pub(super) fn rods(
+/// What effects with mechanics of their own need at points.
+pub(super) fn of_mechanics(
     graph: &mut Graph,
     mechanism: &Mechanism,
     equations: &Equations,
     value: &dyn Fn(&Monomial) -> ExprId,
 ) -> Result<Vec<Load>, DeriveError> {
-    let tree = &equations.tree;
+    let (tree, gravity) = (&equations.tree, &equations.gravity);
+    let projection = &equations.projection;
     let mut loads = Vec::new();
     for effect in &mechanism.effects {
-        let Action::Rod = effect.action else { continue };
-        let moments: Vec<ExprId> = effect
+        let values: Vec<ExprId> = effect
             .terms
             .iter()
             .map(|term| value(&Monomial(vec![(term.parameter.0, 1)])))
             .collect();
-        for place in &effect.places {
-            let Place::Drive(d) = place else { continue };
-            let DriveKind::Linear { from, to } = mechanism.drives[d.0].kind else {
+        let forces = point_forces(graph, mechanism, tree, projection, gravity, effect, &values)?;
+        for (point, force) in forces {
+            let point = &mechanism.points[point.0];
+            let Some(link) = tree.link_of(point.frame) else {
                 continue;
             };
-            let length = equations.projection.drives[d.0].coordinate;
-            let ends = [from.0, to.0]
-                .map(|point| stretch::position_in_base(graph, mechanism, tree, point));
-            let [a, b] = ends;
-            let forces = rod::end_forces(graph, [a?, b?], length, &equations.gravity, &moments);
-            for (point, force) in [from, to].into_iter().zip(forces) {
-                let point = &mechanism.points[point.0];
-                let Some(link) = tree.link_of(point.frame) else {
-                    continue;
-                };
-                let turns = turns_along(tree, &[], &tree.path(Some(link)));
-                let force = turn_in_all(graph, &turns, &force);
-                let at = point_at(graph, point)?;
-                loads.push(Load {
-                    link,
-                    wrench: through(graph, &at, force),
-                    until: None,
-                });
-            }
+            let turns = turns_along(tree, &[], &tree.path(Some(link)));
+            let force = turn_in_all(graph, &turns, &force);
+            let at = point_at(graph, point)?;
+            loads.push(Load {
+                link,
+                wrench: through(graph, &at, force),
+                until: None,
+            });
         }
     }
     Ok(loads)

@@ -98,7 +98,7 @@ fn reactions(
     let drives = equations.projection.drive_forces(graph, &on_tree)?;
     let closing_forces = closing_forces(graph, mechanism, equations, &cuts, &on_tree, &drives)?;
     all.extend(loads::drives(graph, mechanism, equations, &drives)?);
-    all.extend(loads::rods(graph, mechanism, equations, &value)?);
+    all.extend(loads::of_mechanics(graph, mechanism, equations, &value)?);
     for cut in &cuts {
         all.extend(cut.loads(graph, tree));
     }

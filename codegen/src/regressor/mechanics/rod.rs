@@ -6,7 +6,7 @@
 //! `du'(Jr u'' + Sr (a'' - g)) + da'(Sr u'' + mr (a'' - g))` with the moments `Jr`, `Sr` and `mr` of second, first and
 //! no order of the mass along the rod.
 
-use modelmill_spec::{DriveKind, Mechanism};
+use modelmill_spec::{DriveIdx, DriveKind, Effect, Mechanism, Place, PointIdx};
 
 use crate::DeriveError;
 use crate::expr::vector::Vector;
@@ -15,24 +15,48 @@ use crate::loops::stretch::position_in_base;
 use crate::regressor::projection::Projection;
 use crate::tree::Tree;
 
-/// Generalised forces on all coordinates of the open tree, for `Jr`, `Sr` and `mr` of one each.
-pub(crate) fn generalised_forces(
+/// The linear drives of an effect, with their points. Model files are checked for other places; a mechanism made by a
+/// program has no rod there.
+fn lines(mechanism: &Mechanism, effect: &Effect) -> Vec<(DriveIdx, [PointIdx; 2])> {
+    let line = |place: &Place| match place {
+        Place::Drive(d) => match mechanism.drives[d.0].kind {
+            DriveKind::Linear { from, to } => Some((*d, [from, to])),
+            DriveKind::Joint(_) => None,
+        },
+        _ => None,
+    };
+    effect.places.iter().filter_map(line).collect()
+}
+
+/// Generalised forces of the rod along each drive, for `Jr`, `Sr` and `mr` of one each.
+pub(super) fn generalised_forces(
     graph: &mut Graph,
     mechanism: &Mechanism,
     tree: &Tree,
     projection: &Projection,
     gravity: &Vector,
-    drive: usize,
-) -> Result<[Vec<ExprId>; 3], DeriveError> {
+    effect: &Effect,
+) -> Result<Vec<Vec<Vec<ExprId>>>, DeriveError> {
     let n = mechanism.coordinates.len();
-    let DriveKind::Linear { from, to } = mechanism.drives[drive].kind else {
-        // Model files are checked for this; a mechanism made by a program has no rod there.
-        return Ok([0; 3].map(|_| vec![Graph::ZERO; n]));
-    };
-    let a = position_in_base(graph, mechanism, tree, from.0)?;
-    let end = position_in_base(graph, mechanism, tree, to.0)?;
+    let mut all = Vec::new();
+    for (drive, [from, to]) in lines(mechanism, effect) {
+        let a = position_in_base(graph, mechanism, tree, from.0)?;
+        let end = position_in_base(graph, mechanism, tree, to.0)?;
+        let length = projection.drives[drive.0].coordinate;
+        all.push(along(graph, [a, end], length, gravity, n));
+    }
+    Ok(all)
+}
+
+/// Generalised forces on `n` coordinates of a rod from `a` to `end`.
+fn along(
+    graph: &mut Graph,
+    [a, end]: [Vector; 2],
+    length: ExprId,
+    gravity: &Vector,
+    n: usize,
+) -> Vec<Vec<ExprId>> {
     let d: Vector = std::array::from_fn(|i| graph.sub(end[i], a[i]));
-    let length = projection.drives[drive].coordinate;
     let per_length = graph.pow(length, -1);
     let per_square = graph.pow(length, -2);
 
@@ -66,7 +90,7 @@ pub(crate) fn generalised_forces(
     let lifted_along = graph.dot(&d, &lifted);
     let lifted_along = graph.mul(lifted_along, per_square);
 
-    let mut forces = [0; 3].map(|_| Vec::with_capacity(n));
+    let mut forces = vec![Vec::with_capacity(n); 3];
     for coordinate in 0..n {
         let by = |graph: &mut Graph, v: &Vector| -> Vector {
             let slopes = graph.differentiate(v, Atom::Coordinate(coordinate));
@@ -93,14 +117,34 @@ pub(crate) fn generalised_forces(
             column.push(force);
         }
     }
-    Ok(forces)
+    forces
+}
+
+/// Forces at both ends of the rod along each drive.
+pub(super) fn point_forces(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    tree: &Tree,
+    projection: &Projection,
+    gravity: &Vector,
+    effect: &Effect,
+    moments: &[ExprId],
+) -> Result<Vec<(PointIdx, Vector)>, DeriveError> {
+    let mut all = Vec::new();
+    for (drive, points) in lines(mechanism, effect) {
+        let length = projection.drives[drive.0].coordinate;
+        let [a, b] = points.map(|point| position_in_base(graph, mechanism, tree, point.0));
+        let forces = end_forces(graph, [a?, b?], length, gravity, moments);
+        all.extend(points.into_iter().zip(forces));
+    }
+    Ok(all)
 }
 
 /// Forces that a rod needs at its two ends, in the axes of the base, for given moments of second, first and no order.
 ///
 /// The rod's own balance of moments about the first point gives the force at the second one, which is square to the
 /// rod since it slides there; the rest of its weight and inertia hangs on the first.
-pub(crate) fn end_forces(
+fn end_forces(
     graph: &mut Graph,
     [a, b]: [Vector; 2],
     length: ExprId,

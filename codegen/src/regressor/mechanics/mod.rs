@@ -1,0 +1,51 @@
+//! Effects with mechanics of their own, see [`Mechanics`]: what those need that need forces, one file for each.
+
+mod rod;
+
+use modelmill_spec::{Effect, Mechanics, Mechanism, PointIdx};
+
+use crate::DeriveError;
+use crate::expr::vector::Vector;
+use crate::expr::{ExprId, Graph};
+use crate::regressor::projection::Projection;
+use crate::tree::Tree;
+
+/// Generalised forces on all coordinates of the open tree that an effect needs, `[i][t][c]`: for each time `i` that it
+/// acts, for its term `t` with a parameter of one, on the coordinate `c`. Empty if it needs none.
+pub(crate) fn generalised_forces(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    tree: &Tree,
+    projection: &Projection,
+    gravity: &Vector,
+    effect: &Effect,
+) -> Result<Vec<Vec<Vec<ExprId>>>, DeriveError> {
+    match effect.mechanics {
+        Some(Mechanics::Rod) => {
+            rod::generalised_forces(graph, mechanism, tree, projection, gravity, effect)
+        }
+        // Their bodies are among those of the mechanism, and gravity is turned already.
+        Some(Mechanics::Placement | Mechanics::Part | Mechanics::Tilt | Mechanics::Delay)
+        | None => Ok(Vec::new()),
+    }
+}
+
+/// Forces at points, in the axes of the base, that supply an effect with what it needs, for given values of its
+/// parameters.
+pub(crate) fn point_forces(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    tree: &Tree,
+    projection: &Projection,
+    gravity: &Vector,
+    effect: &Effect,
+    values: &[ExprId],
+) -> Result<Vec<(PointIdx, Vector)>, DeriveError> {
+    match effect.mechanics {
+        Some(Mechanics::Rod) => {
+            rod::point_forces(graph, mechanism, tree, projection, gravity, effect, values)
+        }
+        Some(Mechanics::Placement | Mechanics::Part | Mechanics::Tilt | Mechanics::Delay)
+        | None => Ok(Vec::new()),
+    }
+}

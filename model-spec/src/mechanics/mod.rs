@@ -1,0 +1,205 @@
+//! What effects do that no expression at their place can say: one enum, and one file for each of its variants.
+//!
+//! Whatever model files, pages and the diagnosis ask of one is answered by its [`Entry`]. The generalised forces of those
+//! that have some are in `regressor/mechanics` of `modelmill-codegen`.
+
+mod delay;
+mod part;
+mod placement;
+mod rod;
+mod tilt;
+
+use crate::build::effect_places::Scene;
+use crate::build::symbols::Symbols as Names;
+use crate::diagnostic::Log;
+use crate::exact::Exact;
+use crate::kinds::ActsOn;
+use crate::mechanism::{Bodies, Constant, Effect, EffectTerm, Mechanism, Part, Place};
+use crate::schema::EffectEntry;
+use crate::unit::Dimension;
+use crate::values::Name;
+use crate::words::words;
+
+words! {
+    /// What a kind does that no expression at its place can say.
+    #[derive(PartialOrd, Ord, Hash)]
+    pub Mechanics as "MechanicsName": "mechanics",
+    /// A slender rod along each of the linear drives that turns about the drive's first point and slides through its
+    /// second. The terms are moments of its mass along itself about the first point: of second order (kg m^2), of
+    /// first order (kg m), and the mass (kg). With `a` the first point and `u` the unit vector along the drive, the
+    /// generalised force is `du'(Jr u'' + Sr (a'' - g)) + da'(Sr u'' + mr (a'' - g))` (d'Alembert).
+    "rod" => Rod,
+    /// The moments of lumped masses are taken where their forces are.
+    "placement" => Placement,
+    /// Differences of one part from what the model file says of it.
+    "part" => Part,
+    /// A turn of the base against gravity; [`Mechanism::gravity`] holds the result.
+    "tilt" => Tilt,
+    /// A delay of the measured forces; [`Mechanism::force_delay`] holds the time.
+    "delay" => Delay,
+}
+
+impl Mechanics {
+    /// What the variant is and does.
+    pub(crate) fn entry(self) -> &'static dyn Entry {
+        match self {
+            Self::Rod => &rod::Rod,
+            Self::Placement => &placement::Placement,
+            Self::Part => &part::Difference,
+            Self::Tilt => &tilt::Tilt,
+            Self::Delay => &delay::Delay,
+        }
+    }
+
+    /// What it does, for people, where other kinds have an expression.
+    pub fn words(self) -> &'static str {
+        self.entry().words()
+    }
+
+    /// What it does in a model, for people: what stands before its parameters, or before its constants if it has no
+    /// parameters.
+    pub fn lead(self) -> &'static str {
+        self.entry().lead()
+    }
+
+    /// What stands before the value of a constant where constants are listed; empty where there is only one.
+    pub fn constant_label(self, symbol: &str) -> &'static str {
+        self.entry().constant_label(symbol)
+    }
+
+    /// Whether its forces are part of what the drives carry, as those of masses are.
+    pub fn is_part_of_load(self) -> bool {
+        self.entry().is_part_of_load()
+    }
+
+    /// Whether it could say anything at a place of a model that the model does not say by itself.
+    pub fn has_effect_at(self, mechanism: &Mechanism, place: Place) -> bool {
+        self.entry().has_effect_at(mechanism, place)
+    }
+
+    /// The symbols of the parameters that it has at a place, if these depend on the place.
+    pub fn parameters_at(self, mechanism: &Mechanism, place: Place) -> Option<Vec<&'static str>> {
+        self.entry().parameters_at(place, &mechanism.parts)
+    }
+
+    /// Which of some places it acts on as one, by their positions in the list; `None` if on each by itself.
+    pub fn groups(self, mechanism: &Mechanism, places: &[Place]) -> Option<Vec<Vec<usize>>> {
+        self.entry().groups(mechanism, places)
+    }
+
+    /// Whether it is one property of the whole mechanism, which it can have only once.
+    pub(crate) fn is_of_the_whole(self) -> bool {
+        matches!(self.entry().on(), ActsOn::Base | ActsOn::Force)
+    }
+}
+
+/// Symbols with their dimensions.
+pub(crate) type Symbols = &'static [(&'static str, Dimension)];
+
+/// What one of the [`Mechanics`] is and does.
+pub(crate) trait Entry: Sync {
+    /// See [`Mechanics::words`].
+    fn words(&self) -> &'static str;
+
+    /// See [`Mechanics::lead`].
+    fn lead(&self) -> &'static str;
+
+    /// See [`Mechanics::constant_label`].
+    fn constant_label(&self, _symbol: &str) -> &'static str {
+        ""
+    }
+
+    /// The one sort of place on which it acts.
+    fn on(&self) -> ActsOn;
+
+    /// Its parameters, in the order of an effect's terms.
+    fn parameters(&self) -> Symbols {
+        &[]
+    }
+
+    /// Its constants.
+    fn constants(&self) -> Symbols {
+        &[]
+    }
+
+    /// How many places an effect must have; any number if `None`.
+    fn n_places(&self) -> Option<usize> {
+        Some(1)
+    }
+
+    /// Reports a place of an effect where there is nothing to act on.
+    fn check_place(&self, _name: &Name, _place: Place, _scene: &Scene<'_>, _log: &mut Log) {}
+
+    /// See [`Mechanics::parameters_at`].
+    fn parameters_at(&self, _place: Place, _parts: &[Part]) -> Option<Vec<&'static str>> {
+        None
+    }
+
+    /// Reports a parameter that an effect names though it does not have it at its place, where it has `those`.
+    fn refuse_parameter(
+        &self,
+        _entry: &EffectEntry,
+        _symbol: &str,
+        _those: &[&str],
+        _log: &mut Log,
+    ) {
+    }
+
+    /// The values of an effect's constants, where they are to be constants of the model with names of their own; `None`
+    /// if that fails, which is reported.
+    fn named_constants(
+        &self,
+        values: Vec<(String, Exact)>,
+        _kind: &Name,
+        _names: &mut Names,
+        _log: &mut Log,
+    ) -> Option<Vec<(String, Exact)>> {
+        Some(values)
+    }
+
+    /// Bodies of an effect.
+    fn bodies(&self, _terms: &[EffectTerm], _places: &[Place], _scene: &Scene<'_>) -> Bodies {
+        Bodies::default()
+    }
+
+    /// Gravity of the mechanism with an effect, for that without it.
+    fn gravity(&self, _effect: &Effect, gravity: [Exact; 3]) -> [Exact; 3] {
+        gravity
+    }
+
+    /// How much later than they act an effect lets forces be read, s.
+    fn force_delay(&self, _effect: &Effect, _constants: &[Constant]) -> f64 {
+        0.0
+    }
+
+    /// See [`Mechanics::is_part_of_load`].
+    fn is_part_of_load(&self) -> bool {
+        true
+    }
+
+    /// See [`Mechanics::has_effect_at`].
+    fn has_effect_at(&self, _mechanism: &Mechanism, _place: Place) -> bool {
+        true
+    }
+
+    /// See [`Mechanics::groups`].
+    fn groups(&self, _mechanism: &Mechanism, _places: &[Place]) -> Option<Vec<Vec<usize>>> {
+        None
+    }
+}
+
+/// Gravity of the mechanism with its effects, and how much later than they act its forces are read.
+pub(crate) fn whole(
+    effects: &[Effect],
+    mut gravity: [Exact; 3],
+    constants: &[Constant],
+) -> ([Exact; 3], f64) {
+    let mut delay = 0.0;
+    for effect in effects {
+        if let Some(mechanics) = effect.mechanics {
+            gravity = mechanics.entry().gravity(effect, gravity);
+            delay += mechanics.entry().force_delay(effect, constants);
+        }
+    }
+    (gravity, delay)
+}

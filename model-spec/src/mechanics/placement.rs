@@ -1,0 +1,102 @@
+//! The moments of lumped masses, taken where their forces are.
+
+use crate::build::effect_places::Scene;
+use crate::diagnostic::{Diagnostic, Log};
+use crate::exact::{Exact, Symbol};
+use crate::kinds::ActsOn;
+use crate::mechanics::{Entry, Symbols};
+use crate::mechanism::{Bodies, EffectTerm, LumpedMass, Mechanism, Place, Point};
+use crate::unit::Dimension;
+use crate::values::Name;
+
+pub(crate) struct Placement;
+
+impl Entry for Placement {
+    fn words(&self) -> &'static str {
+        "m times the moments at the point, less those at `moment_at`"
+    }
+
+    fn lead(&self) -> &'static str {
+        "the moments of lumped masses at the point where their forces act; the mass: "
+    }
+
+    fn on(&self) -> ActsOn {
+        ActsOn::Point
+    }
+
+    fn parameters(&self) -> Symbols {
+        &[("m", Dimension::MASS)]
+    }
+
+    fn n_places(&self) -> Option<usize> {
+        None
+    }
+
+    fn check_place(&self, name: &Name, place: Place, scene: &Scene<'_>, log: &mut Log) {
+        if displaced(place, &scene.points.points, scene.lumped_masses).is_empty() {
+            log.push(
+                Diagnostic::error(
+                    name.span,
+                    "no lumped mass here has different places for forces and for moments",
+                )
+                .label("expected the point at which the forces of such a mass are taken")
+                .help("this effect corrects a `[[lumped_mass]]` whose `moment_at` differs from its `force_at`; for a mass that the model lacks, take `point_mass`"),
+            );
+        }
+    }
+
+    /// Masses where forces are taken, less such whose moments are taken elsewhere: what is left are moments.
+    fn bodies(&self, terms: &[EffectTerm], places: &[Place], scene: &Scene<'_>) -> Bodies {
+        let mut bodies = Bodies::default();
+        for term in terms {
+            let mass = Exact::Symbol(Symbol::Parameter(term.parameter));
+            let all = places
+                .iter()
+                .flat_map(|place| displaced(*place, &scene.points.points, scene.lumped_masses));
+            for lump in all {
+                bodies.lumped_masses.push(LumpedMass {
+                    mass: mass.clone(),
+                    moment_at: lump.force_at.clone(),
+                    ..lump.clone()
+                });
+                bodies.lumped_masses.push(LumpedMass {
+                    mass: mass.clone(),
+                    share: -lump.share.clone(),
+                    ..lump.clone()
+                });
+            }
+        }
+        bodies
+    }
+
+    fn has_effect_at(&self, mechanism: &Mechanism, place: Place) -> bool {
+        !displaced(place, &mechanism.points, &mechanism.lumped_masses).is_empty()
+    }
+
+    /// Shares of one mass are misplaced together.
+    fn groups(&self, mechanism: &Mechanism, places: &[Place]) -> Option<Vec<Vec<usize>>> {
+        let mut groups: Vec<(Vec<&Exact>, Vec<usize>)> = Vec::new();
+        for (i, place) in places.iter().enumerate() {
+            let lumps = displaced(*place, &mechanism.points, &mechanism.lumped_masses);
+            let masses: Vec<&Exact> = lumps.into_iter().map(|lump| &lump.mass).collect();
+            match groups.iter_mut().find(|(known, _)| *known == masses) {
+                Some((_, group)) => group.push(i),
+                None => groups.push((masses, vec![i])),
+            }
+        }
+        Some(groups.into_iter().map(|(_, group)| group).collect())
+    }
+}
+
+/// Lumped masses whose forces are taken at a point, but whose moments elsewhere.
+fn displaced<'a>(place: Place, points: &[Point], all: &'a [LumpedMass]) -> Vec<&'a LumpedMass> {
+    let Place::Point(point) = place else {
+        return Vec::new();
+    };
+    let point = &points[point.0];
+    let is_here = |lump: &LumpedMass| point.frame == lump.frame && point.at == lump.force_at;
+    let masses = all.iter();
+    masses
+        .filter(|lump| is_here(lump) && lump.force_at != lump.moment_at)
+        .collect()
+}
