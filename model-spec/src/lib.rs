@@ -3,6 +3,7 @@
 //! The way of a file: `document` (TOML with places) -> `merge` (variants) -> `schema` (tables of the format)
 //! -> `build` (names, units, shapes) -> `pose` (loops and drives at the nominal pose).
 
+mod additions;
 mod angle;
 mod build;
 mod column;
@@ -45,6 +46,7 @@ mod unit;
 mod values;
 mod words;
 
+pub use additions::{AddedEffect, ConstantValue};
 pub use column::{ColumnFault, ColumnSum, Quantity, read_column};
 pub use diagnostic::{Diagnostic, Severity, SourceFile, Sources, Span};
 pub use document::LARGEST_FILE;

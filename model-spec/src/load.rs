@@ -1,6 +1,7 @@
 //! Reads a model file and those that it extends, and makes the mechanism that they describe.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use modelmill_boundary::files::{Disk, FileError, FileFault, Files, tidy};
 
@@ -29,6 +30,15 @@ pub struct Loaded {
     pub kinds: Vec<EffectKind>,
     /// Where each product of [`Mechanism::retain`] stands.
     pub retain: Vec<Span>,
+    /// What the mechanism was built from, for effects that join it.
+    pub(crate) entries: Arc<Entries>,
+}
+
+/// The tables of a model file and of its libraries.
+#[derive(Debug)]
+pub(crate) struct Entries {
+    pub(crate) model: ModelEntry,
+    pub(crate) libraries: Vec<EffectKindEntry>,
 }
 
 impl Loaded {
@@ -123,7 +133,7 @@ pub fn load_with(
     let (table, named) = read_chain(path_name, text, files, &mut sources, &mut log);
     let given = libraries.iter().map(|path| (path.clone(), None));
     let libraries: Vec<_> = given.chain(named).collect();
-    let kinds = read_libraries(&libraries, files, &mut sources, &mut log);
+    let libraries = read_libraries(&libraries, files, &mut sources, &mut log);
     let whole = Span {
         file: 0,
         start: 0,
@@ -134,7 +144,7 @@ pub fn load_with(
         // Names that a broken line would define would all be reported as unknown.
         (None, Vec::new())
     } else {
-        build(&model, &kinds, &mut log)
+        build(&model, &libraries, &mut log)
     };
     let mut diagnostics = log.finish();
     let Some(mechanism) = mechanism else {
@@ -155,6 +165,7 @@ pub fn load_with(
             .flat_map(|list| &list.entries)
             .map(|formula| formula.ast.span)
             .collect(),
+        entries: Arc::new(Entries { model, libraries }),
     })
 }
 

@@ -169,6 +169,14 @@ pub(crate) struct Unit {
 }
 
 impl Unit {
+    /// A unit by its text, such as `N s/m`; `None` if that is none.
+    pub(crate) fn from_text(text: &str) -> Option<Self> {
+        Some(Self {
+            text: text.to_owned(),
+            dimension: parse(text).ok()?,
+        })
+    }
+
     /// True for an angle, which may stand in sines and cosines.
     pub(crate) fn is_angle(&self) -> bool {
         self.text == "rad"

@@ -1,11 +1,11 @@
-//! Every effect that may be missing, written down as `add` would write it, in variants of the model: their derivation gives
+//! Every effect that may be missing, as the entry that `add` would write, in variants of the model: their derivation gives
 //! the columns of all.
 
-use std::fmt::Write as _;
-use std::path::Path;
-
 use modelmill_codegen::{Derivation, Guard, Monomial};
-use modelmill_spec::{Effect, EffectKind, Loaded, Mechanics, Mechanism, Scale, Search, Sign};
+use modelmill_spec::{
+    AddedEffect, Constant, ConstantValue, Effect, EffectKind, Mechanics, Mechanism, Scale, Search,
+    Sign,
+};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -71,18 +71,14 @@ pub(crate) enum Sort {
     Carried,
 }
 
-/// Writes down and derives all candidates of a model.
+/// Derives all candidates of a model.
 pub(crate) fn candidates(model: &Model) -> Outcome<Candidates> {
     let loaded = &model.loaded;
     let mechanism = &loaded.mechanism;
     let all = spots(mechanism);
     let mut singles: Vec<Single> = Vec::new();
     let mut entries = Vec::new();
-    let mut variants = [
-        Variant::new(model)?,
-        Variant::new(model)?,
-        Variant::new(model)?,
-    ];
+    let mut variants: [Variant; 3] = Default::default();
     let (mut tilt, mut delay) = (None, None);
     for (k, kind) in loaded.kinds.iter().enumerate() {
         let fitting: Vec<&Spot> = all
@@ -118,7 +114,7 @@ pub(crate) fn candidates(model: &Model) -> Outcome<Candidates> {
                 continue;
             }
             let single = single(k, kind, &spots, singles.len(), &[]);
-            variants[single.sort as usize].write(kind, &single, singles.len());
+            variants[single.sort as usize].add(mechanism, kind, &single, singles.len());
             singles.push(single);
         }
         for sum in sums {
@@ -195,76 +191,63 @@ pub(crate) fn uses_load(kind: &EffectKind) -> bool {
     words.any(|word| word == "load")
 }
 
-/// A variant of the model that has effects besides, as text.
+/// The model with effects besides.
+#[derive(Default)]
 pub(crate) struct Variant {
-    text: String,
-    constants: String,
+    constants: Vec<Constant>,
+    effects: Vec<AddedEffect>,
     /// Which candidates it holds, in order.
     singles: Vec<usize>,
 }
 
 impl Variant {
-    pub(crate) fn new(model: &Model) -> Outcome<Self> {
-        Ok(Self {
-            text: header(model)?,
-            constants: String::new(),
-            singles: Vec::new(),
-        })
-    }
-
-    pub(crate) fn write(&mut self, kind: &EffectKind, single: &Single, number: usize) {
+    pub(crate) fn add(
+        &mut self,
+        mechanism: &Mechanism,
+        kind: &EffectKind,
+        single: &Single,
+        number: usize,
+    ) {
         self.singles.push(number);
-        let places: Vec<String> = single
-            .spots
-            .iter()
-            .map(|s| format!("\"{}\"", s.name))
-            .collect();
-        let _ = writeln!(
-            self.text,
-            "[[effect]]\nkind = \"{}\"\nat = [{}]",
-            kind.name,
-            places.join(", ")
-        );
-        // Which differences a part has depends on the part.
-        if kind.mechanics != Some(Mechanics::Part) {
-            let named: Vec<String> = (kind.parameters.iter())
-                .map(|p| format!("{0} = {{ name = \"candidate{number}_{0}\" }}", p.symbol))
-                .collect();
-            let _ = writeln!(self.text, "parameters = {{ {} }}", named.join(", "));
-        }
-        let searched =
-            (single.constants.iter()).map(|(symbol, name, _)| format!("{symbol} = \"{name}\""));
-        let given = (single.given.iter()).map(|(symbol, value)| format!("{symbol} = {value:?}"));
-        let constants: Vec<String> = searched.chain(given).collect();
-        if constants.is_empty() {
-            return;
-        }
-        let _ = writeln!(self.text, "constants = {{ {} }}", constants.join(", "));
+        let place = single.spots[0].place;
+        let at_place = (kind.mechanics).and_then(|one| one.parameters_at(mechanism, place));
+        let has = |symbol: &str| {
+            at_place
+                .as_ref()
+                .is_none_or(|those| those.contains(&symbol))
+        };
+        let symbols = kind.parameters.iter().map(|p| &p.symbol);
+        let searched = (single.constants.iter())
+            .map(|(symbol, name, _)| (symbol.clone(), ConstantValue::Named(name.clone())));
+        let given = (single.given.iter())
+            .map(|(symbol, value)| (symbol.clone(), ConstantValue::Number(*value)));
+        self.effects.push(AddedEffect {
+            kind: kind.name.clone(),
+            at: single.spots.iter().map(|spot| spot.name.clone()).collect(),
+            parameters: symbols
+                .filter(|symbol| has(symbol))
+                .map(|symbol| (symbol.clone(), format!("candidate{number}_{symbol}")))
+                .collect(),
+            constants: searched.chain(given).collect(),
+        });
         for (symbol, name, _) in &single.constants {
             let constant = kind.constants.iter().find(|c| c.symbol == *symbol);
             let carries = single.spots[0].carries;
             let unit = constant
                 .and_then(|c| c.units.iter().find(|(c, _)| *c == carries))
                 .map_or("1", |(_, unit)| unit.as_str());
-            let _ = writeln!(
-                self.constants,
-                "{name} = {{ value = 1, unit = \"{unit}\" }}"
-            );
+            self.constants.push(named_constant(name, 1.0, unit));
         }
     }
 
     /// Derives the columns of its effects alone; `own` effects of the model come before them.
     pub(crate) fn derive(
-        mut self,
+        self,
         model: &Model,
         own: usize,
         singles: &mut [Single],
     ) -> Outcome<Derivation> {
-        if !self.constants.is_empty() {
-            let _ = write!(self.text, "[constants]\n{}", self.constants);
-        }
-        let variant = load(model, &self.text)?;
-        let mechanism = &variant.mechanism;
+        let mechanism = &model.loaded.with(&self.constants, &self.effects)?;
         let mut wanted = Vec::new();
         for (number, effect) in self.singles.iter().zip(&mechanism.effects[own..]) {
             let terms = effect.terms.iter();
@@ -286,21 +269,19 @@ impl Variant {
 
 /// The base columns of a model as functions of a tilt of its base.
 pub(crate) fn tilted(model: &Model) -> Outcome<Derivation> {
-    let mut text = header(model)?;
-    let names = ["tx", "ty", "tz"].map(|t| (t, format!("candidate_{t}")));
-    let given: Vec<String> = names
-        .iter()
-        .map(|(t, name)| format!("{t} = \"{name}\""))
-        .collect();
-    let _ = write!(
-        text,
-        "[[effect]]\nkind = \"gravity_tilt\"\nat = \"base\"\nconstants = {{ {} }}\n[constants]\n",
-        given.join(", ")
-    );
-    for (_, name) in &names {
-        let _ = writeln!(text, "{name} = {{ value = 0, unit = \"rad\" }}");
-    }
-    let variant = load(model, &text)?;
+    let names = ["tx", "ty", "tz"].map(|t| (t.to_owned(), format!("candidate_{t}")));
+    let constants = names
+        .each_ref()
+        .map(|(_, name)| named_constant(name, 0.0, "rad"));
+    let tilt = AddedEffect {
+        kind: "gravity_tilt".to_owned(),
+        at: vec!["base".to_owned()],
+        constants: names
+            .map(|(t, name)| (t, ConstantValue::Named(name)))
+            .to_vec(),
+        ..AddedEffect::default()
+    };
+    let variant = model.loaded.with(&constants, &[tilt])?;
     let reduction = &model.derivation.reduction;
     let base: Vec<&Monomial> = reduction
         .retained
@@ -308,23 +289,18 @@ pub(crate) fn tilted(model: &Model) -> Outcome<Derivation> {
         .map(|k| &reduction.products[*k])
         .collect();
     let is_base = |product: &Monomial| base.contains(&product);
-    modelmill_codegen::derive_columns(&variant.mechanism, &is_base)
+    modelmill_codegen::derive_columns(&variant, &is_base)
         .map_err(|error| Error::derivation(&model.path, error))
 }
 
-fn load(model: &Model, text: &str) -> Outcome<Loaded> {
-    let name = Path::new(&model.path).with_file_name("candidates.toml");
-    model.host().load_text(&name, text)
-}
-
-fn header(model: &Model) -> Outcome<String> {
-    let file = Path::new(&model.path).file_name();
-    let file = file
-        .ok_or_else(|| Error::input(format!("{} is not the path of a model file", model.path)))?;
-    let extends = serde_json::to_string(&file.to_string_lossy()).map_err(Error::input)?;
-    Ok(format!(
-        "schema = 1\nname = \"candidates\"\nextends = {extends}\n"
-    ))
+fn named_constant(name: &str, value: f64, unit: &str) -> Constant {
+    Constant {
+        name: name.to_owned(),
+        value,
+        unit: unit.to_owned(),
+        is_angle: unit == "rad",
+        note: None,
+    }
 }
 
 /// Values that are tried for the constant that a candidate searches for, given the largest rate and the travel of its place;

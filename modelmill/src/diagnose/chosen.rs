@@ -1,9 +1,9 @@
-//! An effect that the user names, written down and derived like a candidate, with its columns along recordings.
+//! An effect that the user names, derived like a candidate, with its columns along recordings.
 
 use modelmill_codegen::Evaluator;
 use modelmill_identify::diagnose::{Candidate, Choice, Column, Effect, Source};
 use modelmill_spec::edit::NewEffect;
-use modelmill_spec::{ActsOn, DriveKind, EffectKind, Mechanics, Mechanism, Search};
+use modelmill_spec::{ActsOn, DriveKind, EffectKind, Mechanics, Mechanism, Place, Search};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -65,11 +65,7 @@ pub(crate) fn choose(model: &Model, named: &Named, constants: Constants) -> Outc
         .map(|place| spot(mechanism, &kind, &all, place));
     let places: Vec<Spot> = of_kind.collect::<Outcome<_>>()?;
     let mut singles = Vec::new();
-    let mut variants = [
-        Variant::new(model)?,
-        Variant::new(model)?,
-        Variant::new(model)?,
-    ];
+    let mut variants: [Variant; 3] = Default::default();
     let mut tilt = None;
     let mut entries = Vec::new();
     if kind.mechanics == Some(Mechanics::Tilt) {
@@ -80,12 +76,14 @@ pub(crate) fn choose(model: &Model, named: &Named, constants: Constants) -> Outc
         tilt = Some((change, tilted(model)?));
     } else {
         let given = given(&kind, named, constants)?;
-        let joined = kind.places.is_some() || kind.mechanics == Some(Mechanics::Placement);
+        let all: Vec<Place> = places.iter().map(|spot| spot.place).collect();
+        let grouped = kind.mechanics.and_then(|one| one.groups(mechanism, &all));
+        let joined = kind.places.is_some() || grouped.is_some();
         let together = if joined { places.len() } else { 1 };
         for group in places.chunks(together) {
             let group: Vec<&Spot> = group.iter().collect();
             let one = single(0, &kind, &group, singles.len(), &given);
-            variants[one.sort as usize].write(&kind, &one, singles.len());
+            variants[one.sort as usize].add(mechanism, &kind, &one, singles.len());
             singles.push(one);
         }
         entries.push(Entry {

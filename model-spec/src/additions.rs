@@ -1,0 +1,156 @@
+//! Effects that join a model which was read: entries beside those of its file, of which nothing is written and nothing is
+//! read again.
+
+use crate::build::build;
+use crate::diagnostic::{Log, Span};
+use crate::document::Key;
+use crate::formula::{Ast, AstKind, Formula};
+use crate::load::{Failure, Loaded};
+use crate::mechanism::{Constant, Mechanism};
+use crate::parser::parse;
+use crate::record::{List, Named, OneOrMany};
+use crate::schema::{ConstantEntry, EffectEntry, EffectParameterEntry};
+use crate::unit::Unit;
+use crate::values::{Name, Number};
+
+/// An effect that shall join a model.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AddedEffect {
+    /// Name of the kind.
+    pub kind: String,
+    /// Where it acts.
+    pub at: Vec<String>,
+    /// Symbols of parameters with the names that they get; others are called `symbol_place`.
+    pub parameters: Vec<(String, String)>,
+    /// Symbols of constants with their values; others have those of the kind.
+    pub constants: Vec<(String, ConstantValue)>,
+}
+
+/// The value of a constant of an effect.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ConstantValue {
+    /// A number, in SI units.
+    Number(f64),
+    /// A constant of the model, by its name.
+    Named(String),
+}
+
+/// Where what is in no file stands.
+const NOWHERE: Span = Span {
+    file: usize::MAX,
+    start: 0,
+    end: 0,
+};
+
+impl Loaded {
+    /// The mechanism with further constants and effects, which come behind those that it has.
+    ///
+    /// Fails with what is wrong, as a file with these entries would: a name that is taken, an unknown kind or place, a
+    /// value that is missing.
+    pub fn with(
+        &self,
+        constants: &[Constant],
+        effects: &[AddedEffect],
+    ) -> Result<Mechanism, Failure> {
+        let mut log = Log::default();
+        let mut model = self.entries.model.clone();
+        let table = model.constants.get_or_insert_with(|| Named {
+            entries: Vec::new(),
+            faulty: Vec::new(),
+        });
+        let further = constants.iter().map(|one| (key(&one.name), constant(one)));
+        table.entries.extend(further);
+        let list = model.effect.get_or_insert_with(|| List {
+            entries: Vec::new(),
+            span: NOWHERE,
+            faulty: false,
+        });
+        for added in effects {
+            list.entries.push(effect(added, &mut log));
+        }
+        let (mechanism, _) = build(&model, &self.entries.libraries, &mut log);
+        mechanism.ok_or_else(|| Failure {
+            diagnostics: log.finish(),
+            sources: self.sources.clone(),
+        })
+    }
+}
+
+fn key(text: &str) -> Key {
+    Key {
+        name: text.to_owned(),
+        span: NOWHERE,
+    }
+}
+
+fn name(text: &str) -> Name {
+    Name {
+        text: text.to_owned(),
+        span: NOWHERE,
+    }
+}
+
+fn constant(constant: &Constant) -> ConstantEntry {
+    ConstantEntry {
+        span: NOWHERE,
+        value: Some(Number {
+            value: constant.value,
+            span: NOWHERE,
+        }),
+        unit: Unit::from_text(&constant.unit),
+        note: None,
+        faulty: false,
+    }
+}
+
+fn effect(added: &AddedEffect, log: &mut Log) -> EffectEntry {
+    let named = |name_of: &str| EffectParameterEntry {
+        span: NOWHERE,
+        name: Some(name(name_of)),
+        nominal: None,
+        faulty: false,
+    };
+    let parameters = added.parameters.iter();
+    let constants = added.constants.iter();
+    EffectEntry {
+        span: NOWHERE,
+        name: None,
+        kind: Some(name(&added.kind)),
+        at: Some(OneOrMany {
+            entries: added.at.iter().map(|place| name(place)).collect(),
+            span: NOWHERE,
+        }),
+        parameters: Some(Named {
+            entries: parameters
+                .map(|(symbol, name)| (key(symbol), named(name)))
+                .collect(),
+            faulty: Vec::new(),
+        }),
+        constants: (!added.constants.is_empty()).then(|| Named {
+            entries: constants
+                .filter_map(|(symbol, value)| Some((key(symbol), formula(value, log)?)))
+                .collect(),
+            faulty: Vec::new(),
+        }),
+        note: None,
+        faulty: false,
+    }
+}
+
+fn formula(value: &ConstantValue, log: &mut Log) -> Option<Formula> {
+    Some(match value {
+        ConstantValue::Named(name) => Formula {
+            text: name.clone(),
+            ast: Ast {
+                span: NOWHERE,
+                kind: AstKind::Name(name.clone()),
+            },
+        },
+        ConstantValue::Number(value) => {
+            // The decimal that a file would have, so that both mean the same rational number.
+            let text = format!("{value:?}");
+            let ast = parse(&text, NOWHERE, None, log)?;
+            Formula { text, ast }
+        }
+    })
+}
