@@ -89,7 +89,7 @@ impl Dimension {
     pub(crate) const RATE: Self = Self::new([0, 0, -1, 0]);
     pub(crate) const ANGULAR_ACCELERATION: Self = Self::new([0, 0, -2, 0]);
 
-    const fn new(single: [i32; 4]) -> Self {
+    pub(crate) const fn new(single: [i32; 4]) -> Self {
         Self([2 * single[0], 2 * single[1], 2 * single[2], 2 * single[3]])
     }
 

@@ -132,32 +132,31 @@ impl Draft {
                 self.length(0.3, 0.9)
             };
             let mut steps = vec![shift(Axis::X, offset)];
-            match motion {
-                Motion::Revolute => steps.push(Step::Rotate(
+            if motion.is_angle() {
+                steps.push(Step::Rotate(
                     Axis::Z,
                     Angle {
                         pi: ratio(0, 1),
                         terms: vec![(Symbol::Coordinate(coordinate), 1)],
                     },
-                )),
-                Motion::Prismatic => {
-                    let angle = if self.stream.chance(0.5) {
-                        let value = self.stream.either_side(0.3, 1.3);
-                        let constant = self.constant("a", value, "rad");
-                        Angle {
-                            pi: ratio(0, 1),
-                            terms: vec![(Symbol::Constant(constant), 1)],
-                        }
-                    } else {
-                        Angle {
-                            pi: ratio(1, 2),
-                            terms: Vec::new(),
-                        }
-                    };
-                    steps.push(Step::Rotate(Axis::Z, angle));
-                    let axis = *self.stream.pick(&[Axis::X, Axis::Y]);
-                    steps.push(slide(axis, number(0), coordinate));
-                }
+                ));
+            } else {
+                let angle = if self.stream.chance(0.5) {
+                    let value = self.stream.either_side(0.3, 1.3);
+                    let constant = self.constant("a", value, "rad");
+                    Angle {
+                        pi: ratio(0, 1),
+                        terms: vec![(Symbol::Constant(constant), 1)],
+                    }
+                } else {
+                    Angle {
+                        pi: ratio(1, 2),
+                        terms: Vec::new(),
+                    }
+                };
+                steps.push(Step::Rotate(Axis::Z, angle));
+                let axis = *self.stream.pick(&[Axis::X, Axis::Y]);
+                steps.push(slide(axis, number(0), coordinate));
             }
             frame = self.frame(frame, steps);
             joints.push((coordinate, frame));
