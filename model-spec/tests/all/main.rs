@@ -1,5 +1,6 @@
 //! Model files: what is read, what is refused and with which words, and what is written back.
 
+mod additions;
 mod edit;
 mod faulty;
 mod fuzz;

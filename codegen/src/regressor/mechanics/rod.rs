@@ -90,7 +90,7 @@ fn along(
     let lifted_along = graph.dot(&d, &lifted);
     let lifted_along = graph.mul(lifted_along, per_square);
 
-    let mut forces = vec![Vec::with_capacity(n); 3];
+    let mut forces = vec![Vec::new(); 3];
     for coordinate in 0..n {
         let by = |graph: &mut Graph, v: &Vector| -> Vector {
             let slopes = graph.differentiate(v, Atom::Coordinate(coordinate));
