@@ -266,7 +266,7 @@ pub(crate) struct GenerateArgs {
     /// With a function `self_test` that holds base parameters against all parameters, for a test of your own
     #[arg(long)]
     pub(crate) self_test: bool,
-    /// What to make: a Rust module, or a crate that builds a C library with its header, or a Python module
+    /// What to make: a Rust module, sources of plain C99, or a crate that builds a C library with its header or a Python module
     #[arg(long, value_enum, default_value = "rust")]
     pub(crate) language: LanguageArg,
 }

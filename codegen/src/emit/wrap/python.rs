@@ -255,7 +255,7 @@ fn items(face: &Face<'_>) -> TokenStream {
 
         /// Results of one state after the other, entry by entry, without Python's lock.
         fn computed(
-            py: Python<'_>, many: &Many, entries: usize, at: impl Fn(usize) -> Result<Vec<f64>, PoseError> + Send,
+            py: Python<'_>, many: &Many, entries: usize, at: impl Fn(usize) -> Result<Vec<f64>, PoseError> + Sync,
         ) -> PyResult<Vec<f64>> {
             let n = many.n;
             let done = py.detach(|| {
@@ -384,9 +384,14 @@ fn single(face: &Face<'_>, one: &Function) -> TokenStream {
         quote! { shaped(py, &many, &values[#from * n..#at * n], &[#(#shape),*])? }
     });
     let results: Vec<TokenStream> = results.collect();
-    let kind = results
-        .iter()
-        .map(|_| quote! { Bound<'py, PyArrayDyn<f64>> });
+    let one_array = quote! { Bound<'py, PyArrayDyn<f64>> };
+    let (results, kind) = match results.as_slice() {
+        [result] => (result.clone(), one_array),
+        several => {
+            let kinds = several.iter().map(|_| &one_array);
+            (quote! { (#(#several),*) }, quote! { (#(#kinds),*) })
+        }
+    };
     let shapes = one.parts.iter().map(|part| {
         let counts = part.shape.iter().map(|count| count.n.to_string());
         format!("({}, n)", counts.collect::<Vec<String>>().join(", "))
@@ -402,7 +407,7 @@ fn single(face: &Face<'_>, one: &Function) -> TokenStream {
         #[pyo3(signature = (#(#names,)* #p_name *, geometry=None))]
         fn #name<'py>(
             py: Python<'py>, #(#names: PyReadonlyArrayDyn<'py, f64>,)* #p_argument geometry: Option<BTreeMap<String, f64>>,
-        ) -> PyResult<(#(#kind),*)> {
+        ) -> PyResult<#kind> {
             #arrays
             let owner = #owner;
             let values = computed(py, &many, #entries, |sample| {
@@ -410,7 +415,7 @@ fn single(face: &Face<'_>, one: &Function) -> TokenStream {
                 let found = owner.#method(&state #forces)?;
                 Ok([#(#values),*].concat())
             })?;
-            Ok((#(#results),*))
+            Ok(#results)
         }
     }
 }
