@@ -5,6 +5,7 @@ use quote::{format_ident, quote};
 
 use super::functions::{Function, functions};
 use super::{Face, source};
+use crate::emit::language::rust::doc_lines;
 use crate::emit::language::{EmittedFile, Source};
 
 /// Names that a module of Python cannot have, or must leave to the module whose arrays it takes.
@@ -81,6 +82,7 @@ fn items(face: &Face<'_>) -> TokenStream {
          without an answer raise ValueError, with the number of the state; names that the model has not, KeyError.",
         modelmill_boundary::text::comment(mechanism.title.as_deref().unwrap_or(&mechanism.name))
     );
+    let title = doc_lines(&title, false);
     let (constants, parameters) = (face.constants(), face.parameters());
     let (n_active, n_drives, n_base) = (face.n_active(), face.n_drives(), face.n_base());
     let records = [
@@ -292,7 +294,7 @@ fn items(face: &Face<'_>) -> TokenStream {
             Ok(PyArray1::from_slice(py, &base))
         }
 
-        #[doc = #title]
+        #title
         #[pymodule]
         #[pyo3(name = #module)]
         fn python_module(m: &Bound<'_, PyModule>) -> PyResult<()> {
