@@ -81,7 +81,7 @@ pub(crate) enum Command {
         modelmill generate model-spec/models/scara.toml --out scara.rs\n  \
         modelmill generate model-spec/models/panda.toml --language c99 --out panda-c99\n  \
         modelmill generate model-spec/models/panda.toml --language c --out panda-c\n  \
-        modelmill generate model-spec/models/panda.toml --language python --out panda-python")]
+        modelmill generate model-spec/models/panda.toml --language python --dynamics --out panda-python")]
     Generate(GenerateArgs),
     /// Compute the model's forces along a recording
     #[command(after_help = "Examples (from the project's root):\n  \
