@@ -48,12 +48,13 @@ const TEXTS: [&str; 34] = [
 
 /// Words of Rust, C and Python, macros and names of their libraries, of the emitted code itself, and names that differ in
 /// case only.
-const NAMES: [&str; 44] = [
+const NAMES: [&str; 55] = [
     "double", "Double", "DOUBLE", "int", "Int", "restrict", "volatile", "register", "errno",
     "NULL", "NAN", "INFINITY", "M_PI", "I", "EOF", "linux", "size_t", "fn", "crate", "self",
     "Self", "super", "dyn", "type", "T", "Model", "Geometry", "n", "N", "q", "once", "input",
     "prepared", "lambda", "def", "None", "True", "nonlocal", "numpy", "p1_min", "yield_ok", "Err",
-    "f64", "core",
+    "f64", "core", "Some", "Ok", "One", "Var", "N_BASE", "INPUTS", "POSE", "Gravity", "Bias",
+    "Forces", "Columns",
 ];
 
 /// A text between quotes of TOML.
@@ -335,8 +336,7 @@ fn hostile_names_of_files_and_columns_are_texts_in_every_output() {
             };
             format!("{motion},{},{more}", force.split_once(',').unwrap().1)
         });
-    let data =
-        place.join("run \u{1b}[2J\u{202e}\n</script><script>alert(1)<'script> \"\"\" ??' *' .csv");
+    let data = place.join("run \u{1b}[2J\u{202e}\n<script>alert(1)<'script> \"\"\" ??' *' .csv");
     std::fs::write(&data, joined.collect::<Vec<_>>().join("\n")).unwrap();
     let data = text(&data);
     let fit = place.join("fit.json");

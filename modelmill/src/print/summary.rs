@@ -117,7 +117,7 @@ impl Summary {
         style: Style,
     ) -> String {
         let m = &derivation.mechanism;
-        let mut lines = vec![style.bold(&format!("{name}: sound"))];
+        let mut lines = vec![style.bold(&format!("{}: sound", plain(name)))];
         if let Some(title) = &m.title {
             lines.push(format!("  {}", plain(title)));
         }
