@@ -242,6 +242,10 @@ fn streams_without_an_end_are_refused() {
     ] {
         refused(&confined(from, &["check", "/dev/stdin"]), &["/dev/stdin"]);
     }
+    refused(
+        &confined("yes |", &["check", "-"]),
+        &["/dev/stdin is standard input"],
+    );
     for (says, args) in [
         ("y", &["check", "PIPE"][..]),
         ("yy", &["generate", "PIPE"]),

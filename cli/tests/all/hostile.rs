@@ -36,7 +36,7 @@ const TEXTS: [&str; 34] = [
     "<img src=x onerror=alert(1)>",
     "\" onload=\"alert(1)",
     "<!-- --> ]]> <![CDATA[",
-    "[a](javascript:x) ![b](http://c) [d]: http://e",
+    "[a](javascript:x) ![b](ftp://c) [d]: ftp://e",
     "| cell | `code` **bold** _it_ # head",
     "$x$ \\( y \\) \\input{x} % rest",
     "\\end{document} \\end{verbatim} ^^M ~",
