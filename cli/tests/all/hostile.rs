@@ -417,31 +417,7 @@ fn crates_of_hostile_models_compile_and_hold_no_code_of_theirs() {
     };
     let place = models[0].parent().unwrap();
 
-    // Rust: the module with everything, where any warning is an error.
-    let rust = place.join("rust");
-    std::fs::create_dir_all(rust.join("src")).unwrap();
-    std::fs::write(rust.join("src/model.rs"), &bad).unwrap();
-    std::fs::write(
-        rust.join("src/lib.rs"),
-        "#![no_std]\n#![deny(warnings)]\npub mod model;\n",
-    )
-    .unwrap();
-    let runtime = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../runtime")
-        .canonicalize()
-        .unwrap();
-    std::fs::write(
-        rust.join("Cargo.toml"),
-        format!(
-            "[package]\nname = \"hostile\"\nversion = \"0.1.0\"\nedition = \"2024\"\n[dependencies]\nmodelmill-runtime = {{ path = {} }}\n\
-             [workspace]\n",
-            quoted(text(&runtime))
-        ),
-    )
-    .unwrap();
-    std::fs::copy(runtime.join("../Cargo.lock"), rust.join("Cargo.lock")).unwrap();
-    cargo("check", &rust, &[]);
-
+    check_module(place, &bad);
     let compilers = [("cc", "c"), ("c++", "c++")]
         .map(|(program, language)| there(program).then_some((program, language)));
     let c99 = crates("c99", &all);
@@ -483,10 +459,42 @@ fn crates_of_hostile_models_compile_and_hold_no_code_of_theirs() {
     }
 
     let module = crates("python", &["--dynamics"]);
-    if !cfg!(target_os = "linux") || !has_its_crates(&module) {
+    import(place, &module);
+}
+
+/// Compiles a module of Rust with everything in it, where any warning is an error.
+fn check_module(place: &Path, module: &str) {
+    let rust = place.join("rust");
+    std::fs::create_dir_all(rust.join("src")).unwrap();
+    std::fs::write(rust.join("src/model.rs"), module).unwrap();
+    std::fs::write(
+        rust.join("src/lib.rs"),
+        "#![no_std]\n#![deny(warnings)]\npub mod model;\n",
+    )
+    .unwrap();
+    let runtime = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../runtime")
+        .canonicalize()
+        .unwrap();
+    std::fs::write(
+        rust.join("Cargo.toml"),
+        format!(
+            "[package]\nname = \"hostile\"\nversion = \"0.1.0\"\nedition = \"2024\"\n[dependencies]\nmodelmill-runtime = {{ path = {} }}\n\
+             [workspace]\n",
+            quoted(text(&runtime))
+        ),
+    )
+    .unwrap();
+    std::fs::copy(runtime.join("../Cargo.lock"), rust.join("Cargo.lock")).unwrap();
+    cargo("check", &rust, &[]);
+}
+
+/// Builds a Python module and imports it.
+fn import(place: &Path, module: &Path) {
+    if !cfg!(target_os = "linux") || !has_its_crates(module) {
         return;
     }
-    cargo("build", &module, &[]);
+    cargo("build", module, &[]);
     let Some(python) = python() else {
         println!("skipped: there is no python3 on this machine");
         return;

@@ -67,6 +67,10 @@ impl Part {
 }
 
 /// All functions of a state that a model has.
+#[allow(
+    clippy::too_many_lines,
+    reason = "a list of functions, one after the other"
+)]
 pub(super) fn functions(face: &Face<'_>) -> Vec<Function> {
     let count = |name, n| Count { name, n };
     let active = count("ACTIVE", face.n_active());

@@ -265,7 +265,7 @@ fn read_header(stream: &mut impl BufRead) -> Result<(String, Vec<u8>), Fault> {
 fn find_separator(header: &str) -> Result<u8, Fault> {
     // What stands between quotes separates nothing, unless one is left open.
     let parts: Vec<&str> = header.split('"').collect();
-    let step = if parts.len() % 2 == 0 { 1 } else { 2 };
+    let step = if parts.len().is_multiple_of(2) { 1 } else { 2 };
     let present: Vec<u8> = [b',', b';', b'\t']
         .into_iter()
         .filter(|s| {
