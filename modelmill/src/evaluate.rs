@@ -1,6 +1,5 @@
 //! `evaluate`: a model's forces along a recording, of the drives or in the joints.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use modelmill_codegen::Reactions;
@@ -9,6 +8,7 @@ use crate::along;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::{self, Reading};
+use crate::text::csv::csv;
 
 /// Columns of numbers along a recording.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,16 +80,10 @@ impl Evaluated {
 
     /// The columns as text (CSV), `t` first.
     pub fn csv(&self) -> String {
-        let names: Vec<&str> = self.columns.iter().map(|(name, _)| name.as_str()).collect();
-        let mut text = format!("t,{}\n", names.join(","));
-        for (i, t) in self.time.iter().enumerate() {
-            let _ = write!(text, "{t}");
-            for (_, values) in &self.columns {
-                let _ = write!(text, ",{}", values[i]);
-            }
-            text.push('\n');
-        }
-        text
+        let mut columns = vec![("t", self.time.as_slice())];
+        let more = self.columns.iter();
+        columns.extend(more.map(|(name, values)| (name.as_str(), values.as_slice())));
+        csv(&columns)
     }
 }
 

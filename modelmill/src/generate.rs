@@ -1,6 +1,6 @@
 //! `generate`: a model as code.
 
-use modelmill_codegen::{C99, RustModule, Source, emit_c, emit_python};
+use modelmill_codegen::{C99, Language as _, RustModule, Source, emit_c, emit_python};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -41,7 +41,6 @@ impl Model {
     /// Fails when a language lacks something that is asked for, or the mechanism has no such equations.
     pub fn generate(&self, code: &Code) -> Outcome<Vec<EmittedFile>> {
         let more = [
-            ("the equation of motion", code.dynamics),
             ("reactions", code.reactions),
             ("a self-test", code.self_test),
         ];
@@ -53,30 +52,25 @@ impl Model {
             )));
         }
         let what = format!("writing the code of {}", self.name);
-        self.host().watched(&what, 0, |_| match code.language {
-            Language::Rust => self.written(&RustModule, *code),
-            Language::C99 => self.written(&C99, *code),
-            Language::C => Ok(with_runtime(emit_c(&self.derivation))),
-            Language::Python => Ok(with_runtime(emit_python(&self.derivation))),
+        self.host().watched(&what, 0, |_| {
+            let derivation = &self.derivation;
+            let fault = |error| Error::derivation(&self.path, error);
+            let dynamics = code.dynamics.then(|| derivation.dynamics()).transpose();
+            let reactions = code.reactions.then(|| derivation.reactions()).transpose();
+            let (dynamics, reactions) = (dynamics.map_err(fault)?, reactions.map_err(fault)?);
+            let source = Source {
+                derivation,
+                dynamics: dynamics.as_ref(),
+                reactions: reactions.as_ref(),
+                self_test: code.self_test,
+            };
+            Ok(match code.language {
+                Language::Rust => RustModule.write(&source),
+                Language::C99 => C99.write(&source),
+                Language::C => with_runtime(emit_c(&source)),
+                Language::Python => with_runtime(emit_python(&source)),
+            })
         })?
-    }
-
-    fn written(
-        &self,
-        language: &dyn modelmill_codegen::Language,
-        code: Code,
-    ) -> Outcome<Vec<EmittedFile>> {
-        let derivation = &self.derivation;
-        let fault = |error| Error::derivation(&self.path, error);
-        let dynamics = code.dynamics.then(|| derivation.dynamics()).transpose();
-        let reactions = code.reactions.then(|| derivation.reactions()).transpose();
-        let (dynamics, reactions) = (dynamics.map_err(fault)?, reactions.map_err(fault)?);
-        Ok(language.write(&Source {
-            derivation,
-            dynamics: dynamics.as_ref(),
-            reactions: reactions.as_ref(),
-            self_test: code.self_test,
-        }))
     }
 }
 

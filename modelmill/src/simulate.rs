@@ -1,6 +1,5 @@
 //! `simulate`: a rig driven along a trajectory, as a recording.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use modelmill_boundary::files::Kind;
@@ -9,6 +8,7 @@ use modelmill_rig::{Rig, Run, Samples, SimulationError, Trajectory, TrajectoryEr
 
 use crate::error::{Error, Outcome};
 use crate::host::Host;
+use crate::text::csv::csv;
 
 /// A run of a rig.
 pub struct Simulated {
@@ -32,7 +32,9 @@ impl Simulated {
 
     /// The run as a recording (CSV).
     pub fn csv(&self) -> String {
-        csv(&self.run)
+        let columns = self.run.columns.iter();
+        let columns = columns.map(|(name, values)| (name.as_str(), values.as_slice()));
+        csv(&columns.collect::<Vec<_>>())
     }
 }
 
@@ -177,18 +179,4 @@ fn refusal(
         recording.file(),
         pose.join(", ")
     ))
-}
-
-fn csv(made: &Run) -> String {
-    let names: Vec<&str> = made.columns.iter().map(|(name, _)| name.as_str()).collect();
-    let mut text = names.join(",");
-    text.push('\n');
-    let samples = made.columns.first().map_or(0, |(_, time)| time.len());
-    for i in 0..samples {
-        for (k, (_, values)) in made.columns.iter().enumerate() {
-            let _ = write!(text, "{}{}", if k == 0 { "" } else { "," }, values[i]);
-        }
-        text.push('\n');
-    }
-    text
 }

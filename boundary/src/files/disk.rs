@@ -174,6 +174,8 @@ fn capped(stream: impl Read, path: &Path, most: u64) -> Result<Vec<u8>, FileErro
     if bytes.len() as u64 > most {
         return Err(FileError::new(path, FileFault::TooLarge { most }));
     }
+    // What was read by doubling may take up twice its room.
+    bytes.shrink_to_fit();
     Ok(bytes)
 }
 
@@ -190,7 +192,10 @@ fn patiently(path: &Path, most: u64, patience: Duration) -> Result<Vec<u8>, File
         match receiver.recv_timeout(patience) {
             Ok(Ok(more)) => bytes.extend_from_slice(&more),
             Ok(Err(error)) => return Err(FileError::system(path, &error)),
-            Err(RecvTimeoutError::Disconnected) => return Ok(bytes),
+            Err(RecvTimeoutError::Disconnected) => {
+                bytes.shrink_to_fit();
+                return Ok(bytes);
+            }
             Err(RecvTimeoutError::Timeout) => {
                 let seconds = patience.as_secs();
                 return Err(FileError::new(path, FileFault::Silent { seconds }));

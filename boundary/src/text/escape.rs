@@ -64,7 +64,7 @@ pub fn latex(text: &str) -> Cow<'_, str> {
 }
 
 /// Text of a comment in C, Rust or Python, whichever sort: it neither ends the comment nor begins one in it, joins no
-/// lines and ends no documentation string.
+/// lines, ends no documentation string, and is neither tag nor link where `rustdoc` makes a page of it.
 ///
 /// A backslash joins lines at their end and begins escapes in a Python string, and three signs stand for one in C
 /// (`??/`); a backslash becomes a slash, and a blank goes between the others.
@@ -78,7 +78,15 @@ pub fn comment(text: &str) -> Cow<'_, str> {
     let mut before = '\0';
     escaped(plain(text), |c, out| {
         let c = if c == '\\' { '/' } else { c };
-        if matches!((before, c), ('*', '/') | ('/', '*') | ('?', '?')) {
+        let joins = match before {
+            '*' => c == '/',
+            '/' => c == '*',
+            '?' => c == '?',
+            '<' => c.is_ascii_alphabetic() || matches!(c, '/' | '!' | '?'),
+            ']' => matches!(c, '(' | '[' | ':'),
+            _ => false,
+        };
+        if joins {
             out.push(' ');
         }
         // Three of them end a documentation string, whatever stands behind.
@@ -88,14 +96,34 @@ pub fn comment(text: &str) -> Cow<'_, str> {
 }
 
 /// A field of CSV text, in quotes where it needs them; a spreadsheet does not take it for a formula.
+///
+/// ```
+/// use modelmill_boundary::text::{csv_field, csv_name};
+/// assert_eq!(csv_field("=cmd()"), "\"'=cmd()\"");
+/// assert_eq!(csv_name("'=cmd()"), "=cmd()");
+/// ```
 pub fn csv_field(text: &str) -> Cow<'_, str> {
     let text = plain(text);
-    let is_formula = text.starts_with(['=', '+', '-', '@']) && text.parse::<f64>().is_err();
+    let is_formula = begins_formula(&text) && text.parse::<f64>().is_err();
     if !is_formula && !text.contains(['"', ',', ';']) && text.trim() == text {
         return text;
     }
     let mark = if is_formula { "'" } else { "" };
     Cow::Owned(format!("\"{mark}{}\"", text.replace('"', "\"\"")))
+}
+
+/// A name as [`csv_field`] was given it, of a field without its quotes.
+pub fn csv_name(field: &str) -> &str {
+    let unmarked = field.strip_prefix('\'');
+    unmarked
+        .filter(|text| begins_formula(text))
+        .unwrap_or(field)
+}
+
+/// Whether a spreadsheet would take a text for a formula, or such a text is marked already.
+fn begins_formula(text: &str) -> bool {
+    text.trim_start_matches('\'')
+        .starts_with(['=', '+', '-', '@'])
 }
 
 /// JSON as a terminal may show it: what does harm within its strings is written as `\u` and four digits, which means the
@@ -140,9 +168,11 @@ mod tests {
             "\"\"\"\"\"\"",
             "a\rint evil;",
             "a\u{2028}int evil;",
+            "<script>alert(1)</script>",
+            "[a](javascript:b)",
         ] {
             let text = comment(hostile);
-            for sign in ["*/", "/*", "??", "\\", "\"\"", "\n", "\r"] {
+            for sign in ["*/", "/*", "??", "\\", "\"\"", "\n", "\r", "</", "]("] {
                 assert!(!text.contains(sign), "{hostile:?} became {text:?}");
             }
         }
@@ -161,6 +191,7 @@ mod tests {
         assert_eq!(csv_field("-1.5"), "-1.5");
         assert_eq!(csv_field("a,\"b\""), "\"a,\"\"b\"\"\"");
         assert_eq!(csv_field("=1+1"), "\"'=1+1\"");
+        assert_eq!(csv_name("'tis"), "'tis");
     }
 
     #[test]

@@ -10,7 +10,7 @@ mod escape;
 use std::borrow::Cow;
 
 pub use advice::{Advised, spelled};
-pub use escape::{code_in_markdown, comment, csv_field, html, json, latex, markdown};
+pub use escape::{code_in_markdown, comment, csv_field, csv_name, html, json, latex, markdown};
 
 /// Text on one line: line ends and tabs become blanks, and what steers a terminal or the direction of writing becomes
 /// the replacement character.

@@ -81,7 +81,7 @@ pub(crate) enum Command {
         modelmill generate model-spec/models/scara.toml --out scara.rs\n  \
         modelmill generate model-spec/models/panda.toml --language c99 --out panda-c99\n  \
         modelmill generate model-spec/models/panda.toml --language c --out panda-c\n  \
-        modelmill generate model-spec/models/panda.toml --language python --out panda-python")]
+        modelmill generate model-spec/models/panda.toml --language python --dynamics --out panda-python")]
     Generate(GenerateArgs),
     /// Compute the model's forces along a recording
     #[command(after_help = "Examples (from the project's root):\n  \
@@ -266,7 +266,7 @@ pub(crate) struct GenerateArgs {
     /// With a function `self_test` that holds base parameters against all parameters, for a test of your own
     #[arg(long)]
     pub(crate) self_test: bool,
-    /// What to make: a Rust module, or a crate that builds a C library with its header, or a Python module
+    /// What to make: a Rust module, sources of plain C99, or a crate that builds a C library with its header or a Python module
     #[arg(long, value_enum, default_value = "rust")]
     pub(crate) language: LanguageArg,
 }

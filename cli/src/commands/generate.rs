@@ -15,7 +15,6 @@ use crate::{commands, terminal};
 /// Writes the source that `cargo build` makes of the model, or the folder of a crate.
 pub(crate) fn run(host: &Host, args: &GenerateArgs) -> Outcome {
     let more = [
-        ("--dynamics", args.dynamics),
         ("--reactions", args.reactions),
         ("--self-test", args.self_test),
     ];

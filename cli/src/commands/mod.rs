@@ -66,8 +66,13 @@ pub(crate) fn load_quietly(host: &Host, path: &Path) -> Outcome<Loaded> {
     }
     if !path.exists() {
         return Err(Failure::Input(format!(
-            "there is no file {}; the path of a model file (TOML) is expected{}",
+            "there is no file {}; the path of a model file (TOML) is expected{}{}",
             path.display(),
+            if path == Path::new("-") {
+                " (/dev/stdin is standard input)"
+            } else {
+                ""
+            },
             nearby(path)
         )));
     }

@@ -11,13 +11,13 @@ fn project() -> PathBuf {
 }
 
 /// A folder of this test for everything that it writes; what was built there once is only checked for changes.
-fn folder(name: &str) -> PathBuf {
+pub(crate) fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR"))
         .join("languages")
         .join(name)
 }
 
-fn run(command: &mut Command) -> String {
+pub(crate) fn run(command: &mut Command) -> String {
     let output = command
         .output()
         .unwrap_or_else(|error| panic!("{command:?}: {error}"));
@@ -30,24 +30,25 @@ fn run(command: &mut Command) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-fn there(program: &str) -> bool {
+pub(crate) fn there(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok()
 }
 
-/// Writes the crate of a bundled model.
+/// Writes the crate of a bundled model, with its equation of motion.
 fn written(model: &str, language: &str) -> PathBuf {
     let file = project().join(format!("model-spec/models/{model}.toml"));
-    written_of(&file, model, language)
+    written_of(&file, model, language, &["--dynamics"])
 }
 
 /// Writes the crate of a model file.
-fn written_of(file: &Path, model: &str, language: &str) -> PathBuf {
+pub(crate) fn written_of(file: &Path, model: &str, language: &str, more: &[&str]) -> PathBuf {
     let out = folder(&format!("{model}-{language}"));
     run(Command::new(env!("CARGO_BIN_EXE_modelmill"))
         .arg("generate")
         .arg(file)
         .args(["--language", language, "--out"])
-        .arg(&out));
+        .arg(&out)
+        .args(more));
     // The versions of the project's own lock file, so that nothing newer is asked for.
     std::fs::copy(project().join("Cargo.lock"), out.join("Cargo.lock")).unwrap();
     out
@@ -56,12 +57,17 @@ fn written_of(file: &Path, model: &str, language: &str) -> PathBuf {
 /// Writes the crate of a bundled model and builds it.
 fn built(model: &str, language: &str, options: &[&str]) -> PathBuf {
     let out = written(model, language);
+    cargo("build", &out, options);
+    out
+}
+
+/// Lets cargo look at a crate, or build it, in the folder of all these tests.
+pub(crate) fn cargo(what: &str, at: &Path, options: &[&str]) {
     run(Command::new(env!("CARGO"))
-        .args(["build", "--release", "--quiet", "--target-dir"])
+        .args([what, "--release", "--quiet", "--target-dir"])
         .arg(folder("target"))
         .args(options)
-        .current_dir(&out));
-    out
+        .current_dir(at));
 }
 
 fn tables() -> PathBuf {
@@ -82,18 +88,42 @@ fn the_c_library_gives_the_torques_of_the_table() {
         return;
     }
     for options in [&[][..], &["--no-default-features"]] {
-        let out = built("panda", "c", options);
-        let program = folder("panda-c-test");
-        run(Command::new("cc")
-            .args(["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-I"])
-            .arg(out.join("include"))
-            .arg(project().join("cli/tests/languages/panda.c"))
-            .arg(folder("target").join("release/libpanda.a"))
-            .args(LIBRARIES)
-            .arg("-o")
-            .arg(&program));
-        assert_eq!(run(Command::new(program).arg(tables())), "agrees\n");
+        c_agrees("panda", "panda", "panda", options);
     }
+}
+
+/// Builds a C library and holds it against the tables by a program that says so.
+fn c_agrees(model: &str, name: &str, test: &str, options: &[&str]) {
+    let out = built(model, "c", options);
+    let program = folder(&format!("{test}-c-test"));
+    run(Command::new("cc")
+        .args([
+            "-std=c99",
+            "-O2",
+            "-Wall",
+            "-Wextra",
+            "-pedantic",
+            "-Werror",
+            "-I",
+        ])
+        .arg(out.join("include"))
+        .arg(project().join(format!("cli/tests/languages/{test}.c")))
+        .arg(folder("target").join(format!("release/lib{name}.a")))
+        .args(LIBRARIES)
+        .arg("-o")
+        .arg(&program));
+    assert_eq!(run(Command::new(program).arg(tables())), "agrees\n");
+}
+
+/// Loops in closed form beside a table, and loops by Newton's method.
+#[test]
+fn the_c_library_moves_loops_and_inverts_its_own_dynamics() {
+    if !there("cc") {
+        println!("skipped: there is no C compiler `cc` on this machine");
+        return;
+    }
+    c_agrees("spidermill-paper", "spidermill_paper", "spidermill", &[]);
+    c_agrees("three_rrr", "three_rrr", "three_rrr", &[]);
 }
 
 /// Writes the C99 of a bundled model with all that it can have.
@@ -115,7 +145,7 @@ fn c99(model: &str) -> PathBuf {
 }
 
 /// What every compiler must take without a word.
-const STRICT: [&str; 6] = [
+pub(crate) const STRICT: [&str; 6] = [
     "-std=c99",
     "-O2",
     "-Wall",
@@ -224,13 +254,13 @@ fn emitted_code_cannot_panic() {
 }
 
 /// A Python that has numpy, or at least one without.
-fn python() -> Option<String> {
+pub(crate) fn python() -> Option<String> {
     let named = std::env::var("MODELMILL_PEERS_PYTHON").ok();
     named.or_else(|| there("python3").then(|| "python3".to_owned()))
 }
 
 /// Whether the crates that a Python module needs can be had; says so if not.
-fn has_its_crates(out: &Path) -> bool {
+pub(crate) fn has_its_crates(out: &Path) -> bool {
     let fetched = Command::new(env!("CARGO"))
         .arg("fetch")
         .current_dir(out)
@@ -262,24 +292,28 @@ fn the_python_module_gives_the_torques_of_the_table() {
         );
         return;
     }
-    let out = written("panda", "python");
-    if !has_its_crates(&out) {
-        return;
+    for (model, name, test) in [
+        ("panda", "panda", "panda.py"),
+        ("spidermill-paper", "spidermill_paper", "spidermill.py"),
+    ] {
+        if !has_its_crates(&written(model, "python")) {
+            return;
+        }
+        built(model, "python", &[]);
+        let module = folder("module");
+        std::fs::create_dir_all(&module).unwrap();
+        std::fs::copy(
+            folder("target").join(format!("release/lib{name}.so")),
+            module.join(format!("{name}.so")),
+        )
+        .unwrap();
+        let says = run(Command::new(&python)
+            .arg(project().join("cli/tests/languages").join(test))
+            .arg(&module)
+            .arg(tables()));
+        println!("{says}");
+        assert!(says.starts_with("agrees with the table"), "{says}");
     }
-    built("panda", "python", &[]);
-    let module = folder("module");
-    std::fs::create_dir_all(&module).unwrap();
-    std::fs::copy(
-        folder("target").join("release/libpanda.so"),
-        module.join("panda.so"),
-    )
-    .unwrap();
-    let says = run(Command::new(&python)
-        .arg(project().join("cli/tests/languages/panda.py"))
-        .arg(&module)
-        .arg(tables()));
-    println!("{says}");
-    assert!(says.starts_with("agrees with the table"), "{says}");
 }
 
 /// A pendulum without constants under a name, as a model file.
@@ -305,7 +339,7 @@ fn c_headers_are_c_whatever_the_model_is_called_and_lacks() {
         ("stdint", "stdint_model"),
         ("loop", "loop"),
     ] {
-        let out = written_of(&pendulum(name), name, "c");
+        let out = written_of(&pendulum(name), name, "c", &[]);
         let source = folder(&format!("{name}.c"));
         std::fs::write(&source, format!("#include \"{header}.h\"\n")).unwrap();
         run(Command::new("cc")
@@ -330,7 +364,7 @@ fn python_modules_build_whatever_the_model_is_called() {
         ("loop", "loop"),
         ("class", "class_model"),
     ] {
-        let out = written_of(&pendulum(name), name, "python");
+        let out = written_of(&pendulum(name), name, "python", &[]);
         if !has_its_crates(&out) {
             return;
         }
@@ -339,10 +373,7 @@ fn python_modules_build_whatever_the_model_is_called() {
             manifest.contains(&format!("module-name = \"{module}\"")),
             "{manifest}"
         );
-        run(Command::new(env!("CARGO"))
-            .args(["check", "--release", "--quiet", "--target-dir"])
-            .arg(folder("target"))
-            .current_dir(&out));
+        cargo("check", &out, &[]);
     }
 }
 
@@ -356,7 +387,7 @@ fn what_only_rust_has_is_refused_with_a_word() {
     };
     let out = folder("never");
     let output = generate(&[
-        "--dynamics",
+        "--reactions",
         "--language",
         "c",
         "--out",
@@ -365,12 +396,12 @@ fn what_only_rust_has_is_refused_with_a_word() {
     assert_eq!(output.status.code(), Some(2));
     let says = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
-        says.contains("--dynamics goes with the Rust module and c99 only"),
+        says.contains("--reactions goes with the Rust module and c99 only"),
         "{says}"
     );
     assert!(!out.exists());
     assert!(
-        generate(&["--dynamics", "--language", "rust"])
+        generate(&["--reactions", "--language", "rust"])
             .status
             .success()
     );

@@ -4,6 +4,8 @@
 
 #[allow(dead_code, reason = "what only the run of the benchmark calls")]
 mod benchmark;
+#[cfg(target_os = "linux")]
+mod bombs;
 #[cfg(unix)]
 mod boundary;
 mod cloos;
@@ -21,6 +23,8 @@ mod figures;
 mod guide;
 mod hidden_cases;
 mod hidden_effects;
+#[cfg(unix)]
+mod hostile;
 mod interpret;
 mod json;
 mod languages;

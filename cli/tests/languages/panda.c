@@ -3,38 +3,12 @@
 
 #include "panda.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include "table.h"
 
 #define STATES 40
 #define COLUMNS 28
 
 static double table[STATES][COLUMNS], parameters[PANDA_N_PARAMETERS];
-
-/* Reads rows of numbers behind a line of names. */
-static void read_table(const char *folder, const char *name, double *to, size_t rows, size_t columns) {
-  static char path[4096], line[65536];
-  snprintf(path, sizeof path, "%s/%s", folder, name);
-  FILE *file = fopen(path, "r");
-  if (!file || !fgets(line, sizeof line, file)) {
-    fprintf(stderr, "%s cannot be read\n", path);
-    exit(1);
-  }
-  for (size_t i = 0; i < rows; ++i) {
-    char *next = fgets(line, sizeof line, file);
-    for (size_t k = 0; next && k < columns; ++k, ++next) *to++ = strtod(next, &next);
-  }
-  fclose(file);
-}
-
-static void check(int good, const char *what) {
-  if (!good) {
-    fprintf(stderr, "%s\n", what);
-    exit(1);
-  }
-}
 
 int main(int argc, char **argv) {
   check(argc == 2, "usage: panda FOLDER-OF-TABLES");
@@ -52,12 +26,30 @@ int main(int argc, char **argv) {
         "an unprepared model must be refused");
   check(panda_prepare(&dynamics, geometry, base) == PANDA_OK, "prepare");
 
+  double matrix[7 * 7], bias[7], coriolis[7], gravity[7], effects[7], found[7], motion[7 + 7 + 49], back[7];
   double largest = 0, worst = 0;
   static double q[7 * STATES], qd[7 * STATES], qdd[7 * STATES], all[7 * STATES];
   for (size_t i = 0; i < STATES; ++i) {
     const double *row = table[i];
     check(panda_inverse_dynamics(&dynamics, row, row + 7, row + 14, forces) == PANDA_OK, "inverse dynamics");
     check(panda_regressor(&dynamics, row, row + 7, row + 14, regressor) == PANDA_OK, "regressor");
+    check(panda_mass_matrix(&dynamics, row, row + 7, row + 14, matrix) == PANDA_OK, "mass matrix");
+    check(panda_bias(&dynamics, row, row + 7, row + 14, bias) == PANDA_OK, "bias");
+    check(panda_coriolis(&dynamics, row, row + 7, row + 14, coriolis) == PANDA_OK, "coriolis");
+    check(panda_gravity(&dynamics, row, row + 7, row + 14, gravity) == PANDA_OK, "gravity");
+    check(panda_effects(&dynamics, row, row + 7, row + 14, effects) == PANDA_OK, "effects");
+    check(panda_forward(&dynamics, row, row + 7, row + 14, row + 21, found) == PANDA_OK, "forward dynamics");
+    check(panda_inverse_dynamics(&dynamics, row, row + 7, found, back) == PANDA_OK, "forces of what was found");
+    check(panda_drives(&dynamics, row, row + 7, row + 14, motion) == PANDA_OK, "drives");
+    for (size_t d = 0; d < 7; ++d) {
+      double total = bias[d];
+      for (size_t k = 0; k < 7; ++k) total += matrix[d * 7 + k] * row[14 + k];
+      worst = fmax(worst, fmax(fabs(total - row[21 + d]), fabs(back[d] - row[21 + d])));
+      worst = fmax(worst, fabs(coriolis[d] + gravity[d] + effects[d] - bias[d]));
+      check(fabs(found[d] - row[14 + d]) < 1e-9 * (1 + fabs(row[14 + d])), "accelerations do not come back");
+      check(motion[d] == row[d] && motion[7 + d] == row[7 + d], "motion of the drives");
+      for (size_t k = 0; k < 7; ++k) check(motion[14 + d * 7 + k] == (d == k), "Jacobian of the drives");
+    }
     for (size_t d = 0; d < 7; ++d) {
       double sum = 0;
       for (size_t b = 0; b < PANDA_N_BASE; ++b) sum += regressor[d * PANDA_N_BASE + b] * base[b];
@@ -83,6 +75,10 @@ int main(int argc, char **argv) {
   q[2 * STATES + 17] = NAN;
   check(panda_inverse_dynamics_many(&dynamics, STATES, q, qd, qdd, all, &failed) == PANDA_NOT_FINITE && failed == 17,
         "what is no number must be found where it stands");
+  q[0] = NAN;
+  check(panda_mass_matrix(&dynamics, q, qd, qdd, matrix) == PANDA_NOT_FINITE, "a mass matrix of what is no number");
+  check(panda_forward(&dynamics, table[0], table[0] + 7, table[0] + 14, q, found) == PANDA_NOT_FINITE, "forces that are none");
+  check(panda_forward(&dynamics, table[0], table[0] + 7, table[0] + 14, NULL, found) == PANDA_NULL_POINTER, "no forces");
   check(panda_inverse_dynamics(&dynamics, NULL, qd, qdd, forces) == PANDA_NULL_POINTER, "null pointers must be refused");
   puts("agrees");
   return 0;

@@ -1,8 +1,6 @@
-/* Tables of numbers for tests, and what ends them. */
+/* Tables of numbers for tests. */
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
+#include "check.h"
 
 /* Reads rows of numbers behind a line of names. */
 static void read_table(const char *folder, const char *name, double *to, size_t rows, size_t columns) {
@@ -20,11 +18,4 @@ static void read_table(const char *folder, const char *name, double *to, size_t 
     for (k = 0; next && k < columns; ++k, ++next) *to++ = strtod(next, &next);
   }
   fclose(file);
-}
-
-static void check(int good, const char *what) {
-  if (!good) {
-    fprintf(stderr, "%s\n", what);
-    exit(1);
-  }
 }

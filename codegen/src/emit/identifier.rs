@@ -4,8 +4,51 @@ use std::fmt::Write as _;
 
 use proc_macro2::{Ident, Span};
 
-/// Keywords that `r#` does not make identifiers.
-const NEVER: [&str; 4] = ["self", "Self", "super", "crate"];
+/// Keywords that `r#` does not make identifiers, and names of the prelude and of emitted modules that a pattern takes for
+/// what they are instead of binding them.
+const NEVER: [&str; 41] = [
+    "self",
+    "Self",
+    "super",
+    "crate",
+    "None",
+    "Some",
+    "Ok",
+    "Err",
+    "One",
+    "Var",
+    "ACTIVE",
+    "BASE_PARAMETERS",
+    "CONSTANTS",
+    "DRIVES",
+    "INPUTS",
+    "INPUTS_WITH_PASSIVE",
+    "JOINTS",
+    "LOOPS",
+    "N_ACTIVE",
+    "N_BASE",
+    "N_DRIVES",
+    "N_JOINTS",
+    "N_LOOPS",
+    "N_PASSIVE",
+    "N_PRODUCTS",
+    "PARAMETERS",
+    "PASSIVE",
+    "POSE",
+    "Bias",
+    "Columns",
+    "Coriolis",
+    "Effects",
+    "Forces",
+    "Gaps",
+    "Gravity",
+    "LoopScales",
+    "MassMatrix",
+    "MotionOfDrives",
+    "MotionOfPassive",
+    "Regressor",
+    "Wrenches",
+];
 
 /// Keywords that the parser takes for identifiers, because an older edition does.
 const NEWER: [&str; 1] = ["gen"];
@@ -64,9 +107,10 @@ mod tests {
     #[test]
     fn different_names_give_different_identifiers() {
         let names = [
-            "type", "type_", "_type", "r", "r_type", "self", "self_", "_self", "Self", "super",
-            "crate", "gen", "async", "try", "union", "x", "_", "__", "_x", "_x_", "a-b", "a_b",
-            "a_2d_b", "_a_2d_b", "\u{e4}", "_e4_", "1", "_1", "f64", "_f64", "T", "Model",
+            "Gravity", "_Gravity", "None", "type", "type_", "_type", "r", "r_type", "self",
+            "self_", "_self", "Self", "super", "crate", "gen", "async", "try", "union", "x", "_",
+            "__", "_x", "_x_", "a-b", "a_b", "a_2d_b", "_a_2d_b", "\u{e4}", "_e4_", "1", "_1",
+            "f64", "_f64", "T", "Model",
         ];
         for of in [of_field, of_module] {
             let mut seen = BTreeMap::new();

@@ -243,7 +243,7 @@ impl fmt::Display for Fault {
                     f,
                     "the recording is too large to be kept in memory: up to here {samples} samples of {columns} columns are \
                      {:.1} GB; ",
-                    8e-9 * (*samples as f64) * (*columns as f64)
+                    8e-9 * (*samples as f64) * (*columns as f64 + 1.0)
                 )?;
                 match until {
                     Some((from, to)) => write!(

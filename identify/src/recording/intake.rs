@@ -26,7 +26,8 @@ pub(crate) struct Intake<'a> {
     kept: Vec<bool>,
     columns: Vec<Column>,
     lines: Vec<u64>,
-    left_out: Vec<u64>,
+    /// The first sample that was left out, and how many were.
+    left_out: Option<(u64, usize)>,
     /// How the time of a sample follows from its fields, where samples are chosen by it.
     time: Option<(Vec<(usize, f64)>, f64)>,
     before: usize,
@@ -92,7 +93,7 @@ impl<'a> Intake<'a> {
             names,
             kept,
             lines: Vec::new(),
-            left_out: Vec::new(),
+            left_out: None,
             time,
             before: 0,
             stopped: None,
@@ -137,11 +138,12 @@ impl<'a> Intake<'a> {
         if self.options.not_finite == NotFinite::LeaveOut
             && (0..sample.len()).any(|i| is_read(i) && sample[i] == Field::NotFinite)
         {
-            self.left_out.push(line);
+            self.left_out.get_or_insert((line, 0)).1 += 1;
             return Ok(Flow::Go);
         }
         let n_kept = self.kept.iter().filter(|kept| **kept).count() + self.options.computed.len();
-        if (self.lines.len() + 1) * n_kept > self.options.most_numbers {
+        // The line of each sample is kept with its numbers.
+        if (self.lines.len() + 1) * (n_kept + 1) > self.options.most_numbers {
             return Err(Fault::TooLarge {
                 line,
                 samples: self.lines.len(),
@@ -202,13 +204,12 @@ impl<'a> Intake<'a> {
                 if self.before == 1 { "is" } else { "are" },
             )));
         }
-        if let Some(first) = self.left_out.first() {
+        if let Some((first, n)) = self.left_out {
             notes.push(Note::warning(format!(
-                "{} of {} samples of {file} {} NaN, infinite or empty fields and {} left out, the first in line {first}.",
-                self.left_out.len(),
-                self.left_out.len() + self.lines.len(),
-                if self.left_out.len() == 1 { "holds" } else { "hold" },
-                if self.left_out.len() == 1 { "is" } else { "are" },
+                "{n} of {} samples of {file} {} NaN, infinite or empty fields and {} left out, the first in line {first}.",
+                n + self.lines.len(),
+                if n == 1 { "holds" } else { "hold" },
+                if n == 1 { "is" } else { "are" },
             )));
         }
         let mut computed = IndexMap::new();

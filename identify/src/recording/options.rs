@@ -35,7 +35,7 @@ pub struct ReadOptions {
     pub wanted: Option<Vec<String>>,
     /// Only samples whose time `t` lies between these two, s; the others are passed over, counted and said.
     pub between: Option<(f64, f64)>,
-    /// Most numbers that are kept; a recording that holds more is refused before memory runs out.
+    /// Most numbers that are kept, the line of each sample among them; a recording that holds more is refused before memory runs out.
     pub most_numbers: usize,
 }
 

@@ -198,7 +198,7 @@ fn only_the_time_that_is_asked_for_is_read() {
             &path,
             &ReadOptions {
                 between: Some(between),
-                most_numbers: 30_010,
+                most_numbers: 40_004,
                 ..options()
             },
         )

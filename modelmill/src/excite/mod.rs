@@ -6,8 +6,6 @@ pub mod plant;
 mod separate;
 mod separated;
 
-use std::fmt::Write as _;
-
 use modelmill_identify::Note;
 use modelmill_identify::excite::{
     Excitation, Motion, Plant, excite, scaled_condition_number, steps,
@@ -17,6 +15,7 @@ use crate::diagnose::Named;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::Recording;
+use crate::text::csv::csv;
 use crate::text::svg::Figure;
 use crate::text::table::significant;
 
@@ -202,23 +201,21 @@ fn samples(rate: f64, period: f64) -> usize {
 impl Excited {
     /// The trajectory as a recording without forces (CSV): `t`, positions, rates and accelerations.
     pub fn csv(&self) -> String {
-        let mut text = "t".to_owned();
-        for suffix in ["", "_d", "_dd"] {
-            for name in &self.coordinates {
-                let _ = write!(text, ",{name}{suffix}");
-            }
-        }
-        text.push('\n');
-        for (i, t) in self.time.iter().enumerate() {
-            let _ = write!(text, "{t}");
-            for columns in [&self.motion.q, &self.motion.qd, &self.motion.qdd] {
-                for column in columns {
-                    let _ = write!(text, ",{}", column[i]);
-                }
-            }
-            text.push('\n');
-        }
-        text
+        let motion = [
+            ("", &self.motion.q),
+            ("_d", &self.motion.qd),
+            ("_dd", &self.motion.qdd),
+        ];
+        let named: Vec<(String, &[f64])> = motion
+            .iter()
+            .flat_map(|(suffix, columns)| {
+                let named = self.coordinates.iter().zip(*columns);
+                named.map(move |(name, column)| (format!("{name}{suffix}"), column.as_slice()))
+            })
+            .collect();
+        let mut columns = vec![("t", self.time.as_slice())];
+        columns.extend(named.iter().map(|(name, column)| (name.as_str(), *column)));
+        csv(&columns)
     }
 }
 

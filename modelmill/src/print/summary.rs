@@ -1,5 +1,6 @@
 //! What a model file holds, as JSON and for people; and what is wrong with one that has no meaning, as JSON.
 
+use modelmill_boundary::text::plain;
 use modelmill_codegen::review::NumericMethod;
 use modelmill_codegen::{Derivation, Reduction, module_name};
 use modelmill_spec::{Diagnostic, DriveKind, Failure, Mechanism, Motion, Severity, Sources};
@@ -116,9 +117,9 @@ impl Summary {
         style: Style,
     ) -> String {
         let m = &derivation.mechanism;
-        let mut lines = vec![style.bold(&format!("{name}: sound"))];
+        let mut lines = vec![style.bold(&format!("{}: sound", plain(name)))];
         if let Some(title) = &m.title {
-            lines.push(format!("  {title}"));
+            lines.push(format!("  {}", plain(title)));
         }
         let mut line = |what: &str, text: String| lines.push(format!("  {what:<20}{text}"));
         let list = |names: &[String]| match names {

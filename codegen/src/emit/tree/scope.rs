@@ -9,10 +9,11 @@ use crate::Derivation;
 use crate::expr::{Atom, Graph};
 
 /// Words that stand in every routine, in whatever language, and names of modules that a variable would meet.
-const WORDS: [&str; 41] = [
+const WORDS: [&str; 42] = [
     "n",
     "angles",
     "outputs",
+    "input",
     "inputs",
     "passive",
     "self",

@@ -1,18 +1,15 @@
 //! A crate that makes a C library of a model: a static library, a shared one, and the header for both.
 
-use std::fmt::Write as _;
-
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
-use modelmill_boundary::text::comment;
-
+use super::c_header::header;
+use super::functions::{Function, functions};
 use super::{Face, source};
-use crate::Derivation;
-use crate::emit::language::EmittedFile;
+use crate::emit::language::{EmittedFile, Source};
 
 /// What a function returns, with its name in the header after the prefix, and its meaning.
-const STATUS: [(&str, &str); 8] = [
+pub(super) const STATUS: [(&str, &str); 8] = [
     ("OK", "all is well"),
     (
         "OUT_OF_REACH",
@@ -65,9 +62,10 @@ const RESERVED: &[&str] = &[
     "wctype",
 ];
 
-/// The files of the crate. It needs `modelmill-runtime` in the folder `modelmill-runtime` beside its manifest.
-pub fn emit_c(derivation: &Derivation) -> Vec<EmittedFile> {
-    let face = Face::new(derivation, RESERVED);
+/// The files of the crate, without reactions and self-test. It needs `modelmill-runtime` in the folder `modelmill-runtime`
+/// beside its manifest.
+pub fn emit_c(from: &Source<'_>) -> Vec<EmittedFile> {
+    let face = Face::new(from, RESERVED);
     let doc = "The model for C: see the header in `include`. All `unsafe` code is here, and all of it reads and writes what the \
                caller's pointers point to.";
     vec![
@@ -121,7 +119,7 @@ codegen-units = 1
 }
 
 /// 64-bit words that surely hold a prepared model: every fixed value, and what errors and passive coordinates take.
-fn words(face: &Face<'_>) -> usize {
+pub(super) fn words(face: &Face<'_>) -> usize {
     let programs = &face.derivation.programs;
     let mut all = vec![
         &programs.regressor,
@@ -132,10 +130,14 @@ fn words(face: &Face<'_>) -> usize {
     if let crate::programs::PassivePosition::Newton(loops) = &programs.passive_position {
         all.extend([&loops.residual, &loops.scales]);
     }
-    // The inverse dynamics may hold the model once more.
+    if let Some(d) = face.dynamics {
+        all.extend([&d.mass_matrix, &d.coriolis, &d.gravity, &d.effects, &d.bias]);
+    }
     let fixed: usize = all.iter().map(|p| p.ops.len().min(fixed_values(p))).sum();
-    let geometry = face.constants().len();
-    2 * (fixed + face.n_passive()) + 3 * geometry + face.n_base() + 32
+    // Inverse dynamics and equation of motion may hold the model once more each.
+    let parts = 2 + usize::from(face.dynamics.is_some());
+    let geometry = 2 * face.constants().len();
+    parts * (fixed + face.n_passive() + geometry + face.n_base() + 16)
 }
 
 fn fixed_values(program: &crate::Program) -> usize {
@@ -157,15 +159,6 @@ fn items(face: &Face<'_>) -> TokenStream {
     let parts = face.state();
     let names: Vec<_> = parts.iter().map(|(name, _)| name).collect();
     let state_arguments = quote! { #(#names: *const f64),* };
-    let one = {
-        let sizes = parts.iter().map(|(_, n)| n);
-        quote! {
-            let (#(Some(#names)),*) = (#(unsafe { array::<#sizes>(#names) }),*) else {
-                return NULL_POINTER;
-            };
-            let state = model::State { #(#names: *#names),* };
-        }
-    };
     let many = {
         let sizes = parts.iter().map(|(_, n)| n);
         quote! {
@@ -180,83 +173,35 @@ fn items(face: &Face<'_>) -> TokenStream {
             return NOT_PREPARED;
         };
     };
-    let single = |name: &str, owner: &str, method: &str, output: TokenStream| {
-        let (name, owner, method) = (
-            function(name),
-            format_ident!("{owner}"),
-            format_ident!("{method}"),
-        );
-        quote! {
-            #[unsafe(no_mangle)]
-            pub unsafe extern "C" fn #name(dynamics: *const #dynamics, #state_arguments, output: *mut f64) -> i32 {
-                #prepared
-                #one
-                let Some(output) = (unsafe { output.cast::<#output>().as_mut() }) else {
-                    return NULL_POINTER;
-                };
-                match prepared.#owner.#method(&state) {
-                    Ok(found) => {
-                        *output = found;
-                        OK
-                    }
-                    Err(error) => status(error),
-                }
-            }
-        }
-    };
-    let forces = single(
-        "inverse_dynamics",
-        "dynamics",
-        "forces",
-        quote! { [f64; #n_drives] },
-    );
+    let singles: Vec<TokenStream> = functions(face)
+        .iter()
+        .flat_map(|one| {
+            let near = one.follows.then(|| single(face, one, true));
+            [Some(single(face, one, false)), near]
+        })
+        .flatten()
+        .collect();
     let n_entries = n_drives * n_base;
-    let regressor = single(
-        "regressor",
-        "model",
-        "regressor",
-        quote! { [[f64; #n_base]; #n_drives] },
-    );
-    let near = face.newton.then(|| {
-        let (name, n) = (function("inverse_dynamics_near"), face.n_passive());
+    let passive_position = face.newton.then(|| {
+        let [position, near] = ["passive_position", "passive_position_near"].map(function);
+        let (n, n_active) = (face.n_passive(), face.n_active());
         quote! {
             #[unsafe(no_mangle)]
-            pub unsafe extern "C" fn #name(
-                dynamics: *const #dynamics, #state_arguments, passive: *mut f64, output: *mut f64,
-            ) -> i32 {
+            pub unsafe extern "C" fn #position(dynamics: *const #dynamics, q: *const f64, passive: *mut f64) -> i32 {
                 #prepared
-                #one
-                let (Some(passive), Some(output)) =
-                    (unsafe { (array_mut::<#n>(passive), array_mut::<#n_drives>(output)) })
-                else {
+                let (Some(q), Some(passive)) = (unsafe { (array::<#n_active>(q), array_mut::<#n>(passive)) }) else {
                     return NULL_POINTER;
                 };
-                match prepared.dynamics.forces_near(&state, passive) {
-                    Ok(found) => {
-                        *output = found;
-                        OK
-                    }
-                    Err(error) => status(error),
-                }
+                answer(prepared.model.passive_position(q), |found| *passive = found)
             }
-        }
-    });
-    let nominal_passive = face.newton.then(|| {
-        let (name, n, n_active) = (function("passive_position"), face.n_passive(), face.n_active());
-        quote! {
+
             #[unsafe(no_mangle)]
-            pub unsafe extern "C" fn #name(dynamics: *const #dynamics, q: *const f64, output: *mut f64) -> i32 {
+            pub unsafe extern "C" fn #near(dynamics: *const #dynamics, q: *const f64, passive: *mut f64) -> i32 {
                 #prepared
-                let (Some(q), Some(output)) = (unsafe { (array::<#n_active>(q), array_mut::<#n>(output)) }) else {
+                let (Some(q), Some(passive)) = (unsafe { (array::<#n_active>(q), array_mut::<#n>(passive)) }) else {
                     return NULL_POINTER;
                 };
-                match prepared.model.passive_position(q) {
-                    Ok(found) => {
-                        *output = found;
-                        OK
-                    }
-                    Err(error) => status(error),
-                }
+                answer(prepared.model.passive_position_near(q, passive), |found| *passive = found)
             }
         }
     });
@@ -304,6 +249,12 @@ fn items(face: &Face<'_>) -> TokenStream {
         "prepare",
     ]
     .map(function);
+    let equation_field = face
+        .dynamics
+        .map(|_| quote! { equation: model::Dynamics<f64>, });
+    let equation_init = face
+        .dynamics
+        .map(|_| quote! { equation: model::Dynamics::new(&geometry, base), });
     let status_constants = STATUS.iter().enumerate().map(|(k, (name, _))| {
         let (name, k) = (format_ident!("{name}"), i32::try_from(k).unwrap_or(0));
         quote! { const #name: i32 = #k; }
@@ -332,6 +283,7 @@ fn items(face: &Face<'_>) -> TokenStream {
         struct Prepared {
             model: model::Model<f64>,
             dynamics: model::InverseDynamics<f64>,
+            #equation_field
         }
 
         const _: () = assert!(core::mem::size_of::<Prepared>() <= #words * 8 && core::mem::align_of::<Prepared>() <= 8);
@@ -344,6 +296,16 @@ fn items(face: &Face<'_>) -> TokenStream {
                 PoseError::Singular => SINGULAR,
                 PoseError::Undefined => UNDEFINED,
                 PoseError::NotFinite(_) => NOT_FINITE,
+            }
+        }
+
+        fn answer<T>(found: Result<T, PoseError>, write: impl FnOnce(T)) -> i32 {
+            match found {
+                Ok(found) => {
+                    write(found);
+                    OK
+                }
+                Err(error) => status(error),
             }
         }
 
@@ -431,6 +393,7 @@ fn items(face: &Face<'_>) -> TokenStream {
             let prepared = Prepared {
                 model: model::Model::new(&geometry),
                 dynamics: model::InverseDynamics::new(&geometry, base),
+                #equation_init
             };
             unsafe {
                 (&raw mut (*dynamics).room).cast::<Prepared>().write(prepared);
@@ -439,10 +402,8 @@ fn items(face: &Face<'_>) -> TokenStream {
             OK
         }
 
-        #forces
-        #regressor
-        #nominal_passive
-        #near
+        #(#singles)*
+        #passive_position
         #forces_many
         #regressor_many
 
@@ -455,205 +416,70 @@ fn items(face: &Face<'_>) -> TokenStream {
     }
 }
 
-#[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
-fn header(face: &Face<'_>) -> String {
-    let name = &face.name;
-    let upper = name.to_uppercase();
-    let mechanism = &face.derivation.mechanism;
-    let (active, passive) = face.derivation.coordinates();
-    let mut text = String::new();
-    let mut line = |s: &str| {
-        text.push_str(s);
-        text.push('\n');
+/// A function of one state; one that is `near` takes passive coordinates of a pose near by.
+fn single(face: &Face<'_>, one: &Function, near: bool) -> TokenStream {
+    let suffix = if near { "_near" } else { "" };
+    let name = format_ident!("{}_{}{suffix}", face.name, one.name);
+    let dynamics = format_ident!("{}_dynamics", face.name);
+    let (owner, method) = (
+        format_ident!("{}", one.owner),
+        format_ident!("{}{suffix}", one.method),
+    );
+    let state = face.state();
+    let given = one
+        .takes_forces
+        .then(|| (format_ident!("forces"), face.n_drives()));
+    let inputs: Vec<_> = state.iter().chain(&given).collect();
+    let (names, sizes): (Vec<_>, Vec<usize>) = inputs.iter().map(|(name, n)| (name, *n)).unzip();
+    let fields = state.iter().map(|(name, _)| name);
+    let forces = one.takes_forces.then(|| quote! { , forces });
+    let n_passive = face.n_passive();
+    let (passive_argument, passive_array, passive) = if near {
+        (
+            quote! { passive: *mut f64, },
+            quote! {
+                let Some(passive) = (unsafe { array_mut::<#n_passive>(passive) }) else {
+                    return NULL_POINTER;
+                };
+            },
+            quote! { , passive },
+        )
+    } else {
+        Default::default()
     };
-    let plain = |s: &str| comment(s).into_owned();
-    line(&format!(
-        "/* {}: {}.",
-        name,
-        plain(mechanism.title.as_deref().unwrap_or(&mechanism.name))
-    ));
-    line(" *");
-    line(" * Inverse dynamics tau = H_min(q, q', q'') p_min, written by modelmill; do not edit.");
-    line(" *");
-    line(
-        " * Prepare once, then call; nothing allocates, locks or throws, and all of it is reentrant:",
-    );
-    line(" *");
-    let room = |count: &str, n: usize| match n {
-        0 => "1".to_owned(),
-        _ => format!("{upper}_N_{count}"),
-    };
-    line(&format!(
-        " *     double geometry[{}], parameters[{}], base[{}];",
-        room("CONSTANTS", mechanism.constants.len()),
-        room("PARAMETERS", mechanism.parameters.len()),
-        room("BASE", face.n_base()),
-    ));
-    line(&format!(" *     {name}_dynamics dynamics;"));
-    line(&format!(" *     {name}_default_geometry(geometry);"));
-    line(&format!(" *     {name}_nominal_parameters(parameters);"));
-    line(&format!(
-        " *     {name}_base_parameters(geometry, parameters, base);"
-    ));
-    line(&format!(
-        " *     {name}_prepare(&dynamics, geometry, base);"
-    ));
-    line(" *");
-    line(
-        " * SI units. Pointers must be aligned and point to as many numbers as the declaration says; arrays that are read and",
-    );
-    line(
-        " * written must not overlap. Functions return a status; results are only written when it is OK. */",
-    );
-    line(&format!(
-        "#ifndef {upper}_H\n#define {upper}_H\n\n#include <stddef.h>\n#include <stdint.h>\n"
-    ));
-    for (what, n) in [
-        ("ACTIVE", face.n_active()),
-        ("PASSIVE", face.n_passive()),
-        ("DRIVES", face.n_drives()),
-        ("BASE", face.n_base()),
-        ("CONSTANTS", face.constants().len()),
-        ("PARAMETERS", face.parameters().len()),
-    ] {
-        line(&format!("#define {upper}_N_{what} {n}"));
-    }
-    line("\n/* What functions return. */");
-    for (k, (status, meaning)) in STATUS.iter().enumerate() {
-        line(&format!("#define {upper}_{status} {k} /* {meaning} */"));
-    }
-    let mut places = |what: &str, prefix: &str, names: &mut dyn Iterator<Item = String>| {
-        line(&format!("\n/* {what}, in order. */"));
-        for (k, name) in names.enumerate() {
-            line(&format!("#define {upper}_{prefix}_{name} {k}"));
-        }
-    };
-    let identifier = |s: &str| {
-        crate::emit::identifier::of_field(s)
-            .to_string()
-            .trim_start_matches("r#")
-            .to_owned()
-    };
-    let coordinate = |i: &usize| identifier(&mechanism.coordinates[*i].name);
-    places(
-        "Coordinates",
-        "COORDINATE",
-        &mut active.iter().map(coordinate),
-    );
-    if face.newton {
-        places(
-            "Passive coordinates",
-            "PASSIVE",
-            &mut passive.iter().map(coordinate),
-        );
-    }
-    places(
-        "Drives",
-        "DRIVE",
-        &mut mechanism.drives.iter().map(|d| identifier(&d.name)),
-    );
-    places(
-        "Known quantities",
-        "CONSTANT",
-        &mut mechanism.constants.iter().map(|c| identifier(&c.name)),
-    );
-    places(
-        "Dynamic parameters",
-        "PARAMETER",
-        &mut mechanism.parameters.iter().map(|p| identifier(&p.name)),
-    );
-    line("\n/* Base parameters, in order:");
-    for base in face.derivation.base_parameters() {
-        line(&plain(&format!(
-            " * {} = {} ({})",
-            base.name,
-            base.expression,
-            comment(&base.unit)
-        )));
-    }
-    line(" */\n\n#ifdef __cplusplus\nextern \"C\" {\n#endif\n");
-    line("/* A prepared model. Its content is its own. */");
-    line(&format!(
-        "typedef struct {name}_dynamics {{\n  uint64_t ready;\n  uint64_t room[{}];\n}} {name}_dynamics;\n",
-        words(face)
-    ));
-    let state: String = face.state().iter().fold(String::new(), |mut s, (part, n)| {
-        _ = write!(s, "const double {part}[{n}], ");
-        s
+    let mut at = 0;
+    let writes = one.parts.iter().map(|part| {
+        let value = one.part(part);
+        let kind = part
+            .shape
+            .iter()
+            .rev()
+            .fold(quote! { f64 }, |inner, count| {
+                let n = count.n;
+                quote! { [#inner; #n] }
+            });
+        let place = at;
+        at += part.n();
+        quote! { output.add(#place).cast::<#kind>().write(#value); }
     });
-    let states: String = face.state().iter().fold(String::new(), |mut s, (part, _)| {
-        _ = write!(s, "const double *{part}, ");
-        s
-    });
-    // An array of nothing is no C.
-    let array = |what: &str, count: &str| {
-        let n = match count {
-            "CONSTANTS" => mechanism.constants.len(),
-            "PARAMETERS" => mechanism.parameters.len(),
-            _ => face.n_base(),
-        };
-        if n == 0 {
-            format!("*{what}")
-        } else {
-            format!("{what}[{upper}_N_{count}]")
+    let writes: Vec<TokenStream> = writes.collect();
+    quote! {
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn #name(
+            dynamics: *const #dynamics, #(#names: *const f64,)* #passive_argument output: *mut f64,
+        ) -> i32 {
+            let Some(prepared) = (unsafe { prepared(dynamics) }) else {
+                return NOT_PREPARED;
+            };
+            let (#(Some(#names)),*) = (#(unsafe { array::<#sizes>(#names) }),*) else {
+                return NULL_POINTER;
+            };
+            #passive_array
+            if output.is_null() {
+                return NULL_POINTER;
+            }
+            let state = model::State { #(#fields: *#fields),* };
+            answer(prepared.#owner.#method(&state #forces #passive), |found| unsafe { #(#writes)* })
         }
-    };
-    line("/* The model file's values. */");
-    line(&format!(
-        "int32_t {name}_default_geometry(double {});",
-        array("geometry", "CONSTANTS")
-    ));
-    line(&format!(
-        "int32_t {name}_nominal_parameters(double {});",
-        array("parameters", "PARAMETERS")
-    ));
-    line("\n/* Base parameters of physical ones. */");
-    line(&format!(
-        "int32_t {name}_base_parameters(const double *geometry, const double *parameters, double {});",
-        array("base", "BASE")
-    ));
-    line("\n/* Computes what depends on geometry and base parameters alone. */");
-    line(&format!(
-        "int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const double {});",
-        array("base", "BASE")
-    ));
-    line("\n/* Forces of the drives, N or N m. */");
-    line(&format!(
-        "int32_t {name}_inverse_dynamics(const {name}_dynamics *dynamics, {state}double forces[{upper}_N_DRIVES]);"
-    ));
-    line("\n/* H_min row by row: one row per drive, one column per base parameter. */");
-    line(&format!(
-        "int32_t {name}_regressor(const {name}_dynamics *dynamics, {state}double {});",
-        match face.n_drives() * face.n_base() {
-            0 => "*regressor".to_owned(),
-            n => format!("regressor[{n}]"),
-        }
-    ));
-    if face.newton {
-        line("\n/* Passive coordinates of a pose, followed from the nominal pose. */");
-        line(&format!(
-            "int32_t {name}_passive_position(const {name}_dynamics *dynamics, const double q[{upper}_N_ACTIVE], double passive[{upper}_N_PASSIVE]);"
-        ));
-        line(
-            "\n/* Forces, with the passive coordinates of a pose near by, such as the last cycle's; they become those of this state. */",
-        );
-        line(&format!(
-            "int32_t {name}_inverse_dynamics_near(const {name}_dynamics *dynamics, {state}double passive[{upper}_N_PASSIVE], double forces[{upper}_N_DRIVES]);"
-        ));
     }
-    line(
-        "\n/* The same for n states at once, in the widest vectors of the machine. Number i of coordinate k stands at k * n + i, and",
-    );
-    line(
-        " * so do results (the regressor's entries row by row). Where a state has no answer, its number goes to `failed`, which may",
-    );
-    line(" * be NULL, and all results before it are in place. */");
-    line(&format!(
-        "int32_t {name}_inverse_dynamics_many(const {name}_dynamics *dynamics, size_t n, {states}double *forces, size_t *failed);"
-    ));
-    line(&format!(
-        "int32_t {name}_regressor_many(const {name}_dynamics *dynamics, size_t n, {states}double *regressor, size_t *failed);"
-    ));
-    line("\n#ifdef __cplusplus\n}\n#endif\n\n#endif");
-    text
 }

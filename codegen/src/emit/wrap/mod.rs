@@ -3,6 +3,8 @@
 //! The face is the only code with `unsafe`; the module beside it is the one that [`super::emit`] makes.
 
 mod c_abi;
+mod c_header;
+mod functions;
 mod python;
 
 pub use c_abi::emit_c;
@@ -11,16 +13,18 @@ pub use python::emit_python;
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
-use crate::Derivation;
 use crate::emit::identifier::{of_field, of_module};
-use crate::emit::language::EmittedFile;
 use crate::emit::language::rust::{doc_lines, emit, print};
+use crate::emit::language::{EmittedFile, Source};
 use crate::emit::tree::uses_load;
 use crate::programs::PassivePosition;
+use crate::{Derivation, Dynamics};
 
 /// What faces of all languages need to know of a model.
 pub(super) struct Face<'a> {
     pub(super) derivation: &'a Derivation,
+    /// The equation of motion, if that is wanted.
+    pub(super) dynamics: Option<&'a Dynamics>,
     /// Name of the library and prefix of its functions.
     pub(super) name: String,
     pub(super) load: bool,
@@ -30,7 +34,8 @@ pub(super) struct Face<'a> {
 
 impl<'a> Face<'a> {
     /// Names that are `reserved` in the other language get `_model` behind them.
-    pub(super) fn new(derivation: &'a Derivation, reserved: &[&str]) -> Self {
+    pub(super) fn new(source: &Source<'a>, reserved: &[&str]) -> Self {
+        let derivation = source.derivation;
         let module = of_module(&derivation.mechanism.name).to_string();
         let mut name = module.trim_start_matches("r#").to_owned();
         if reserved.contains(&name.as_str()) {
@@ -38,6 +43,7 @@ impl<'a> Face<'a> {
         }
         Self {
             derivation,
+            dynamics: source.dynamics,
             name,
             load: uses_load(derivation),
             newton: matches!(
@@ -88,9 +94,13 @@ impl<'a> Face<'a> {
 
     /// The emitted module as a file.
     pub(super) fn module(&self) -> EmittedFile {
+        let mut emitted = emit(self.derivation);
+        if let Some(dynamics) = self.dynamics {
+            emitted = emitted.with_dynamics(self.derivation, dynamics);
+        }
         EmittedFile {
             path: "src/model.rs".to_owned(),
-            text: emit(self.derivation).file(),
+            text: emitted.file(),
         }
     }
 

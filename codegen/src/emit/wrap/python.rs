@@ -1,11 +1,12 @@
 //! A crate that makes a Python module of a model, with PyO3: functions of numpy arrays, one state or many.
 
-use proc_macro2::TokenStream;
-use quote::quote;
+use proc_macro2::{Ident, TokenStream};
+use quote::{format_ident, quote};
 
+use super::functions::{Function, functions};
 use super::{Face, source};
-use crate::Derivation;
-use crate::emit::language::EmittedFile;
+use crate::emit::language::rust::doc_lines;
+use crate::emit::language::{EmittedFile, Source};
 
 /// Names that a module of Python cannot have, or must leave to the module whose arrays it takes.
 const RESERVED: &[&str] = &[
@@ -15,10 +16,11 @@ const RESERVED: &[&str] = &[
     "while", "with", "yield",
 ];
 
-/// The files of the crate. It needs `modelmill-runtime` in the folder `modelmill-runtime` beside its manifest.
+/// The files of the crate, without reactions and self-test. It needs `modelmill-runtime` in the folder `modelmill-runtime`
+/// beside its manifest.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
-pub fn emit_python(derivation: &Derivation) -> Vec<EmittedFile> {
-    let face = Face::new(derivation, RESERVED);
+pub fn emit_python(from: &Source<'_>) -> Vec<EmittedFile> {
+    let face = Face::new(from, RESERVED);
     let name = &face.name;
     let package = name.trim_start_matches('_');
     let cargo = format!(
@@ -76,9 +78,11 @@ fn items(face: &Face<'_>) -> TokenStream {
     let title = format!(
         "{}.\n\nInverse dynamics tau = H_min(q, q', q'') p_min. Arrays of one state have one number per coordinate; arrays \
          of n states have shape (coordinates, n) and are read as they lie in memory, and so are results: forces (drives, n), \
-         regressor (drives, base parameters, n).",
+         regressor (drives, base parameters, n). SI units.\n\nArrays of other types or shapes, numbers that are none and poses \
+         without an answer raise ValueError, with the number of the state; names that the model has not, KeyError.",
         modelmill_boundary::text::comment(mechanism.title.as_deref().unwrap_or(&mechanism.name))
     );
+    let title = doc_lines(&title, false);
     let (constants, parameters) = (face.constants(), face.parameters());
     let (n_active, n_drives, n_base) = (face.n_active(), face.n_drives(), face.n_base());
     let records = [
@@ -87,17 +91,21 @@ fn items(face: &Face<'_>) -> TokenStream {
     ];
     let parts = face.state();
     let names: Vec<_> = parts.iter().map(|(name, _)| name).collect();
-    let sizes: Vec<_> = parts.iter().map(|(_, n)| n).collect();
-    let texts = names.iter().map(ToString::to_string);
-    let texts: Vec<String> = texts.collect();
     let arguments = quote! { #(#names: PyReadonlyArrayDyn<'py, f64>),* };
+    let arrays = arrays(&parts);
     let states = quote! {
-        let many = Many::of(&[#((&#names, #texts, #sizes)),*])?;
-        #(let #names = slice(&#names, #texts)?;)*
-        let n = many.n;
-        let states = model::States { #(#names: columns::<#sizes>(#names, n)),* };
+        #arrays
+        let states = model::States { #(#names),* };
     };
-    let regressor_entries = n_drives * n_base;
+    // The two that vectors compute for many states at once are written out below.
+    let of_blocks = ["inverse_dynamics", "regressor"];
+    let singles = functions(face);
+    let singles = singles.iter().filter(|one| !of_blocks.contains(&one.name));
+    let called: Vec<Ident> = singles
+        .clone()
+        .map(|one| format_ident!("{}", name(one)))
+        .collect();
+    let singles: Vec<TokenStream> = singles.map(|one| single(face, one)).collect();
     let doc_forces = "Forces of the drives, N or N m, for base parameters `p`. `parallel` uses all cores; `geometry` names known \
                       quantities that differ from the model file's.";
     let doc_regressor = "H_min: one row per drive, one column per base parameter. `parallel` and `geometry` as in `inverse_dynamics`.";
@@ -233,7 +241,6 @@ fn items(face: &Face<'_>) -> TokenStream {
         ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
             #states
             let model = model::Model::new(&geometry_of(geometry)?);
-            debug_assert_eq!(#regressor_entries, model::N_DRIVES * model::N_BASE);
             let regressor = PyArray::zeros(py, many.shape(&[#n_drives, #n_base]), false);
             let mut to = regressor.readwrite();
             let to = to.as_slice_mut().map_err(|error| value_error(error.to_string()))?;
@@ -248,6 +255,33 @@ fn items(face: &Face<'_>) -> TokenStream {
             Ok(regressor)
         }
 
+        /// Results of one state after the other, entry by entry, without Python's lock.
+        fn computed(
+            py: Python<'_>, many: &Many, entries: usize, at: impl Fn(usize) -> Result<Vec<f64>, PoseError> + Sync,
+        ) -> PyResult<Vec<f64>> {
+            let n = many.n;
+            let done = py.detach(|| {
+                let mut to = vec![0.0; entries * n];
+                for sample in 0..n {
+                    let found = at(sample).map_err(|reason| BlockError::At { sample, reason })?;
+                    for (to, value) in to.iter_mut().skip(sample).step_by(n).zip(found) {
+                        *to = value;
+                    }
+                }
+                Ok(to)
+            });
+            done.map_err(|error| many.error(error))
+        }
+
+        /// An array of results for Python.
+        fn shaped<'py>(
+            py: Python<'py>, many: &Many, values: &[f64], shape: &[usize],
+        ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+            PyArray1::from_slice(py, values).reshape(many.shape(shape))
+        }
+
+        #(#singles)*
+
         #[doc = #doc_base]
         #[pyfunction]
         #[pyo3(signature = (parameters=None, geometry=None))]
@@ -260,14 +294,16 @@ fn items(face: &Face<'_>) -> TokenStream {
             Ok(PyArray1::from_slice(py, &base))
         }
 
-        #[doc = #title]
+        #title
         #[pymodule]
         #[pyo3(name = #module)]
         fn python_module(m: &Bound<'_, PyModule>) -> PyResult<()> {
             m.add_function(wrap_pyfunction!(inverse_dynamics, m)?)?;
             m.add_function(wrap_pyfunction!(regressor, m)?)?;
             m.add_function(wrap_pyfunction!(base_parameters, m)?)?;
+            #(m.add_function(wrap_pyfunction!(#called, m)?)?;)*
             m.add("COORDINATES", model::ACTIVE.to_vec())?;
+            m.add("PASSIVE", model::PASSIVE.to_vec())?;
             m.add("DRIVES", model::DRIVES.to_vec())?;
             let base = model::BASE_PARAMETERS.map(|b| (b.name, b.expression, b.unit));
             m.add("BASE_PARAMETERS", base.to_vec())?;
@@ -275,6 +311,113 @@ fn items(face: &Face<'_>) -> TokenStream {
             m.add("PARAMETERS", BTreeMap::from(model::PARAMETERS.map(|c| (c.name, c.value))))?;
             debug_assert_eq!(model::N_ACTIVE, #n_active);
             Ok(())
+        }
+    }
+}
+
+/// What a function is called in Python.
+fn name(one: &Function) -> &'static str {
+    match one.name {
+        "forward" => "forward_dynamics",
+        name => name,
+    }
+}
+
+/// Arrays of the given names as columns of `n` states, with their shapes in `many`.
+fn arrays(parts: &[(Ident, usize)]) -> TokenStream {
+    let (names, sizes): (Vec<_>, Vec<usize>) = parts.iter().map(|(name, n)| (name, *n)).unzip();
+    let texts: Vec<String> = names.iter().map(ToString::to_string).collect();
+    quote! {
+        let many = Many::of(&[#((&#names, #texts, #sizes)),*])?;
+        let n = many.n;
+        #(let #names = columns::<#sizes>(slice(&#names, #texts)?, n);)*
+    }
+}
+
+/// A function that looks at one state after the other.
+fn single(face: &Face<'_>, one: &Function) -> TokenStream {
+    let (name, method) = (
+        format_ident!("{}", name(one)),
+        format_ident!("{}", one.method),
+    );
+    let state = face.state();
+    let is_given = |part: &&(Ident, usize)| one.reads_accelerations || part.0 != "qdd";
+    let forces = one
+        .takes_forces
+        .then(|| (format_ident!("forces"), face.n_drives()));
+    let given: Vec<(Ident, usize)> = state
+        .iter()
+        .filter(is_given)
+        .chain(&forces)
+        .cloned()
+        .collect();
+    let names: Vec<_> = given.iter().map(|(name, _)| name).collect();
+    let arrays = arrays(&given);
+    let fields = state.iter().map(|(name, n)| {
+        if given.iter().any(|(given, _)| given == name) {
+            quote! { #name: #name.map(|values| values[sample]) }
+        } else {
+            quote! { #name: [0.0; #n] }
+        }
+    });
+    let forces = one
+        .takes_forces
+        .then(|| quote! { , &forces.map(|values| values[sample]) });
+    let (p_argument, p_name, owner) = if one.owner == "model" {
+        let model = quote! { model::Model::new(&geometry_of(geometry)?) };
+        (None, None, model)
+    } else {
+        let owner = quote! { model::Dynamics::new(&geometry_of(geometry)?, &base_of(&p)?) };
+        let argument = quote! { p: PyReadonlyArray1<'py, f64>, };
+        (Some(argument), Some(quote! { p, }), owner)
+    };
+    let values = one.parts.iter().map(|part| {
+        let value = one.part(part);
+        match part.shape.len() {
+            1 => quote! { &#value[..] },
+            _ => quote! { #value.as_flattened() },
+        }
+    });
+    let entries = one.n();
+    let mut at = 0;
+    let results = one.parts.iter().map(|part| {
+        let (from, shape) = (at, part.shape.iter().map(|count| count.n));
+        at += part.n();
+        quote! { shaped(py, &many, &values[#from * n..#at * n], &[#(#shape),*])? }
+    });
+    let results: Vec<TokenStream> = results.collect();
+    let one_array = quote! { Bound<'py, PyArrayDyn<f64>> };
+    let (results, kind) = match results.as_slice() {
+        [result] => (result.clone(), one_array),
+        several => {
+            let kinds = several.iter().map(|_| &one_array);
+            (quote! { (#(#several),*) }, quote! { (#(#kinds),*) })
+        }
+    };
+    let shapes = one.parts.iter().map(|part| {
+        let counts = part.shape.iter().map(|count| count.n.to_string());
+        format!("({}, n)", counts.collect::<Vec<String>>().join(", "))
+    });
+    let shapes = shapes.collect::<Vec<String>>().join(", ");
+    let doc = format!(
+        "{}; of n states {shapes}. `geometry` as in `inverse_dynamics`.",
+        one.doc
+    );
+    quote! {
+        #[doc = #doc]
+        #[pyfunction]
+        #[pyo3(signature = (#(#names,)* #p_name *, geometry=None))]
+        fn #name<'py>(
+            py: Python<'py>, #(#names: PyReadonlyArrayDyn<'py, f64>,)* #p_argument geometry: Option<BTreeMap<String, f64>>,
+        ) -> PyResult<#kind> {
+            #arrays
+            let owner = #owner;
+            let values = computed(py, &many, #entries, |sample| {
+                let state = model::State { #(#fields),* };
+                let found = owner.#method(&state #forces)?;
+                Ok([#(#values),*].concat())
+            })?;
+            Ok(#results)
         }
     }
 }

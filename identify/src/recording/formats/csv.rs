@@ -6,6 +6,8 @@ use std::cell::Cell;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::rc::Rc;
 
+use modelmill_boundary::text::csv_name;
+
 use crate::recording::column::Field;
 use crate::recording::error::Fault;
 use crate::recording::formats::{Format, Input};
@@ -121,7 +123,8 @@ fn names(reader: &mut csv::Reader<impl Read>, line: u64) -> Result<Vec<String>, 
     if header.iter().any(|name| name.contains('\n')) {
         return Err(Fault::OpenQuote { line });
     }
-    Ok(header.iter().map(str::to_owned).collect())
+    let names = header.iter().map(|name| csv_name(name).to_owned());
+    Ok(names.collect())
 }
 
 /// The line in which a quote opens a field that goes on in the next line and takes in samples: to the end of the text,
@@ -260,9 +263,15 @@ fn read_header(stream: &mut impl BufRead) -> Result<(String, Vec<u8>), Fault> {
 }
 
 fn find_separator(header: &str) -> Result<u8, Fault> {
+    // What stands between quotes separates nothing, unless one is left open.
+    let parts: Vec<&str> = header.split('"').collect();
+    let step = if parts.len().is_multiple_of(2) { 1 } else { 2 };
     let present: Vec<u8> = [b',', b';', b'\t']
         .into_iter()
-        .filter(|s| header.as_bytes().contains(s))
+        .filter(|s| {
+            let mut outside = parts.iter().step_by(step);
+            outside.any(|part| part.as_bytes().contains(s))
+        })
         .collect();
     let is_number = |text: &str| text.trim().trim_matches('"').parse::<f64>().is_ok();
     match present.as_slice() {
