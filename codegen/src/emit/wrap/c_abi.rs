@@ -10,6 +10,7 @@ use modelmill_boundary::text::comment;
 use super::{Face, source};
 use crate::Derivation;
 use crate::emit::language::EmittedFile;
+use crate::emit::language::c99::RESERVED;
 
 /// What a function returns, with its name in the header after the prefix, and its meaning.
 const STATUS: [(&str, &str); 8] = [
@@ -32,42 +33,9 @@ const STATUS: [(&str, &str); 8] = [
     ("LENGTH", "arrays of different lengths"),
 ];
 
-/// Names whose headers the C library has itself.
-const RESERVED: &[&str] = &[
-    "assert",
-    "complex",
-    "ctype",
-    "errno",
-    "fenv",
-    "float",
-    "inttypes",
-    "iso646",
-    "limits",
-    "locale",
-    "math",
-    "setjmp",
-    "signal",
-    "stdalign",
-    "stdarg",
-    "stdatomic",
-    "stdbool",
-    "stddef",
-    "stdint",
-    "stdio",
-    "stdlib",
-    "stdnoreturn",
-    "string",
-    "tgmath",
-    "threads",
-    "time",
-    "uchar",
-    "wchar",
-    "wctype",
-];
-
 /// The files of the crate. It needs `modelmill-runtime` in the folder `modelmill-runtime` beside its manifest.
 pub fn emit_c(derivation: &Derivation) -> Vec<EmittedFile> {
-    let face = Face::new(derivation, RESERVED);
+    let face = Face::new(derivation, &RESERVED);
     let doc = "The model for C: see the header in `include`. All `unsafe` code is here, and all of it reads and writes what the \
                caller's pointers point to.";
     vec![
