@@ -474,6 +474,8 @@ pub(super) fn pose(derivation: &Derivation, scope: &Scope) -> TokenStream {
         "",
     );
     let written_once = statements(&pose.once.statements());
+    let begin = (!pose.once.kept.is_empty())
+        .then(|| quote! { let n = &One::<T>::new(); #given_once #written_once });
     let names: Vec<Ident> = pose.once.kept.iter().map(|name| of_field(name)).collect();
     let n_kept = Literal::usize_unsuffixed(names.len());
     let read = given(
@@ -505,9 +507,7 @@ pub(super) fn pose(derivation: &Derivation, scope: &Scope) -> TokenStream {
 
         impl<T: Real> Pose<T> {
             fn new(geometry: &Geometry<T>) -> Self {
-                let n = &One::<T>::new();
-                #given_once
-                #written_once
+                #begin
                 Self { geometry: *geometry, once: values![#(#names),*] }
             }
 
