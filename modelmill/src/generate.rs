@@ -1,24 +1,68 @@
 //! `generate`: a model as code.
 
-use modelmill_codegen::{C99, Language as _, RustModule, Source, emit_c, emit_python};
+use std::fmt;
+
+use modelmill_codegen::{Form, LANGUAGES, Source};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
-pub use modelmill_codegen::EmittedFile;
+pub use modelmill_codegen::{EmittedFile, Form as LanguageForm};
 
-/// Languages that models are emitted for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Language {
-    /// One module for `no_std` and `std`.
-    #[default]
-    Rust,
-    /// A header and a source of plain C99, without a Rust toolchain.
-    C99,
-    /// A crate that builds a static and a shared library, and their header.
-    C,
-    /// A crate that builds a Python module for numpy arrays.
-    Python,
+/// A language that models are emitted for: an entry of [`Self::all`], the first of which is the default.
+#[derive(Clone, Copy)]
+pub struct Language(&'static dyn modelmill_codegen::Language);
+
+impl Language {
+    /// All languages.
+    pub fn all() -> impl Iterator<Item = Self> {
+        LANGUAGES.into_iter().map(Self)
+    }
+
+    /// The language of a name, such as `rust`, `c99`, `c` and `python`.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::all().find(|language| language.name() == name)
+    }
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        self.0.name()
+    }
+
+    /// What is made in it, in a few words.
+    pub fn about(self) -> &'static str {
+        self.0.about()
+    }
+
+    /// What its files are.
+    pub fn form(self) -> Form {
+        self.0.form()
+    }
+
+    /// Whether it can have reactions and a self-test.
+    pub fn has_all(self) -> bool {
+        self.0.has_all()
+    }
+}
+
+impl Default for Language {
+    fn default() -> Self {
+        Self(LANGUAGES[0])
+    }
+}
+
+impl PartialEq for Language {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name()
+    }
+}
+
+impl Eq for Language {}
+
+impl fmt::Debug for Language {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
 }
 
 /// What is emitted.
@@ -45,32 +89,35 @@ impl Model {
             ("a self-test", code.self_test),
         ];
         if let Some((what, _)) = more.iter().find(|(_, asked)| *asked)
-            && !matches!(code.language, Language::Rust | Language::C99)
+            && !code.language.has_all()
         {
+            let able = Language::all().filter(|language| language.has_all());
+            let able: Vec<&str> = able.map(Language::name).collect();
             return Err(Error::options(format!(
-                "only the Rust module and C99 can have {what}"
+                "only {} can have {what}",
+                able.join(" and ")
             )));
         }
         let what = format!("writing the code of {}", self.name);
-        self.host().watched(&what, 0, |_| {
-            let derivation = &self.derivation;
-            let fault = |error| Error::derivation(&self.path, error);
-            let dynamics = code.dynamics.then(|| derivation.dynamics()).transpose();
-            let reactions = code.reactions.then(|| derivation.reactions()).transpose();
-            let (dynamics, reactions) = (dynamics.map_err(fault)?, reactions.map_err(fault)?);
-            let source = Source {
-                derivation,
-                dynamics: dynamics.as_ref(),
-                reactions: reactions.as_ref(),
-                self_test: code.self_test,
-            };
-            Ok(match code.language {
-                Language::Rust => RustModule.write(&source),
-                Language::C99 => C99.write(&source),
-                Language::C => with_runtime(emit_c(&source)),
-                Language::Python => with_runtime(emit_python(&source)),
-            })
-        })?
+        self.host().watched(&what, 0, |_| self.written(*code))?
+    }
+
+    fn written(&self, code: Code) -> Outcome<Vec<EmittedFile>> {
+        let derivation = &self.derivation;
+        let fault = |error| Error::derivation(&self.path, error);
+        let dynamics = code.dynamics.then(|| derivation.dynamics()).transpose();
+        let reactions = code.reactions.then(|| derivation.reactions()).transpose();
+        let (dynamics, reactions) = (dynamics.map_err(fault)?, reactions.map_err(fault)?);
+        let files = code.language.0.write(&Source {
+            derivation,
+            dynamics: dynamics.as_ref(),
+            reactions: reactions.as_ref(),
+            self_test: code.self_test,
+        });
+        Ok(match code.language.form() {
+            Form::Crate { .. } => with_runtime(files),
+            Form::Module | Form::Sources => files,
+        })
     }
 }
 

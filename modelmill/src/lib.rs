@@ -66,7 +66,7 @@
 //! assert!(!changes.base.is_empty());
 //!
 //! assert!(paper.equations(Format::Markdown)?.text.contains("p1_min"));
-//! let module = &paper.generate(&Code { language: Language::Rust, ..Code::default() })?[0];
+//! let module = &paper.generate(&Code { language: Language::default(), ..Code::default() })?[0];
 //! assert!(module.text.contains("pub struct InverseDynamics"));
 //! # Ok::<(), modelmill::Error>(())
 //! ```

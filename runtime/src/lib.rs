@@ -40,7 +40,8 @@ pub use solve::solve;
 pub mod emitted {
     pub use crate::{
         Assembly, BaseParameter, Linearised, Loops, Numbers, One, PoseError, Quantity, Real, Run,
-        Scales, Term, Var, accelerations, at, check_base, check_finite, plainly, settle, values,
+        Scales, Term, Var, accelerations, at, check_base, check_finite, plainly, read, settle,
+        values, variables,
     };
 }
 

@@ -298,13 +298,49 @@ macro_rules! program {
     };
 }
 
-/// What emitted structs of named quantities have in common: the values of a table, and whether all are numbers.
+/// A struct of named quantities with the table of their names, units and values in the model file, which are its default.
+///
+/// `as` gives the name in the model file where Rust cannot have it.
 #[macro_export]
 macro_rules! record {
-    ($record:ident, $table:ident) => {
+    ($(#[$doc:meta])* $record:ident, $table:ident:) => {
+        /// Names, units, and the model file's values: none.
+        pub const $table: [$crate::Quantity; 0] = [];
+
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $record<T> {
+            nothing: ::core::marker::PhantomData<T>,
+        }
+
         impl<T: $crate::Real> Default for $record<T> {
             fn default() -> Self {
-                Self::of($table.map(|quantity| T::from_f64(quantity.value)))
+                Self { nothing: ::core::marker::PhantomData }
+            }
+        }
+
+        #[allow(dead_code)]
+        impl<T: $crate::Real> $record<T> {
+            fn check(&self) -> Result<(), $crate::PoseError> {
+                Ok(())
+            }
+        }
+    };
+    ($(#[$doc:meta])* $record:ident, $table:ident: $($field:ident $(as $name:literal)?: $unit:literal = $value:expr),+ $(,)?) => {
+        /// Names, units, and the model file's values.
+        pub const $table: [$crate::Quantity; [$($unit),+].len()] = [
+            $($crate::Quantity::new($crate::record!(@name $field $($name)?), $unit, $value)),+
+        ];
+
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $record<T> {
+            $(#[doc = concat!("Unit: ", $unit, ".")] pub $field: T),+
+        }
+
+        impl<T: $crate::Real> Default for $record<T> {
+            fn default() -> Self {
+                Self { $($field: T::from_f64($value)),+ }
             }
         }
 
@@ -312,9 +348,29 @@ macro_rules! record {
         impl<T: $crate::Real> $record<T> {
             /// Names the first that is no number, or too large to compute with.
             fn check(&self) -> Result<(), $crate::PoseError> {
-                $crate::check_finite(&self.values(), &$table.map(|quantity| quantity.name))
+                $crate::check_finite(&[$(self.$field),+], &$table.map(|quantity| quantity.name))
+            }
+
+            /// The same as variables of a program.
+            #[inline(always)]
+            fn on<N: $crate::Numbers<Scalar = T>>(&self, n: &N) -> $record<$crate::Var<N::Value>> {
+                $record { $($field: n.of(self.$field)),+ }
             }
         }
+    };
+    (@name $field:ident) => {
+        stringify!($field)
+    };
+    (@name $field:ident $name:literal) => {
+        $name
+    };
+}
+
+/// Entries of an array that are the same at every state, as variables.
+#[macro_export]
+macro_rules! read {
+    ($n:ident, $array:expr; $($name:ident = $k:literal),+ $(,)?) => {
+        $(let $name = $n.of($array[$k]);)+
     };
 }
 
@@ -323,6 +379,14 @@ macro_rules! record {
 macro_rules! values {
     ($($variable:expr),* $(,)?) => {
         [$($variable.get()),*]
+    };
+}
+
+/// Variables of what a program computed, in an array.
+#[macro_export]
+macro_rules! variables {
+    ($($term:expr),* $(,)?) => {
+        [$($term.var()),*]
     };
 }
 

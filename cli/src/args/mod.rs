@@ -7,8 +7,10 @@ pub(crate) mod separate;
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use modelmill::excite::Limit;
+use modelmill::generate::{Language, LanguageForm};
 use modelmill::{Host, Model};
 
 use crate::failure::Outcome;
@@ -255,7 +257,7 @@ pub(crate) struct GenerateArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
     /// Write the source to this file instead of standard output; with --language c99, c or python, files to this folder
-    #[arg(long, value_name = "FILE.rs|DIR", required_if_eq_any([("language", "c99"), ("language", "c"), ("language", "python")]))]
+    #[arg(long, value_name = "FILE.rs|DIR", required_if_eq_any(in_folders()))]
     pub(crate) out: Option<PathBuf>,
     /// With the equation of motion: mass matrix, velocity terms, gravity, forward dynamics
     #[arg(long)]
@@ -267,21 +269,24 @@ pub(crate) struct GenerateArgs {
     #[arg(long)]
     pub(crate) self_test: bool,
     /// What to make: a Rust module, sources of plain C99, or a crate that builds a C library with its header or a Python module
-    #[arg(long, value_enum, default_value = "rust")]
-    pub(crate) language: LanguageArg,
+    #[arg(long, value_parser = languages(), default_value = Language::default().name())]
+    pub(crate) language: Language,
 }
 
-/// Languages that models are emitted for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum LanguageArg {
-    /// A module for `no_std` and `std`
-    Rust,
-    /// A header and a source of plain C99
-    C99,
-    /// A static and a shared library, and a header
-    C,
-    /// A module for numpy arrays
-    Python,
+/// The languages by their names.
+fn languages() -> impl TypedValueParser<Value = Language> {
+    let all = Language::all();
+    let values = all.map(|language| PossibleValue::new(language.name()).help(language.about()));
+    let parser = PossibleValuesParser::new(values);
+    parser.map(|name| Language::named(&name).expect("the parser knows these names alone"))
+}
+
+/// Languages whose files need a folder.
+fn in_folders() -> Vec<(&'static str, &'static str)> {
+    let others = Language::all().filter(|language| language.form() != LanguageForm::Module);
+    others
+        .map(|language| ("language", language.name()))
+        .collect()
 }
 
 /// Where the values of the base parameters come from.

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use modelmill::Host;
 use modelmill::files::{Disk, Files};
-use modelmill::generate::{Code, EmittedFile, Language};
+use modelmill::generate::{Code, EmittedFile, Language, LanguageForm};
 use modelmill::text::table::count;
 
-use crate::args::{GenerateArgs, LanguageArg};
+use crate::args::GenerateArgs;
 use crate::failure::{Failure, Outcome};
 use crate::output::{Target, refuse_dash, write};
 use crate::{commands, terminal};
@@ -19,35 +19,33 @@ pub(crate) fn run(host: &Host, args: &GenerateArgs) -> Outcome {
         ("--self-test", args.self_test),
     ];
     if let Some((flag, _)) = more.iter().find(|(_, asked)| *asked)
-        && !matches!(args.language, LanguageArg::Rust | LanguageArg::C99)
+        && !args.language.has_all()
     {
+        let able = Language::all().filter(|language| language.has_all());
+        let able: Vec<&str> = able.map(Language::name).collect();
         return Err(Failure::Usage(format!(
-            "{flag} goes with the Rust module and c99 only; leave it out, or leave --language out"
+            "{flag} goes with --language {} only; leave it out, or leave --language out",
+            able.join(" and ")
         )));
     }
     let model = commands::model(host, &args.model)?;
-    let target = match (&args.out, args.language) {
-        (Some(path), LanguageArg::Rust) => Some(Target::new(path, model.files())?),
+    let form = args.language.form();
+    let target = match (&args.out, form) {
+        (Some(path), LanguageForm::Module) => Some(Target::new(path, model.files())?),
         _ => None,
     };
     let files = model.generate(&Code {
-        language: match args.language {
-            LanguageArg::Rust => Language::Rust,
-            LanguageArg::C99 => Language::C99,
-            LanguageArg::C => Language::C,
-            LanguageArg::Python => Language::Python,
-        },
+        language: args.language,
         dynamics: args.dynamics,
         reactions: args.reactions,
         self_test: args.self_test,
     })?;
-    let what = match args.language {
-        LanguageArg::Rust => return module(target.as_ref(), &files),
-        LanguageArg::C99 => return sources(args, &model.files().collect::<Vec<&Path>>(), &files),
-        LanguageArg::C => "a C library and its header: build it there with `cargo build --release`",
-        LanguageArg::Python => {
-            "a Python module: build it there with `maturin build --release`, or `cargo build --release`"
+    let makes = match form {
+        LanguageForm::Module => return module(target.as_ref(), &files),
+        LanguageForm::Sources => {
+            return sources(args, &model.files().collect::<Vec<&Path>>(), &files);
         }
+        LanguageForm::Crate { makes } => makes,
     };
     let Some(folder) = &args.out else {
         return Err(Failure::Usage(
@@ -55,7 +53,7 @@ pub(crate) fn run(host: &Host, args: &GenerateArgs) -> Outcome {
         ));
     };
     write_crate(folder, &files)?;
-    terminal::note(&format!("{}: a crate that makes {what}", folder.display()));
+    terminal::note(&format!("{}: a crate that makes {makes}", folder.display()));
     Ok(())
 }
 
@@ -95,9 +93,10 @@ fn sources(args: &GenerateArgs, inputs: &[&Path], files: &[EmittedFile]) -> Outc
     }
     let names = files.iter().map(|file| file.path.as_str());
     terminal::note(&format!(
-        "{}: {}, for any compiler of C99",
+        "{}: {}, {}",
         folder.display(),
-        names.collect::<Vec<&str>>().join(" and ")
+        names.collect::<Vec<&str>>().join(" and "),
+        args.language.about()
     ));
     Ok(())
 }

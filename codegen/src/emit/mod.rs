@@ -5,9 +5,11 @@
 
 mod identifier;
 mod language;
+mod languages;
 pub(crate) mod tree;
 mod wrap;
 
 pub use language::rust::{Emitted, emit, emit_with_dynamics, module_name};
-pub use language::{C99, EmittedFile, LANGUAGES, Language, RustModule, Source};
+pub use language::{C99, EmittedFile, Form, Language, RustModule, Source};
+pub use languages::LANGUAGES;
 pub use wrap::{emit_c, emit_python};

@@ -352,7 +352,7 @@ impl<'a> Evaluator<'a> {
             Atom::Rate(i) => states.qd[self.position(i)],
             Atom::Acceleration(i) => states.qdd[self.position(i)],
             Atom::Load(d) => states.load[d],
-            Atom::Pi | Atom::Constant(_) | Atom::Parameter(_) | Atom::Base(_) => {
+            Atom::Pi | Atom::Constant(_) | Atom::Parameter(_) | Atom::Base(_) | Atom::Shared(_) => {
                 unreachable!("fixed atoms are no inputs of a state")
             }
         };

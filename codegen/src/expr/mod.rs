@@ -59,6 +59,8 @@ pub enum Atom {
     Acceleration(usize),
     /// The force or torque that a drive carries, effects aside.
     Load(usize),
+    /// A value of the pose that several emitted programs share, by its place.
+    Shared(usize),
 }
 
 impl Atom {

@@ -47,7 +47,7 @@ pub enum Op {
 
 impl Op {
     /// The same operation on other operands.
-    fn map_operands(self, new: impl Fn(ValueId) -> ValueId) -> Self {
+    pub(crate) fn map_operands(self, new: impl Fn(ValueId) -> ValueId) -> Self {
         match self {
             Self::Number(_) | Self::Input(_) => self,
             Self::Add(a, b) => Self::Add(new(a), new(b)),
@@ -212,6 +212,15 @@ impl Program {
         }
         let kept: Vec<usize> = (0..self.ops.len()).filter(|i| needed[*i]).collect();
         self.in_order(&kept)
+    }
+
+    /// The same program with its first `n` outputs alone.
+    pub(crate) fn with_outputs(mut self, n: usize) -> Self {
+        self.outputs.truncate(n);
+        let outputs = &self.outputs;
+        self.guards
+            .retain(|guard| !matches!(guard, Guard::Finite(v) if !outputs.contains(v)));
+        self.without_dead_code()
     }
 
     /// The same program with the operations that `order` names, in that order; operands stand before what needs them.

@@ -129,9 +129,19 @@ pub(crate) fn programs(
         let scale = Size::from_residual(graph, mechanism, &projection.loops.residual).scale(graph);
         plain(graph, &[scale])
     });
+    let n_motion = drives.len();
+    let together = [drives.as_slice(), &inverse_dynamics].concat();
     let mut program = |outputs: &[ExprId]| closing.program(graph, equations, outputs);
     let regressor = program(&regressor);
     let inverse_dynamics = program(&inverse_dynamics);
+    let mut drives = program(&drives);
+    if matches!(passive_position, PassivePosition::Closed) {
+        // Loops are closed by the same operations as elsewhere, so that code has them once, unless that costs too much.
+        let same = program(&together).with_outputs(n_motion);
+        if 10 * same.weight() <= 11 * drives.weight() {
+            drives = same;
+        }
+    }
     Ok(Programs {
         passive_position,
         passive: program(&passive),
@@ -139,7 +149,7 @@ pub(crate) fn programs(
         regressor,
         inverse_dynamics,
         base_parameters,
-        drives: program(&drives),
+        drives,
         scale,
     })
 }

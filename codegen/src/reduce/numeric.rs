@@ -225,7 +225,7 @@ pub(super) fn sample(
                 Atom::Acceleration(i) => qdd[i],
                 Atom::Load(d) => load[d],
                 Atom::Pi => std::f64::consts::PI,
-                Atom::Base(_) => 0.0,
+                Atom::Base(_) | Atom::Shared(_) => 0.0,
             }))
         };
         let Some(found) = evaluate(&rates, &qd, &qdd) else {

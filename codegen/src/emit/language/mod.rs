@@ -1,9 +1,9 @@
 //! Languages that print the statement tree.
 //!
-//! A language is one entry of [`LANGUAGES`]: what it is called, and how it writes a model. Adding one touches its own file and
-//! that list.
+//! A language is one entry of [`LANGUAGES`](super::LANGUAGES): what it is called, what its files are, and how it writes a
+//! model. Adding one touches its own folder and that list, which the library and the program read.
 
-mod c99;
+pub(in crate::emit) mod c99;
 pub(in crate::emit) mod rust;
 mod syntax;
 
@@ -31,16 +31,35 @@ pub struct Source<'a> {
     pub self_test: bool,
 }
 
+/// What the files of a language are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// One file.
+    Module,
+    /// Source files for a folder.
+    Sources,
+    /// A crate, which needs the runtime in its folder `modelmill-runtime`.
+    Crate {
+        /// What it makes, and how it is built.
+        makes: &'static str,
+    },
+}
+
 /// A language in which models are written.
 pub trait Language: Sync {
     /// What it is called.
     fn name(&self) -> &'static str;
+    /// What is made in it, in a few words.
+    fn about(&self) -> &'static str;
+    /// What its files are.
+    fn form(&self) -> Form;
+    /// Whether it has reactions and a self-test, if a source asks for them.
+    fn has_all(&self) -> bool {
+        true
+    }
     /// The files of a model.
     fn write(&self, source: &Source<'_>) -> Vec<EmittedFile>;
 }
-
-/// All languages.
-pub const LANGUAGES: [&dyn Language; 2] = [&RustModule, &C99];
 
 /// A module of Rust.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +68,14 @@ pub struct RustModule;
 impl Language for RustModule {
     fn name(&self) -> &'static str {
         "rust"
+    }
+
+    fn about(&self) -> &'static str {
+        "A module for `no_std` and `std`"
+    }
+
+    fn form(&self) -> Form {
+        Form::Module
     }
 
     fn write(&self, source: &Source<'_>) -> Vec<EmittedFile> {
@@ -76,6 +103,14 @@ pub struct C99;
 impl Language for C99 {
     fn name(&self) -> &'static str {
         "c99"
+    }
+
+    fn about(&self) -> &'static str {
+        "A header and a source of plain C99"
+    }
+
+    fn form(&self) -> Form {
+        Form::Sources
     }
 
     fn write(&self, source: &Source<'_>) -> Vec<EmittedFile> {

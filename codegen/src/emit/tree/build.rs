@@ -3,14 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::angles::AnglesFirst;
+use super::names::Meaning;
 use super::order::order;
 use super::scope::{Scope, unique};
 use super::{Asked, Check, Expression, Routine, Statement};
 use crate::expr::Atom;
 use crate::lower::{Guard, Op, Program, Stage, ValueId};
 
-/// Formulas wider than this many characters are divided.
-const WIDEST: usize = 100;
+/// Formulas wider than this many characters with their names are divided, so that lines of a method have no more than 100.
+const WIDEST: usize = 80;
 
 /// What the angles that come first are called together.
 pub(in crate::emit) const ANGLES: &str = "angles";
@@ -22,11 +23,25 @@ const GROUP: usize = 250;
 impl Routine {
     /// The statements of a program; `outputs` are names for its results, if they have any.
     pub(in crate::emit) fn new(program: &Program, scope: &Scope, outputs: &[String]) -> Self {
-        let mut taken = scope.taken().clone();
+        Self::written(program, scope, outputs, false)
+    }
+
+    /// The same; if all results are to be called by names, each has one.
+    pub(super) fn written(
+        program: &Program,
+        scope: &Scope,
+        outputs: &[String],
+        results_have_names: bool,
+    ) -> Self {
+        let mut taken = scope.taken_in(program);
         let first = AnglesFirst::of(program);
         let named = named(program, scope, outputs, &mut taken);
         let inside = inside(program, &named, scope);
-        let order = order(program, &inside, &first.done);
+        let last = (!results_have_names).then_some(scope.sections.forces());
+        let sections = scope.sections.of(program, &inside, &named, last);
+        let turns_signs = sections.is_some();
+        let sections = sections.unwrap_or_else(|| vec![0; program.ops.len()]);
+        let order = order(program, &inside, &first.done, &sections);
         let mut place = vec![0; order.len()];
         for (k, i) in order.iter().enumerate() {
             place[*i] = k;
@@ -45,6 +60,9 @@ impl Routine {
             first: first.in_order(&order),
             values: vec![None; order.len()],
             next: [0; 2],
+            sections: order.iter().map(|i| sections[*i]).collect(),
+            turns_signs,
+            results_have_names,
             program: program.in_order(&order),
         };
         (builder.uses, builder.by_state) = uses(&builder.program);
@@ -91,13 +109,20 @@ fn is_leaf(op: &Op) -> bool {
     matches!(op, Op::Number(_) | Op::Input(_))
 }
 
+/// What a value is called, and whether the name stands for its negative.
+#[derive(Clone, Debug)]
+pub(super) struct Named {
+    pub(super) name: String,
+    negative: bool,
+}
+
 /// Names of values that mean something, results first.
 fn named(
     program: &Program,
     scope: &Scope,
     outputs: &[String],
     taken: &mut BTreeSet<String>,
-) -> BTreeMap<usize, String> {
+) -> BTreeMap<usize, Named> {
     let mut named = BTreeMap::new();
     let read: BTreeSet<&str> = (program.ops.iter())
         .filter_map(|op| match op {
@@ -113,20 +138,36 @@ fn named(
         let i = v.index();
         let plain = is_leaf(&program.ops[i]) || matches!(program.ops[i], Op::Neg(_));
         if !plain && !named.contains_key(&i) {
-            named.insert(i, unique(name, taken));
+            let name = unique(name, taken);
+            let negative = false;
+            named.insert(i, Named { name, negative });
         }
     }
     for (i, meaning) in scope.meanings.of(program) {
-        named.entry(i).or_insert_with(|| {
-            let sign = if meaning.negative { "minus_" } else { "" };
-            unique(&format!("{sign}{}", meaning.symbol.text()), taken)
-        });
+        if named.contains_key(&i) {
+            continue;
+        }
+        let Meaning { symbol, negative } = meaning;
+        // The negative of a square would be an operation more.
+        let squared = match program.ops[i] {
+            Op::Mul(a, b) if a == b && negative => match &program.ops[a.index()] {
+                Op::Input(atom) => Some(scope.name(*atom)),
+                _ => named.get(&a.index()).map(|named| named.name.as_str()),
+            },
+            _ => None,
+        };
+        let (name, negative) = match squared {
+            Some(base) => (format!("{base}_sq"), false),
+            None => (symbol.text(), negative),
+        };
+        let name = unique(&name, taken);
+        named.insert(i, Named { name, negative });
     }
     named
 }
 
 /// Values that are written inside the only formula that uses them.
-fn inside(program: &Program, named: &BTreeMap<usize, String>, scope: &Scope) -> Vec<bool> {
+fn inside(program: &Program, named: &BTreeMap<usize, Named>, scope: &Scope) -> Vec<bool> {
     let n = program.ops.len();
     let (uses, by_state) = uses(program);
     let mut inside = vec![false; n];
@@ -141,7 +182,7 @@ fn inside(program: &Program, named: &BTreeMap<usize, String>, scope: &Scope) -> 
         };
         let mut open = Vec::new();
         // A formula stands beside its name.
-        let widest = WIDEST - named.get(&i).map_or(3, String::len).min(50);
+        let widest = WIDEST - named.get(&i).map_or(3, |n| n.name.len()).min(50);
         let mut total = own;
         op.for_each_operand(|v| {
             let k = v.index();
@@ -158,7 +199,7 @@ fn inside(program: &Program, named: &BTreeMap<usize, String>, scope: &Scope) -> 
                     open.push(k);
                 }
             } else {
-                total += named.get(&k).map_or(3, String::len);
+                total += named.get(&k).map_or(3, |n| n.name.len());
             }
         });
         open.sort_by_key(|k| width[*k]);
@@ -184,8 +225,15 @@ struct Builder<'a> {
     /// Which values are results.
     outputs: Vec<bool>,
     inside: Vec<bool>,
-    named: BTreeMap<usize, String>,
+    named: BTreeMap<usize, Named>,
     first: AnglesFirst,
+    /// The section in which each value stands.
+    sections: Vec<usize>,
+    /// Whether values are turned to the sign of what they are called. In long programs it decides which pairs of operations a
+    /// compiler finds; they keep the signs of the recursion, and names where these agree.
+    turns_signs: bool,
+    /// Whether all results are called by names.
+    results_have_names: bool,
     /// What stands for each value, once it is known.
     values: Vec<Option<Expression>>,
     /// Numbers given to nameless values, once and at every state.
@@ -207,9 +255,9 @@ impl Builder<'_> {
             if self.program.stages[i] == Stage::Fixed
                 && !is_leaf(&self.program.ops[i])
                 && self.by_state[i]
-                && let Some(Expression::Name(name)) = value
+                && let Some(value) = value
             {
-                kept.push(name.clone());
+                value.for_each_name(&mut |name| kept.push(name.to_owned()));
             }
         }
         let mut state = self.angles_first();
@@ -224,9 +272,15 @@ impl Builder<'_> {
             }
         }
         let mut guards = self.program.guards.clone();
+        let mut section = 0;
         for i in 0..self.program.ops.len() {
             if self.program.stages[i] == Stage::Fixed {
                 continue;
+            }
+            let headed = self.scope.sections.heading(self.sections[i]);
+            if let Some(heading) = headed.filter(|_| self.sections[i] != section) {
+                state.push(Statement::Section(heading.to_owned()));
+                section = self.sections[i];
             }
             if !self.first.done[i] {
                 self.value(i, &mut state);
@@ -238,9 +292,6 @@ impl Builder<'_> {
             guards.retain(|guard| {
                 let ready = guard.values().all(|v| v.index() <= i);
                 if ready {
-                    if let (Guard::Reachable(_), Some(note)) = (guard, self.scope.loops()) {
-                        state.push(Statement::Section(note));
-                    }
                     let check = self.check(*guard);
                     state.push(Statement::Guard(check));
                 }
@@ -256,7 +307,7 @@ impl Builder<'_> {
         Routine {
             once,
             kept,
-            state: in_groups(without_unread(state, &results), &[]),
+            state: in_groups(without_empty(without_unread(state, &results)), &[]),
             read_once,
             read,
             results,
@@ -295,7 +346,7 @@ impl Builder<'_> {
         for k in outputs {
             statements.push(Statement::Put {
                 output: *k,
-                value: self.at(i),
+                value: self.at(i).settled(),
             });
         }
     }
@@ -314,7 +365,7 @@ impl Builder<'_> {
         let op = self.program.ops[i].clone();
         let value = match &op {
             Op::Number(value) => Expression::number(value),
-            Op::Input(atom) => Expression::name(self.scope.name(*atom)),
+            Op::Input(atom) => self.scope.input(*atom),
             Op::Add(a, b) => Expression::add(self.of(*a), self.of(*b)),
             Op::Sub(a, b) => Expression::sub(self.of(*a), self.of(*b)),
             Op::Mul(a, b) => Expression::mul(self.of(*a), self.of(*b)),
@@ -343,7 +394,10 @@ impl Builder<'_> {
             }
         };
         // What is a result and nothing else is written where it is handed over.
-        let only_put = self.uses[i] == 1 && self.outputs[i] && !self.named.contains_key(&i);
+        let only_put = self.uses[i] == 1
+            && self.outputs[i]
+            && !self.named.contains_key(&i)
+            && !self.results_have_names;
         let unnamed = is_leaf(&op)
             || self.inside[i]
             || only_put && !self.is_handed(i)
@@ -352,10 +406,45 @@ impl Builder<'_> {
             self.values[i] = Some(value);
             return;
         }
-        let name = self.called(i);
-        self.values[i] = Some(Expression::name(&name));
+        let (name, value, turned) = self.signed(i, value);
         let note = self.scope.note(&name);
+        let written = Expression::name(&name);
         statements.push(Statement::Let { name, value, note });
+        self.values[i] = Some(if turned {
+            Expression::neg(written)
+        } else {
+            written
+        });
+    }
+
+    /// What is written for a value: its name, what the name stands for, and whether that is the negative. A sign that
+    /// would be an operation of its own is left to those who use the value.
+    fn signed(&mut self, i: usize, value: Expression) -> (String, Expression, bool) {
+        let fixed = self.program.stages[i] == Stage::Fixed;
+        let Some(Named { name, negative }) = self.named.get(&i).cloned() else {
+            let name = self.numbered(i);
+            return match value {
+                Expression::Neg(value) if !fixed => (name, *value, true),
+                value => (name, value.settled(), false),
+            };
+        };
+        if negative && !self.turns_signs && !fixed {
+            return (self.numbered(i), value, false);
+        }
+        let meant = if negative {
+            Expression::neg(value)
+        } else {
+            value
+        };
+        // Wrenches and Jacobians keep the sign of the equations.
+        let keeps = fixed
+            || ["F_", "M_", "J_"]
+                .iter()
+                .any(|start| name.starts_with(start));
+        match meant.settled() {
+            Expression::Neg(other) if !keeps => (self.numbered(i), *other, !negative),
+            meant => (name, meant, negative),
+        }
     }
 
     /// Whether a value is computed once and used at every state.
@@ -363,11 +452,8 @@ impl Builder<'_> {
         self.program.stages[i] == Stage::Fixed && self.by_state[i]
     }
 
-    /// The name of a value.
-    fn called(&mut self, i: usize) -> String {
-        if let Some(name) = self.named.get(&i) {
-            return name.clone();
-        }
+    /// A name for a value without a meaning.
+    fn numbered(&mut self, i: usize) -> String {
         let (letter, counter) = match self.program.stages[i] {
             Stage::Fixed => ("k", 0),
             Stage::State => ("x", 1),
@@ -383,8 +469,8 @@ impl Builder<'_> {
 
     /// `s_theta1`, `c_theta1` and so on.
     fn angle_name(&mut self, i: usize, letter: &str, angle: ValueId) -> String {
-        if let Some(name) = self.named.get(&i) {
-            return name.clone();
+        if let Some(named) = self.named.get(&i) {
+            return named.name.clone();
         }
         let mut parts = Vec::new();
         let mut terms = 0;
@@ -446,7 +532,11 @@ impl Builder<'_> {
     fn check(&self, guard: Guard) -> Check {
         match guard {
             Guard::Reachable(v) => Check::Reachable(self.of(v)),
-            Guard::Regular(v, size) => Check::Regular(self.of(v), self.of(size)),
+            // Its magnitude is what counts.
+            Guard::Regular(v, size) => match self.of(v) {
+                Expression::Neg(value) => Check::Regular(*value, self.of(size)),
+                value => Check::Regular(value, self.of(size)),
+            },
             Guard::Finite(v) => Check::Finite(self.of(v)),
         }
     }
@@ -471,6 +561,22 @@ fn without_unread(statements: Vec<Statement>, results: &[Expression]) -> Vec<Sta
         kept.push(statement);
     }
     kept.reverse();
+    kept
+}
+
+/// The statements without headings that nothing follows.
+fn without_empty(statements: Vec<Statement>) -> Vec<Statement> {
+    let is_heading = |statement: &Statement| matches!(statement, Statement::Section(_));
+    let mut kept: Vec<Statement> = Vec::with_capacity(statements.len());
+    for statement in statements {
+        if is_heading(&statement) && kept.last().is_some_and(is_heading) {
+            kept.pop();
+        }
+        kept.push(statement);
+    }
+    if kept.last().is_some_and(is_heading) {
+        kept.pop();
+    }
     kept
 }
 

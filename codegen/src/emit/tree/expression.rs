@@ -52,14 +52,23 @@ impl Expression {
     }
 
     pub(in crate::emit) fn sub(a: Self, b: Self) -> Self {
-        match b {
-            Self::Neg(b) => Self::add(a, *b),
-            b => Self::Sub(Box::new(a), Box::new(b)),
+        match (a, b) {
+            (a, Self::Neg(b)) => Self::add(a, *b),
+            (Self::Neg(a), b) => Self::neg(Self::add(*a, b)),
+            (a, b) => Self::Sub(Box::new(a), Box::new(b)),
         }
     }
 
-    /// `a * b`, written `b * a` where that reads better: it is the same number.
+    /// `a * b`, written `b * a` where that reads better: it is the same number. Signs are passed on.
     pub(in crate::emit) fn mul(a: Self, b: Self) -> Self {
+        match (a, b) {
+            (Self::Neg(a), b) => Self::neg(Self::mul(*a, b)),
+            (a, Self::Neg(b)) => Self::neg(Self::mul(a, *b)),
+            (a, b) => Self::product(a, b),
+        }
+    }
+
+    fn product(a: Self, b: Self) -> Self {
         let nested = b.binding() == Binding::Product && a.binding() != Binding::Product;
         let number = matches!(b, Self::Number(_)) && a.binding() != Binding::Product;
         let (a, b) = if nested || number { (b, a) } else { (a, b) };
@@ -67,7 +76,11 @@ impl Expression {
     }
 
     pub(in crate::emit) fn div(a: Self, b: Self) -> Self {
-        Self::Div(Box::new(a), Box::new(b))
+        match (a, b) {
+            (Self::Neg(a), b) => Self::neg(Self::div(*a, b)),
+            (a, Self::Neg(b)) => Self::neg(Self::div(a, *b)),
+            (a, b) => Self::Div(Box::new(a), Box::new(b)),
+        }
     }
 
     pub(in crate::emit) fn neg(a: Self) -> Self {
@@ -75,6 +88,39 @@ impl Expression {
             Self::Neg(a) => *a,
             Self::Number(a) => Self::Number(-a),
             a => Self::Neg(Box::new(a)),
+        }
+    }
+
+    /// The negative where it takes no operation more: it is the same number.
+    fn turned(&self) -> Option<Self> {
+        match self {
+            Self::Number(a) => Some(Self::Number(-a)),
+            Self::Neg(a) => Some((**a).clone()),
+            Self::Sub(a, b) => Some(Self::Sub(b.clone(), a.clone())),
+            Self::Add(a, b) => {
+                let (turned, rest) = match a.turned() {
+                    Some(turned) => (turned, b),
+                    None => (b.turned()?, a),
+                };
+                Some(Self::Sub(Box::new(turned), rest.clone()))
+            }
+            Self::Mul(a, b) => match a.turned() {
+                Some(a) => Some(Self::mul(a, (**b).clone())),
+                None => Some(Self::mul((**a).clone(), b.turned()?)),
+            },
+            Self::Div(a, b) => match a.turned() {
+                Some(a) => Some(Self::div(a, (**b).clone())),
+                None => Some(Self::div((**a).clone(), b.turned()?)),
+            },
+            Self::Name(_) | Self::Call(..) | Self::Atan2(..) => None,
+        }
+    }
+
+    /// The same number with a sign in front only where that saves nothing.
+    pub(in crate::emit) fn settled(self) -> Self {
+        match self {
+            Self::Neg(a) => a.turned().unwrap_or(Self::Neg(a)),
+            other => other,
         }
     }
 

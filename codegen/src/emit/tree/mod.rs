@@ -10,10 +10,13 @@ mod expression;
 pub(crate) mod names;
 mod once;
 mod order;
+mod pose;
 mod scope;
+mod sections;
 
 pub(in crate::emit) use expression::{Binding, Expression};
 pub(in crate::emit) use once::Once;
+pub(in crate::emit) use pose::Pose;
 pub(in crate::emit) use scope::Scope;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -40,6 +43,34 @@ pub(in crate::emit) struct Routine {
     pub(in crate::emit) results: Vec<Expression>,
     /// How many outputs there are.
     pub(in crate::emit) n_outputs: usize,
+}
+
+impl Routine {
+    /// Whether there are poses without an answer.
+    pub(in crate::emit) fn can_fail(&self) -> bool {
+        self.any(&|statement| matches!(statement, Statement::Guard(_)))
+    }
+
+    /// Outputs that are zero throughout.
+    pub(in crate::emit) fn zeros(&self) -> Vec<usize> {
+        let is_put = |k: usize| {
+            self.any(
+                &|statement| matches!(statement, Statement::Put { output, .. } if *output == k),
+            )
+        };
+        (0..self.n_outputs).filter(|k| !is_put(*k)).collect()
+    }
+
+    /// Whether a statement of a state is such.
+    fn any(&self, is_such: &dyn Fn(&Statement) -> bool) -> bool {
+        fn among(statements: &[Statement], is_such: &dyn Fn(&Statement) -> bool) -> bool {
+            statements.iter().any(|statement| match statement {
+                Statement::Group { statements, .. } => among(statements, is_such),
+                statement => is_such(statement),
+            })
+        }
+        among(&self.state, is_such)
+    }
 }
 
 /// One statement.

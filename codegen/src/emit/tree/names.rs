@@ -12,6 +12,9 @@ use crate::expr::print::Symbol;
 use crate::expr::vector::{self, Vector};
 use crate::expr::{Atom, ExprId, F64, Graph, Node, Tape};
 use crate::lower::{Op, Program};
+use crate::newton_euler::{Load, Wrench, joint_wrenches};
+use crate::regressor::form::{Frames, TotalForm};
+use crate::tree::expressions::Monomial;
 use crate::{Derivation, Evaluator, States};
 
 /// A state with all its atoms' values, and the quantities with a meaning there.
@@ -179,15 +182,23 @@ fn known(derivation: &Derivation, atoms: &BTreeMap<Atom, f64>) -> Vec<(Symbol, f
     named.extend(rates(&mut graph, derivation));
     named.extend(links(&mut graph, derivation));
     named.extend(points(&mut graph, derivation));
+    named.extend(wrenches(&mut graph, derivation));
     let atom = |a: Atom| atoms.get(&a).copied().unwrap_or(f64::NAN);
     let reserved = reserved(&derivation.mechanism);
     let mut known: Vec<(Symbol, f64)> = Vec::new();
-    for (symbol, id) in named {
+    let ids: Vec<ExprId> = named.iter().map(|(_, id)| *id).collect();
+    let together = Tape::new(&graph, &ids).evaluate(&F64(atom));
+    for (k, (symbol, id)) in named.into_iter().enumerate() {
         // Numbers and inputs have names already; so have the negatives of what is named.
         if matches!(graph.node(id), Node::Rational(_) | Node::Atom(_)) {
             continue;
         }
-        let Some(value) = Tape::new(&graph, &[id]).evaluate(&F64(atom)).map(|v| v[0]) else {
+        // One that has no value takes it from all others.
+        let value = match &together {
+            Some(values) => Some(values[k]),
+            None => Tape::new(&graph, &[id]).evaluate(&F64(atom)).map(|v| v[0]),
+        };
+        let Some(value) = value else {
             continue;
         };
         let taken = known
@@ -381,6 +392,45 @@ fn links(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
         for (axis, id) in AXES.iter().zip(before[*link]) {
             let name = format!("a_{}_{parent}_{axis}", frame.name);
             named.push((Symbol::new(name), id));
+        }
+    }
+    named
+}
+
+/// What moves every link and all beyond it, with base parameters for the inertia, as its joint transmits it: the force, and
+/// the moment about its origin, along its own axes and those from which it turns; and the generalised forces.
+fn wrenches(graph: &mut Graph, derivation: &Derivation) -> Vec<(Symbol, ExprId)> {
+    let (mechanism, equations) = (&derivation.mechanism, &derivation.equations);
+    let tree = &equations.tree;
+    let base = crate::programs::base_atoms(graph, &derivation.reduction);
+    let value = |product: &Monomial| base.get(product).copied().unwrap_or(Graph::ZERO);
+    let plain = TotalForm::PLAIN;
+    let frames = Frames::new(graph, tree, &equations.gravity, plain.style, false);
+    let wrenches = plain.wrenches(graph, &equations.inertia, tree, &frames, &value);
+    let loads = wrenches.into_iter().map(|(link, _, wrench)| Load {
+        link,
+        wrench,
+        until: None,
+    });
+    let through = joint_wrenches(graph, tree, loads.collect());
+    let mut named = Vec::new();
+    for (frame, link) in mechanism.frames.iter().zip(&tree.of_frame) {
+        let Some(link) = link else { continue };
+        let Wrench { force, moment } = through[*link];
+        let turn = tree.links[*link].absolute.clone();
+        let first = tree.links[tree.links[*link].first_parallel].parent;
+        let carries = (0..mechanism.frames.len()).rfind(|f| tree.of_frame[*f] == first);
+        let carries = carries.map_or("base", |f| mechanism.frames[f].name.as_str());
+        for (letter, own) in [("F", force), ("M", moment)] {
+            let turned = graph.turn_out(&turn, &own);
+            for (k, axis) in AXES.iter().enumerate() {
+                named.push((
+                    Symbol::new(format!("{letter}_{}_{axis}", frame.name)),
+                    own[k],
+                ));
+                let along = format!("{letter}_{}_{carries}_{axis}", frame.name);
+                named.push((Symbol::new(along), turned[k]));
+            }
         }
     }
     named

@@ -28,18 +28,30 @@ struct Statement {
     next_guarded: Option<usize>,
     /// How many values wait after it; inputs wait where they are.
     values: usize,
+    /// The section in which it stands.
+    section: usize,
     /// Time from its start to the end of the program if nothing ever waits for a register, in cycles or thereabouts.
     height: usize,
 }
 
 /// The operations of a program in another order: those that are fixed as they were, then those of a state, with the ones
-/// in `first` before all others. `fused` says which ones are written inside others.
-pub(super) fn order(program: &Program, fused: &[bool], first: &[bool]) -> Vec<usize> {
+/// in `first` before all others. `fused` says which ones are written inside others, `sections` where each stands; what
+/// stands in an earlier section comes first.
+pub(super) fn order(
+    program: &Program,
+    fused: &[bool],
+    first: &[bool],
+    sections: &[usize],
+) -> Vec<usize> {
     let of_state = |i: &usize| program.stages[*i] == Stage::State;
     let early = |i: &usize| !of_state(i) || first[*i];
     let n = program.ops.len();
     let mut order: Vec<usize> = (0..n).filter(early).collect();
-    let statements = statements(program, fused, &|i| !early(&i));
+    let mut statements = statements(program, fused, &|i| !early(&i));
+    for statement in &mut statements {
+        let of = statement.ops.iter().map(|i| sections[*i]);
+        statement.section = of.max().unwrap_or(0);
+    }
     for statement in scheduled(&statements) {
         order.extend(&statements[statement].ops);
     }
@@ -143,7 +155,12 @@ fn scheduled(statements: &[Statement]) -> Vec<usize> {
         let best = (0..ready.len()).min_by_key(|place| {
             let k = ready[*place];
             let pressure = if live < REGISTERS { 0 } else { kept(k) };
-            (pressure, Reverse(statements[k].height), k)
+            (
+                statements[k].section,
+                pressure,
+                Reverse(statements[k].height),
+                k,
+            )
         });
         let Some(best) = best else {
             break;

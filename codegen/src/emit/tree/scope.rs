@@ -2,11 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::names::Meanings;
 use modelmill_spec::DriveKind;
 
+use super::Expression;
+use super::names::Meanings;
+use super::pose::Pose;
+use super::sections::Sections;
 use crate::Derivation;
 use crate::expr::{Atom, Graph};
+use crate::lower::{Op, Program};
 
 /// Words that stand in every routine, in whatever language, and names of modules that a variable would meet.
 const WORDS: [&str; 42] = [
@@ -63,6 +67,12 @@ pub(in crate::emit) struct Scope {
     notes: BTreeMap<String, String>,
     /// What values of programs mean.
     pub(in crate::emit) meanings: Meanings,
+    /// Inputs that stand with the other sign under their names.
+    turned: BTreeSet<Atom>,
+    /// What names belong to, for headings.
+    pub(super) sections: Sections,
+    /// What the programs share of the pose, if it is written apart.
+    pub(in crate::emit) pose: Option<Box<Pose>>,
 }
 
 impl Scope {
@@ -73,6 +83,9 @@ impl Scope {
             taken: WORDS.into_iter().map(str::to_owned).collect(),
             notes: notes(derivation),
             meanings: Meanings::new(derivation),
+            turned: BTreeSet::new(),
+            sections: Sections::new(derivation),
+            pose: None,
         };
         let coordinates = || mechanism.coordinates.iter().enumerate();
         for (i, c) in mechanism.constants.iter().enumerate() {
@@ -103,6 +116,39 @@ impl Scope {
         self.atoms.insert(atom, name);
     }
 
+    /// The same with what the programs share of the pose written apart.
+    pub(in crate::emit) fn with_pose(derivation: &Derivation) -> Self {
+        let mut scope = Self::new(derivation);
+        scope.pose = Pose::new(derivation, &mut scope).map(Box::new);
+        scope
+    }
+
+    /// Takes a value that stands for an input, with its number at the state of [`Self::meanings`].
+    pub(super) fn add_shared(&mut self, atom: Atom, value: &Expression, number: f64) {
+        let (name, turned) = match value {
+            Expression::Neg(a) => (&**a, true),
+            a => (a, false),
+        };
+        let Expression::Name(name) = name else {
+            panic!("what is shared has a name: {value:?}");
+        };
+        self.atoms.insert(atom, name.clone());
+        if turned {
+            self.turned.insert(atom);
+        }
+        self.meanings.atoms.insert(atom, number);
+    }
+
+    /// What stands for an input.
+    pub(super) fn input(&self, atom: Atom) -> Expression {
+        let name = Expression::name(self.name(atom));
+        if self.turned.contains(&atom) {
+            Expression::neg(name)
+        } else {
+            name
+        }
+    }
+
     /// What an input is called.
     pub(in crate::emit) fn name(&self, atom: Atom) -> &str {
         self.atoms.get(&atom).map_or("", String::as_str)
@@ -119,17 +165,24 @@ impl Scope {
         })
     }
 
-    /// What is said where loops are asked whether they close.
-    pub(super) fn loops(&self) -> Option<String> {
-        self.notes.get("").cloned()
-    }
-
     /// What a value with a name is, for the reader.
     pub(super) fn note(&self, name: &str) -> Option<String> {
-        self.notes.get(name.trim_start_matches("minus_")).cloned()
+        self.notes.get(name).cloned()
     }
 
-    /// Names that are taken.
+    /// Names that are taken in a program: those of what is shared only where some of that is read.
+    pub(super) fn taken_in(&self, program: &Program) -> BTreeSet<String> {
+        let mut taken = self.taken.clone();
+        let is_shared = |op: &Op| matches!(op, Op::Input(Atom::Shared(_)));
+        if program.ops.iter().any(is_shared) {
+            let shared = self.atoms.iter();
+            let shared = shared.filter(|(atom, _)| matches!(atom, Atom::Shared(_)));
+            taken.extend(shared.map(|(_, name)| name.clone()));
+        }
+        taken
+    }
+
+    /// Names that are taken everywhere.
     pub(super) fn taken(&self) -> &BTreeSet<String> {
         &self.taken
     }
@@ -146,45 +199,9 @@ fn notes(derivation: &Derivation) -> BTreeMap<String, String> {
         .iter()
         .map(|c| c.residual.len())
         .sum();
-    let loops: Vec<String> = mechanism
-        .loops
-        .iter()
-        .map(|l| format!("`{}`", l.name))
-        .collect();
-    match loops.as_slice() {
-        [] => {}
-        [one] => {
-            let text =
-                format!("Loop {one}, eqs. (L1) to (L{n_gaps}), closes where this is not negative.");
-            notes.insert(String::new(), text);
-        }
-        _ => {
-            let text = format!(
-                "Loops, eqs. (L1) to (L{n_gaps}): one of them closes where this is not negative."
-            );
-            notes.insert(String::new(), text);
-        }
-    }
     for k in 0..projection.determinants.len() {
         let tag = format!("eq. (L{})", n_gaps + k + 1);
         notes.insert(format!("Delta_{}", k + 1), tag);
-    }
-    for frame in &mechanism.frames {
-        for axis in ["x", "y", "z"] {
-            let of = format!("link {}", frame.name);
-            notes.insert(
-                format!("omega_{}_{axis}", frame.name),
-                format!("{of} turns"),
-            );
-            notes.insert(
-                format!("omega_{}_{axis}_d", frame.name),
-                format!("{of} turns faster"),
-            );
-            notes.insert(
-                format!("a_{}_{axis}", frame.name),
-                format!("{of} accelerates, less gravity"),
-            );
-        }
     }
     let mut tag = 0;
     for drive in &mechanism.drives {

@@ -6,6 +6,7 @@ use quote::{format_ident, quote};
 use super::c_header::header;
 use super::functions::{Function, functions};
 use super::{Face, source};
+use crate::emit::language::c99::RESERVED;
 use crate::emit::language::{EmittedFile, Source};
 
 /// What a function returns, with its name in the header after the prefix, and its meaning.
@@ -29,43 +30,10 @@ pub(super) const STATUS: [(&str, &str); 8] = [
     ("LENGTH", "arrays of different lengths"),
 ];
 
-/// Names whose headers the C library has itself.
-const RESERVED: &[&str] = &[
-    "assert",
-    "complex",
-    "ctype",
-    "errno",
-    "fenv",
-    "float",
-    "inttypes",
-    "iso646",
-    "limits",
-    "locale",
-    "math",
-    "setjmp",
-    "signal",
-    "stdalign",
-    "stdarg",
-    "stdatomic",
-    "stdbool",
-    "stddef",
-    "stdint",
-    "stdio",
-    "stdlib",
-    "stdnoreturn",
-    "string",
-    "tgmath",
-    "threads",
-    "time",
-    "uchar",
-    "wchar",
-    "wctype",
-];
-
 /// The files of the crate, without reactions and self-test. It needs `modelmill-runtime` in the folder `modelmill-runtime`
 /// beside its manifest.
 pub fn emit_c(from: &Source<'_>) -> Vec<EmittedFile> {
-    let face = Face::new(from, RESERVED);
+    let face = Face::new(from, &RESERVED);
     let doc = "The model for C: see the header in `include`. All `unsafe` code is here, and all of it reads and writes what the \
                caller's pointers point to.";
     vec![

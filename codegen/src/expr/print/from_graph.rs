@@ -17,6 +17,7 @@ pub fn atom(mechanism: &Mechanism, atom: Atom) -> Symbol {
         Atom::Acceleration(i) => Symbol::derived(&*mechanism.coordinates[i].name, 2),
         Atom::Pi => Symbol::new("pi"),
         Atom::Load(d) => Symbol::new(format!("load_{}", mechanism.drives[d].name)),
+        Atom::Shared(k) => Symbol::new(format!("pose_{}", k + 1)),
     }
 }
 

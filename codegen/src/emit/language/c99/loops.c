@@ -19,8 +19,6 @@ static int NAME_newton(const NAME_model *self, const double *q, double *passive,
         int closed = 1, status;
         for (i = 0; i < UPPER_N_PASSIVE; i++)
             pose[UPPER_N_ACTIVE + i] = passive[i];
-        NAME_zero(scales, 2 * UPPER_N_PASSIVE + UPPER_N_ACTIVE);
-        NAME_zero(found, UPPER_N_PASSIVE + UPPER_N_PASSIVE * UPPER_N_PASSIVE);
         (void)NAME_scales_program(self, pose, scales);
         (void)NAME_gaps_program(self, pose, found);
         for (i = 0; i < UPPER_N_ACTIVE; i++) {
@@ -76,7 +74,6 @@ static int NAME_follow(const NAME_model *self, const double *from, const double 
         pose[i] = from[i];
     for (i = 0; i < UPPER_N_PASSIVE; i++)
         pose[UPPER_N_ACTIVE + i] = at[i] = before[i] = known[i];
-    NAME_zero(scales, 2 * UPPER_N_PASSIVE + UPPER_N_ACTIVE);
     (void)NAME_scales_program(self, pose, scales);
     for (i = 0; i < UPPER_N_ACTIVE; i++) {
         double way = fabs(to[i] - from[i]), scale = scales[2 * UPPER_N_PASSIVE + i];

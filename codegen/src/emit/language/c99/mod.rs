@@ -14,8 +14,8 @@ use crate::emit::tree::{Once, Routine, Scope, reads_passive, uses_load};
 use crate::lower::Program;
 use crate::programs::PassivePosition;
 
-/// Names whose headers the C library has itself, or that its sources include.
-const RESERVED: [&str; 30] = [
+/// Names whose headers the C library has itself, and that of its first function.
+pub(in crate::emit) const RESERVED: [&str; 30] = [
     "assert",
     "complex",
     "ctype",

@@ -129,10 +129,10 @@ typedef struct {{
     lines.push(format!("(void){name}_prepare(&dynamics, geometry, base);"));
     lines.push(format!("{name}_prepare_columns(&all, geometry);"));
     lines.push(format!(
-        "{name}_zero(all_triangle, {n_products} * {n_products});"
+        "memset(all_triangle, 0, {n_products} * {n_products} * sizeof(double));"
     ));
     lines.push(format!(
-        "{name}_zero(few_triangle, {upper}_N_BASE * {upper}_N_BASE);"
+        "memset(few_triangle, 0, {upper}_N_BASE * {upper}_N_BASE * sizeof(double));"
     ));
     let mut at = 0;
     let mut parts = Vec::new();
@@ -171,7 +171,6 @@ typedef struct {{
                 inputs[{n_active} + i] = unit_of[i] * {name}_between(&random, -2.0, 2.0);
             for (i = 0; i < {n_active}; i++)
                 inputs[2 * {n_active} + i] = unit_of[i] * {name}_between(&random, -8.0, 8.0);{load}{follow}
-            {name}_zero(h, {upper}_N_DRIVES * {n_products});
             if ({name}_regressor(&dynamics, {arguments}, h_min) != {upper}_OK
                 || {name}_inverse_dynamics(&dynamics, {arguments}, forces) != {upper}_OK
                 || {name}_columns_program(&all, inputs, h) != {upper}_OK)

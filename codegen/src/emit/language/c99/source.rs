@@ -30,7 +30,7 @@ pub(super) fn source(unit: &Unit<'_>) -> String {
 "
     );
     text.push_str(&unit.named(include_str!("support.c")));
-    if uses(unit, "_sin_cos(") {
+    if uses(unit, "_sin_cos") {
         text.push('\n');
         text.push_str(&unit.named(include_str!("sin_cos.c")));
     }
@@ -185,7 +185,7 @@ pub(super) fn body(lines: &[String], text: &mut String) {
     }
 }
 
-/// A program: outputs begin as zeros.
+/// A program.
 pub(super) fn program(
     unit: &Unit<'_>,
     function: &Function<'_>,
@@ -197,7 +197,7 @@ pub(super) fn program(
     let routine = &function.routine;
     _ = writeln!(
         text,
-        "\nstatic int {name}_{}_program(const {name}_{owner} *self, const double *inputs, double *outputs)\n{{",
+        "\nstatic int {name}_{}_program(const {name}_{owner} *restrict self, const double *restrict inputs, double *restrict outputs)\n{{",
         function.name
     );
     let mut lines = Vec::new();
@@ -240,6 +240,9 @@ pub(super) fn program(
     }
     for unused in ["self", "inputs", "outputs"] {
         lines.push(format!("(void){unused};"));
+    }
+    for k in routine.zeros() {
+        lines.push(format!("outputs[{k}] = 0.0;"));
     }
     c.statements(&routine.state, &mut lines);
     lines.push(format!("return {}_OK;", unit.upper));
@@ -346,6 +349,8 @@ fn public(unit: &Unit<'_>, function: &Function<'_>, owner: &str, text: &mut Stri
     } else {
         "dynamics->input"
     };
+    // Results are written only when all is well.
+    let can_fail = function.routine.can_fail();
     let ways: &[bool] = if function.follows {
         &[false, true]
     } else {
@@ -353,13 +358,12 @@ fn public(unit: &Unit<'_>, function: &Function<'_>, owner: &str, text: &mut Stri
     };
     for near in ways {
         let mut lines = vec![
-            format!(
-                "double inputs[{}], outputs[{}];",
-                n_inputs.max(1),
-                n_outputs.max(1)
-            ),
+            format!("double inputs[{}];", n_inputs.max(1)),
             format!("int status = {input};"),
         ];
+        if can_fail {
+            lines.push(format!("double outputs[{}];", n_outputs.max(1)));
+        }
         if *near {
             lines.push("int i;".to_owned());
             lines.push(format!("double found[{upper}_N_PASSIVE];"));
@@ -384,9 +388,9 @@ fn public(unit: &Unit<'_>, function: &Function<'_>, owner: &str, text: &mut Stri
             }
         }
         lines.push(format!("if (status != {upper}_OK) return status;"));
-        lines.push(format!("{name}_zero(outputs, {n_outputs});"));
+        let results = if can_fail { "outputs" } else { function.result };
         lines.push(format!(
-            "status = {name}_{}_program({owner}, inputs, outputs);",
+            "status = {name}_{}_program({owner}, inputs, {results});",
             function.name
         ));
         lines.push(format!("if (status != {upper}_OK) return status;"));
@@ -395,10 +399,12 @@ fn public(unit: &Unit<'_>, function: &Function<'_>, owner: &str, text: &mut Stri
                 "for (i = 0; i < {upper}_N_PASSIVE; i++) passive[i] = found[i];"
             ));
         }
-        lines.push(format!(
-            "memcpy({}, outputs, {n_outputs} * sizeof(double));",
-            function.result
-        ));
+        if can_fail {
+            lines.push(format!(
+                "memcpy({results}, outputs, {n_outputs} * sizeof(double));",
+                results = function.result
+            ));
+        }
         lines.push("return status;".to_owned());
         _ = writeln!(text, "\n{}\n{{", signature(unit, function, owner, *near));
         body(&lines, text);

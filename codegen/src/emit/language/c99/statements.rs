@@ -193,13 +193,40 @@ impl C<'_> {
                     self.term(value)
                 ));
             }
-            // Each is computed where it is used.
-            Statement::Angles(_) => {}
+            Statement::Angles(angles) => {
+                let mut values: Vec<String> = angles.iter().map(|a| self.term(&a.value)).collect();
+                // They are computed in pairs.
+                if values.len() % 2 == 1 {
+                    values.extend(values.last().cloned());
+                }
+                let n = values.len();
+                lines.push(format!("double sines[{n}], cosines[{n}];"));
+                lines.push(format!(
+                    "const double angles[{n}] = {{{}}};",
+                    values.join(", ")
+                ));
+                lines.push(format!(
+                    "{}_sin_cos_all({n}, angles, sines, cosines);",
+                    self.name
+                ));
+            }
+            Statement::SinCos {
+                sine,
+                cosine,
+                asked: Some(k),
+                ..
+            } => {
+                for (name, all) in [(sine, "sines"), (cosine, "cosines")] {
+                    if let Some(name) = name {
+                        lines.push(format!("const double {} = {all}[{k}];", self.name(name)));
+                    }
+                }
+            }
             Statement::SinCos {
                 sine,
                 cosine,
                 angle,
-                ..
+                asked: None,
             } => {
                 let place = lines.len();
                 let [sine, cosine] =

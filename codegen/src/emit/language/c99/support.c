@@ -10,10 +10,3 @@ static int NAME_all_fine(const double *values, int n)
         fine &= fabs(values[k]) < LARGEST_INPUT;
     return fine;
 }
-
-static void NAME_zero(double *values, int n)
-{
-    int k;
-    for (k = 0; k < n; k++)
-        values[k] = 0.0;
-}

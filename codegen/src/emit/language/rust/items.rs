@@ -1,12 +1,14 @@
 //! The items of an emitted module: names and units, geometry, parameters, state, and the functions of the model.
 
+use std::fmt::Write as _;
+
 use modelmill_spec::Motion;
 use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};
 
 use super::functions::{inverse_dynamics, is_newton, model};
 use super::program::single;
-use super::statements::{Rust, lines, number as signed, verbatim};
+use super::statements::{Rust, filled, lines, number as signed, verbatim};
 use crate::Derivation;
 use crate::emit::identifier::of_field;
 use crate::emit::language::syntax::Syntax;
@@ -75,6 +77,7 @@ pub(super) fn items(derivation: &Derivation, scope: &Scope) -> TokenStream {
     );
     let state = state(derivation);
     let base_parameters = base_parameters(derivation, scope);
+    let pose = super::program::pose(derivation, scope);
     let model = model(derivation, scope);
     let inverse_dynamics = inverse_dynamics(derivation, scope);
     quote! {
@@ -85,6 +88,7 @@ pub(super) fn items(derivation: &Derivation, scope: &Scope) -> TokenStream {
         #parameters
         #state
         #base_parameters
+        #pose
         #model
         #inverse_dynamics
     }
@@ -107,44 +111,8 @@ fn tables(derivation: &Derivation) -> TokenStream {
             "BaseParameter::new({name:?}, {retained:?}, {unit:?}, {expression:?})"
         ))
     });
-    let quantities = |items: Vec<(&str, &str, f64)>| {
-        items
-            .into_iter()
-            .map(|(name, unit, value)| {
-                verbatim(&format!("Quantity::new({name:?}, {unit:?}, {value:?})"))
-            })
-            .collect::<Vec<_>>()
-    };
-    let constants = quantities(
-        mechanism
-            .constants
-            .iter()
-            .map(|c| (c.name.as_str(), c.unit.as_str(), c.value))
-            .collect(),
-    );
-    let parameters = quantities(
-        mechanism
-            .parameters
-            .iter()
-            .map(|p| (p.name.as_str(), p.unit.as_str(), p.nominal))
-            .collect(),
-    );
-    let [
-        n_active,
-        n_passive,
-        n_drives,
-        n_base,
-        n_constants,
-        n_parameters,
-    ] = [
-        n_active,
-        n_passive,
-        n_drives,
-        n_base,
-        constants.len(),
-        parameters.len(),
-    ]
-    .map(Literal::usize_unsuffixed);
+    let [n_active, n_passive, n_drives, n_base] =
+        [n_active, n_passive, n_drives, n_base].map(Literal::usize_unsuffixed);
     quote! {
         /// Number of independent coordinates.
         pub const N_ACTIVE: usize = #n_active;
@@ -162,63 +130,23 @@ fn tables(derivation: &Derivation) -> TokenStream {
         pub const DRIVES: [&str; N_DRIVES] = [#(#drives),*];
         /// Base parameters, in the order of the columns of H_min.
         pub const BASE_PARAMETERS: [BaseParameter; N_BASE] = [#(#bases),*];
-        /// Known quantities with the model file's values.
-        pub const CONSTANTS: [Quantity; #n_constants] = [#(#constants),*];
-        /// Dynamic parameters with their nominal values.
-        pub const PARAMETERS: [Quantity; #n_parameters] = [#(#parameters),*];
     }
 }
 
-/// A struct of named quantities, whose values stand in a table.
+/// A struct of named quantities and the table of their values, in one list.
 fn record(name: &str, doc: &str, table: &str, fields: &[(&str, f64, &str)]) -> TokenStream {
-    let (name, table, doc) = (
-        format_ident!("{name}"),
-        format_ident!("{table}"),
-        format!(" {doc}"),
-    );
-    let n = Literal::usize_unsuffixed(fields.len());
-    if fields.is_empty() {
-        return quote! {
-            #[doc = #doc]
-            #[derive(Clone, Copy, Debug, PartialEq)]
-            pub struct #name<T> { nothing: ::core::marker::PhantomData<T> }
-            impl<T: Copy> #name<T> {
-                fn of(_: [T; #n]) -> Self { Self { nothing: ::core::marker::PhantomData } }
-                fn values(&self) -> [T; #n] { [] }
-            }
-            ::modelmill_runtime::record!(#name, #table);
+    let mut text = format!("/// {doc}\n{name}, {table}:");
+    for (field, value, unit) in fields {
+        let ident = of_field(field).to_string();
+        let called = if ident == *field {
+            String::new()
+        } else {
+            format!(" as {field:?}")
         };
+        _ = write!(text, "\n{ident}{called}: {unit:?} = {value:?},");
     }
-    let idents: Vec<_> = fields.iter().map(|f| of_field(f.0)).collect();
-    let each = |written: &dyn Fn(&proc_macro2::Ident) -> String| {
-        idents
-            .iter()
-            .map(written)
-            .collect::<Vec<String>>()
-            .join(", ")
-    };
-    let values = verbatim(&format!("[{}]", each(&|field| format!("self.{field}"))));
-    let on = each(&|field| format!("{field}: n.of(self.{field})"));
-    let on = verbatim(&format!("{name} {{ {on} }}"));
-    let of = idents.iter().map(ToString::to_string);
-    let of = format!("Self {{ {} }}", of.collect::<Vec<String>>().join(", "));
-    let of = verbatim(&of);
-    let docs = fields
-        .iter()
-        .map(|f| format!(" Unit: {}.", modelmill_boundary::text::comment(f.2)));
-    quote! {
-        #[doc = #doc]
-        #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct #name<T> { #(#[doc = #docs] pub #idents: T),* }
-        impl<T: Copy> #name<T> {
-            fn of([#(#idents),*]: [T; #n]) -> Self { #of }
-            fn values(&self) -> [T; #n] { #values }
-            /// The same as variables of a program.
-            #[inline(always)]
-            fn on<N: Numbers<Scalar = T>>(&self, n: &N) -> #name<Var<N::Value>> where T: Real { #on }
-        }
-        ::modelmill_runtime::record!(#name, #table);
-    }
+    let text = verbatim(&text);
+    quote! { ::modelmill_runtime::record! { #text } }
 }
 
 fn state(derivation: &Derivation) -> TokenStream {
@@ -239,7 +167,8 @@ fn state(derivation: &Derivation) -> TokenStream {
     };
     let inputs = inputs_of_state(derivation, false);
     let n_inputs = Literal::usize_unsuffixed(inputs.len());
-    let names = inputs.into_iter().map(name);
+    let names = inputs.into_iter().map(|atom| format!("{:?}", name(atom)));
+    let names = verbatim(&filled("[", names, "];").join("\n"));
     let mut fields = vec![
         ("q", active.len()),
         ("qd", active.len()),
@@ -248,31 +177,29 @@ fn state(derivation: &Derivation) -> TokenStream {
     if load {
         fields.push(("load", mechanism.drives.len()));
     }
-    let entries: Vec<TokenStream> = fields
+    let entries: Vec<String> = fields
         .iter()
-        .flat_map(|(field, n)| {
-            let field = format_ident!("{field}");
-            (0..*n).map(move |k| {
-                let k = Literal::usize_unsuffixed(k);
-                quote! { state.#field[#k] }
-            })
-        })
+        .flat_map(|(field, n)| (0..*n).map(move |k| format!("state.{field}[{k}]")))
         .collect();
     let with_passive = is_newton(derivation).then(|| {
         let all = inputs_of_state(derivation, true);
         let n_all = Literal::usize_unsuffixed(all.len());
-        let names = all.into_iter().map(name);
-        let passive = (0..passive.len()).map(Literal::usize_unsuffixed);
+        let names = all.into_iter().map(|atom| format!("{:?}", name(atom)));
+        let names = verbatim(&filled("[", names, "];").join("\n"));
+        let passive = (0..passive.len()).map(|k| format!("passive[{k}]"));
+        let entries = entries.iter().cloned().chain(passive);
+        let entries = verbatim(&filled("[", entries, "]").join("\n"));
         quote! {
             /// The inputs of a program that reads passive coordinates.
-            const INPUTS_WITH_PASSIVE: [&str; #n_all] = [#(#names),*];
+            const INPUTS_WITH_PASSIVE: [&str; #n_all] = #names;
 
             /// The numbers of a state and of its passive coordinates in their order.
             fn inputs_with_passive<V: Copy>(state: &State<V>, passive: &[V; N_PASSIVE]) -> [V; #n_all] {
-                [#(#entries,)* #(passive[#passive]),*]
+                #entries
             }
         }
     });
+    let entries = verbatim(&filled("[", entries.into_iter(), "]").join("\n"));
     quote! {
         /// Motion of the independent coordinates, rad or m, and seconds.
         pub type State<T> = #alias;
@@ -283,11 +210,11 @@ fn state(derivation: &Derivation) -> TokenStream {
         /// Motion of the passive coordinates.
         pub type Passive<T> = ::modelmill_runtime::Passive<T, N_PASSIVE>;
         /// The inputs of a program, in order.
-        const INPUTS: [&str; #n_inputs] = [#(#names),*];
+        const INPUTS: [&str; #n_inputs] = #names;
 
         /// The numbers of a state in the order of [`INPUTS`].
         fn inputs<V: Copy>(state: &State<V>) -> [V; #n_inputs] {
-            [#(#entries),*]
+            #entries
         }
 
         #with_passive
@@ -375,7 +302,7 @@ fn sum(start: &str, value: &Expression) -> Vec<String> {
     for (k, term) in terms.iter().rev().enumerate() {
         let space = if k == 0 { "" } else { " " };
         match lines.last_mut() {
-            Some(line) if k == 0 || line.len() + term.len() < 100 => {
+            Some(line) if k == 0 || line.len() + term.len() < 95 => {
                 line.push_str(space);
                 line.push_str(term);
             }

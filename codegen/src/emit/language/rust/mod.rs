@@ -32,7 +32,7 @@ pub struct Emitted {
 
 /// Writes the module of a derivation: regressor and inverse dynamics.
 pub fn emit(derivation: &Derivation) -> Emitted {
-    let scope = Scope::new(derivation);
+    let scope = Scope::with_pose(derivation);
     Emitted {
         name: derivation.mechanism.name.clone(),
         doc: items::module_doc(derivation),

@@ -5,11 +5,11 @@ use std::collections::BTreeSet;
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
 
-use super::statements::{Rust, lines, statements};
+use super::statements::{Rust, filled, lines, statements, verbatim};
 use crate::Derivation;
 use crate::emit::identifier::of_field;
 use crate::emit::language::syntax::Syntax;
-use crate::emit::tree::{Once, Routine, Scope, inputs_of_state, reads_passive};
+use crate::emit::tree::{Once, Pose, Routine, Scope, Statement, inputs_of_state, reads_passive};
 use crate::expr::Atom;
 use crate::lower::Program;
 
@@ -109,12 +109,23 @@ impl Owner<'_> {
         let mut once = Once::new(self.scope);
         let mut routines = Vec::new();
         for function in &self.functions {
-            let mut routine = Routine::new(function.program, self.scope, &function.outputs);
+            let pose = self.scope.pose.as_deref();
+            let rest = pose.and_then(|pose| pose.rest(function.program));
+            let program = rest.as_ref().unwrap_or(function.program);
+            let mut routine = Routine::new(program, self.scope, &function.outputs);
             once.absorb(&mut routine);
-            routines.push(routine);
+            let pose = pose.filter(|_| rest.is_some());
+            routine
+                .read
+                .extend(pose.iter().flat_map(|pose| &pose.inputs));
+            routines.push((routine, pose));
         }
         let name = format_ident!("{}", self.name);
-        let reads = |wanted: fn(&Atom) -> bool| routines.iter().any(|r| r.read.iter().any(wanted));
+        let reads =
+            |wanted: fn(&Atom) -> bool| routines.iter().any(|(r, _)| r.read.iter().any(wanted));
+        let has_pose = routines.iter().any(|(_, pose)| pose.is_some());
+        let pose_field = has_pose.then(|| quote! { pose: Pose<T>, });
+        let pose_init = has_pose.then(|| quote! { pose: Pose::new(geometry), });
         let base = reads(|atom| matches!(atom, Atom::Base(_)));
         let physical = reads(|atom| matches!(atom, Atom::Parameter(_)));
         let base_field = base.then(|| quote! { base: [T; N_BASE], });
@@ -153,7 +164,7 @@ impl Owner<'_> {
         } = &self.more;
         let prepared = quote! {
             Self {
-                input, geometry: *geometry, #base_init #physical_init #once_init #model_init #inits
+                input, geometry: *geometry, #pose_init #base_init #physical_init #once_init #model_init #inits
             }
         };
         let new = if finish.is_empty() {
@@ -164,9 +175,9 @@ impl Owner<'_> {
         let doc = &self.doc;
         let visible = self.is_public.then(|| quote! { pub });
         let functions: Vec<TokenStream> = (self.functions.iter().zip(&routines))
-            .map(|(function, routine)| self.function(function, routine, &once))
+            .map(|(function, (routine, pose))| self.function(function, routine, *pose, &once))
             .collect();
-        let items = self.functions.iter().zip(&routines).map(|(function, routine)| {
+        let items = self.functions.iter().zip(&routines).map(|(function, (routine, _))| {
             let (item, program) = (
                 format_ident!("{}", function.item),
                 format_ident!("{}_program", function.name),
@@ -183,6 +194,7 @@ impl Owner<'_> {
                 /// What is wrong with the geometry or the parameters.
                 input: Result<(), PoseError>,
                 geometry: Geometry<T>,
+                #pose_field
                 #base_field
                 #physical_field
                 #once_field
@@ -207,16 +219,19 @@ impl Owner<'_> {
     }
 
     /// The method of a program, and the program.
-    fn function(&self, function: &Function<'_>, routine: &Routine, once: &Once) -> TokenStream {
+    fn function(
+        &self,
+        function: &Function<'_>,
+        routine: &Routine,
+        pose: Option<&Pose>,
+        once: &Once,
+    ) -> TokenStream {
         let program = format_ident!("{}_program", function.name);
         let (inputs, _) = self.inputs(function, routine);
         let n_inputs = Literal::usize_unsuffixed(inputs.len());
         let given = self.given(&routine.read, true);
-        let once = (!routine.kept.is_empty()).then(|| {
-            let places = once.kept.iter().enumerate();
-            let read = places.filter(|(_, name)| routine.kept.contains(name));
-            variables(read.map(|(k, name)| (of_field(name), k)), "self.once")
-        });
+        let once = kept(once, routine);
+        let pose = pose.map(|pose| self.pose(pose, routine));
         let state = statements(&routine.state);
         let method = self.method(function);
         quote! {
@@ -227,10 +242,30 @@ impl Owner<'_> {
                 #given
                 #once
                 let [#(#inputs),*] = n.inputs();
+                #pose
                 #state
                 Ok(())
             }
         }
+    }
+
+    /// What a program reads of the pose.
+    fn pose(&self, pose: &Pose, routine: &Routine) -> TokenStream {
+        let called = (0..pose.routine.results.len()).map(|k| {
+            let atom = Atom::Shared(k);
+            if routine.read.contains(&atom) {
+                Rust.name(self.scope.name(atom))
+            } else {
+                "_".to_owned()
+            }
+        });
+        let inputs = pose
+            .inputs
+            .iter()
+            .map(|atom| Rust.name(self.scope.name(*atom)));
+        let inputs: Vec<String> = inputs.collect();
+        let end = format!("] = self.pose.at(&*n, [{}])?;", inputs.join(", "));
+        lines(&filled("let [", called, &end))
     }
 
     /// The method; where the passive coordinates are found by Newton's method, a second one that takes a guess.
@@ -410,17 +445,86 @@ pub(super) fn given(
 
 /// Entries of an array that are the same at every state, as variables.
 fn variables(entries: impl Iterator<Item = (Ident, usize)>, array: &str) -> TokenStream {
-    let entries: Vec<(Ident, usize)> = entries.collect();
-    let written = entries.chunks(6).map(|part| {
-        let names = part.iter().map(|(name, _)| name.to_string());
-        let values = part.iter().map(|(_, k)| format!("n.of({array}[{k}])"));
-        let (names, values): (Vec<String>, Vec<String>) = (names.collect(), values.collect());
-        match part {
-            [_] => format!("let {} = {};", names.join(", "), values.join(", ")),
-            _ => format!("let ({}) = ({});", names.join(", "), values.join(", ")),
+    let entries = entries.map(|(name, k)| format!("{name} = {k}"));
+    let mut entries = entries.peekable();
+    if entries.peek().is_none() {
+        return TokenStream::new();
+    }
+    lines(&filled(&format!("read!(n, {array}; "), entries, ");"))
+}
+
+/// What is computed once and read by a program.
+fn kept(once: &Once, routine: &Routine) -> TokenStream {
+    let places = once.kept.iter().enumerate();
+    let read = places.filter(|(_, name)| routine.kept.contains(name));
+    variables(read.map(|(k, name)| (of_field(name), k)), "self.once")
+}
+
+/// The struct of what programs share of a pose.
+pub(super) fn pose(derivation: &Derivation, scope: &Scope) -> TokenStream {
+    let Some(pose) = &scope.pose else {
+        return TokenStream::new();
+    };
+    let given_once = given(
+        derivation,
+        scope,
+        &pose.once.read,
+        &quote! { geometry },
+        &TokenStream::new(),
+        "",
+    );
+    let written_once = statements(&pose.once.statements());
+    let begin = (!pose.once.kept.is_empty())
+        .then(|| quote! { let n = &One::<T>::new(); #given_once #written_once });
+    let names: Vec<Ident> = pose.once.kept.iter().map(|name| of_field(name)).collect();
+    let n_kept = Literal::usize_unsuffixed(names.len());
+    let read = given(
+        derivation,
+        scope,
+        &pose.routine.read,
+        &quote! { self.geometry },
+        &TokenStream::new(),
+        "",
+    );
+    let kept = kept(&pose.once, &pose.routine);
+    let called = |atom: &Atom| of_field(scope.name(*atom));
+    let n_inputs = Literal::usize_unsuffixed(pose.inputs.len());
+    let inputs = pose.inputs.iter().map(|atom| called(atom).to_string());
+    let inputs = lines(&filled("let [", inputs, "] = q;"));
+    let n_results = Literal::usize_unsuffixed(pose.routine.results.len());
+    let state = pose.routine.state.iter();
+    let state = state.filter(|statement| !matches!(statement, Statement::Put { .. }));
+    let state = statements(&state.cloned().collect::<Vec<Statement>>());
+    let results = (0..pose.routine.results.len()).map(|k| Rust.name(scope.name(Atom::Shared(k))));
+    let results = verbatim(&filled("Ok(variables![", results, "])").join("\n"));
+    quote! {
+        /// Where the loops close and the drives are at a pose, the same for all programs.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        struct Pose<T> {
+            geometry: Geometry<T>,
+            once: [T; #n_kept],
         }
-    });
-    lines(&written.collect::<Vec<String>>())
+
+        impl<T: Real> Pose<T> {
+            fn new(geometry: &Geometry<T>) -> Self {
+                #begin
+                Self { geometry: *geometry, once: values![#(#names),*] }
+            }
+
+            #[inline(always)]
+            fn at<N: Numbers<Scalar = T>>(
+                &self,
+                n: &N,
+                q: [Var<N::Value>; #n_inputs],
+            ) -> Result<[Var<N::Value>; #n_results], PoseError> {
+                #inputs
+                #read
+                #kept
+                #state
+                #results
+            }
+        }
+    }
 }
 
 /// The value of a program without a state, with `geometry` in scope.

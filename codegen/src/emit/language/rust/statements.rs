@@ -14,6 +14,9 @@ use crate::expr::Unary;
 /// What a line of a program begins with on its way.
 const LINE: char = '\u{a7}';
 
+/// How wide a line of a list may be, less the indentation of a program.
+const WIDTH: usize = 88;
+
 /// The syntax of Rust, with `n` for the arithmetic in scope.
 pub(super) struct Rust;
 
@@ -63,6 +66,28 @@ pub(super) fn lines(written: &[String]) -> TokenStream {
     quote! { #(#texts;)* }
 }
 
+/// Items of a list between its begin and its end, in as many lines as they need.
+pub(super) fn filled(start: &str, items: impl Iterator<Item = String>, end: &str) -> Vec<String> {
+    let mut lines = vec![start.to_owned()];
+    let mut items = items.peekable();
+    while let Some(mut item) = items.next() {
+        item.push_str(if items.peek().is_some() { "," } else { end });
+        let space = if lines.len() == 1 && lines[0] == start {
+            ""
+        } else {
+            " "
+        };
+        match lines.last_mut() {
+            Some(line) if line.len() + space.len() + item.len() <= WIDTH => {
+                line.push_str(space);
+                line.push_str(&item);
+            }
+            _ => lines.push(format!("    {item}")),
+        }
+    }
+    lines
+}
+
 /// An item of a list as tokens that become what it says.
 pub(super) fn verbatim(text: &str) -> TokenStream {
     let text = format!("{LINE}{text}");
@@ -80,12 +105,11 @@ pub(super) fn with_lines(source: &str) -> String {
             let literal = &rest[at..at + literal_length(&rest[at..])];
             rest = &rest[at + literal.len()..];
             let value = syn::parse_str::<syn::LitStr>(literal).map(|literal| literal.value());
-            text.push_str(
-                value
-                    .as_deref()
-                    .unwrap_or_default()
-                    .trim_start_matches(LINE),
-            );
+            let value = value.unwrap_or_default();
+            // Several lines begin where the first one does.
+            let indent = &line[..line.len() - line.trim_start().len()];
+            let value = value.trim_start_matches(LINE);
+            text.push_str(&value.replace('\n', &format!("\n{indent}")));
             // A statement brings its own end.
             if rest == ";" {
                 rest = "";
