@@ -106,19 +106,19 @@ fn options_that_do_nothing_are_named() {
     let with = |more: &[&str]| ran(&[&all[..], more].concat());
     let says = with(&["--order", "2", "--cutoff", "20"]).err;
     assert!(
-        says.contains("--cutoff and --order do nothing to"),
+        says.contains("`--cutoff` and `--order` do nothing to"),
         "{says}"
     );
     assert!(
         with(&["--order", "2"])
             .err
-            .contains("--order does nothing to")
+            .contains("`--order` does nothing to")
     );
     let says = with(&["--order", "2", "--derivatives", "positions"]).err;
     assert!(!says.contains("nothing to"), "{says}");
     assert!(!with(&[]).err.contains("nothing to"));
     let says = with(&["--trim", "10"]).err;
-    assert!(says.contains("as asked for by --trim"), "{says}");
+    assert!(says.contains("as asked for by `--trim`"), "{says}");
 }
 
 #[test]

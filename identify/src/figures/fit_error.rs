@@ -93,7 +93,7 @@ impl fmt::Display for FitFileError {
             ),
             FitFault::NoJson => write!(
                 f,
-                "{file} is no fit: the JSON that verb `identify` writes is expected"
+                "{file} is no fit: the JSON that verb `identify` writes is expected; recordings go to option `data`"
             ),
             FitFault::MissingParameter {
                 name,

@@ -157,7 +157,7 @@ fn a_column_with_other_things_than_numbers_is_refused_when_it_is_used() {
         recording.column("f").unwrap_err().to_string(),
         "run.csv, line 2: column `f` holds `NaN` where a finite number is expected \
          (3 fields of the column are not finite or empty); \
-         repair the recording, or leave such samples out with `--skip-bad-samples` (they are counted)"
+         repair the recording, or leave such samples out with option `skip_bad_samples` (they are counted)"
     );
     let says: Vec<&str> = recording
         .notes()
@@ -220,12 +220,12 @@ fn renamings_and_missing_columns() {
     assert_eq!(
         read(&[]).unwrap().column("t").unwrap_err().to_string(),
         "run.csv: there is no column `t`; is `t_s` meant? The columns are: `t_s`, `theta1`, `F_left`. \
-         Map one onto it with `--map t=t_s`."
+         Map one onto it with option `columns` = `t=t_s`."
     );
     assert_eq!(
         read(&[("spindle_left", "F_lefd")]).unwrap_err().to_string(),
         "run.csv: a renaming asks for the column `F_lefd`, which is not there; is `F_left` meant? \
-         The columns are: `t_s`, `theta1`, `F_left`. Renamings read `--map ours=theirs`."
+         The columns are: `t_s`, `theta1`, `F_left`. Renamings read option `columns` = `ours=theirs`."
     );
     assert!(
         read(&[("theta1", "F_left")])
@@ -288,7 +288,7 @@ fn a_force_may_be_missing_until_it_is_needed() {
     assert_eq!(
         run.measured().unwrap_err().to_string(),
         "run.csv: the measured force of `right` is needed, but there is no such column; \
-         map one onto it with `--map right=THEIRS`"
+         map one onto it with option `columns` = `right=THEIRS`"
     );
 }
 
