@@ -228,7 +228,7 @@ mod tests {
                     out; verb `identify` makes one";
         assert_eq!(
             spelled(says),
-            "map it: `--map \"q=q [deg]\" --map w=w/2`, or leave `--skip-bad-samples` out; `modelmill identify` makes one"
+            "map it: `--map \"q=q [deg]\" --map \"w=w/2\"`, or leave `--skip-bad-samples` out; `modelmill identify` makes one"
         );
     }
 

@@ -188,7 +188,7 @@ fn a_rig_without_a_plan() {
 
     let says = plan_for(&machine()).expect_err("a weld");
     assert!(
-        says.contains("`weld` is no revolute joint") && says.contains("--plan"),
+        says.contains("`weld` is no revolute joint") && says.contains("option `plan`"),
         "{says}"
     );
 }

@@ -199,6 +199,7 @@ fn narrower_vectors_agree_too() {
     for vectors in ["256", "none"] {
         let program = std::env::current_exe().unwrap();
         let output = std::process::Command::new(program)
+            .arg("many_states::")
             .env("MODELMILL_VECTORS", vectors)
             .output()
             .unwrap();
