@@ -123,10 +123,7 @@ const FLAGS: [(&str, &str); 3] = [
 pub(crate) fn spelled(text: &str) -> Cow<'_, str> {
     let spelled = text::spelled(text, |advised| match advised {
         Advised::Option(name, None) => format!("`{}`", flag(name)),
-        Advised::Option(name, Some(value)) if needs_quotes(value) => {
-            format!("`{} \"{value}\"`", flag(name))
-        }
-        Advised::Option(name, Some(value)) => format!("`{} {value}`", flag(name)),
+        Advised::Option(name, Some(value)) => format!("`{} {}`", flag(name), in_quotes(value)),
         Advised::Verb(name) => format!("`modelmill {name}`"),
     });
     // Flags side by side are one piece of a command line.
@@ -136,9 +133,15 @@ pub(crate) fn spelled(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// Whether a value is more than a word, a number or a name for another.
-fn needs_quotes(value: &str) -> bool {
-    value.contains([' ', '/']) || value.contains("=-")
+/// A value as a shell takes it, in the quotes that the help shows unless a shell would look into them.
+fn in_quotes(value: &str) -> Cow<'_, str> {
+    if value.contains(['"', '$', '\\', '!', '\'']) {
+        Cow::Owned(quoted(value))
+    } else if quoted(value) != value || value.contains('/') || value.contains("=-") {
+        Cow::Owned(format!("\"{value}\""))
+    } else {
+        Cow::Borrowed(value)
+    }
 }
 
 fn flag(field: &str) -> String {
@@ -230,6 +233,19 @@ mod tests {
             spelled(says),
             "map it: `--map \"q=q [deg]\" --map \"w=w/2\"`, or leave `--skip-bad-samples` out; `modelmill identify` makes one"
         );
+    }
+
+    /// What a recording calls its columns may be anything.
+    #[test]
+    fn a_shell_does_not_look_into_values() {
+        for (value, expected) in [
+            ("q=$(rm x)", "'q=$(rm x)'"),
+            ("q=a;b", "\"q=a;b\""),
+            ("q=x", "q=x"),
+            ("q=-x", "\"q=-x\""),
+        ] {
+            assert_eq!(in_quotes(value), expected);
+        }
     }
 
     /// Every option and verb that a text of the library names is a flag or a command of the program.

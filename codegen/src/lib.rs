@@ -18,8 +18,7 @@ mod tree;
 pub use derive::base::BaseParameter;
 pub use derive::{Derivation, derive_columns};
 pub use emit::{
-    C99, Emitted, EmittedFile, Form, LANGUAGES, Language, RustModule, Source, emit, emit_c,
-    emit_python, emit_with_dynamics, module_name,
+    Emitted, EmittedFile, Form, LANGUAGES, Language, Source, emit, emit_with_dynamics, module_name,
 };
 pub use error::DeriveError;
 pub use evaluate::{Evaluator, PoseFault, PoseReason, States};

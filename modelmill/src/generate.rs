@@ -79,7 +79,7 @@ pub struct Code {
 }
 
 impl Model {
-    /// The model as source files: one module in Rust, or a crate with a copy of the runtime, so that its folder can go
+    /// The model as source files: one module in Rust, a header and a source in C99, or a crate with a copy of the runtime, so that its folder can go
     /// anywhere. Paths are relative to that folder.
     ///
     /// Fails when a language lacks something that is asked for, or the mechanism has no such equations.

@@ -45,7 +45,8 @@ fn next(text: &str) -> Option<(&str, Advised<'_>, &str)> {
     let mut from = 0;
     while let Some(found) = text[from..].find(['o', 'v']) {
         let at = from + found;
-        if let Some((advised, behind)) = advised(&text[at..]) {
+        let begins_a_word = !text[..at].ends_with(char::is_alphanumeric);
+        if begins_a_word && let Some((advised, behind)) = advised(&text[at..]) {
             return Some((&text[..at], advised, behind));
         }
         from = at + 1;
@@ -101,6 +102,7 @@ mod tests {
             spelled("with option\n  `noise` =\n  `0.1`", upper),
             "with NOISE(0.1)"
         );
+        assert!(matches!(spelled("adoption `x`", upper), Cow::Borrowed(_)));
         // A mark that is cut off is text like any other.
         assert_eq!(spelled("option `pri", upper), "option `pri");
     }

@@ -61,7 +61,7 @@ pub(crate) fn run(host: &Host, args: &GenerateArgs) -> Outcome {
 fn module(target: Option<&Target>, files: &[EmittedFile]) -> Outcome {
     for file in files {
         let Some(target) = target else {
-            return terminal::print(&file.text);
+            return terminal::print_as_is(&file.text);
         };
         target.write(&file.text)?;
         terminal::note(&format!(
@@ -93,10 +93,9 @@ fn sources(args: &GenerateArgs, inputs: &[&Path], files: &[EmittedFile]) -> Outc
     }
     let names = files.iter().map(|file| file.path.as_str());
     terminal::note(&format!(
-        "{}: {}, {}",
+        "{}: {}",
         folder.display(),
-        names.collect::<Vec<&str>>().join(" and "),
-        args.language.about()
+        names.collect::<Vec<&str>>().join(" and ")
     ));
     Ok(())
 }

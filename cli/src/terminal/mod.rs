@@ -39,8 +39,12 @@ pub(crate) fn errors_in_colour() -> bool {
 
 /// Writes the result of a command to standard output, with one line feed at its end.
 pub(crate) fn print(text: &str) -> Outcome {
-    let text = spelled(text);
-    let text = text::terminal(&text, colours_allowed() && io::stdout().is_terminal());
+    print_as_is(&spelled(text))
+}
+
+/// Writes data and code, in which nothing is advised, to standard output, with one line feed at its end.
+pub(crate) fn print_as_is(text: &str) -> Outcome {
+    let text = text::terminal(text, colours_allowed() && io::stdout().is_terminal());
     let mut out = io::stdout().lock();
     let end = if text.ends_with('\n') { "" } else { "\n" };
     out.write_all(text.as_bytes())
@@ -54,7 +58,7 @@ pub(crate) fn print(text: &str) -> Outcome {
 
 /// Prints one JSON object to standard output.
 pub(crate) fn print_json(value: &serde_json::Value) -> Outcome {
-    print(&text::json(&format!("{:#}", spelled_in(value))))
+    print_as_is(&text::json(&format!("{:#}", spelled_in(value))))
 }
 
 /// Writes to standard error; who does not read it is not bothered.

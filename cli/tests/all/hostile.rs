@@ -48,13 +48,66 @@ const TEXTS: [&str; 34] = [
 
 /// Words of Rust, C and Python, macros and names of their libraries, of the emitted code itself, and names that differ in
 /// case only.
-const NAMES: [&str; 55] = [
-    "double", "Double", "DOUBLE", "int", "Int", "restrict", "volatile", "register", "errno",
-    "NULL", "NAN", "INFINITY", "M_PI", "I", "EOF", "linux", "size_t", "fn", "crate", "self",
-    "Self", "super", "dyn", "type", "T", "Model", "Geometry", "n", "N", "q", "once", "input",
-    "prepared", "lambda", "def", "None", "True", "nonlocal", "numpy", "p1_min", "yield_ok", "Err",
-    "f64", "core", "Some", "Ok", "One", "Var", "N_BASE", "INPUTS", "POSE", "Gravity", "Bias",
-    "Forces", "Columns",
+const NAMES: [&str; 59] = [
+    "double",
+    "Double",
+    "DOUBLE",
+    "int",
+    "Int",
+    "restrict",
+    "volatile",
+    "register",
+    "errno",
+    "NULL",
+    "NAN",
+    "INFINITY",
+    "M_PI",
+    "I",
+    "EOF",
+    "linux",
+    "size_t",
+    "fn",
+    "crate",
+    "self",
+    "Self",
+    "super",
+    "dyn",
+    "type",
+    "T",
+    "Model",
+    "Geometry",
+    "n",
+    "N",
+    "q",
+    "once",
+    "input",
+    "prepared",
+    "lambda",
+    "def",
+    "None",
+    "True",
+    "nonlocal",
+    "numpy",
+    "p1_min",
+    "yield_ok",
+    "Err",
+    "f64",
+    "core",
+    "Some",
+    "Ok",
+    "One",
+    "Var",
+    "N_BASE",
+    "INPUTS",
+    "POSE",
+    "Gravity",
+    "Bias",
+    "Forces",
+    "Columns",
+    "sines",
+    "cosines",
+    "DBL_MAX",
+    "LARGEST_INPUT",
 ];
 
 /// A text between quotes of TOML.
@@ -399,6 +452,7 @@ fn crates_of_hostile_models_compile_and_hold_no_code_of_theirs() {
     let crates = |language: &str, more: &[&str]| {
         let of = |name: &str, model| written_of(model, name, language, more);
         let [bad, good] = [of("hostile", &models[0]), of("harmless", &models[1])];
+        let mut compared = 0;
         for path in [
             "src/lib.rs",
             "src/model.rs",
@@ -408,11 +462,16 @@ fn crates_of_hostile_models_compile_and_hold_no_code_of_theirs() {
             "Cargo.toml",
             "pyproject.toml",
         ] {
-            let [bad, good] = [&bad, &good]
-                .map(|out| std::fs::read_to_string(out.join(path)).unwrap_or_default());
+            let [bad, good] = [&bad, &good].map(|out| std::fs::read_to_string(out.join(path)).ok());
+            assert_eq!(bad.is_some(), good.is_some(), "{path}");
+            let (Some(bad), Some(good)) = (bad, good) else {
+                continue;
+            };
+            compared += 1;
             steers_nothing(path, &bad);
             assert_eq!(code(&bad), code(&good), "other code in {path}");
         }
+        assert!(compared >= 2, "{language}: {compared} files were compared");
         bad
     };
     let place = models[0].parent().unwrap();

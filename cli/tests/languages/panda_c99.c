@@ -15,7 +15,7 @@ int main(int argc, char **argv) {
   panda_geometry geometry;
   panda_parameters parameters;
   double base[PANDA_N_BASE], forces[PANDA_N_DRIVES], h[PANDA_N_DRIVES * PANDA_N_BASE], motion[7 + 7 + 49];
-  double matrix[49], bias[7 + 49], found[7], coriolis[7], gravity[7], effects[7], wrenches[PANDA_N_WRENCHES];
+  double matrix[49], bias[7], found[7], coriolis[7], gravity[7], effects[7], wrenches[PANDA_N_WRENCHES];
   double largest = 0, worst = 0, bad[7] = {0};
   int i, d, b;
   check(argc == 2, "usage: panda_c99 FOLDER-OF-TABLES");

@@ -10,6 +10,5 @@ pub(crate) mod tree;
 mod wrap;
 
 pub use language::rust::{Emitted, emit, emit_with_dynamics, module_name};
-pub use language::{C99, EmittedFile, Form, Language, RustModule, Source};
+pub use language::{EmittedFile, Form, Language, Source};
 pub use languages::LANGUAGES;
-pub use wrap::{emit_c, emit_python};

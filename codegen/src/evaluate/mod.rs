@@ -352,9 +352,10 @@ impl<'a> Evaluator<'a> {
             Atom::Rate(i) => states.qd[self.position(i)],
             Atom::Acceleration(i) => states.qdd[self.position(i)],
             Atom::Load(d) => states.load[d],
-            Atom::Pi | Atom::Constant(_) | Atom::Parameter(_) | Atom::Base(_) | Atom::Shared(_) => {
+            Atom::Pi | Atom::Constant(_) | Atom::Parameter(_) | Atom::Base(_) => {
                 unreachable!("fixed atoms are no inputs of a state")
             }
+            Atom::Shared(_) => unreachable!("only emitted code has a pose apart"),
         };
         // States before the first fault known so far may still have an earlier one.
         machine.run(n, input, visit)?;

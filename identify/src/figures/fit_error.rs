@@ -79,7 +79,7 @@ impl fmt::Display for FitFileError {
             FitFault::Unreadable { reason } => {
                 write!(
                     f,
-                    "{file}: the fit cannot be read: {reason}; make it with verb `identify`"
+                    "{file}: the fit cannot be read: {reason}; make it with verb `identify` (option `out` = `{file}`)"
                 )
             }
             FitFault::NotAFit {

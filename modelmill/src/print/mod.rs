@@ -14,5 +14,5 @@ mod spelling;
 mod summary;
 pub mod tables;
 
-pub use spelling::{Spelling, Words};
+pub use spelling::{Advised, Spelling, Words, spelled};
 pub use summary::{faults, refusal};

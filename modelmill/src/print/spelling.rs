@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
+pub use modelmill_boundary::text::{Advised, spelled};
 use modelmill_spec::edit::NewEffect;
 
 use crate::diagnose::Separation;
@@ -23,7 +24,7 @@ pub trait Spelling {
     fn held(&self) -> String;
 
     /// A text of the library, which names options by their fields ("option `columns` = `q=angle`") and verbs by their
-    /// names ("verb `identify`").
+    /// names ("verb `identify`"); [`spelled`] finds them.
     fn text<'a>(&self, text: &'a str) -> Cow<'a, str> {
         Cow::Borrowed(text)
     }

@@ -142,7 +142,7 @@ fn found(findings: &Findings, spelling: &dyn Spelling) -> String {
         let _ = writeln!(
             html,
             "<p class=\"alias\">The model with these effects could not be made: {}</p>",
-            escape(says)
+            escape(&spelling.text(says))
         );
     }
     let model = &findings.before.model;

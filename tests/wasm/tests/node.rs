@@ -50,17 +50,18 @@ fn module() -> Option<PathBuf> {
         skip("the compiler lacks the target: `rustup target add wasm32-unknown-unknown`");
         return None;
     }
+    // The folder of this test is `deps` in that of its profile, and that in the folder of builds or of a target in it.
+    let test = std::env::current_exe().expect("a test has a path");
+    let builds = test.ancestors().nth(3).expect("a folder of builds");
     let status = Command::new(env!("CARGO"))
         .args(["build", "--locked", "--package", "modelmill-in-wasm"])
-        .args(["--target", TARGET])
+        .args(["--target", TARGET, "--target-dir"])
+        .arg(builds)
         .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."))
         .status()
         .expect("cargo runs");
     assert!(status.success(), "the library builds for {TARGET}");
-    // The folder of this test is `target/debug/deps`, or that of another profile's.
-    let test = std::env::current_exe().expect("a test has a path");
-    let target = test.ancestors().nth(3).expect("a folder of targets");
-    Some(target.join(TARGET).join("debug/modelmill_in_wasm.wasm"))
+    Some(builds.join(TARGET).join("debug/modelmill_in_wasm.wasm"))
 }
 
 /// Compares two answers, and counts their numbers.

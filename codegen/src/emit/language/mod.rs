@@ -63,7 +63,7 @@ pub trait Language: Sync {
 
 /// A module of Rust.
 #[derive(Clone, Copy, Debug)]
-pub struct RustModule;
+pub(in crate::emit) struct RustModule;
 
 impl Language for RustModule {
     fn name(&self) -> &'static str {
@@ -98,7 +98,7 @@ impl Language for RustModule {
 
 /// Plain C99, one header and one source.
 #[derive(Clone, Copy, Debug)]
-pub struct C99;
+pub(in crate::emit) struct C99;
 
 impl Language for C99 {
     fn name(&self) -> &'static str {

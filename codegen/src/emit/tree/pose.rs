@@ -89,9 +89,8 @@ impl Pose {
             .iter()
             .map(|k| (numbered[*k].0, &numbered[*k].1, &plain[*k]));
         let (program, places) = joined(parts, &shared, &guards, &read);
-        let routine = Routine::written(&program, scope, &[], true);
+        let mut routine = Routine::written(&program, scope, &[], true);
         let values = run(&program, &scope.meanings.atoms);
-        let mut routine = routine;
         let mut once = Once::new(scope);
         once.absorb(&mut routine);
         for (k, (value, output)) in routine.results.iter().zip(&program.outputs).enumerate() {

@@ -32,7 +32,7 @@ pub(super) const STATUS: [(&str, &str); 8] = [
 
 /// The files of the crate, without reactions and self-test. It needs `modelmill-runtime` in the folder `modelmill-runtime`
 /// beside its manifest.
-pub fn emit_c(from: &Source<'_>) -> Vec<EmittedFile> {
+pub(in crate::emit) fn emit_c(from: &Source<'_>) -> Vec<EmittedFile> {
     let face = Face::new(from, &RESERVED);
     let doc = "The model for C: see the header in `include`. All `unsafe` code is here, and all of it reads and writes what the \
                caller's pointers point to.";

@@ -7,8 +7,8 @@ mod c_header;
 mod functions;
 mod python;
 
-pub use c_abi::emit_c;
-pub use python::emit_python;
+pub(super) use c_abi::emit_c;
+pub(super) use python::emit_python;
 
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};

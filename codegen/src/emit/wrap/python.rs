@@ -19,7 +19,7 @@ const RESERVED: &[&str] = &[
 /// The files of the crate, without reactions and self-test. It needs `modelmill-runtime` in the folder `modelmill-runtime`
 /// beside its manifest.
 #[allow(clippy::too_many_lines, reason = "one text from top to bottom")]
-pub fn emit_python(from: &Source<'_>) -> Vec<EmittedFile> {
+pub(in crate::emit) fn emit_python(from: &Source<'_>) -> Vec<EmittedFile> {
     let face = Face::new(from, RESERVED);
     let name = &face.name;
     let package = name.trim_start_matches('_');

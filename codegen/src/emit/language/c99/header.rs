@@ -191,6 +191,10 @@ int {name}_passive_position_near(const {name}_dynamics *dynamics, const double *
         }
     }
     if unit.source.dynamics.is_some() {
+        text.push_str("\n/* c + g + e alone. */\n");
+        for near in bias_is_near(unit) {
+            _ = writeln!(text, "{};", bias(unit, *near));
+        }
         _ = writeln!(
             text,
             "\n/* Forward dynamics: accelerations under given forces of the drives; those of the state are not read. */\n{};",
@@ -278,6 +282,30 @@ pub(super) fn signature(
         function.name,
         unit.state_parameters(),
         function.result
+    )
+}
+
+/// Whether the bias forces come from the nominal pose, and from a pose near by.
+pub(super) fn bias_is_near(unit: &Unit<'_>) -> &'static [bool] {
+    let follows = |f: &Function<'_>| f.name == "bias_and_drives" && f.follows;
+    if unit.functions.iter().any(follows) {
+        &[false, true]
+    } else {
+        &[false]
+    }
+}
+
+/// How the bias forces are declared.
+pub(super) fn bias(unit: &Unit<'_>, near: bool) -> String {
+    let name = &unit.name;
+    let (suffix, passive) = if near {
+        ("_near", ", double *passive")
+    } else {
+        ("", "")
+    };
+    format!(
+        "int {name}_bias{suffix}(const {name}_dynamics *dynamics, {}{passive}, double *bias)",
+        unit.state_parameters()
     )
 }
 

@@ -14,7 +14,7 @@ use crate::emit::tree::{Once, Routine, Scope, reads_passive, uses_load};
 use crate::lower::Program;
 use crate::programs::PassivePosition;
 
-/// Names whose headers the C library has itself, and that of its first function.
+/// Names whose headers the C library has itself, and `main`.
 pub(in crate::emit) const RESERVED: [&str; 30] = [
     "assert",
     "complex",
@@ -199,7 +199,7 @@ impl<'a> Unit<'a> {
                 ),
                 (
                     &dynamics.bias,
-                    "bias",
+                    "bias_and_drives",
                     format!(
                         "c + g + e, at a lower cost than one by one, then the Jacobian of the drives row by row; {accelerations}"
                     ),

@@ -58,6 +58,7 @@ pub(super) fn source(unit: &Unit<'_>) -> String {
         public(unit, function, "dynamics", &mut text);
     }
     if unit.source.dynamics.is_some() {
+        bias(unit, &mut text);
         forward_dynamics(unit, &mut text);
     }
     if let Some((function, once)) = &unit.reactions {
@@ -412,6 +413,32 @@ fn public(unit: &Unit<'_>, function: &Function<'_>, owner: &str, text: &mut Stri
     }
 }
 
+/// The bias forces alone, without what forward dynamics need beside them.
+fn bias(unit: &Unit<'_>, text: &mut String) {
+    let Unit { name, upper, .. } = unit;
+    let arguments = unit.state_arguments();
+    for near in super::header::bias_is_near(unit) {
+        let (suffix, passive) = if *near {
+            ("_near", ", passive")
+        } else {
+            ("", "")
+        };
+        _ = writeln!(
+            text,
+            "
+{}
+{{
+    double all[{upper}_N_ACTIVE + {upper}_N_DRIVES * {upper}_N_ACTIVE];
+    int status = {name}_bias_and_drives{suffix}(dynamics, {arguments}{passive}, all);
+    if (status == {upper}_OK)
+        memcpy(bias, all, {upper}_N_ACTIVE * sizeof *bias);
+    return status;
+}}",
+            super::header::bias(unit, *near)
+        );
+    }
+}
+
 /// Accelerations from forces: a linear system with the mass matrix.
 fn forward_dynamics(unit: &Unit<'_>, text: &mut String) {
     let Unit { name, upper, .. } = unit;
@@ -425,7 +452,7 @@ fn forward_dynamics(unit: &Unit<'_>, text: &mut String) {
     double found[{upper}_N_ACTIVE];
     int i, d, status = {name}_mass_matrix(dynamics, {arguments}, matrix);
     if (status == {upper}_OK)
-        status = {name}_bias(dynamics, {arguments}, bias);
+        status = {name}_bias_and_drives(dynamics, {arguments}, bias);
     if (status == {upper}_OK && !{name}_all_fine(forces, {upper}_N_DRIVES))
         status = {upper}_NOT_FINITE;
     if (status != {upper}_OK)

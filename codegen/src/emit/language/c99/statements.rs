@@ -14,7 +14,12 @@ pub(super) struct C<'a> {
 }
 
 /// Words of C, of its headers, and of the functions that are written.
-const TAKEN: [&str; 78] = [
+const TAKEN: [&str; 83] = [
+    "sines",
+    "cosines",
+    "SINGULAR_SHARE",
+    "LARGEST_INPUT",
+    "DBL_MAX",
     "auto",
     "break",
     "case",
