@@ -300,6 +300,9 @@ mod tests {
         assert_eq!(fault(&folder.0.join("none")), FileFault::Missing);
         let pipe = folder.pipe();
         assert_eq!(fault(&pipe), FileFault::Silent { seconds: 0 });
+        // A pipe of its own: who still waits at the other would read from this one, leave, and end its writer.
+        let folder = Folder::new("endless-writer");
+        let pipe = folder.pipe();
         let mut endless = Command::new("sh")
             .args(["-c", "exec cat /dev/zero > \"$0\""])
             .arg(&pipe)
