@@ -4,8 +4,11 @@ use std::fmt::Write as _;
 
 use modelmill_boundary::text::csv_field;
 
-/// A line of names and one line per sample, for columns of one length; names are written so that recordings read them
-/// again as they are, whatever they hold.
+/// A line of names and one line per sample. Recordings read names again as they are, but for what steers a terminal or
+/// breaks a line.
+///
+/// # Panics
+/// If a column is shorter than the first.
 ///
 /// ```
 /// use modelmill::text::csv::csv;

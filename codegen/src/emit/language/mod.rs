@@ -1,7 +1,7 @@
 //! Languages that print the statement tree.
 //!
 //! A language is one entry of [`LANGUAGES`](super::LANGUAGES): what it is called, what its files are, and how it writes a
-//! model. Adding one touches its own folder and that list, which the library and the program read.
+//! model. Adding one touches its own folder, this file and that list, which the library and the program read.
 
 pub(in crate::emit) mod c99;
 pub(in crate::emit) mod rust;
