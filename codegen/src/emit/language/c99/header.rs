@@ -271,6 +271,10 @@ pub(super) fn signature(
     owner: &str,
     near: bool,
 ) -> String {
+    declared(unit, function.name, owner, near, function.result)
+}
+
+fn declared(unit: &Unit<'_>, what: &str, owner: &str, near: bool, result: &str) -> String {
     let name = &unit.name;
     let (suffix, passive) = if near {
         ("_near", ", double *passive")
@@ -278,10 +282,8 @@ pub(super) fn signature(
         ("", "")
     };
     format!(
-        "int {name}_{}{suffix}(const {name}_{owner} *{owner}, {}{passive}, double *{})",
-        function.name,
-        unit.state_parameters(),
-        function.result
+        "int {name}_{what}{suffix}(const {name}_{owner} *{owner}, {}{passive}, double *{result})",
+        unit.state_parameters()
     )
 }
 
@@ -297,16 +299,7 @@ pub(super) fn bias_is_near(unit: &Unit<'_>) -> &'static [bool] {
 
 /// How the bias forces are declared.
 pub(super) fn bias(unit: &Unit<'_>, near: bool) -> String {
-    let name = &unit.name;
-    let (suffix, passive) = if near {
-        ("_near", ", double *passive")
-    } else {
-        ("", "")
-    };
-    format!(
-        "int {name}_bias{suffix}(const {name}_dynamics *dynamics, {}{passive}, double *bias)",
-        unit.state_parameters()
-    )
+    declared(unit, "bias", "dynamics", near, "bias")
 }
 
 /// How forward dynamics are declared.
