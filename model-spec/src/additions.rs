@@ -11,7 +11,7 @@ use crate::parser::parse;
 use crate::record::{List, Named, OneOrMany};
 use crate::schema::{ConstantEntry, EffectEntry, EffectParameterEntry};
 use crate::unit::Unit;
-use crate::values::{Name, Number};
+use crate::values::{Name, Number, Text};
 
 /// An effect that shall join a model.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -58,7 +58,9 @@ impl Loaded {
             entries: Vec::new(),
             faulty: Vec::new(),
         });
-        let further = constants.iter().map(|one| (key(&one.name), constant(one)));
+        let further = constants
+            .iter()
+            .map(|one| (key(&one.name), constant(one, &mut log)));
         table.entries.extend(further);
         let list = model.effect.get_or_insert_with(|| List {
             entries: Vec::new(),
@@ -90,15 +92,18 @@ fn name(text: &str) -> Name {
     }
 }
 
-fn constant(constant: &Constant) -> ConstantEntry {
+fn constant(constant: &Constant, log: &mut Log) -> ConstantEntry {
     ConstantEntry {
         span: NOWHERE,
         value: Some(Number {
             value: constant.value,
             span: NOWHERE,
         }),
-        unit: Unit::from_text(&constant.unit),
-        note: None,
+        unit: Unit::from_text(&constant.unit, NOWHERE, None, log),
+        note: constant.note.clone().map(|text| Text {
+            text,
+            span: NOWHERE,
+        }),
         faulty: false,
     }
 }

@@ -169,12 +169,40 @@ pub(crate) struct Unit {
 }
 
 impl Unit {
-    /// A unit by its text, such as `N s/m`; `None` if that is none.
-    pub(crate) fn from_text(text: &str) -> Option<Self> {
-        Some(Self {
-            text: text.to_owned(),
-            dimension: parse(text).ok()?,
-        })
+    /// A unit by its text, such as `N s/m`, which stands at `span` and, as far as it is known, begins at `inner` there.
+    pub(crate) fn from_text(
+        text: &str,
+        span: Span,
+        inner: Option<usize>,
+        log: &mut Log,
+    ) -> Option<Self> {
+        let fault = match parse(text) {
+            Ok(dimension) => {
+                return Some(Self {
+                    text: text.split_whitespace().collect::<Vec<_>>().join(" "),
+                    dimension,
+                });
+            }
+            Err(fault) => fault,
+        };
+        let place = inner.map_or(span, |inner| Span {
+            file: span.file,
+            start: inner + fault.start,
+            end: inner + fault.end,
+        });
+        let found = &text[fault.start..fault.end];
+        let mut diagnostic = Diagnostic::error(place, fault.message).label(
+            "expected SI units such as `kg`, `m`, `rad`, `kg m^2`, `N s/m`, `m/s^2`, or `1`",
+        );
+        if let Some((_, si)) = FOREIGN.iter().find(|(foreign, _)| *foreign == found) {
+            diagnostic = diagnostic.help(format!(
+                "write `{si}` and convert the value; modelmill uses SI units without prefixes"
+            ));
+        } else if let Some(near) = suggest::nearest(found, UNITS.iter().map(|(name, _)| *name)) {
+            diagnostic = diagnostic.help(format!("did you mean `{near}`?"));
+        }
+        log.push(diagnostic);
+        None
     }
 
     /// True for an angle, which may stand in sines and cosines.
@@ -191,34 +219,7 @@ impl Read for Unit {
         let Value::Text { text, inner } = &node.value else {
             return crate::record::wrong_type::<Self>(node, log);
         };
-        match parse(text) {
-            Ok(dimension) => Some(Self {
-                text: text.split_whitespace().collect::<Vec<_>>().join(" "),
-                dimension,
-            }),
-            Err(fault) => {
-                let span = inner.map_or(node.span, |inner| Span {
-                    file: node.span.file,
-                    start: inner + fault.start,
-                    end: inner + fault.end,
-                });
-                let found = &text[fault.start..fault.end];
-                let mut diagnostic = Diagnostic::error(span, fault.message).label(
-                    "expected SI units such as `kg`, `m`, `rad`, `kg m^2`, `N s/m`, `m/s^2`, or `1`",
-                );
-                if let Some((_, si)) = FOREIGN.iter().find(|(foreign, _)| *foreign == found) {
-                    diagnostic = diagnostic.help(format!(
-                        "write `{si}` and convert the value; modelmill uses SI units without prefixes"
-                    ));
-                } else if let Some(near) =
-                    suggest::nearest(found, UNITS.iter().map(|(name, _)| *name))
-                {
-                    diagnostic = diagnostic.help(format!("did you mean `{near}`?"));
-                }
-                log.push(diagnostic);
-                None
-            }
-        }
+        Self::from_text(text, node.span, *inner, log)
     }
 }
 

@@ -17,7 +17,7 @@ fn constant(name: &str, value: f64, unit: &str) -> Constant {
         value,
         unit: unit.to_owned(),
         is_angle: unit == "rad",
-        note: None,
+        note: Some(format!("as {name} is")),
     }
 }
 
@@ -93,9 +93,16 @@ fn mean_what_a_file_means() {
     variant.push_str("[constants]\n");
     variant.extend(constants.iter().map(|one| {
         let Constant {
-            name, value, unit, ..
+            name,
+            value,
+            unit,
+            note,
+            ..
         } = one;
-        format!("{name} = {{ value = {value:?}, unit = {unit:?} }}\n")
+        format!(
+            "{name} = {{ value = {value:?}, unit = {unit:?}, note = {:?} }}\n",
+            note.as_deref().unwrap_or_default()
+        )
     }));
     let written = load(
         &format!("{FOLDER}/variant.toml"),
@@ -133,6 +140,7 @@ fn what_cannot_be_is_said() {
             "unknown kind",
         ),
         (vec![constant("d1", 1.0, "m")], friction(), "`d1`"),
+        (vec![constant("further", 1.0, "mm")], friction(), "`mm`"),
         (vec![], shared, "`d1`"),
     ] {
         let says = refused(&constants, effect);
