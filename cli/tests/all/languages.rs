@@ -166,7 +166,7 @@ pub(crate) const STRICT: [&str; 6] = [
 ];
 
 #[test]
-fn c99_gives_the_numbers_of_the_tables() {
+fn c99_gives_the_numbers_of_the_tables_and_follows_loops() {
     if !there("cc") {
         println!("skipped: there is no C compiler `cc` on this machine");
         return;
@@ -182,13 +182,13 @@ fn c99_gives_the_numbers_of_the_tables() {
         for (model, name, test) in [
             ("panda", "panda", "panda_c99"),
             ("spidermill-paper", "spidermill_paper", "spidermill_c99"),
+            ("three_rrr", "three_rrr", "three_rrr"),
         ] {
             let out = c99(model);
             let program = folder(&format!("{test}{target}"));
             run(Command::new("cc")
                 .args(STRICT)
-                .arg(target)
-                .arg("-I")
+                .args([target, "-DPLAIN_C99", "-I"])
                 .arg(&out)
                 .arg(project().join(format!("cli/tests/languages/{test}.c")))
                 .arg(out.join(format!("{name}.c")))

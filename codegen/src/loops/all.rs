@@ -58,4 +58,9 @@ impl Loops {
             residual,
         })
     }
+
+    /// How many gaps close the loops: eqs. (L1) to (Ln) of the page.
+    pub(crate) fn n_gaps(&self) -> usize {
+        self.closures.iter().map(|c| c.residual.len()).sum()
+    }
 }

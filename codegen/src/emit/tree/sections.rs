@@ -188,7 +188,7 @@ impl Sections {
 /// What is said of the loops.
 fn closing(derivation: &Derivation) -> String {
     let loops = &derivation.equations.projection.loops;
-    let n_gaps: usize = loops.closures.iter().map(|c| c.residual.len()).sum();
+    let n_gaps = loops.n_gaps();
     let mechanism = &derivation.mechanism;
     let names: Vec<String> = mechanism
         .loops

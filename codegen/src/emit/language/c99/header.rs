@@ -208,8 +208,6 @@ int {name}_passive_position_near(const {name}_dynamics *dynamics, const double *
         for (k, of) in source_names(reactions).iter().enumerate() {
             _ = writeln!(text, " * {k}: {}", comment(of));
         }
-        let parameters = unit.source.derivation.mechanism.parameters.len();
-        _ = parameters;
         _ = writeln!(
             text,
             " */
