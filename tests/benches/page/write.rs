@@ -6,6 +6,7 @@ use modelmill_codegen::{Method, OperationCount, PassCount, Program, Stage};
 use modelmill_tests::counts::{HEADINGS, best_known, row, text};
 use modelmill_tests::fixtures::derived;
 
+use crate::c99::C99;
 use crate::peers::{GENERATORS, Peers};
 use crate::{Figures, GENERATIONS, TURNS, run};
 
@@ -302,7 +303,7 @@ fn generation(page: &mut String, all: &[Figures], peers: &Peers) {
 fn run_time(page: &mut String, all: &[Figures], peers: &Peers) {
     page.push_str(
         "## Run time\n\n\
-         Nanoseconds per state: one state at a time, whose sines and cosines come in pairs; many states in scalar instructions, one number at a time; in blocks of the widest vectors of this machine and of 256 bits. How many times faster than in scalar instructions blocks are; and how many times longer than one state peers take.\n\n\
+         Nanoseconds per state: one state at a time, whose sines and cosines come in pairs; many states in scalar instructions, one number at a time; in blocks of the widest vectors of this machine and of 256 bits. How many times faster than in scalar instructions blocks are; and how many times longer than one state in Rust our C99 (`cc -O3`) and peers take.\n\n\
          Inverse dynamics:\n\n",
     );
     let rows = |function: &'static str, who: Vec<&'static str>| {
@@ -316,6 +317,7 @@ fn run_time(page: &mut String, all: &[Figures], peers: &Peers) {
             );
             cells.push(times(f.faster("blocks", "scalar", function)));
             cells.push(times(f.faster("blocks, 256 bits", "scalar", function)));
+            cells.push(times(f.longer(C99, function)));
             cells.extend(who.iter().map(|w| f.peer(f.longer(w, function), w, peers)));
             cells
         })
@@ -328,6 +330,7 @@ fn run_time(page: &mut String, all: &[Figures], peers: &Peers) {
         "256 bits",
         "scalar / blocks",
         "scalar / 256 bits",
+        C99,
     ];
     let who: Vec<&str> = std::iter::once("Pinocchio").chain(GENERATORS).collect();
     let headings: Vec<&str> = ours.into_iter().chain(who.iter().copied()).collect();
