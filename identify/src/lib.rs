@@ -55,7 +55,7 @@ pub use motion::{
     decimate_columns, decimate_table, decimate_time, differentiate, filter_and_differentiate,
 };
 pub use recording::{
-    Computed, Fault, NotFinite, Note, ReadOptions, Recording, RecordingError, RecordingFile,
-    Severity, name_of_bytes, place_word,
+    ColumnInfo, Computed, Fault, NotFinite, Note, ReadOptions, Recording, RecordingError,
+    RecordingFile, Severity, TableInfo, name_of_bytes, place_word,
 };
 pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER};

@@ -59,6 +59,11 @@ pub enum Fault {
         /// To, s.
         to: f64,
     },
+    /// Topics or files that are needed together were not recorded at the same time.
+    NothingInCommon {
+        /// What messages call them.
+        parts: Vec<String>,
+    },
     /// The first line holds numbers where column names are expected.
     NoHeader,
     /// The separator cannot be told from the first line.
@@ -230,7 +235,7 @@ impl fmt::Display for Fault {
             ),
             Self::NotCsv { looks_like } => write!(
                 f,
-                "this looks like {looks_like}, not like a recording; save it as CSV (UTF-8, with a header), Parquet or MATLAB's format 5"
+                "this looks like {looks_like}, not like a recording; save it as CSV (UTF-8, with a header), Parquet, HDF5, MCAP or a MATLAB file"
             ),
             Self::Format { format, says } => write!(f, "this is {format}: {says}"),
             Self::TooLarge {
@@ -256,6 +261,11 @@ impl fmt::Display for Fault {
             Self::NoneBetween { from, to } => write!(
                 f,
                 "no sample lies between t = {from} s and {to} s, as option `between` asks; give times that the recording has"
+            ),
+            Self::NothingInCommon { parts } => write!(
+                f,
+                "{} have no samples at the same time, so they cannot be joined; are their clocks the same?",
+                parts.join(" and ")
             ),
             Self::NoHeader => f.write_str(
                 "the first line holds numbers, but column names are expected there; \

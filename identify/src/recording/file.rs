@@ -10,7 +10,7 @@ use modelmill_boundary::files::{Files, Opened};
 
 use crate::recording::error::{Fault, RecordingError};
 use crate::recording::formats::{Format, Input, LONGEST_STREAM, TELLING_BYTES, format_of};
-use crate::recording::{ReadOptions, Recording, name_of_bytes};
+use crate::recording::{ReadOptions, Recording, TableInfo, name_of_bytes};
 
 /// A recording that is open, to be read as often as needed.
 pub struct RecordingFile {
@@ -63,6 +63,12 @@ impl RecordingFile {
     pub fn names(&self) -> Result<Vec<String>, RecordingError> {
         let names = self.input().and_then(|input| self.format.names(input));
         names.map_err(|fault| self.fault(fault))
+    }
+
+    /// What it holds, table by table or topic by topic; fails when it cannot be read.
+    pub fn tables(&self) -> Result<Vec<TableInfo>, RecordingError> {
+        let tables = self.input().and_then(|input| self.format.tables(input));
+        tables.map_err(|fault| self.fault(fault))
     }
 
     /// Reads it; fails as [`Recording::read`] does.

@@ -1,4 +1,4 @@
-//! Recordings: a file of CSV text, Parquet or MATLAB's format 5 goes in, named columns of numbers come out.
+//! Recordings: a file of any format of the list in `formats` goes in, named columns of numbers come out.
 //!
 //! A column that holds something else than numbers harms only those who ask for it: it is named in
 //! the notes, and [`Recording::column`] refuses it with the line at fault.
@@ -10,9 +10,11 @@ mod file;
 mod formats;
 mod gaps;
 mod intake;
+mod join;
 mod notes;
 mod options;
 mod read;
+mod tables;
 
 use indexmap::IndexMap;
 
@@ -22,6 +24,7 @@ pub use file::RecordingFile;
 pub use notes::{Note, Severity};
 pub use options::{Computed, NotFinite, ReadOptions};
 pub use read::{name_of_bytes, place_word};
+pub use tables::{ColumnInfo, TableInfo};
 
 use column::{Column, Defect, missing};
 pub(crate) use gaps::GAP;

@@ -39,6 +39,27 @@ pub struct ReadOptions {
     pub most_numbers: usize,
 }
 
+impl ReadOptions {
+    /// A single column under the name that the file gives it.
+    pub(crate) fn only(name: &str) -> Self {
+        Self {
+            wanted: Some(vec![name.to_owned()]),
+            ..Self::default()
+        }
+    }
+
+    /// Whether a column that the file calls `theirs` is needed.
+    pub(crate) fn needs(&self, theirs: &str) -> bool {
+        let Some(wanted) = &self.wanted else {
+            return true;
+        };
+        let is_term = |one: &Computed| one.terms.iter().any(|(name, _)| name == theirs);
+        let renamed = self.renames.iter().find(|(_, other)| other == theirs);
+        let ours = renamed.map_or(theirs, |(ours, _)| ours);
+        self.computed.iter().any(is_term) || wanted.iter().any(|name| name == ours)
+    }
+}
+
 impl Default for ReadOptions {
     fn default() -> Self {
         Self {

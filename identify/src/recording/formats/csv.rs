@@ -10,9 +10,10 @@ use modelmill_boundary::text::csv_name;
 
 use crate::recording::column::Field;
 use crate::recording::error::Fault;
-use crate::recording::formats::{Format, Input};
+use crate::recording::formats::{Format, Input, TableInfo};
 use crate::recording::intake::{Flow, Intake};
 use crate::recording::notes::Note;
+use crate::recording::tables::{ColumnInfo, likely_time};
 use crate::recording::{ReadOptions, Recording};
 
 /// The longest header line that is looked at; beyond it the file is no recording.
@@ -44,6 +45,33 @@ impl Format for Csv {
     fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault> {
         let (mut reader, _, header_line) = open(input.stream(), Rc::default())?;
         names(&mut reader, header_line)
+    }
+
+    fn tables(&self, input: Input<'_>) -> Result<Vec<TableInfo>, Fault> {
+        let mut stream = input.stream();
+        let (mut reader, _, header_line) = open(&mut stream, Rc::default())?;
+        let names = names(&mut reader, header_line)?;
+        let time = likely_time(&names).and_then(|time| names.iter().position(|name| name == time));
+        let mut record = csv::ByteRecord::new();
+        let (mut samples, mut span) = (0, None);
+        while reader.read_byte_record(&mut record).map_err(unreadable)? {
+            samples += 1;
+            if let Some(Field::Number(t)) = time.and_then(|place| record.get(place)).map(parse) {
+                span = Some((span.map_or(t, |(first, _)| first), t));
+            }
+        }
+        let info = |name: String| ColumnInfo {
+            name,
+            kind: "text".to_owned(),
+        };
+        Ok(vec![TableInfo {
+            name: String::new(),
+            kind: String::new(),
+            columns: names.into_iter().map(info).collect(),
+            samples,
+            time: span,
+            remark: None,
+        }])
     }
 }
 
@@ -234,7 +262,6 @@ fn read_header(stream: &mut impl BufRead) -> Result<(String, Vec<u8>), Fault> {
         [b'P', b'A', b'R', b'1', ..] => Some("a Parquet file"),
         [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] => Some("UTF-16 text"),
         [b'P', b'K', 3, 4, ..] => Some("a spreadsheet or ZIP archive"),
-        [0x1F, 0x8B, ..] => Some("a gzip archive"),
         [b'M', b'A', b'T', b'L', b'A', b'B', ..] => Some("a MATLAB file"),
         _ if bytes.contains(&0) => Some("binary data"),
         line if line.trim_ascii().contains(&b'\r') => {

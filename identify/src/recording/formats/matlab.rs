@@ -8,9 +8,10 @@ use std::io::{BufReader, Read, Seek};
 use crate::recording::column::Field;
 use crate::recording::error::Fault;
 use crate::recording::formats::matlab_arrays::Arrays;
-use crate::recording::formats::{Format, Input};
+use crate::recording::formats::{Format, Input, TableInfo};
 use crate::recording::intake::{Flow, Intake};
 use crate::recording::notes::Note;
+use crate::recording::tables::{ColumnInfo, found_time};
 use crate::recording::{ReadOptions, Recording};
 use crate::words::list;
 
@@ -45,30 +46,27 @@ impl Format for Matlab5 {
     fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault> {
         Ok(Columns::new(&open(input.seekable()?)?)?.names())
     }
-}
 
-/// What `save -v7.3` writes, which is HDF5: known, so that it can be said what to do, and not read.
-pub(crate) struct Matlab73;
-
-impl Format for Matlab73 {
-    fn begins(&self, first: &[u8]) -> bool {
-        first.starts_with(b"MATLAB 7.3 MAT-file") || first.starts_with(b"\x89HDF")
-    }
-
-    fn read(&self, _: Input<'_>, _: &str, _: &ReadOptions) -> Result<Recording, Fault> {
-        Err(not_read())
-    }
-
-    fn names(&self, _: Input<'_>) -> Result<Vec<String>, Fault> {
-        Err(not_read())
-    }
-}
-
-fn not_read() -> Fault {
-    Fault::Format {
-        format: "a MATLAB 7.3 or HDF5 file",
-        says: "only MATLAB's format 5 is read; save it again with `save(name, ..., '-v7')`, or as CSV or Parquet"
-            .to_owned(),
+    fn tables(&self, input: Input<'_>) -> Result<Vec<TableInfo>, Fault> {
+        let mut stream = input.seekable()?;
+        let columns = Columns::new(&open(&mut stream)?)?;
+        let info = |column: &Column| ColumnInfo {
+            name: column.name.clone(),
+            kind: "number".to_owned(),
+        };
+        Ok(vec![TableInfo {
+            name: String::new(),
+            kind: String::new(),
+            columns: columns.sound.iter().map(info).collect(),
+            samples: columns.samples,
+            time: found_time(&columns.names(), |name| {
+                stream.rewind().ok()?;
+                read(&mut stream, "", &ReadOptions::only(name)).ok()
+            }),
+            remark: (!columns.others.is_empty()).then(|| {
+                format!("left aside, of another length or not real: {}", list(&columns.others))
+            }),
+        }])
     }
 }
 

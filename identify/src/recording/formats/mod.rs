@@ -2,23 +2,34 @@
 //!
 //! To add one, write its [`Format`] in a file of its own and put it into [`FORMATS`].
 
+mod bag;
 mod csv;
+mod hdf5;
 mod matlab;
 mod matlab_arrays;
+mod mcap;
+mod packing;
 mod parquet;
 mod parquet_pages;
+mod rosbag;
+mod sqlite;
 
 use std::fs::File;
 use std::io::{Cursor, Read, Seek};
 
 use crate::recording::error::Fault;
+use crate::recording::tables::TableInfo;
 use crate::recording::{ReadOptions, Recording};
 
 /// All formats, in the order in which they are asked whether a file is theirs; text comes last and takes what is left.
-pub(crate) const FORMATS: [&dyn Format; 4] = [
+pub(crate) const FORMATS: [&dyn Format; 8] = [
     &parquet::Parquet,
     &matlab::Matlab5,
-    &matlab::Matlab73,
+    &hdf5::Hdf5,
+    &mcap::Mcap,
+    &rosbag::Rosbag2,
+    &packing::Packed(packing::Packing::Gzip),
+    &packing::Packed(packing::Packing::Zstd),
     &csv::Csv,
 ];
 
@@ -42,6 +53,11 @@ pub(crate) trait Format: Sync {
         true
     }
 
+    /// Whether a file of another format is in it.
+    fn is_packed(&self) -> bool {
+        false
+    }
+
     /// Whether a file that begins with these bytes, [`TELLING_BYTES`] of them if it has as many, is of this kind.
     fn begins(&self, first: &[u8]) -> bool;
 
@@ -51,6 +67,9 @@ pub(crate) trait Format: Sync {
 
     /// Names of the columns as the file has them.
     fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault>;
+
+    /// What it holds, table by table.
+    fn tables(&self, input: Input<'_>) -> Result<Vec<TableInfo>, Fault>;
 }
 
 /// The format of what begins with these bytes.

@@ -7,19 +7,22 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit, Type};
-use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::RowGroupMetaData;
-use parquet::file::reader::{ChunkReader, FileReader, Length, SerializedFileReader};
-use parquet::schema::types::ColumnDescriptor;
+use parquet::file::reader::{ChunkReader, FileReader, Length, RowGroupReader, SerializedFileReader};
+use parquet::file::serialized_reader::SerializedPageReader;
+use parquet::schema::types::{ColumnDescPtr, ColumnDescriptor};
 
 use crate::recording::column::Field;
 use crate::recording::error::Fault;
-use crate::recording::formats::parquet_pages::{self, Packing};
-use crate::recording::formats::{Format, Input, all_of};
+use crate::recording::formats::packing::Packing;
+use crate::recording::formats::parquet_pages::{self, Growth, UnpackedPages};
+use crate::recording::formats::{Format, Input, TableInfo, all_of};
 use crate::recording::intake::{Flow, Intake};
 use crate::recording::notes::Note;
+use crate::recording::tables::{ColumnInfo, found_time};
 use crate::recording::{ReadOptions, Recording};
 
 /// Samples that are read at once.
@@ -65,6 +68,14 @@ impl Format for Parquet {
             Input::Stream(stream) => names_of(Bytes::from(all_of(stream)?)),
         }
     }
+
+    fn tables(&self, input: Input<'_>) -> Result<Vec<TableInfo>, Fault> {
+        match input {
+            Input::File(stream) => tables_of(Shared(Arc::new(stream))),
+            Input::Bytes(bytes) => tables_of(Shared(Arc::new(Bytes::copy_from_slice(bytes)))),
+            Input::Stream(stream) => tables_of(Shared(Arc::new(Bytes::from(all_of(stream)?)))),
+        }
+    }
 }
 
 fn read(
@@ -100,12 +111,11 @@ fn read(
         let group = reader.get_row_group(group).map_err(fault)?;
         let mut columns = Vec::new();
         for i in 0..width {
-            let column = if wanted[i] {
-                Some(group.get_column_reader(i).map_err(fault)?)
+            columns.push(if wanted[i] {
+                Some(column_reader(&bytes, &*group, i, &schema.column(i))?)
             } else {
                 None
-            };
-            columns.push(column);
+            });
         }
         let mut left = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
         while left > 0 {
@@ -141,6 +151,32 @@ fn read(
     intake.finish(file)
 }
 
+/// What reads a column of a row group. Pages that the library has no pure decoder for are read as if they were not packed,
+/// and unpacked on their way.
+fn column_reader<R: ChunkReader + 'static>(
+    bytes: &Arc<R>,
+    group: &dyn RowGroupReader,
+    i: usize,
+    column: &ColumnDescPtr,
+) -> Result<ColumnReader, Fault> {
+    let chunk = group.metadata().column(i);
+    let packing = match chunk.compression() {
+        Compression::ZSTD(_) => Packing::Zstd,
+        Compression::BROTLI(_) => Packing::Brotli,
+        _ => return group.get_column_reader(i).map_err(fault),
+    };
+    let as_stored = chunk
+        .clone()
+        .into_builder()
+        .set_compression(Compression::UNCOMPRESSED)
+        .build()
+        .map_err(fault)?;
+    let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
+    let pages = SerializedPageReader::new(bytes.clone(), &as_stored, rows, None).map_err(fault)?;
+    let pages = UnpackedPages { pages, packing };
+    Ok(get_column_reader(column.clone(), Box::new(pages)))
+}
+
 /// Fails when pages of a row group would take more memory than there may be, before any is unpacked.
 fn check_pages<R: ChunkReader>(
     bytes: &R,
@@ -155,10 +191,10 @@ fn check_pages<R: ChunkReader>(
         .zip(wanted)
         .filter(|(_, is_wanted)| **is_wanted)
     {
-        let packing = match column.compression() {
-            Compression::GZIP(_) => Packing::Gzip,
-            Compression::LZ4 => Packing::OldLz4,
-            _ => Packing::AsSaid,
+        let growth = match column.compression() {
+            Compression::GZIP(_) => Growth::Gzip,
+            Compression::LZ4 => Growth::OldLz4,
+            _ => Growth::AsSaid,
         };
         let start = column
             .dictionary_page_offset()
@@ -171,7 +207,7 @@ fn check_pages<R: ChunkReader>(
             return Err(refused(io::Error::other("a column has a negative place")));
         };
         let stream = bytes.get_read(start).map_err(fault)?;
-        sum += parquet_pages::largest(stream, length, packing).map_err(refused)?;
+        sum += parquet_pages::largest(stream, length, growth).map_err(refused)?;
     }
     // One page of every column is in memory at once.
     if sum > MOST_UNPACKED {
@@ -184,6 +220,12 @@ fn check_pages<R: ChunkReader>(
 
 /// A file of which the pages are looked at before they are read.
 struct Shared<R>(Arc<R>);
+
+impl<R> Clone for Shared<R> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
 
 impl<R: Length> Length for Shared<R> {
     fn len(&self) -> u64 {
@@ -203,6 +245,43 @@ impl<R: ChunkReader> ChunkReader for Shared<R> {
     }
 }
 
+/// The one table of a file.
+fn tables_of(stream: Shared<impl ChunkReader + 'static>) -> Result<Vec<TableInfo>, Fault> {
+    let reader = SerializedFileReader::new(stream.clone()).map_err(fault)?;
+    let schema = reader.metadata().file_metadata().schema_descr_ptr();
+    let info = |column: &ColumnDescPtr| ColumnInfo {
+        name: column.path().string(),
+        kind: kind_of(column),
+    };
+    let rows = reader.metadata().file_metadata().num_rows();
+    let names = names(&reader);
+    Ok(vec![TableInfo {
+        name: String::new(),
+        kind: String::new(),
+        columns: schema.columns().iter().map(info).collect(),
+        samples: usize::try_from(rows).unwrap_or(0),
+        time: found_time(&names, |name| read(stream, "", &ReadOptions::only(name)).ok()),
+        remark: None,
+    }])
+}
+
+/// Type of a column, in the words of the others.
+fn kind_of(column: &ColumnDescriptor) -> String {
+    let kind = match (Kind::in_column(column), column.physical_type()) {
+        (Kind::Ticks { .. }, _) | (_, Type::INT96) => "time",
+        (Kind::Decimal(_), _) => "decimal",
+        (Kind::Unusable, _) => "no number",
+        (Kind::Unsigned, Type::INT32) => "uint32",
+        (Kind::Unsigned, _) => "uint64",
+        (Kind::Numbers, Type::BOOLEAN) => "bool",
+        (Kind::Numbers, Type::INT32) => "int32",
+        (Kind::Numbers, Type::INT64) => "int64",
+        (Kind::Numbers, Type::FLOAT) => "float32",
+        (Kind::Numbers, _) => "float64",
+    };
+    kind.to_owned()
+}
+
 /// Names of the columns; those of nested ones hold points.
 fn names_of(stream: impl ChunkReader + 'static) -> Result<Vec<String>, Fault> {
     Ok(names(&SerializedFileReader::new(stream).map_err(fault)?))
@@ -217,6 +296,8 @@ fn names<R: ChunkReader + 'static>(reader: &SerializedFileReader<R>) -> Vec<Stri
 /// What the numbers of a column mean.
 enum Kind {
     Numbers,
+    /// Whole numbers without a sign, in all bits of what they are stored in.
+    Unsigned,
     /// Whole numbers of this many to the second; the first one is zero once it is known.
     Ticks {
         per_second: f64,
@@ -245,12 +326,17 @@ impl Kind {
             Some(LogicalType::Timestamp(stamp)) => return ticks(per_second(stamp.unit)),
             Some(LogicalType::Time(time)) => return ticks(per_second(time.unit)),
             Some(LogicalType::Decimal(decimal)) => return Self::Decimal(decimal.scale),
+            Some(LogicalType::Integer(whole)) if !whole.is_signed => return Self::Unsigned,
             _ => {}
         }
         match column.converted_type() {
             ConvertedType::TIMESTAMP_MILLIS | ConvertedType::TIME_MILLIS => ticks(1e3),
             ConvertedType::TIMESTAMP_MICROS | ConvertedType::TIME_MICROS => ticks(1e6),
             ConvertedType::DECIMAL => Self::Decimal(column.type_scale()),
+            ConvertedType::UINT_8
+            | ConvertedType::UINT_16
+            | ConvertedType::UINT_32
+            | ConvertedType::UINT_64 => Self::Unsigned,
             _ => Self::Numbers,
         }
     }
@@ -263,7 +349,16 @@ impl Kind {
                 value.wrapping_sub(*first.get_or_insert(value)) as f64 / *per_second
             }
             Self::Decimal(scale) => value as f64 / 10.0_f64.powi(*scale),
+            Self::Unsigned => value.cast_unsigned() as f64,
             Self::Numbers | Self::Unusable => value as f64,
+        }
+    }
+
+    /// The same of a number that is stored in four bytes.
+    fn short(&mut self, value: i32) -> f64 {
+        match self {
+            Self::Unsigned => f64::from(value.cast_unsigned()),
+            _ => self.whole(i64::from(value)),
         }
     }
 }
@@ -282,9 +377,9 @@ fn batch(column: &mut ColumnReader, kind: &mut Kind, n: usize) -> Result<Vec<Fie
         ColumnReader::BoolColumnReader(reader) => values(reader, n, |value| {
             Field::Number(f64::from(u8::from(*value)))
         }),
-        ColumnReader::Int32ColumnReader(reader) => values(reader, n, |value| {
-            Field::finite(kind.whole(i64::from(*value)))
-        }),
+        ColumnReader::Int32ColumnReader(reader) => {
+            values(reader, n, |value| Field::finite(kind.short(*value)))
+        }
         ColumnReader::Int64ColumnReader(reader) => {
             values(reader, n, |value| Field::finite(kind.whole(*value)))
         }
@@ -360,7 +455,7 @@ fn fault(error: ParquetError) -> Fault {
     Fault::Format {
         format: "a Parquet file",
         says: format!(
-            "it cannot be read: {says}; write it again, uncompressed or compressed by snappy, gzip or lz4"
+            "it cannot be read: {says}; write it again, uncompressed or compressed by snappy, gzip, zstd, brotli or lz4"
         ),
     }
 }

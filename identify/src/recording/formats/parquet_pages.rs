@@ -1,4 +1,6 @@
-//! Pages of a Parquet file before they are unpacked: their headers alone say how large they become, and the library that
+//! Pages of a Parquet file: looked at before they are unpacked, and unpacked where the library has no decoder without C.
+//!
+//! Their headers alone say how large they become, and the library that
 //! reads them believes it.
 //!
 //! A column's pages stand one behind the other, each with a header in Thrift's compact protocol (apache/parquet-format,
@@ -7,6 +9,10 @@
 use std::io::{self, BufReader, Read};
 
 use flate2::read::MultiGzDecoder;
+use parquet::column::page::{Page, PageMetadata, PageReader};
+use parquet::errors::{ParquetError, Result};
+
+use crate::recording::formats::packing::Packing;
 
 /// The largest page that is unpacked, bytes; writers make pages of one million.
 const LARGEST_PAGE: u64 = 128 << 20;
@@ -16,10 +22,10 @@ const LARGEST_OLD_LZ4: u64 = 2 << 20;
 /// Structures within one another in a header; Parquet has four.
 const DEEPEST: usize = 16;
 
-/// How pages are packed, as far as that tells how large they become.
+/// How much pages may grow when they are unpacked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Packing {
-    /// To the size that the header says, which the library holds to.
+pub(super) enum Growth {
+    /// To the size that the header says, which whoever unpacks them holds to.
     AsSaid,
     /// To whatever is in it.
     Gzip,
@@ -30,23 +36,23 @@ pub(super) enum Packing {
 /// Looks through the pages of a column that is `length` bytes long; the size of the largest unpacked.
 ///
 /// Fails when a page is larger than any that makes sense, or does not keep to its header.
-pub(super) fn largest(stream: impl Read, length: u64, packing: Packing) -> io::Result<u64> {
+pub(super) fn largest(stream: impl Read, length: u64, growth: Growth) -> io::Result<u64> {
     let mut stream = BufReader::with_capacity(1 << 16, stream.take(length)).take(length);
     let mut largest = 0;
     while stream.limit() > 0 {
-        let page = Page::read(&mut stream)?;
+        let page = Header::read(&mut stream)?;
         if page.packed > stream.limit() {
             return Err(io::Error::other("a page is longer than its column"));
         }
         // A dictionary's numbers have four bytes at least.
         let is_too_large = page.unpacked > LARGEST_PAGE
             || page.words.saturating_mul(4) > page.unpacked
-            || (packing == Packing::OldLz4 && page.packed > LARGEST_OLD_LZ4);
+            || (growth == Growth::OldLz4 && page.packed > LARGEST_OLD_LZ4);
         if is_too_large {
             return Err(io::Error::other("a page would take too much memory"));
         }
         let mut body = (&mut stream).take(page.packed);
-        if packing == Packing::Gzip && page.is_packed {
+        if growth == Growth::Gzip && page.is_packed {
             io::copy(&mut (&mut body).take(page.levels), &mut io::sink())?;
             let inside = page.unpacked.saturating_sub(page.levels);
             let mut all = MultiGzDecoder::new(&mut body).take(inside + 1);
@@ -60,9 +66,109 @@ pub(super) fn largest(stream: impl Read, length: u64, packing: Packing) -> io::R
     Ok(largest)
 }
 
+/// The pages of a column, of which the library takes the bytes as they are stored.
+pub(super) struct UnpackedPages<P> {
+    pub(super) pages: P,
+    pub(super) packing: Packing,
+}
+
+impl<P: PageReader> UnpackedPages<P> {
+    fn unpacked(&self, page: Page) -> Result<Page> {
+        let unpack = |packed: &[u8]| {
+            let unpacked = self.packing.unpacked(packed, LARGEST_PAGE);
+            unpacked.map_err(|error| ParquetError::General(error.to_string()))
+        };
+        Ok(match page {
+            Page::DataPage {
+                buf,
+                num_values,
+                encoding,
+                def_level_encoding,
+                rep_level_encoding,
+                statistics,
+            } => Page::DataPage {
+                buf: unpack(&buf)?.into(),
+                num_values,
+                encoding,
+                def_level_encoding,
+                rep_level_encoding,
+                statistics,
+            },
+            Page::DictionaryPage {
+                buf,
+                num_values,
+                encoding,
+                is_sorted,
+            } => Page::DictionaryPage {
+                buf: unpack(&buf)?.into(),
+                num_values,
+                encoding,
+                is_sorted,
+            },
+            Page::DataPageV2 {
+                buf,
+                num_values,
+                encoding,
+                num_nulls,
+                num_rows,
+                def_levels_byte_len,
+                rep_levels_byte_len,
+                is_compressed,
+                statistics,
+            } => {
+                // Levels stand in front and are never packed.
+                let levels = u64::from(def_levels_byte_len) + u64::from(rep_levels_byte_len);
+                let levels = usize::try_from(levels).unwrap_or(usize::MAX);
+                let Some((levels, values)) = buf.split_at_checked(levels) else {
+                    return Err(ParquetError::General("a page is shorter than its levels".to_owned()));
+                };
+                let buf = if is_compressed && !values.is_empty() {
+                    [levels, &unpack(values)?].concat().into()
+                } else {
+                    buf
+                };
+                Page::DataPageV2 {
+                    buf,
+                    num_values,
+                    encoding,
+                    num_nulls,
+                    num_rows,
+                    def_levels_byte_len,
+                    rep_levels_byte_len,
+                    is_compressed: false,
+                    statistics,
+                }
+            }
+        })
+    }
+}
+
+impl<P: PageReader> Iterator for UnpackedPages<P> {
+    type Item = Result<Page>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.get_next_page().transpose()
+    }
+}
+
+impl<P: PageReader> PageReader for UnpackedPages<P> {
+    fn get_next_page(&mut self) -> Result<Option<Page>> {
+        let page = self.pages.get_next_page()?;
+        page.map(|page| self.unpacked(page)).transpose()
+    }
+
+    fn peek_next_page(&mut self) -> Result<Option<PageMetadata>> {
+        self.pages.peek_next_page()
+    }
+
+    fn skip_next_page(&mut self) -> Result<()> {
+        self.pages.skip_next_page()
+    }
+}
+
 /// What a header says of sizes.
-#[derive(Debug, Default, PartialEq)]
-struct Page {
+#[derive(Debug, Default)]
+struct Header {
     /// Bytes in the file.
     packed: u64,
     /// Bytes in memory.
@@ -74,7 +180,7 @@ struct Page {
     is_packed: bool,
 }
 
-impl Page {
+impl Header {
     fn read(stream: &mut impl Read) -> io::Result<Self> {
         let mut page = Self {
             is_packed: true,
@@ -244,16 +350,16 @@ mod tests {
         packed.finish().unwrap()
     }
 
-    fn look(bytes: &[u8], packing: Packing) -> Result<u64, String> {
+    fn look(bytes: &[u8], growth: Growth) -> Result<u64, String> {
         largest(bytes, bytes.len() as u64, packing).map_err(|error| error.to_string())
     }
 
     #[test]
     fn honest_pages_tell_the_largest() {
         let two = [page(5, b"abcde"), page(300, b"xyz")].concat();
-        assert_eq!(look(&two, Packing::AsSaid), Ok(300));
+        assert_eq!(look(&two, Growth::AsSaid), Ok(300));
         let three = [page(70_000, &gzip(70_000)), page(9, &gzip(9))].concat();
-        assert_eq!(look(&three, Packing::Gzip), Ok(70_000));
+        assert_eq!(look(&three, Growth::Gzip), Ok(70_000));
         // The second form has its levels unpacked in front, and may leave all unpacked.
         let mut second = vec![0x15, 6, 0x15];
         second.extend(whole(6));
@@ -263,22 +369,22 @@ mod tests {
             0x5c, 0x15, 2, 0x15, 0, 0x15, 2, 0x15, 0, 0x15, 4, 0x15, 0, 0x12, 0, 0,
         ]);
         second.extend(b"llabcd");
-        assert_eq!(look(&second, Packing::Gzip), Ok(6));
+        assert_eq!(look(&second, Growth::Gzip), Ok(6));
     }
 
     #[test]
     fn pages_that_lie_are_refused() {
-        let huge = look(&page(1 << 30, b"abc"), Packing::AsSaid).unwrap_err();
+        let huge = look(&page(1 << 30, b"abc"), Growth::AsSaid).unwrap_err();
         assert!(huge.contains("too much memory"), "{huge}");
-        let bomb = look(&page(100, &gzip(1 << 20)), Packing::Gzip).unwrap_err();
+        let bomb = look(&page(100, &gzip(1 << 20)), Growth::Gzip).unwrap_err();
         assert!(bomb.contains("larger than its header"), "{bomb}");
         let cut = page(100, b"abc");
-        assert!(look(&cut[..cut.len() - 1], Packing::AsSaid).is_err());
+        assert!(look(&cut[..cut.len() - 1], Growth::AsSaid).is_err());
         // A dictionary of more numbers than it has bytes for.
         let mut dictionary = vec![0x15, 4, 0x15, 16, 0x15, 0, 0x4c, 0x15];
         dictionary.extend(whole(1 << 20));
         dictionary.extend([0x15, 0, 0, 0]);
-        assert!(look(&dictionary, Packing::AsSaid).is_err());
-        assert!(look(&[0x1c; 100], Packing::AsSaid).is_err());
+        assert!(look(&dictionary, Growth::AsSaid).is_err());
+        assert!(look(&[0x1c; 100], Growth::AsSaid).is_err());
     }
 }

@@ -1,0 +1,271 @@
+//! Definitions of ROS messages: text of the form `ros2msg` (or `ros1msg`) goes in, a tree of types comes out.
+//!
+//! The definition of a message is followed by those of the messages that it holds, each under a line of `=` and a line
+//! `MSG: package/Name` (MCAP registry of schemas, `ros2msg`).
+
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+/// More messages within one another than any definition has.
+const DEEPEST: usize = 32;
+
+/// Type of a field.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Type {
+    Number(Number),
+    Text,
+    /// Seconds and nanoseconds, of which the seconds of a duration have a sign; those of a time in ROS 1 have none.
+    Time {
+        is_signed: bool,
+    },
+    Message(Rc<Definition>),
+    /// As many as are given, or as the message says.
+    List(Box<Type>, Option<usize>),
+}
+
+/// Types of numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Number {
+    Bool,
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+}
+
+/// A message: its fields in their order.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Definition {
+    pub(super) fields: Vec<(String, Type)>,
+}
+
+/// Whose rules hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ros {
+    One,
+    Two,
+}
+
+impl Number {
+    const NAMES: [(&'static str, Self); 14] = [
+        ("bool", Self::Bool),
+        ("boolean", Self::Bool),
+        ("int8", Self::I8),
+        ("uint8", Self::U8),
+        ("int16", Self::I16),
+        ("uint16", Self::U16),
+        ("int32", Self::I32),
+        ("uint32", Self::U32),
+        ("int64", Self::I64),
+        ("uint64", Self::U64),
+        ("float32", Self::F32),
+        ("float64", Self::F64),
+        ("float", Self::F32),
+        ("double", Self::F64),
+    ];
+
+    fn named(name: &str, ros: Ros) -> Option<Self> {
+        match (name, ros) {
+            ("byte", Ros::One) => return Some(Self::I8),
+            ("byte" | "char" | "octet", _) => return Some(Self::U8),
+            _ => {}
+        }
+        let found = Self::NAMES.iter().find(|(known, _)| *known == name);
+        found.map(|(_, number)| *number)
+    }
+
+    /// What definitions call it.
+    pub(super) fn name(self) -> &'static str {
+        let found = Self::NAMES.iter().find(|(_, number)| *number == self);
+        found.map_or("", |(name, _)| name)
+    }
+
+    /// Bytes that it takes.
+    pub(super) fn size(self) -> usize {
+        match self {
+            Self::Bool | Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+}
+
+/// The definition of the message `name` in `text`, with those that it needs.
+///
+/// Fails when one of them is missing or cannot be read.
+pub(super) fn read(name: &str, text: &str, ros: Ros) -> Result<Rc<Definition>, String> {
+    let own = plain(name);
+    let mut texts = BTreeMap::new();
+    let (mut current, mut lines) = (own.clone(), Vec::new());
+    for line in text.lines() {
+        let trimmed = line.trim();
+        if trimmed.len() >= 3 && trimmed.bytes().all(|byte| byte == b'=') {
+            texts.entry(current).or_insert_with(|| std::mem::take(&mut lines));
+            lines.clear();
+            current = String::new();
+        } else if let (true, Some(name)) = (current.is_empty(), trimmed.strip_prefix("MSG:")) {
+            current = plain(name.trim());
+        } else {
+            lines.push(trimmed);
+        }
+    }
+    texts.entry(current).or_insert(lines);
+    let mut reader = Reader {
+        texts,
+        done: BTreeMap::new(),
+        ros,
+    };
+    reader.definition(&own, 0)
+}
+
+/// `package/Name`, however much stands between.
+fn plain(name: &str) -> String {
+    name.replace("/msg/", "/")
+}
+
+struct Reader<'a> {
+    texts: BTreeMap<String, Vec<&'a str>>,
+    done: BTreeMap<String, Rc<Definition>>,
+    ros: Ros,
+}
+
+impl Reader<'_> {
+    fn definition(&mut self, name: &str, depth: usize) -> Result<Rc<Definition>, String> {
+        if let Some(done) = self.done.get(name) {
+            return Ok(done.clone());
+        }
+        if depth > DEEPEST {
+            return Err(format!("`{name}` holds itself"));
+        }
+        let Some(lines) = self.texts.get(name).cloned() else {
+            return match well_known(name) {
+                Some(text) => {
+                    let lines = text.lines().collect();
+                    self.texts.insert(name.to_owned(), lines);
+                    self.definition(name, depth)
+                }
+                None => Err(format!("the file does not define `{name}`")),
+            };
+        };
+        let mut fields = Vec::new();
+        for line in lines {
+            let line = line.split('#').next().unwrap_or("").trim();
+            let Some((kind, rest)) = line.split_once(char::is_whitespace) else {
+                if line.is_empty() {
+                    continue;
+                }
+                return Err(format!("the line `{line}` of `{name}` cannot be read"));
+            };
+            let rest = rest.trim();
+            let end = rest
+                .find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))
+                .unwrap_or(rest.len());
+            // A constant takes no room in a message.
+            if rest[end..].trim_start().starts_with('=') {
+                continue;
+            }
+            if end == 0 {
+                return Err(format!("the line `{line}` of `{name}` cannot be read"));
+            }
+            fields.push((rest[..end].to_owned(), self.kind(kind, name, depth)?));
+        }
+        let definition = Rc::new(Definition { fields });
+        self.done.insert(name.to_owned(), definition.clone());
+        Ok(definition)
+    }
+
+    fn kind(&mut self, text: &str, within: &str, depth: usize) -> Result<Type, String> {
+        if let Some((of, length)) = text.strip_suffix(']').and_then(|text| text.rsplit_once('[')) {
+            let of = self.kind(of, within, depth)?;
+            let length = match length {
+                "" => None,
+                most if most.starts_with("<=") => None,
+                length => Some(
+                    length
+                        .parse()
+                        .map_err(|_| format!("`{text}` in `{within}` has no length"))?,
+                ),
+            };
+            return Ok(Type::List(Box::new(of), length));
+        }
+        let bare = text.split("<=").next().unwrap_or(text);
+        if let Some(number) = Number::named(bare, self.ros) {
+            return Ok(Type::Number(number));
+        }
+        match (bare, self.ros) {
+            ("string", _) => return Ok(Type::Text),
+            ("wstring", _) => return Err(format!("`{within}` holds a `wstring`, which is not read")),
+            ("time", Ros::One) => return Ok(Type::Time { is_signed: false }),
+            ("duration", Ros::One) => return Ok(Type::Time { is_signed: true }),
+            _ => {}
+        }
+        let full = match plain(bare) {
+            header if header == "Header" => "std_msgs/Header".to_owned(),
+            full if full.contains('/') => full,
+            short => {
+                let package = within.split('/').next().unwrap_or("");
+                format!("{package}/{short}")
+            }
+        };
+        if full == "builtin_interfaces/Time" || full == "builtin_interfaces/Duration" {
+            return Ok(Type::Time { is_signed: true });
+        }
+        Ok(Type::Message(self.definition(&full, depth + 1)?))
+    }
+}
+
+/// Messages that are everywhere, for files that do not say what is in them, as rosbag2 wrote until 2023.
+fn well_known(name: &str) -> Option<&'static str> {
+    let found = WELL_KNOWN.iter().find(|(known, _)| *known == name);
+    found.map(|(_, text)| *text)
+}
+
+const WELL_KNOWN: [(&str, &str); 22] = [
+    ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id"),
+    ("std_msgs/Bool", "bool data"),
+    ("std_msgs/Int32", "int32 data"),
+    ("std_msgs/Int64", "int64 data"),
+    ("std_msgs/UInt32", "uint32 data"),
+    ("std_msgs/UInt64", "uint64 data"),
+    ("std_msgs/Float32", "float32 data"),
+    ("std_msgs/Float64", "float64 data"),
+    ("std_msgs/String", "string data"),
+    ("std_msgs/MultiArrayDimension", "string label\nuint32 size\nuint32 stride"),
+    ("std_msgs/MultiArrayLayout", "MultiArrayDimension[] dim\nuint32 data_offset"),
+    ("std_msgs/Float32MultiArray", "MultiArrayLayout layout\nfloat32[] data"),
+    ("std_msgs/Float64MultiArray", "MultiArrayLayout layout\nfloat64[] data"),
+    (
+        "sensor_msgs/JointState",
+        "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort",
+    ),
+    ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z"),
+    ("geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w"),
+    ("geometry_msgs/Wrench", "Vector3 force\nVector3 torque"),
+    ("geometry_msgs/WrenchStamped", "std_msgs/Header header\nWrench wrench"),
+    (
+        "sensor_msgs/Imu",
+        "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n\
+         geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n\
+         geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance",
+    ),
+    (
+        "trajectory_msgs/JointTrajectoryPoint",
+        "float64[] positions\nfloat64[] velocities\nfloat64[] accelerations\nfloat64[] effort\n\
+         builtin_interfaces/Duration time_from_start",
+    ),
+    (
+        "control_msgs/InterfaceValue",
+        "string[] interface_names\nfloat64[] values",
+    ),
+    (
+        "control_msgs/DynamicJointState",
+        "std_msgs/Header header\nstring[] joint_names\nInterfaceValue[] interface_values",
+    ),
+];
