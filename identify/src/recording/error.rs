@@ -265,7 +265,7 @@ impl fmt::Display for Fault {
             Self::NothingInCommon { parts } => write!(
                 f,
                 "{} have no samples at the same time, so they cannot be joined; are their clocks the same?",
-                parts.join(" and ")
+                list(parts)
             ),
             Self::NoHeader => f.write_str(
                 "the first line holds numbers, but column names are expected there; \

@@ -87,7 +87,7 @@ pub(crate) fn joined(
     }
     if !interpolated.is_empty() {
         tell(Note::info(format!(
-            "Samples are those of {}, {base_step:.3e} s apart; {} {} interpolated at their times.",
+            "Samples are those of `{}`, {base_step:.3e} s apart; {} {} interpolated at their times.",
             base.name,
             list(&interpolated),
             if interpolated.len() == 1 { "is" } else { "are" },
@@ -95,9 +95,10 @@ pub(crate) fn joined(
     }
     if covered < n {
         tell(Note::warning(format!(
-            "{} of {} have no samples of all others around and are left out.",
+            "{} of `{}` {} not between samples of all others and left out.",
             count_of(n - covered, "sample", "samples"),
-            base.name
+            base.name,
+            if n - covered == 1 { "is" } else { "are" },
         )));
     }
     let kept = |values: Vec<f64>| -> Vec<f64> {

@@ -185,7 +185,7 @@ fn every_format_is_read_from_memory_too() {
             .unwrap_err()
             .to_string(),
     ] {
-        assert!(says.starts_with("-: this is a "), "{says}");
+        assert!(says.starts_with("-: this is a"), "{says}");
     }
 }
 
@@ -250,7 +250,7 @@ fn broken_files_get_an_answer() {
     }
     std::fs::write(&path, b"MATLAB 7.3 MAT-file, Platform: GLNXA64").unwrap();
     let says = Recording::read(&path, &[]).unwrap_err().to_string();
-    assert!(says.contains("-v7"), "{says}");
+    assert!(says.contains("is it complete"), "{says}");
 }
 
 /// Both files were written by scipy 1.17, the one with compressed and upright arrays, the other with arrays that lie.

@@ -4,6 +4,7 @@ mod diagnose;
 mod emps;
 mod filters;
 mod formats;
+mod logs;
 mod preparation;
 mod recordings;
 mod separate;

@@ -351,7 +351,7 @@ pub(super) fn read(show: Show<'_>, file: &str, options: &ReadOptions) -> Result<
     let is_exact = times().all(|t| (-EXACT..EXACT).contains(t));
     let zero = if is_exact { 0 } else { times().copied().min().unwrap_or(0) };
     let parts = parts.into_iter().map(|(name, _, time, columns)| Part {
-        name: format!("`{name}`"),
+        name,
         time: time.iter().map(|t| seconds(t.wrapping_sub(zero))).collect(),
         columns,
     });
