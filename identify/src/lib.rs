@@ -3,7 +3,7 @@
 //!
 //! The crate takes numbers and knows nothing of how a regressor is made. The pipeline:
 //!
-//! 1. [`Recording::read`] - CSV, Parquet or MATLAB's format 5 into named columns; every fault has its line and its remedy.
+//! 1. [`Recording::read`] - CSV, Parquet, MATLAB, HDF5, MCAP or rosbag2 into named columns; every fault has its line and its remedy.
 //! 2. [`Recording::runs_with`] - coordinates with derivatives and forces, as a [`Run`] for each stretch between gaps in time;
 //!    the caller evaluates its regressor along it, rows interleaved per sample (`row = sample * n_channels + channel`), and
 //!    applies [`decimate_table`] to regressor and force where the run asks for it.
@@ -46,7 +46,7 @@ pub use estimate::{
     Deviations, Direction, LeastSquares, LeastSquaresError, RANK_TOLERANCE, Solution, Triangle,
 };
 pub use figures::{
-    ChannelFigures, Comparison, Figures, FiguresError, FitFault, FitFile, FitFileError,
+    ChannelFigures, Comparison, Estimator, Figures, FiguresError, FitFault, FitFile, FitFileError,
     FitParameter, LocateOptions, ParameterInfo, Region, Status, TIME_COLUMN, compare,
     fit_parameters, locate,
 };
@@ -56,6 +56,6 @@ pub use motion::{
 };
 pub use recording::{
     ColumnInfo, Computed, Fault, NotFinite, Note, ReadOptions, Recording, RecordingError,
-    RecordingFile, Severity, TableInfo, name_of_bytes, place_word,
+    RecordingFile, RecordingFiles, Severity, TableInfo, name_of_bytes, place_word,
 };
 pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER};

@@ -189,13 +189,14 @@ pub fn read_column(
         column: column.to_owned(),
         nearest: suggest::nearest(column, names.iter().map(String::as_str)).map(str::to_owned),
     };
+    let (plain, stand_ins) = with_plain_names(body, names);
     let span = Span {
         file: 0,
         start: 0,
-        end: text.len(),
+        end: plain.len(),
     };
     let mut log = Log::default();
-    let Some(ast) = parse(body, span, None, &mut log) else {
+    let Some(ast) = parse(&plain, span, None, &mut log) else {
         // What cannot be read as an expression is taken for a name with blanks and the like.
         if !body.contains(['+', '*', '/', '^', '(']) {
             return Err(missing(body));
@@ -210,7 +211,10 @@ pub fn read_column(
         });
     };
     let sum = affine(&ast, &|name| {
-        if has(name) {
+        let stands_for = stand_ins.iter().find(|(stand_in, _)| stand_in == name);
+        if let Some((_, column)) = stands_for {
+            Some(Value::column(column))
+        } else if has(name) {
             Some(Value::column(name))
         } else {
             constants(name).map(Value::number)
@@ -235,6 +239,41 @@ pub fn read_column(
             .collect(),
         offset: factor * sum.offset,
     })
+}
+
+/// A text in which columns whose names no expression can hold, such as `joint_states.position.elbow`, have names that it
+/// can, and what these stand for.
+fn with_plain_names<'a>(text: &str, names: &'a [String]) -> (String, Vec<(String, &'a str)>) {
+    let mut others: Vec<&String> = names
+        .iter()
+        .filter(|name| name.contains('.') && text.contains(name.as_str()))
+        .collect();
+    // A name may begin another one.
+    others.sort_by_key(|name| std::cmp::Reverse(name.len()));
+    let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
+    let mut plain = text.to_owned();
+    let mut stand_ins = Vec::new();
+    for name in others {
+        let mut stand_in = format!("column_{}", stand_ins.len());
+        while text.contains(&stand_in) || names.contains(&stand_in) {
+            stand_in.push('_');
+        }
+        let mut done = String::new();
+        let mut rest = plain.as_str();
+        while let Some(at) = rest.find(name.as_str()) {
+            let end = at + name.len();
+            let is_whole = !rest[end..].starts_with(is_part)
+                && !rest[..at].ends_with(is_part)
+                && !(at == 0 && done.ends_with(is_part));
+            done.push_str(&rest[..at]);
+            done.push_str(if is_whole { &stand_in } else { name });
+            rest = &rest[end..];
+        }
+        done.push_str(rest);
+        plain = done;
+        stand_ins.push((stand_in, name.as_str()));
+    }
+    (plain, stand_ins)
 }
 
 /// Why a text can be the description of no column of any recording; `None` if it can be.
@@ -462,5 +501,21 @@ mod tests {
         assert!(says("qm5 - qm5 + 1").contains("no column"));
         assert!(says("qm5 +").contains("neither the name of a column nor an expression"));
         assert!(says("qm5 [mm]").contains("`mm` does not suit it; expected one of `rad`, `deg`"));
+    }
+
+    #[test]
+    fn columns_of_logs_stand_in_sums() {
+        let names = ["joints.position.q", "joints.position.q2", "lab/split.effort.arm/wrist"].map(str::to_owned);
+        let read = |text: &str| read_column(text, Quantity::Angle(0), &names, &|_| None).unwrap();
+        let sum = read("-joints.position.q/2 + 3*joints.position.q2");
+        assert_eq!(
+            sum.terms,
+            [("joints.position.q".to_owned(), -0.5), ("joints.position.q2".to_owned(), 3.0)]
+        );
+        let sum = read("2*lab/split.effort.arm/wrist - 1");
+        assert_eq!(sum.terms, [("lab/split.effort.arm/wrist".to_owned(), 2.0)]);
+        assert!((sum.offset + 1.0).abs() < 1e-15);
+        let missing = read_column("-joints.position.q3", Quantity::Angle(0), &names, &|_| None);
+        assert!(missing.is_err());
     }
 }

@@ -152,6 +152,96 @@ fn apart(mut failure: Failure, old: &str, new: &str, effect: &NewEffect) -> Fail
     failure
 }
 
+/// Identified values that a model file shall have.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Adopted {
+    /// Where they come from.
+    pub comment: String,
+    /// Values of parameters by their names.
+    pub parameters: Vec<(String, f64)>,
+    /// Values of base parameters by their expressions.
+    pub base: Vec<(String, f64)>,
+}
+
+/// Writes identified values into the text of a model file, in the place of earlier ones; everything else stays as it is.
+///
+/// Fails if the text is not TOML, or has its table `identified` in another form than this function writes.
+///
+/// ```
+/// use modelmill_spec::edit::{Adopted, adopt};
+/// let values = Adopted {
+///     comment: "from a fit".to_owned(),
+///     base: vec![("m*l".to_owned(), 2.5)],
+///     ..Adopted::default()
+/// };
+/// let text = adopt("name = \"arm\" # mine\n", &values).unwrap();
+/// assert_eq!(text, "name = \"arm\" # mine\n\n[identified]\n# from a fit\nbase = [\n  \
+///                   { expression = \"m*l\", value = 2.5 },\n]\n");
+/// assert_eq!(adopt(&text, &values).unwrap(), text);
+/// ```
+pub fn adopt(text: &str, values: &Adopted) -> Result<String, String> {
+    let mut log = Log::default();
+    let table = document::parse(text, 0, &mut log);
+    if log.n_errors() > 0 {
+        return Err("this is not TOML; mend the file first".to_owned());
+    }
+    let line_end = if text.contains("\r\n") { "\r\n" } else { "\n" };
+    let mut kept = text.to_owned();
+    if let Some((key, _)) = get(&table, "identified") {
+        let start = text[..key.span.start].rfind('\n').map_or(0, |end| end + 1);
+        if text[start..].lines().next().map(str::trim) != Some("[identified]") {
+            return Err("write `[identified]` as a table of its own, on a line of its own".to_owned());
+        }
+        let mut end = text.len();
+        let mut at = start;
+        for line in text[start..].split_inclusive('\n') {
+            if at > start && line.trim_start().starts_with('[') {
+                end = at;
+                break;
+            }
+            at += line.len();
+        }
+        // What stands above the next table belongs to it.
+        let own = &text[start..end];
+        let last = own.trim_end().rfind(['\n', ']', '}']).unwrap_or(own.len() - 1);
+        let own_end = own[last..].find('\n').map_or(own.len(), |line| last + line + 1);
+        kept = format!("{}{}", text[..start].trim_end(), line_end);
+        let rest = &text[start + own_end..];
+        if !rest.trim().is_empty() {
+            let block = identified(values, line_end);
+            return Ok(format!("{kept}{line_end}{block}{line_end}{}", rest.trim_start_matches(['\r', '\n'])));
+        }
+    }
+    if !kept.is_empty() {
+        if !kept.ends_with('\n') {
+            kept.push_str(line_end);
+        }
+        kept.push_str(line_end);
+    }
+    Ok(kept + &identified(values, line_end))
+}
+
+/// The table of identified values.
+fn identified(values: &Adopted, line_end: &str) -> String {
+    let mut lines = vec!["[identified]".to_owned()];
+    let comment = values.comment.lines();
+    lines.extend(comment.map(|line| format!("# {}", line.replace(char::is_control, " "))));
+    if !values.parameters.is_empty() {
+        let pairs = values.parameters.iter();
+        let pairs: Vec<String> = pairs.map(|(name, value)| format!("{name} = {value:?}")).collect();
+        lines.push(format!("parameters = {{ {} }}", pairs.join(", ")));
+    }
+    if !values.base.is_empty() {
+        lines.push("base = [".to_owned());
+        for (expression, value) in &values.base {
+            let expression = expression.replace('\\', "\\\\").replace('"', "\\\"");
+            lines.push(format!("  {{ expression = \"{expression}\", value = {value:?} }},"));
+        }
+        lines.push("]".to_owned());
+    }
+    lines.join(line_end) + line_end
+}
+
 /// Adds an effect to the text of a model file; whether it means anything there is not looked at.
 ///
 /// Fails if the text is not TOML, its `effect` is no list of tables, or the effect cannot be written.

@@ -58,6 +58,8 @@ pub struct Mechanism {
     pub retain: Vec<Vec<(ParameterIdx, u32)>>,
     /// What planned motion must keep.
     pub limits: Limits,
+    /// Values of base parameters by their expressions, which take the place of those of the nominal parameters.
+    pub identified_base: Vec<(String, f64)>,
     /// How recordings name their columns: ours to theirs.
     pub recording: Recording,
 }

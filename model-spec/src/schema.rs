@@ -55,6 +55,8 @@ record! {
         "retain" retain: optional List<Formula>,
         /// What planned motion must keep: `modelmill excite` obeys it.
         "limits" limits: optional LimitsEntry,
+        /// What was identified, in the place of nominal values: `modelmill adopt` writes it.
+        "identified" identified: optional IdentifiedEntry,
         /// How recordings of this mechanism name their columns.
         "recording" recording: optional RecordingEntry,
     }
@@ -485,6 +487,26 @@ record! {
         "y" y: optional Range,
         /// m
         "z" z: optional Range,
+    }
+}
+
+record! {
+    /// What was identified. It takes the place of nominal values.
+    IdentifiedEntry = "what was identified" {
+        /// Values of parameters, which bodies can have.
+        "parameters" parameters: optional Named<Number>,
+        /// Values of base parameters, which say nothing of single bodies.
+        "base" base: optional List<IdentifiedBaseEntry>,
+    }
+}
+
+record! {
+    /// The value of a base parameter.
+    IdentifiedBaseEntry = "the value of a base parameter" {
+        /// The base parameter in the parameters and constants of the file, as `modelmill check --json` has it.
+        "expression" expression: required Text,
+        /// Value in SI units.
+        "value" value: required Number,
     }
 }
 

@@ -153,10 +153,11 @@
 //! # Layout
 //!
 //! In the order of the flow, each standing on those before it: [`text`], [`error`], [`progress`], [`host`], [`model`],
-//! [`stretch`], [`along`], [`audit`], [`recording`], [`compare`], [`evaluate`], [`identify`], [`diagnose`], [`add`],
+//! [`stretch`], [`along`], [`audit`], [`recording`], [`compare`], [`evaluate`], [`identify`], [`diagnose`], [`add`], [`adopt`],
 //! [`interpret`], [`excite`], [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@print`], [`report`].
 
 pub mod add;
+pub mod adopt;
 pub mod along;
 pub mod audit;
 pub mod compare;

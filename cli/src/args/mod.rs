@@ -71,6 +71,13 @@ pub(crate) enum Command {
         --at R3m,R3m_right --set m.name=m4\n\n\
         Places in one --at share the effect's parameters. Without --in-place or --out nothing is written.")]
     Add(AddArgs),
+    /// Write a fit into a model file, in the place of its nominal values, and print the difference
+    #[command(after_help = "Examples:\n  \
+        modelmill identify arm.toml --data run.csv --physical --out fit.json\n  \
+        modelmill adopt arm.toml fit.json --in-place\n\n\
+        A fit of --physical becomes values of parameters, which bodies can have; any other one values of base parameters, \
+        which say nothing of single bodies. Without --in-place or --out nothing is written.")]
+    Adopt(AdoptArgs),
     /// Print the reduced model as equations: p_g, dependencies, p_min, intermediate variables, counts
     #[command(
         after_help = "Examples (from the project's root):\n  modelmill equations model-spec/models/spidermill-paper.toml\n  \
@@ -111,6 +118,13 @@ pub(crate) enum Command {
         modelmill identify arm.toml --data run.csv --instruments run.csv --instrument-map q1=q1_reference\n  \
         modelmill identify arm.toml --data run.csv --instruments period=7.29")]
     Identify(IdentifyArgs),
+    /// List what recordings hold: tables or topics, columns, types, samples, rates
+    #[command(after_help = "Examples (from the project's root):\n  \
+        modelmill recordings recordings/spidermill-mbs/plain-fit.csv\n  \
+        modelmill recordings run.mcap --json\n\n\
+        A joint of sensor_msgs/JointState is read as, for example, --map q1=joint_states.position.shoulder \
+        --map motor1=joint_states.effort.shoulder.")]
+    Recordings(RecordingsArgs),
     /// Hold the model against recordings: error figures, and where the error lives
     #[command(after_help = "Examples (from the project's root):\n  \
         modelmill compare model-spec/models/spidermill.toml \\\n      \
@@ -331,6 +345,14 @@ impl ParameterSource {
         Ok(values.values)
     }
 
+    /// The model with these values in the place of the file's.
+    pub(crate) fn in_model(&self, host: &Host, model: Model) -> Outcome<Model> {
+        Ok(match self {
+            Self::Nominal => model,
+            Self::Fit(_) => model.with_values(&self.values(host, &model)?),
+        })
+    }
+
     /// What the JSON calls it.
     pub(crate) fn name(&self) -> String {
         match self {
@@ -345,7 +367,7 @@ impl ParameterSource {
 pub(crate) struct EvaluateArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recording (CSV) whose states are taken
+    /// Recording whose states are taken
     #[arg(long, value_name = "RUN")]
     pub(crate) data: PathBuf,
     /// Values of the base parameters: `nominal`, or a file that `identify` wrote
@@ -367,7 +389,8 @@ pub(crate) struct EvaluateArgs {
 pub(crate) struct IdentifyArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings (CSV, Parquet, MATLAB 5) to identify from; may be repeated
+    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2) to identify from; may be repeated; files of one run that are to be
+    /// joined on time have a `+` between them
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
     /// Recordings to check the result on, which the fit does not see; may be repeated
@@ -387,12 +410,41 @@ pub(crate) struct IdentifyArgs {
     pub(crate) preparation: PreparationArgs,
 }
 
+/// `adopt`.
+#[derive(Debug, Args)]
+pub(crate) struct AdoptArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// A file that `identify` wrote
+    pub(crate) fit: PathBuf,
+    /// Change the model file
+    #[arg(long, conflicts_with = "out")]
+    pub(crate) in_place: bool,
+    /// Write the model with the fit to this file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `recordings`.
+#[derive(Debug, Args)]
+pub(crate) struct RecordingsArgs {
+    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2)
+    #[arg(required = true, value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+    /// Print one JSON array on standard output, with an object for each file
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
 /// `compare`.
 #[derive(Debug, Args)]
 pub(crate) struct CompareArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings (CSV, Parquet, MATLAB 5); may be repeated
+    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated; `a.csv+b.csv` joins files of one run on time
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
     /// Values of the base parameters: `nominal`, or a file that `identify` wrote
@@ -410,7 +462,7 @@ pub(crate) struct CompareArgs {
 pub(crate) struct AskArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
-    /// Recordings to find it in (CSV, Parquet, MATLAB 5); may be repeated
+    /// Recordings to find it in (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated
     #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
     pub(crate) data: Vec<PathBuf>,
     /// Recordings that decide what is believed; without any, blocks of --data take turns
@@ -419,6 +471,9 @@ pub(crate) struct AskArgs {
     /// Hold all parameters at their nominal values, so that what is wrong with them shows too
     #[arg(long)]
     pub(crate) held: bool,
+    /// What takes the place of the nominal values: a file that `identify` wrote; with --held it is what is held
+    #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
+    pub(crate) parameters: ParameterSource,
     #[command(flatten)]
     pub(crate) preparation: PreparationArgs,
 }
@@ -509,6 +564,9 @@ pub(crate) struct ExciteArgs {
     /// What is made small
     #[arg(long, value_enum, default_value = "condition")]
     pub(crate) criterion: CriterionArg,
+    /// Values of the base parameters, from which forces along the motion follow: `nominal`, or a file that `identify` wrote
+    #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
+    pub(crate) parameters: ParameterSource,
     /// Random trajectories within the limits that are tried first
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = parse_count)]
     pub(crate) random: usize,

@@ -1,6 +1,7 @@
 //! One file per command; what they share: reading models and recordings, and asking for a diagnosis.
 
 pub(crate) mod add;
+pub(crate) mod adopt;
 pub(crate) mod check;
 pub(crate) mod compare;
 pub(crate) mod completions;
@@ -15,6 +16,7 @@ pub(crate) mod generate;
 pub(crate) mod identify;
 pub(crate) mod import;
 pub(crate) mod interpret;
+pub(crate) mod recordings;
 pub(crate) mod reduce;
 pub(crate) mod report;
 pub(crate) mod simulate;
@@ -79,19 +81,33 @@ pub(crate) fn load_quietly(host: &Host, path: &Path) -> Outcome<Loaded> {
     Ok(host.load(path)?)
 }
 
+/// The files of one run: a path, or several with `+` between them.
+pub(crate) fn files_of(path: &Path) -> Vec<PathBuf> {
+    match path.to_str() {
+        Some(text) if text.contains('+') && !path.exists() => {
+            text.split('+').map(PathBuf::from).collect()
+        }
+        _ => vec![path.to_owned()],
+    }
+}
+
 /// Reads recordings; their remarks go to standard error as they come up.
 pub(crate) fn recordings(
     model: &Model,
     paths: &[PathBuf],
     reading: &Reading,
 ) -> Outcome<Vec<Recording>> {
-    let read = |path: &PathBuf| Ok(model.recording(path, reading)?);
+    let read = |path: &PathBuf| {
+        let files = files_of(path);
+        let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+        Ok(model.recording_of(&files, reading)?)
+    };
     paths.iter().map(read).collect()
 }
 
 /// Diagnoses what the command line names.
 pub(crate) fn diagnose(host: &Host, args: &AskArgs, question: Question) -> Outcome<Findings> {
-    let model = self::model(host, &args.model)?;
+    let model = args.parameters.in_model(host, self::model(host, &args.model)?)?;
     let reading = args.preparation.reading();
     let fit = recordings(&model, &args.data, &reading)?;
     let check = recordings(&model, &args.check, &reading)?;

@@ -96,7 +96,8 @@ impl Derivation {
         polynomials
     }
 
-    /// Values of the base parameters for the model file's values.
+    /// Values of the base parameters for the model file's values: identified ones where it has them, by the expression of
+    /// the base parameter, or else those of the nominal parameters.
     pub fn nominal_base_values(&self) -> Vec<f64> {
         let parameters: Vec<f64> = self
             .mechanism
@@ -105,6 +106,25 @@ impl Derivation {
             .map(|p| p.nominal)
             .collect();
         let constants: Vec<f64> = self.mechanism.constants.iter().map(|c| c.value).collect();
-        self.base_values(&parameters, &constants)
+        let mut values = self.base_values(&parameters, &constants);
+        for (k, value) in self.identified_base() {
+            values[k] = value;
+        }
+        values
+    }
+
+    /// The identified values that the model file has of its base parameters, by their positions.
+    pub fn identified_base(&self) -> Vec<(usize, f64)> {
+        let identified = &self.mechanism.identified_base;
+        if identified.is_empty() {
+            return Vec::new();
+        }
+        let base = self.base_parameters().into_iter().enumerate();
+        let value = |expression: &String| {
+            let mut known = identified.iter();
+            known.find(|(other, _)| other == expression)
+        };
+        base.filter_map(|(k, base)| Some((k, value(&base.expression)?.1)))
+            .collect()
     }
 }

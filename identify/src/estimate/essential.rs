@@ -1,5 +1,5 @@
 //! Essential parameters: a solution with its deviations goes in, the parameters that the recording
-//! supports come out, the others left at zero.
+//! supports come out, the others held at what was known of them before, or at zero.
 //!
 //! Backward elimination by the largest relative standard deviation, as M. Gautier, "Optimal
 //! motion planning for robot's inertial parameters identification", CDC 1992, and A. Janot,
@@ -7,7 +7,8 @@
 //! identification", IEEE Trans. CST 22 (2014), section V do it, until what has been left out
 //! would be missed. Their F-test counts every sample as independent, which on recordings finds
 //! everything significant; here the deviations allow for autocorrelation: Wald's statistic
-//! `p_D' C_DD^-1 p_D / q` of all parameters left out is held against `F(q, effective samples - n)`.
+//! `d' C_DD^-1 d / q` of all parameters left out, `d` from where they are held, against
+//! `F(q, effective samples - n)`.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -41,7 +42,7 @@ pub struct Dropped {
     pub parameter: usize,
     /// Its standard deviation over its value when it was left out; infinite for what is not determined.
     pub relative_std: f64,
-    /// Probability that all left out so far are zero and show as much by chance.
+    /// Probability that all left out so far are what they are held at and show as much by chance.
     pub probability: f64,
 }
 
@@ -52,7 +53,7 @@ pub struct Essential {
     pub kept: Vec<usize>,
     /// Those that were left out, in that order.
     pub dropped: Vec<Dropped>,
-    /// Values of all parameters; 0 for those left out.
+    /// Values of all parameters; those left out are what they are held at.
     pub values: Vec<f64>,
     /// Standard deviations that allow for autocorrelation; infinite for those left out.
     pub std: Vec<f64>,
@@ -68,11 +69,13 @@ pub struct Essential {
 
 /// Leaves out parameters until all others are needed.
 ///
-/// `solution` and `deviations` are those of `triangle`. Fails only where a reduced problem cannot be solved.
+/// `solution` and `deviations` are those of `triangle`; `held` is what parameters are that are left out: their nominal
+/// values, 0 where there is none. Fails only where a reduced problem cannot be solved.
 pub fn essential(
     triangle: &Triangle,
     solution: &Solution,
     deviations: &Deviations,
+    held: &[f64],
     options: &EssentialOptions,
 ) -> Result<Essential, LeastSquaresError> {
     let n = triangle.n_parameters();
@@ -92,7 +95,7 @@ pub fn essential(
     let information = r.transpose() * &r;
     // The covariance of the gradients is a property of the residuals; each choice of columns sees its own part.
     let scores = &information * &deviations.covariance * &information;
-    let full = Choice::fit(triangle, &scores, kept)?;
+    let full = Choice::fit(triangle, &scores, held, kept)?;
     let mut effective: Vec<f64> = deviations
         .effective_samples
         .iter()
@@ -109,7 +112,7 @@ pub fn essential(
     let mut choice = full.clone();
     while choice.columns.len() > 1 {
         let relative: Vec<f64> = (0..choice.columns.len())
-            .map(|i| choice.relative_std(i))
+            .map(|i| choice.relative_std(held, i))
             .collect();
         let worst = (0..relative.len()).fold(0, |best, i| {
             if relative[i] > relative[best] {
@@ -133,12 +136,12 @@ pub fn essential(
         });
         let mut columns = choice.columns.clone();
         columns.remove(worst);
-        choice = Choice::fit(triangle, &scores, columns)?;
+        choice = Choice::fit(triangle, &scores, held, columns)?;
     }
     let mut found = Essential {
         kept: choice.columns.clone(),
         dropped,
-        values: vec![0.0; n],
+        values: held.to_vec(),
         std: vec![f64::INFINITY; n],
         classical_std: vec![f64::INFINITY; n],
         condition_number: choice.solution.condition_number,
@@ -146,7 +149,7 @@ pub fn essential(
         rise: choice.solution.residual_norm / solution.residual_norm - 1.0,
     };
     for (i, j) in choice.columns.iter().enumerate() {
-        found.values[*j] = choice.solution.values[i];
+        found.values[*j] += choice.solution.values[i];
         found.std[*j] = choice.covariance[(i, i)].sqrt();
         found.classical_std[*j] = choice.solution.classical_std[i];
     }
@@ -156,7 +159,7 @@ pub fn essential(
     Ok(found)
 }
 
-/// Some of the columns with their own solution.
+/// Some of the columns with their own solution: how far they are from what they would be held at.
 #[derive(Debug, Clone)]
 struct Choice {
     columns: Vec<usize>,
@@ -168,9 +171,11 @@ impl Choice {
     fn fit(
         triangle: &Triangle,
         scores: &DMatrix<f64>,
+        held: &[f64],
         columns: Vec<usize>,
     ) -> Result<Self, LeastSquaresError> {
         let solution = triangle
+            .from(held)
             .only(&columns)?
             .solve_near(&vec![0.0; columns.len()])?;
         let inverse = solution.unit_covariance();
@@ -182,8 +187,9 @@ impl Choice {
         })
     }
 
-    fn relative_std(&self, i: usize) -> f64 {
-        let relative = self.covariance[(i, i)].sqrt() / self.solution.values[i].abs();
+    fn relative_std(&self, held: &[f64], i: usize) -> f64 {
+        let value = held[self.columns[i]] + self.solution.values[i];
+        let relative = self.covariance[(i, i)].sqrt() / value.abs();
         // Nothing over nothing is a parameter that nobody misses.
         if relative.is_nan() {
             f64::INFINITY
@@ -322,6 +328,7 @@ mod tests {
                 &triangle,
                 &solution,
                 &deviations.unwrap(),
+                &[0.0; 7],
                 &EssentialOptions::default(),
             )
             .unwrap();
@@ -339,5 +346,38 @@ mod tests {
             assert!(found.rise < 0.02);
         }
         assert!(right >= trials * 85 / 100, "{right} of {trials}");
+    }
+
+    /// What the rows hardly tell stays at what is known of it, also where another column takes part of its place.
+    #[test]
+    fn what_is_not_supported_stays_where_it_is_held() {
+        let truth = [4.0, 8.0, -3.0];
+        let mut noise = Noise::new(11);
+        let (mut w, mut y) = (Vec::new(), Vec::new());
+        for i in 0..4000 {
+            let t = 0.01 * f64::from(i);
+            // The second column moves next to nothing by itself.
+            let row = [t.sin(), 1e-4 * (2.3 * t).cos(), (1.7 * t).sin()];
+            y.push(row.iter().zip(truth).map(|(w, p)| w * p).sum::<f64>() + noise.normal());
+            w.extend(row);
+        }
+        let mut regression = LeastSquares::new(3);
+        regression.add_rows(&w, &y).unwrap();
+        let solution = regression.solve().unwrap();
+        let deviations: Result<_, LeastSquaresError> =
+            autocorrelated_deviations(&solution, 1, |visit| visit(&w, &y));
+        let deviations = deviations.unwrap();
+        let triangle = Triangle::new(&regression);
+        let options = EssentialOptions::default();
+        let held = [0.0, 8.0, 0.0];
+        let found = essential(&triangle, &solution, &deviations, &held, &options).unwrap();
+        assert_eq!(found.kept, [0, 2]);
+        assert_eq!(found.values[1].to_bits(), 8.0_f64.to_bits());
+        for j in [0, 2] {
+            assert!((found.values[j] - truth[j]).abs() < 5.0 * found.std[j]);
+        }
+        // What is well told moves away from where it would be held.
+        let found = essential(&triangle, &solution, &deviations, &[1.0, 8.0, 5.0], &options).unwrap();
+        assert_eq!(found.kept, [0, 2]);
     }
 }

@@ -60,6 +60,16 @@ impl Triangle {
         solve_triangle(&self.entries, self.rows, nominal)
     }
 
+    /// The same rows for the differences of the parameters from some values.
+    pub(crate) fn from(&self, values: &[f64]) -> Self {
+        let mut shifted = self.clone();
+        for row in shifted.entries.chunks_exact_mut(self.n + 1) {
+            let explained: f64 = row.iter().zip(values).map(|(w, value)| w * value).sum();
+            row[self.n] -= explained;
+        }
+        shifted
+    }
+
     /// The regression of some of the columns alone; the parameters of the others are 0.
     /// Fails when a column is not there.
     pub fn only(&self, columns: &[usize]) -> Result<Self, LeastSquaresError> {

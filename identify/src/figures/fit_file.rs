@@ -39,7 +39,8 @@ pub enum Status {
     Identified,
     /// The recordings do not say it: the value is the nearest to the nominal ones that fits.
     Undetermined,
-    /// Left out at 0, as the recordings do not support it beside the others (`identify --essential`).
+    /// Kept at its nominal value, or at 0 where there is none, as the recordings do not support another one beside the
+    /// others (`identify --essential`).
     NotEssential,
     /// A number of the model file, which was taken off the measured forces before the fit.
     Known,
@@ -113,6 +114,28 @@ pub struct FitFile {
     /// Remarks on the data.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub data: Vec<Note>,
+    /// What the estimator found beside the values, of which only physical parameters are read again.
+    #[serde(default, skip_serializing)]
+    pub estimator: Estimator,
+}
+
+/// What the estimator found beside the values of a fit.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+pub struct Estimator {
+    /// Physical parameters that bodies can have, where these were asked for.
+    #[serde(default)]
+    physical: Option<Physical>,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct Physical {
+    parameters: Vec<PhysicalValue>,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct PhysicalValue {
+    name: String,
+    value: f64,
 }
 
 /// The parameters of a fit file from the model's description, the solution and its deviations,
@@ -155,6 +178,12 @@ pub fn fit_parameters(
 }
 
 impl FitFile {
+    /// Physical parameters that bodies can have, by their names; none unless they were asked for.
+    pub fn physical(&self) -> Vec<(String, f64)> {
+        let found = self.estimator.physical.iter().flat_map(|found| &found.parameters);
+        found.map(|one| (one.name.clone(), one.value)).collect()
+    }
+
     /// Covariance of some of the parameters, by their positions: the file's, or else the squares of its standard
     /// deviations as if the values were independent; `None` where a deviation is missing. The flag says whether the
     /// file's own was taken.

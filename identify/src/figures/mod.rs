@@ -16,7 +16,7 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
 pub use fit_error::{FitFault, FitFileError};
-pub use fit_file::{FitFile, FitParameter, ParameterInfo, Status, fit_parameters};
+pub use fit_file::{Estimator, FitFile, FitParameter, ParameterInfo, Status, fit_parameters};
 pub use locate::{LocateOptions, Region, TIME_COLUMN, locate};
 
 /// Error figures of a comparison.

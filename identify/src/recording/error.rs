@@ -64,6 +64,18 @@ pub enum Fault {
         /// What messages call them.
         parts: Vec<String>,
     },
+    /// Two files of one run have a column that is needed.
+    InBoth {
+        /// Its name.
+        name: String,
+        /// The other file.
+        other: String,
+    },
+    /// A sum of columns takes them from several files.
+    AcrossFiles {
+        /// The column that it makes.
+        name: String,
+    },
     /// The first line holds numbers where column names are expected.
     NoHeader,
     /// The separator cannot be told from the first line.
@@ -266,6 +278,14 @@ impl fmt::Display for Fault {
                 f,
                 "{} have no samples at the same time, so they cannot be joined; are their clocks the same?",
                 list(parts)
+            ),
+            Self::InBoth { name, other } => write!(
+                f,
+                "the column `{name}` is in {other} too; rename it in one of the two files, or leave one of them out"
+            ),
+            Self::AcrossFiles { name } => write!(
+                f,
+                "`{name}` is a sum of columns of several files, which is read from one file only; add them up in a file before"
             ),
             Self::NoHeader => f.write_str(
                 "the first line holds numbers, but column names are expected there; \

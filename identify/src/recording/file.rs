@@ -94,7 +94,7 @@ impl RecordingFile {
         }
     }
 
-    fn fault(&self, fault: Fault) -> RecordingError {
+    pub(crate) fn fault(&self, fault: Fault) -> RecordingError {
         RecordingError {
             file: self.name.clone(),
             fault,

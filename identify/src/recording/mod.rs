@@ -15,6 +15,7 @@ mod notes;
 mod options;
 mod read;
 mod tables;
+mod together;
 
 use indexmap::IndexMap;
 
@@ -25,6 +26,7 @@ pub use notes::{Note, Severity};
 pub use options::{Computed, NotFinite, ReadOptions};
 pub use read::{name_of_bytes, place_word};
 pub use tables::{ColumnInfo, TableInfo};
+pub use together::RecordingFiles;
 
 use column::{Column, Defect, missing};
 pub(crate) use gaps::GAP;

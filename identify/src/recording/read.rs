@@ -12,7 +12,7 @@ use crate::recording::{ReadOptions, Recording};
 
 impl Recording {
     /// Reads a file; `renames` are pairs `(ours, theirs)`.
-    /// Parquet and MATLAB's format 5 are told from CSV text by their first bytes.
+    /// Every other format is told from CSV text by its first bytes.
     ///
     /// Fails when the file cannot be read, is empty, has no header, duplicate or missing names,
     /// lines of unequal length, or more numbers than [`ReadOptions::most_numbers`].

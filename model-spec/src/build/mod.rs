@@ -8,6 +8,7 @@ mod bodies;
 pub(crate) mod effect_places;
 mod effects;
 mod frames;
+mod identified;
 mod joints;
 mod limits;
 mod retain;
@@ -68,6 +69,7 @@ pub(crate) fn build(
     let (gravity, force_delay) = mechanics::whole(&effects, gravity, &symbols.constants);
     let retain = retain::retain(model, &symbols, log);
     let limits = limits::limits(model, &symbols.coordinates, &drives, &points.points, log);
+    let identified_base = identified::identified(model, &mut symbols, log);
     let columns = actuation::recording(model, &symbols, &drives, log);
     actuation::check_place_names(model, log);
     if log.n_errors() == 0 {
@@ -96,6 +98,7 @@ pub(crate) fn build(
         drives,
         effects,
         force_delay,
+        identified_base,
         retain,
         limits,
         recording: Recording { columns },

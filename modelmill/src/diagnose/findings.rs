@@ -219,7 +219,9 @@ fn with_effects(
     held: Held,
 ) -> Outcome<Version> {
     let delay = model.derivation.mechanism.force_delay;
-    let model = model.host().derive(&model.path, edited.loaded.clone())?;
+    let model = (model.host())
+        .derive(&model.path, edited.loaded.clone())?
+        .with_values_of(model);
     let is_later = model.derivation.mechanism.force_delay.to_bits() != delay.to_bits();
     let [fit, check] = if is_later {
         // With a delay forces belong to earlier states.

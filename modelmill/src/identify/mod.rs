@@ -8,7 +8,7 @@ mod standstill;
 
 use modelmill_identify::estimate::FEWEST_ROWS;
 use modelmill_identify::fit_parameters;
-use modelmill_identify::{Figures, FitFile, FitParameter, Note, ParameterInfo, Repeats, Status};
+use modelmill_identify::{Estimator, Figures, FitFile, FitParameter, Note, ParameterInfo, Repeats, Status};
 use modelmill_spec::Sign;
 
 use crate::along;
@@ -138,6 +138,7 @@ pub fn identify(
             fit,
             check,
             data: all_notes,
+            estimator: Estimator::default(),
         },
         nominal_fit,
         nominal_check,

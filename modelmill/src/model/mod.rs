@@ -46,6 +46,8 @@ pub struct Model {
     pub nominal: Vec<f64>,
     /// What was found on the way that may not be intended, beside the warnings of `loaded`.
     pub notes: Vec<Note>,
+    /// Whether the value in `nominal` was identified, in the file or in a fit that was given.
+    identified: Vec<bool>,
     /// The sign that each dynamic parameter must have.
     signs: Vec<Sign>,
     /// Where the file came from.
@@ -102,6 +104,19 @@ impl Host {
             let place = place.unwrap_or_else(|| path.to_owned());
             notes.push(Note::warning(format!("{place}: {says}")));
         }
+        let found = derivation.identified_base();
+        let said = derivation.mechanism.identified_base.len();
+        if found.len() < said {
+            notes.push(Note::warning(format!(
+                "{path}: {} of the {said} values of `identified.base` are of no base parameter of this model and left aside; \
+                 identify it again and let verb `adopt` write the values",
+                said - found.len()
+            )));
+        }
+        let mut identified = vec![false; derivation.reduction.retained.len()];
+        for (k, _) in found {
+            identified[k] = true;
+        }
         let stem = Path::new(path).file_stem();
         Ok(Model {
             name: stem.map_or_else(
@@ -111,6 +126,7 @@ impl Host {
             path: path.to_owned(),
             base: base(&derivation),
             nominal: derivation.nominal_base_values(),
+            identified,
             signs: signs(mechanism, &loaded.kinds),
             loaded: Arc::new(loaded),
             derivation: Arc::new(derivation),
@@ -376,8 +392,34 @@ impl Model {
             .collect()
     }
 
-    /// Whether the file gives a nominal value for anything that a base parameter consists of.
+    /// The model with other values of its base parameters in the place of the file's, such as those of a fit; in its order.
+    #[must_use]
+    pub fn with_values(&self, values: &[f64]) -> Self {
+        assert_eq!(values.len(), self.base.len(), "one value per base parameter");
+        Self {
+            nominal: values.to_vec(),
+            identified: vec![true; values.len()],
+            ..self.clone()
+        }
+    }
+
+    /// The model with the values of another one for all base parameters that both have.
+    pub(crate) fn with_values_of(mut self, other: &Self) -> Self {
+        for (k, base) in self.base.iter().enumerate() {
+            let same = other.base.iter().position(|one| one.expression == base.expression);
+            if let Some(i) = same.filter(|i| other.identified[*i]) {
+                self.nominal[k] = other.nominal[i];
+                self.identified[k] = true;
+            }
+        }
+        self
+    }
+
+    /// Whether the file gives a nominal value for anything that a base parameter consists of, or its value was identified.
     pub fn has_nominal(&self, k: usize) -> bool {
+        if self.identified[k] {
+            return true;
+        }
         let reduction = &self.derivation.reduction;
         let parameters = &self.derivation.mechanism.parameters;
         let lumped = reduction

@@ -163,7 +163,7 @@ pub(crate) fn text(model: &Model, found: &Identified, infos: &[ParameterInfo]) -
                 "all base parameters are essential".to_owned()
             } else {
                 format!(
-                    "not essential, left out at 0: {}; the residual rises by {}",
+                    "not essential, kept at their nominal values (0 where there is none): {}; the residual rises by {}",
                     names.join(", "),
                     percent(Some(*rise))
                 )

@@ -74,6 +74,8 @@ impl Identification {
             figures.push(("check, identified", check));
         }
         lines.extend(tables::figures(&figures));
+        lines.push(String::new());
+        lines.push(self.next_step());
         lines.join("\n")
     }
 }

@@ -2,6 +2,7 @@
 
 mod changes;
 mod comparison;
+mod contents;
 pub mod edit;
 pub mod effects;
 mod estimation;
@@ -9,6 +10,7 @@ mod excitation;
 mod findings;
 mod identification;
 mod interpretation;
+mod next_step;
 mod reduction;
 mod spelling;
 mod summary;

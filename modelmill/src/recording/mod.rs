@@ -2,12 +2,13 @@
 //! believed.
 
 mod columns;
+mod contents;
 mod options;
 
 use std::path::Path;
 use std::sync::Arc;
 
-use modelmill_identify::{Note, Recording as Raw, RecordingFile, Run};
+use modelmill_identify::{Note, Recording as Raw, RecordingFiles, Run};
 
 use crate::audit;
 use crate::error::{Error, Outcome};
@@ -17,13 +18,14 @@ use crate::stretch::{Stretch, variances};
 
 use columns::read_options;
 
+pub use contents::{ColumnInfo, Contents, TableInfo};
 pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER};
 pub use modelmill_identify::{Preparation, Smoothing};
 pub use options::Reading;
 
 /// Reads a recording with the columns that a model needs.
-fn read_raw(model: &Model, path: &Path, reading: &Reading) -> Outcome<Raw> {
-    let file = RecordingFile::open(model.host().files(), path)?;
+fn read_raw(model: &Model, paths: &[&Path], reading: &Reading) -> Outcome<Raw> {
+    let file = RecordingFiles::open(model.host().files(), paths)?;
     let name = file.name();
     let options = read_options(model, reading, &file.names()?, name)?;
     Ok(model
@@ -49,7 +51,7 @@ pub(crate) fn read_as_recorded(
     path: &Path,
     reading: &Reading,
 ) -> Outcome<Vec<Stretch>> {
-    let raw = read_raw(model, path, reading)?;
+    let raw = read_raw(model, &[path], reading)?;
     let mut data = prepare(model, &raw, reading, 0.0)?;
     note_idle_options(&mut data, reading);
     for note in data.iter().flat_map(Stretch::notes) {
@@ -185,18 +187,24 @@ pub struct Recording {
 }
 
 impl Model {
-    /// Reads a recording (CSV, Parquet or MATLAB's format 5), prepares its states, and looks at it before anything is believed:
+    /// Reads a recording (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2), prepares its states, and looks at it before anything is believed:
     /// what was done and what looks odd stands in the notes of its stretches.
     ///
     /// Fails with place and remedy when a column is missing or holds no number, or time stands still.
     pub fn recording(&self, path: impl AsRef<Path>, reading: &Reading) -> Outcome<Recording> {
-        let path = path.as_ref();
-        let raw = read_raw(self, path, reading).map_err(|failure| {
-            kinds_of_files::kind(self.host(), path).map_or(failure, |kind| {
+        self.recording_of(&[path.as_ref()], reading)
+    }
+
+    /// As [`Model::recording`], of several files of one run, whose columns are joined on time: the slowest gives the
+    /// samples, and the others are interpolated.
+    pub fn recording_of(&self, paths: &[&Path], reading: &Reading) -> Outcome<Recording> {
+        let raw = read_raw(self, paths, reading).map_err(|failure| {
+            let kinds = paths.iter().map(|path| (path, kinds_of_files::kind(self.host(), path)));
+            let mut others = kinds.filter_map(|(path, kind)| Some((path.display(), kind?)));
+            others.next().map_or(failure, |(path, kind)| {
                 Error::input(format!(
-                    "{} is {kind}; a recording is expected (CSV, Parquet or MATLAB), with a column `t` and one for each \
-                     coordinate and drive",
-                    path.display()
+                    "{path} is {kind}; a recording is expected (CSV, Parquet, MATLAB, HDF5, MCAP or rosbag2), with a column \
+                     `t` and one for each coordinate and drive"
                 ))
             })
         })?;

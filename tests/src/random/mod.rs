@@ -73,6 +73,7 @@ impl Draft {
                 drives: Vec::new(),
                 effects: Vec::new(),
                 force_delay: 0.0,
+                identified_base: Vec::new(),
                 retain: Vec::new(),
                 limits: Limits::default(),
                 recording: Recording::default(),

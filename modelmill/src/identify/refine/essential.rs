@@ -5,15 +5,21 @@ use modelmill_identify::estimate::{EssentialOptions, Estimate, essential};
 use super::Refined;
 use crate::error::Outcome;
 
-/// Leaves out parameters until all others are needed.
-pub(super) fn refine(found: &mut Estimate) -> Outcome<Refined> {
+/// Leaves out parameters until all others are needed; those that are left out keep their nominal values.
+pub(super) fn refine(found: &mut Estimate, nominal: &[f64]) -> Outcome<Refined> {
     let Estimate {
         solution,
         deviations,
         triangle,
         ..
     } = found;
-    let kept = essential(triangle, solution, deviations, &EssentialOptions::default())?;
+    let kept = essential(
+        triangle,
+        solution,
+        deviations,
+        nominal,
+        &EssentialOptions::default(),
+    )?;
     solution.values = kept.values;
     solution.classical_std = kept.classical_std;
     solution.condition_number = kept.condition_number;

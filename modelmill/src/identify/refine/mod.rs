@@ -72,7 +72,7 @@ pub(crate) fn refine(
     match refinement {
         Refinement::None => Ok(Refined::Nothing),
         Refinement::Prior(sigma) => prior::refine(model, found, unknown, nominal, sigma),
-        Refinement::Essential => essential::refine(found),
+        Refinement::Essential => essential::refine(found, nominal),
         Refinement::Physical => physical::refine(model, found, unknown),
     }
 }

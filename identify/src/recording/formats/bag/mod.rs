@@ -97,7 +97,6 @@ struct Arrival {
 /// Columns of a topic that are in the same messages.
 struct Table {
     topic: String,
-    kind: String,
     columns: Vec<(String, &'static str, Option<Vec<f64>>)>,
     /// Times of the messages whose numbers are kept, ns.
     time: Vec<i64>,
@@ -301,7 +300,6 @@ impl Topic {
                 samples: forms().map(|form| form.count).sum(),
                 span,
                 topic: self.name.clone(),
-                kind: self.kind.clone(),
                 time: order.iter().map(|k| time_of(messages[*k])).collect(),
                 has_stamps,
                 columns: columns

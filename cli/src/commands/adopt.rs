@@ -1,0 +1,63 @@
+//! `adopt`: a fit goes into a model file; the difference is shown.
+
+use std::path::Path;
+
+use modelmill::Host;
+use modelmill::print::edit;
+use serde_json::json;
+
+use crate::args::AdoptArgs;
+use crate::failure::Outcome;
+use crate::output::{self, Target};
+use crate::{commands, terminal};
+
+/// Edits the model file, prints the difference, and writes the result where the user asks for it.
+pub(crate) fn run(host: &Host, args: &AdoptArgs) -> Outcome {
+    let model = commands::model(host, &args.model)?;
+    let inputs = model.files().chain(std::iter::once::<&Path>(args.fit.as_ref()));
+    let target = args
+        .out
+        .as_ref()
+        .map(|path| Target::new(path, inputs))
+        .transpose()?;
+    let fit = host.fit(&args.fit)?;
+    let adoption = model.adopt(&fit, &args.fit.display().to_string())?;
+    for note in &adoption.notes {
+        terminal::remark(note);
+    }
+    let path = args.model.display().to_string();
+    // What is written must be sound where it is written: paths in it start from its folder.
+    let loaded = match &target {
+        Some(target) => host.load_text(target.path(), &adoption.text)?,
+        None => adoption.loaded,
+    };
+    commands::derived(host, &path, loaded)?;
+    let written = match (&target, args.in_place) {
+        (Some(target), _) => {
+            target.write(&adoption.text)?;
+            Some(target.path().display().to_string())
+        }
+        (None, true) => {
+            output::replace(&args.model, &adoption.text)?;
+            Some(path.clone())
+        }
+        (None, false) => None,
+    };
+    let name = written.as_deref().unwrap_or(&path);
+    let difference = edit::difference(model.text(), &adoption.text, [&path, name]);
+    if args.json {
+        return terminal::print_json(&json!({
+            "model": model.name,
+            "parameters": adoption.adopted.parameters.len(),
+            "base": adoption.adopted.base.len(),
+            "diff": difference,
+            "written": written,
+        }));
+    }
+    terminal::print(&edit::coloured(&difference, terminal::style()))?;
+    terminal::note(&match written {
+        Some(name) => format!("{name} is written; its nominal values are those of the fit now"),
+        None => "nothing is written; add --in-place to change the model file, or --out FILE to write another one".to_owned(),
+    });
+    Ok(())
+}

@@ -1,0 +1,22 @@
+//! `recordings`: what files hold.
+
+use modelmill::Host;
+use serde_json::Value;
+
+use crate::args::RecordingsArgs;
+use crate::failure::Outcome;
+use crate::terminal;
+
+/// Prints tables and topics with their columns.
+pub(crate) fn run(host: &Host, args: &RecordingsArgs) -> Outcome {
+    let mut found = Vec::new();
+    for path in &args.files {
+        found.push(host.recordings(path)?);
+    }
+    if args.json {
+        let found: Vec<Value> = found.iter().map(|contents| contents.json()).collect();
+        return terminal::print_json(&Value::from(found));
+    }
+    let texts = found.iter().map(|contents| contents.text(terminal::style()));
+    terminal::print(&texts.collect::<Vec<_>>().join("\n\n"))
+}

@@ -1,0 +1,173 @@
+//! Several files of one run: opened together, read each by itself, joined on their times.
+
+use std::path::Path;
+
+use modelmill_boundary::files::Files;
+
+use crate::recording::column::Column;
+use crate::recording::error::{Fault, RecordingError};
+use crate::recording::join::{Part, joined};
+use crate::recording::notes::Note;
+use crate::recording::{ReadOptions, Recording, RecordingFile};
+use crate::words::list;
+
+/// Files of one run, whose columns are joined on time; most often there is one.
+pub struct RecordingFiles {
+    name: String,
+    files: Vec<RecordingFile>,
+}
+
+impl RecordingFiles {
+    /// Opens files; fails when one of them cannot be read, or there is none.
+    pub fn open(files: &dyn Files, paths: &[&Path]) -> Result<Self, RecordingError> {
+        let opened = paths.iter().map(|path| RecordingFile::open(files, path));
+        let files = opened.collect::<Result<Vec<_>, _>>()?;
+        if files.is_empty() {
+            return Err(RecordingError {
+                file: "a recording".to_owned(),
+                fault: Fault::Unreadable {
+                    reason: "no file is given".to_owned(),
+                },
+            });
+        }
+        let names: Vec<&str> = files.iter().map(RecordingFile::name).collect();
+        Ok(Self {
+            name: names.join("+"),
+            files,
+        })
+    }
+
+    /// What messages call them.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Names of all columns, those of the first file first; a name that an earlier file has too stands once.
+    pub fn names(&self) -> Result<Vec<String>, RecordingError> {
+        let mut all = Vec::new();
+        for file in &self.files {
+            let names = file.names()?;
+            all.extend(names.into_iter().filter(|name| !all.contains(name)).collect::<Vec<_>>());
+        }
+        Ok(all)
+    }
+
+    /// Reads them; the column `t` of each file, or the one that stands for it, joins them.
+    ///
+    /// Fails as [`Recording::read`] does, when two files have a column that is needed, when a sum of columns takes them
+    /// from several files, and when the files have no time in common.
+    pub fn read(&self, options: &ReadOptions) -> Result<Recording, RecordingError> {
+        if let [file] = self.files.as_slice() {
+            return file.read(options);
+        }
+        let names = self.files.iter().map(RecordingFile::names);
+        let names = names.collect::<Result<Vec<_>, _>>()?;
+        self.check(&names, options)?;
+        let mut parts = Vec::new();
+        let mut notes = Vec::new();
+        for (file, names) in self.files.iter().zip(&names) {
+            let recording = file.read(&of_file(options, names))?;
+            notes.extend(recording.notes().iter().cloned());
+            parts.push(recording);
+        }
+        let mut columns: Vec<(String, Column)> = Vec::new();
+        let mut timed = Vec::new();
+        let mut idle = Vec::new();
+        for recording in &mut parts {
+            let time = recording.column("t")?.to_vec();
+            let mut values = Vec::new();
+            for (name, mut column) in std::mem::take(&mut recording.columns) {
+                if name != "t" {
+                    values.push((columns.len(), std::mem::take(&mut column.values)));
+                    columns.push((name, column));
+                }
+            }
+            if values.is_empty() {
+                idle.push(recording.file.clone());
+                continue;
+            }
+            timed.push(Part {
+                name: recording.file.clone(),
+                time,
+                columns: values,
+            });
+        }
+        if !idle.is_empty() {
+            notes.push(Note::warning(format!("Nothing of {} is needed.", list(&idle))));
+        }
+        let together = joined(timed, &mut |note| notes.push(note));
+        let Some(together) = together.map_err(|fault| self.fault(fault))? else {
+            return Err(self.fault(Fault::NoSamples));
+        };
+        let lines = (1..=together.time.len() as u64).collect();
+        for (place, values) in together.columns {
+            columns[place].1.values = values;
+        }
+        let time = Column {
+            values: together.time,
+            ..Column::default()
+        };
+        let others = parts.into_iter().flat_map(|part| part.others);
+        Ok(Recording {
+            file: self.name.clone(),
+            others: others.collect(),
+            columns: std::iter::once(("t".to_owned(), time)).chain(columns).collect(),
+            lines,
+            notes,
+        })
+    }
+
+    /// Fails when it is not clear from which file something comes.
+    fn check(&self, names: &[Vec<String>], options: &ReadOptions) -> Result<(), RecordingError> {
+        let time: Vec<&str> = time_of(options);
+        for (k, of_file) in names.iter().enumerate() {
+            for name in of_file {
+                let is_time = time.contains(&name.as_str());
+                let twin = names[..k].iter().position(|others| others.contains(name));
+                if let (false, true, Some(twin)) = (is_time, options.needs(name), twin) {
+                    return Err(self.files[k].fault(Fault::InBoth {
+                        name: name.clone(),
+                        other: self.files[twin].name().to_owned(),
+                    }));
+                }
+            }
+        }
+        for computed in options.computed.iter().filter(|one| one.name != "t") {
+            let is_whole = |names: &Vec<String>| {
+                let mut terms = computed.terms.iter();
+                terms.all(|(name, _)| names.contains(name))
+            };
+            if !names.iter().any(is_whole) {
+                return Err(self.fault(Fault::AcrossFiles {
+                    name: computed.name.clone(),
+                }));
+            }
+        }
+        Ok(())
+    }
+
+    fn fault(&self, fault: Fault) -> RecordingError {
+        RecordingError {
+            file: self.name.clone(),
+            fault,
+        }
+    }
+}
+
+/// Names that files may have for the time.
+fn time_of(options: &ReadOptions) -> Vec<&str> {
+    let renamed = options.renames.iter().filter(|(ours, _)| ours == "t");
+    let computed = options.computed.iter().filter(|one| one.name == "t");
+    let terms = computed.flat_map(|one| one.terms.iter().map(|(name, _)| name.as_str()));
+    let theirs = renamed.map(|(_, theirs)| theirs.as_str());
+    theirs.chain(terms).chain(std::iter::once("t")).collect()
+}
+
+/// The options as far as they are about the columns of one file.
+fn of_file(options: &ReadOptions, names: &[String]) -> ReadOptions {
+    let mut own = options.clone();
+    own.renames.retain(|(_, theirs)| names.contains(theirs));
+    own.computed
+        .retain(|one| one.terms.iter().all(|(name, _)| names.contains(name)));
+    own
+}

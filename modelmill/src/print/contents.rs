@@ -1,0 +1,61 @@
+//! What a recording holds, as JSON and for people.
+
+use modelmill_identify::TableInfo;
+use serde_json::{Value, json};
+
+use crate::recording::Contents;
+use crate::text::Style;
+use crate::text::table::{Align, count, number, significant, table};
+
+impl Contents {
+    /// The tables as one JSON object.
+    pub fn json(&self) -> Value {
+        let of_table = |table: &TableInfo| {
+            let columns = table.columns.iter();
+            let columns = columns.map(|column| json!({ "name": column.name, "type": column.kind }));
+            json!({
+                "name": table.name,
+                "type": table.kind,
+                "samples": table.samples,
+                "rate": table.rate(),
+                "start": table.time.map(|(start, _)| start),
+                "end": table.time.map(|(_, end)| end),
+                "remark": table.remark,
+                "columns": columns.collect::<Vec<_>>(),
+            })
+        };
+        json!({ "file": self.file, "tables": self.tables.iter().map(of_table).collect::<Vec<_>>() })
+    }
+
+    /// The tables for people.
+    pub fn text(&self, style: Style) -> String {
+        let mut lines = vec![style.bold(&self.file)];
+        for one in &self.tables {
+            let mut head = String::new();
+            if !one.name.is_empty() {
+                head = format!("{} ({}): ", one.name, one.kind);
+            }
+            head.push_str(&count(one.samples, "sample", "samples"));
+            if let Some((start, end)) = one.time {
+                head.push_str(&format!(" from {} to {} s", number(start), number(end)));
+            }
+            if let Some(rate) = one.rate() {
+                head.push_str(&format!(", {} Hz", significant(rate, 4)));
+            }
+            lines.push(String::new());
+            lines.push(format!("  {head}"));
+            if let Some(remark) = &one.remark {
+                lines.push(format!("  {remark}"));
+            }
+            let rows = one.columns.iter();
+            let rows: Vec<Vec<String>> = rows
+                .map(|column| vec![column.name.clone(), column.kind.clone()])
+                .collect();
+            if !rows.is_empty() {
+                let head = [("column", Align::Left), ("type", Align::Left)];
+                lines.extend(table(4, &head, &rows));
+            }
+        }
+        lines.join("\n")
+    }
+}

@@ -1,0 +1,33 @@
+//! `recordings`: what files hold, before a model is held against them.
+
+use std::path::Path;
+
+use modelmill_identify::RecordingFile;
+
+use crate::error::Outcome;
+use crate::host::Host;
+
+pub use modelmill_identify::{ColumnInfo, TableInfo};
+
+/// What a file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contents {
+    /// What messages call it.
+    pub file: String,
+    /// Its tables, or the topics of a log.
+    pub tables: Vec<TableInfo>,
+}
+
+impl Host {
+    /// Lists the tables and topics of a recording with their columns, samples and rates.
+    ///
+    /// Fails when the file cannot be read.
+    pub fn recordings(&self, path: impl AsRef<Path>) -> Outcome<Contents> {
+        let file = RecordingFile::open(self.files(), path.as_ref())?;
+        let tables = self.watched(&format!("reading {}", file.name()), 0, |_| file.tables())??;
+        Ok(Contents {
+            file: file.name().to_owned(),
+            tables,
+        })
+    }
+}
