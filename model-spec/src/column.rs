@@ -505,12 +505,20 @@ mod tests {
 
     #[test]
     fn columns_of_logs_stand_in_sums() {
-        let names = ["joints.position.q", "joints.position.q2", "lab/split.effort.arm/wrist"].map(str::to_owned);
+        let names = [
+            "joints.position.q",
+            "joints.position.q2",
+            "lab/split.effort.arm/wrist",
+        ]
+        .map(str::to_owned);
         let read = |text: &str| read_column(text, Quantity::Angle(0), &names, &|_| None).unwrap();
         let sum = read("-joints.position.q/2 + 3*joints.position.q2");
         assert_eq!(
             sum.terms,
-            [("joints.position.q".to_owned(), -0.5), ("joints.position.q2".to_owned(), 3.0)]
+            [
+                ("joints.position.q".to_owned(), -0.5),
+                ("joints.position.q2".to_owned(), 3.0)
+            ]
         );
         let sum = read("2*lab/split.effort.arm/wrist - 1");
         assert_eq!(sum.terms, [("lab/split.effort.arm/wrist".to_owned(), 2.0)]);

@@ -190,7 +190,9 @@ pub fn adopt(text: &str, values: &Adopted) -> Result<String, String> {
     if let Some((key, _)) = get(&table, "identified") {
         let start = text[..key.span.start].rfind('\n').map_or(0, |end| end + 1);
         if text[start..].lines().next().map(str::trim) != Some("[identified]") {
-            return Err("write `[identified]` as a table of its own, on a line of its own".to_owned());
+            return Err(
+                "write `[identified]` as a table of its own, on a line of its own".to_owned(),
+            );
         }
         let mut end = text.len();
         let mut at = start;
@@ -203,13 +205,21 @@ pub fn adopt(text: &str, values: &Adopted) -> Result<String, String> {
         }
         // What stands above the next table belongs to it.
         let own = &text[start..end];
-        let last = own.trim_end().rfind(['\n', ']', '}']).unwrap_or(own.len() - 1);
-        let own_end = own[last..].find('\n').map_or(own.len(), |line| last + line + 1);
+        let last = own
+            .trim_end()
+            .rfind(['\n', ']', '}'])
+            .unwrap_or(own.len() - 1);
+        let own_end = own[last..]
+            .find('\n')
+            .map_or(own.len(), |line| last + line + 1);
         kept = format!("{}{}", text[..start].trim_end(), line_end);
         let rest = &text[start + own_end..];
         if !rest.trim().is_empty() {
             let block = identified(values, line_end);
-            return Ok(format!("{kept}{line_end}{block}{line_end}{}", rest.trim_start_matches(['\r', '\n'])));
+            return Ok(format!(
+                "{kept}{line_end}{block}{line_end}{}",
+                rest.trim_start_matches(['\r', '\n'])
+            ));
         }
     }
     if !kept.is_empty() {
@@ -228,14 +238,18 @@ fn identified(values: &Adopted, line_end: &str) -> String {
     lines.extend(comment.map(|line| format!("# {}", line.replace(char::is_control, " "))));
     if !values.parameters.is_empty() {
         let pairs = values.parameters.iter();
-        let pairs: Vec<String> = pairs.map(|(name, value)| format!("{name} = {value:?}")).collect();
+        let pairs: Vec<String> = pairs
+            .map(|(name, value)| format!("{name} = {value:?}"))
+            .collect();
         lines.push(format!("parameters = {{ {} }}", pairs.join(", ")));
     }
     if !values.base.is_empty() {
         lines.push("base = [".to_owned());
         for (expression, value) in &values.base {
             let expression = expression.replace('\\', "\\\\").replace('"', "\\\"");
-            lines.push(format!("  {{ expression = \"{expression}\", value = {value:?} }},"));
+            lines.push(format!(
+                "  {{ expression = \"{expression}\", value = {value:?} }},"
+            ));
         }
         lines.push("]".to_owned());
     }

@@ -32,7 +32,10 @@ impl Model {
     /// Fails when the file with the effects has no meaning: an unknown kind or place, a value that is missing, an effect twice.
     pub fn with(&self, effects: &[NewEffect]) -> Outcome<Model> {
         let added = added::add(self, effects)?;
-        Ok(self.host().derive(&self.path, added.loaded)?.with_values_of(self))
+        Ok(self
+            .host()
+            .derive(&self.path, added.loaded)?
+            .with_values_of(self))
     }
 }
 

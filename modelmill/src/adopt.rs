@@ -54,7 +54,9 @@ impl Model {
             }
             for (k, value) in values.values.iter().enumerate() {
                 if !self.is_known(k) {
-                    adopted.base.push((by_expression[k].expression.clone(), *value));
+                    adopted
+                        .base
+                        .push((by_expression[k].expression.clone(), *value));
                 }
             }
         } else {
@@ -68,7 +70,8 @@ impl Model {
                 adopted.parameters.push((name, value));
             }
         }
-        let text = adopt(self.text(), &adopted).map_err(|says| Error::input(format!("{}: {says}", self.path)))?;
+        let text = adopt(self.text(), &adopted)
+            .map_err(|says| Error::input(format!("{}: {says}", self.path)))?;
         let loaded = self.host().load_text(self.path.as_ref(), &text)?;
         Ok(Adoption {
             text,

@@ -434,7 +434,7 @@ pub(crate) struct RecordingsArgs {
     /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2)
     #[arg(required = true, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
-    /// Print one JSON array on standard output, with an object for each file
+    /// Print one JSON object on standard output
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -14,7 +14,9 @@ use crate::{commands, terminal};
 /// Edits the model file, prints the difference, and writes the result where the user asks for it.
 pub(crate) fn run(host: &Host, args: &AdoptArgs) -> Outcome {
     let model = commands::model(host, &args.model)?;
-    let inputs = model.files().chain(std::iter::once::<&Path>(args.fit.as_ref()));
+    let inputs = model
+        .files()
+        .chain(std::iter::once::<&Path>(args.fit.as_ref()));
     let target = args
         .out
         .as_ref()

@@ -14,7 +14,9 @@ use crate::{commands, terminal};
 
 /// Searches, and writes the trajectory and its picture.
 pub(crate) fn run(host: &Host, args: &ExciteArgs) -> Outcome {
-    let model = args.parameters.in_model(host, commands::model(host, &args.model)?)?;
+    let model = args
+        .parameters
+        .in_model(host, commands::model(host, &args.model)?)?;
     let target = Target::new(&args.out, model.files())?;
     let figure = Target::new(&figure_path(args), model.files())?;
     if figure.path() == target.path() {

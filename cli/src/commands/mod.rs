@@ -107,7 +107,9 @@ pub(crate) fn recordings(
 
 /// Diagnoses what the command line names.
 pub(crate) fn diagnose(host: &Host, args: &AskArgs, question: Question) -> Outcome<Findings> {
-    let model = args.parameters.in_model(host, self::model(host, &args.model)?)?;
+    let model = args
+        .parameters
+        .in_model(host, self::model(host, &args.model)?)?;
     let reading = args.preparation.reading();
     let fit = recordings(&model, &args.data, &reading)?;
     let check = recordings(&model, &args.check, &reading)?;

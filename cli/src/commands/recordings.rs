@@ -1,7 +1,7 @@
 //! `recordings`: what files hold.
 
 use modelmill::Host;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::args::RecordingsArgs;
 use crate::failure::Outcome;
@@ -15,8 +15,10 @@ pub(crate) fn run(host: &Host, args: &RecordingsArgs) -> Outcome {
     }
     if args.json {
         let found: Vec<Value> = found.iter().map(|contents| contents.json()).collect();
-        return terminal::print_json(&Value::from(found));
+        return terminal::print_json(&json!({ "recordings": found }));
     }
-    let texts = found.iter().map(|contents| contents.text(terminal::style()));
+    let texts = found
+        .iter()
+        .map(|contents| contents.text(terminal::style()));
     terminal::print(&texts.collect::<Vec<_>>().join("\n\n"))
 }

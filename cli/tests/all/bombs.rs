@@ -193,6 +193,100 @@ fn a_parquet_file_that_unpacks_to_gigabytes_is_refused() {
     }
 }
 
+/// Blocks of zstd that say a byte and how often it comes: 4 bytes for 128 KB.
+fn runs_of_zstd(n: u32, head: &[u8], byte: u8) -> Vec<u8> {
+    let mut bytes = vec![0x28, 0xB5, 0x2F, 0xFD, 0, 0x58];
+    let block = |length: u32, kind: u32, last: bool| {
+        let header = length << 3 | kind << 1 | u32::from(last);
+        header.to_le_bytes()[..3].to_vec()
+    };
+    bytes.extend(block(u32::try_from(head.len()).expect("short"), 0, false));
+    bytes.extend(head);
+    for i in 0..n {
+        bytes.extend(block(128 << 10, 1, i + 1 == n));
+        bytes.push(byte);
+    }
+    bytes
+}
+
+/// 25 GB of text in 800 KB.
+#[test]
+fn packed_text_that_unpacks_to_gigabytes_is_refused() {
+    let folder = folder("packed");
+    let two_link = model("two_link.toml");
+    let path = folder.join("lines.csv.zst");
+    let head = b"t,q1,q2,joint1,joint2\n";
+    std::fs::write(&path, runs_of_zstd(200_000, head, b'\n')).expect("written");
+    let args = ["compare", &two_link, "--data", &text(&path)];
+    refused(
+        &confined("exec", &args),
+        &["lines.csv.zst", "two hundred times"],
+    );
+}
+
+/// A record of MCAP: kind, length, content.
+fn record(kind: u8, bytes: &[u8]) -> Vec<u8> {
+    let length = bytes.len() as u64;
+    [&[kind], &length.to_le_bytes()[..], bytes].concat()
+}
+
+#[test]
+fn a_log_that_lies_of_its_size_is_refused() {
+    let folder = folder("mcap");
+    let two_link = model("two_link.toml");
+    let text_of = |text: &[u8]| {
+        [
+            &u32::try_from(text.len()).expect("short").to_le_bytes(),
+            text,
+        ]
+        .concat()
+    };
+    let chunk = |says: u64| {
+        let packed = runs_of_zstd(1024, b"", 0);
+        let fields = [
+            vec![0; 16],
+            says.to_le_bytes().to_vec(),
+            vec![0; 4],
+            text_of(b"zstd"),
+            (packed.len() as u64).to_le_bytes().to_vec(),
+            packed,
+        ];
+        record(6, &fields.concat())
+    };
+    let log = |chunks: Vec<u8>| [b"\x89MCAP0\r\n".to_vec(), record(1, &[0; 8]), chunks].concat();
+    let mut endless = log(Vec::new());
+    endless.push(6);
+    endless.extend((1_u64 << 60).to_le_bytes());
+    for (name, bytes, word) in [
+        (
+            "many.mcap",
+            log(chunk(128 << 20).repeat(100)),
+            "two hundred times",
+        ),
+        ("more.mcap", log(chunk(1000)), "more than the file says"),
+        ("long.mcap", endless, "larger than 128 MB"),
+    ] {
+        let path = folder.join(name);
+        std::fs::write(&path, bytes).expect("written");
+        let args = ["compare", &two_link, "--data", &text(&path)];
+        refused(&confined("exec", &args), &[name, word]);
+    }
+}
+
+/// A million million samples, and a chunk of 2 GB, in some kilobytes.
+#[test]
+fn an_hdf5_file_that_says_to_be_large_is_refused() {
+    let two_link = model("two_link.toml");
+    for (name, word) in [
+        ("bomb-long.h5", "too large"),
+        ("bomb-chunk.h5", "smaller ones"),
+    ] {
+        let path = crate::common::workspace("identify/tests/fixtures").join(name);
+        let args = ["compare", &two_link, "--data", &text(&path)];
+        refused(&confined("exec", &args), &[name, word]);
+    }
+}
+
 /// Says a text again and again into a named pipe, for as long as somebody listens.
 struct Endless {
     pipe: PathBuf,

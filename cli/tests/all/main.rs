@@ -20,6 +20,7 @@ mod excited_rig;
 mod experiment;
 mod faulty_recordings;
 mod figures;
+mod formats;
 mod guide;
 mod hidden_cases;
 mod hidden_effects;

@@ -377,7 +377,14 @@ mod tests {
             assert!((found.values[j] - truth[j]).abs() < 5.0 * found.std[j]);
         }
         // What is well told moves away from where it would be held.
-        let found = essential(&triangle, &solution, &deviations, &[1.0, 8.0, 5.0], &options).unwrap();
+        let found = essential(
+            &triangle,
+            &solution,
+            &deviations,
+            &[1.0, 8.0, 5.0],
+            &options,
+        )
+        .unwrap();
         assert_eq!(found.kept, [0, 2]);
     }
 }

@@ -180,7 +180,11 @@ pub fn fit_parameters(
 impl FitFile {
     /// Physical parameters that bodies can have, by their names; none unless they were asked for.
     pub fn physical(&self) -> Vec<(String, f64)> {
-        let found = self.estimator.physical.iter().flat_map(|found| &found.parameters);
+        let found = self
+            .estimator
+            .physical
+            .iter()
+            .flat_map(|found| &found.parameters);
         found.map(|one| (one.name.clone(), one.value)).collect()
     }
 

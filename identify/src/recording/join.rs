@@ -53,12 +53,15 @@ pub(crate) fn joined(
         .max_by_key(|i| parts[*i].columns.len())
         .unwrap_or(0);
     let base_step = steps[base];
-    let others_steps: Vec<f64> = (0..steps.len()).filter(|i| *i != base).map(|i| steps[i]).collect();
+    let others_steps: Vec<f64> = (0..steps.len())
+        .filter(|i| *i != base)
+        .map(|i| steps[i])
+        .collect();
     let names: Vec<String> = parts.iter().map(|part| part.name.clone()).collect();
     let base = parts.remove(base);
     let n = base.time.len();
     let mut is_covered = vec![true; n];
-    let mut interpolated = Vec::new();
+    let mut others = Vec::new();
     let mut columns = base.columns;
     for (part, step) in parts.into_iter().zip(others_steps) {
         let around: Vec<Option<(usize, f64)>> = base
@@ -69,12 +72,14 @@ pub(crate) fn joined(
         for (covered, around) in is_covered.iter_mut().zip(&around) {
             *covered &= around.is_some();
         }
-        if around.iter().flatten().any(|(_, share)| *share != 0.0) {
-            interpolated.push(part.name);
+        if part.time != base.time {
+            others.push(part.name);
         }
         for (place, values) in part.columns {
             let value = |around: &Option<(usize, f64)>| match around {
-                Some((k, share)) if *share != 0.0 => values[*k] + share * (values[k + 1] - values[*k]),
+                Some((k, share)) if *share != 0.0 => {
+                    values[*k] + share * (values[k + 1] - values[*k])
+                }
                 Some((k, _)) => values[*k],
                 None => f64::NAN,
             };
@@ -85,12 +90,13 @@ pub(crate) fn joined(
     if covered == 0 {
         return Err(Fault::NothingInCommon { parts: names });
     }
-    if !interpolated.is_empty() {
+    if !others.is_empty() {
         tell(Note::info(format!(
-            "Samples are those of `{}`, {base_step:.3e} s apart; {} {} interpolated at their times.",
+            "Samples are those of `{}`, {base_step:.3e} s apart; {} {} taken at their times, between samples by straight \
+             lines.",
             base.name,
-            list(&interpolated),
-            if interpolated.len() == 1 { "is" } else { "are" },
+            list(&others),
+            if others.len() == 1 { "is" } else { "are" },
         )));
     }
     if covered < n {
@@ -103,11 +109,17 @@ pub(crate) fn joined(
     }
     let kept = |values: Vec<f64>| -> Vec<f64> {
         let pairs = values.into_iter().zip(&is_covered);
-        pairs.filter(|(_, covered)| **covered).map(|(value, _)| value).collect()
+        pairs
+            .filter(|(_, covered)| **covered)
+            .map(|(value, _)| value)
+            .collect()
     };
     Ok(Some(Joined {
         time: kept(base.time),
-        columns: columns.into_iter().map(|(place, values)| (place, kept(values))).collect(),
+        columns: columns
+            .into_iter()
+            .map(|(place, values)| (place, kept(values)))
+            .collect(),
     }))
 }
 

@@ -38,7 +38,16 @@ impl TableInfo {
 }
 
 /// Names that time usually has, in small letters.
-const OF_TIME: [&str; 8] = ["t", "time", "t_s", "time_s", "timestamp", "stamp", "seconds", "sec"];
+const OF_TIME: [&str; 8] = [
+    "t",
+    "time",
+    "t_s",
+    "time_s",
+    "timestamp",
+    "stamp",
+    "seconds",
+    "sec",
+];
 
 /// The column that is likely to be the time.
 pub(crate) fn likely_time(names: &[String]) -> Option<&String> {

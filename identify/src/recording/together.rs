@@ -47,7 +47,12 @@ impl RecordingFiles {
         let mut all = Vec::new();
         for file in &self.files {
             let names = file.names()?;
-            all.extend(names.into_iter().filter(|name| !all.contains(name)).collect::<Vec<_>>());
+            all.extend(
+                names
+                    .into_iter()
+                    .filter(|name| !all.contains(name))
+                    .collect::<Vec<_>>(),
+            );
         }
         Ok(all)
     }
@@ -93,7 +98,10 @@ impl RecordingFiles {
             });
         }
         if !idle.is_empty() {
-            notes.push(Note::warning(format!("Nothing of {} is needed.", list(&idle))));
+            notes.push(Note::warning(format!(
+                "Nothing of {} is needed.",
+                list(&idle)
+            )));
         }
         let together = joined(timed, &mut |note| notes.push(note));
         let Some(together) = together.map_err(|fault| self.fault(fault))? else {
@@ -111,7 +119,9 @@ impl RecordingFiles {
         Ok(Recording {
             file: self.name.clone(),
             others: others.collect(),
-            columns: std::iter::once(("t".to_owned(), time)).chain(columns).collect(),
+            columns: std::iter::once(("t".to_owned(), time))
+                .chain(columns)
+                .collect(),
             lines,
             notes,
         })

@@ -78,12 +78,20 @@ fn same_in(folder: &Path) {
         for name in OURS {
             let (found, expected) = (recording.column(name).unwrap(), csv.column(name).unwrap());
             for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
-                assert_eq!(found.to_bits(), expected.to_bits(), "{file}: {name}, sample {k}");
+                assert_eq!(
+                    found.to_bits(),
+                    expected.to_bits(),
+                    "{file}: {name}, sample {k}"
+                );
             }
         }
         let bytes = std::fs::read(&path).unwrap();
         let piped = Recording::from_bytes(&bytes, "a pipe", &options(&theirs)).unwrap();
-        assert_eq!(piped.column("tau_2").unwrap(), csv.column("tau_2").unwrap(), "{file}");
+        assert_eq!(
+            piped.column("tau_2").unwrap(),
+            csv.column("tau_2").unwrap(),
+            "{file}"
+        );
         let with_columns = tables(&path).into_iter().find(|table| {
             let mut columns = table.columns.iter();
             columns.any(|column| column.name == theirs[1])
@@ -110,7 +118,9 @@ fn files_that_are_made_now_give_the_same_numbers() {
     let packages = "import h5py, pyarrow, mcap_ros2, rosbags, zstandard";
     let has = Command::new(&python).args(["-c", packages]).output();
     if !has.is_ok_and(|output| output.status.success()) {
-        println!("left out: `{python}` lacks packages ({packages}); MODELMILL_PYTHON names another one");
+        println!(
+            "left out: `{python}` lacks packages ({packages}); MODELMILL_PYTHON names another one"
+        );
         return;
     }
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("logs");
@@ -122,7 +132,11 @@ fn files_that_are_made_now_give_the_same_numbers() {
         .arg("3001")
         .output()
         .unwrap();
-    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    assert!(
+        made.status.success(),
+        "{}",
+        String::from_utf8_lossy(&made.stderr)
+    );
     same_in(&folder);
 }
 
@@ -137,14 +151,21 @@ fn whole_numbers_of_all_types_are_read_right() {
                 ("u8", "uint32", (200.0 + x) % 256.0),
                 ("u16", "uint32", 65535.0 - x),
                 ("u32", "uint32", 4_294_967_295.0 - x),
-                ("u64", "uint64", 18_446_744_073_709_551_616.0 - 4096.0 * (x + 1.0)),
+                (
+                    "u64",
+                    "uint64",
+                    18_446_744_073_709_551_616.0 - 4096.0 * (x + 1.0),
+                ),
                 ("i8", "int32", x - 128.0),
                 ("i16", "int32", -x),
                 ("i32", "int32", x - 2_147_483_648.0),
                 ("i64", "int64", 1024.0 * x - 4_611_686_018_427_387_904.0),
             ] {
                 let value = recording.column(name).unwrap()[k];
-                assert!(value.total_cmp(&expected).is_eq() || value == expected, "{name}: {value}");
+                assert!(
+                    value.total_cmp(&expected).is_eq() || value == expected,
+                    "{name}: {value}"
+                );
                 let said = kinds.iter().find(|column| column.name == name).unwrap();
                 assert_eq!(said.kind, kind, "{name}");
             }
@@ -166,7 +187,10 @@ fn datasets_of_all_types_are_read_right() {
                 ("more.group11.x", q + 11.0),
             ] {
                 let value = recording.column(name).unwrap()[k];
-                assert!((value - expected).abs() < 1e-12, "{file}: {name} is {value}");
+                assert!(
+                    (value - expected).abs() < 1e-12,
+                    "{file}: {name} is {value}"
+                );
             }
         }
         let notes = recording.notes();
@@ -181,9 +205,15 @@ fn datasets_of_all_types_are_read_right() {
 fn messages_of_any_type_become_columns() {
     let path = fixtures().join("run-zstd.mcap");
     let topics = tables(&path);
-    let status: Vec<_> = topics.iter().filter(|topic| topic.name == "status").collect();
+    let status: Vec<_> = topics
+        .iter()
+        .filter(|topic| topic.name == "status")
+        .collect();
     assert_eq!(status.len(), 1);
-    assert_eq!((status[0].kind.as_str(), status[0].samples), ("lab_msgs/msg/Status", 12));
+    assert_eq!(
+        (status[0].kind.as_str(), status[0].samples),
+        ("lab_msgs/msg/Status", 12)
+    );
     let columns: Vec<String> = status[0]
         .columns
         .iter()
@@ -216,14 +246,27 @@ fn messages_of_any_type_become_columns() {
     };
     let current = one("status.drives.right.current");
     let expected: Vec<f64> = (0..12).map(|i| -5.0 * f64::from(i)).collect();
-    assert_eq!(current.column("status.drives.right.current").unwrap(), expected);
+    assert_eq!(
+        current.column("status.drives.right.current").unwrap(),
+        expected
+    );
     assert!(
         current.notes()[0].says.contains("`status`") && current.notes()[0].says.contains("arrival"),
         "{:?}",
         current.notes()
     );
-    assert_eq!(one("status.drives.left.count").column("status.drives.left.count").unwrap()[1], 9_007_199_254_741_002.0);
-    assert_eq!(one("status.temperatures_2").column("status.temperatures_2").unwrap()[2], 31.0);
+    assert_eq!(
+        one("status.drives.left.count")
+            .column("status.drives.left.count")
+            .unwrap()[1],
+        9_007_199_254_741_002.0
+    );
+    assert_eq!(
+        one("status.temperatures_2")
+            .column("status.temperatures_2")
+            .unwrap()[2],
+        31.0
+    );
 }
 
 /// The slower topic gives the times, and the faster one is interpolated: linearly, so that a straight line stays one.
@@ -231,7 +274,11 @@ fn messages_of_any_type_become_columns() {
 fn topics_are_joined_on_time() {
     let path = fixtures().join("run-v8.db3");
     let options = ReadOptions {
-        wanted: Some(["t", "command.data", "joint_states.position.elbow"].map(str::to_owned).to_vec()),
+        wanted: Some(
+            ["t", "command.data", "joint_states.position.elbow"]
+                .map(str::to_owned)
+                .to_vec(),
+        ),
         ..ReadOptions::default()
     };
     let recording = Recording::read_with(&path, &options).unwrap();
@@ -242,7 +289,19 @@ fn topics_are_joined_on_time() {
         let expected = k as f64 + 1.0 - 1000.0 / 4e6;
         assert!((value - expected).abs() < 1e-9, "{k}: {value}");
     }
-    let says: Vec<&str> = recording.notes().iter().map(|note| note.says.as_str()).collect();
-    assert!(says.iter().any(|says| says.contains("1 sample of `joint_states`")), "{says:?}");
-    assert!(says.iter().any(|says| says.contains("`command` is interpolated at their times")), "{says:?}");
+    let says: Vec<&str> = recording
+        .notes()
+        .iter()
+        .map(|note| note.says.as_str())
+        .collect();
+    assert!(
+        says.iter()
+            .any(|says| says.contains("1 sample of `joint_states`")),
+        "{says:?}"
+    );
+    assert!(
+        says.iter()
+            .any(|says| says.contains("`command` is taken at their times")),
+        "{says:?}"
+    );
 }

@@ -50,7 +50,7 @@ fn files_that_are_no_recordings() {
     );
     check_refused(
         "PAR1\u{1}\u{2}",
-        "run.csv: this looks like a Parquet file, not like a recording; save it as CSV (UTF-8, with a header), Parquet or MATLAB's format 5",
+        "run.csv: this looks like a Parquet file, not like a recording; save it as CSV (UTF-8, with a header), Parquet, HDF5, MCAP or a MATLAB file",
     );
     let utf16: Vec<u8> = std::iter::once(0xFEFF)
         .chain("t,q\n0,1\n".encode_utf16())

@@ -8,7 +8,9 @@ mod standstill;
 
 use modelmill_identify::estimate::FEWEST_ROWS;
 use modelmill_identify::fit_parameters;
-use modelmill_identify::{Estimator, Figures, FitFile, FitParameter, Note, ParameterInfo, Repeats, Status};
+use modelmill_identify::{
+    Estimator, Figures, FitFile, FitParameter, Note, ParameterInfo, Repeats, Status,
+};
 use modelmill_spec::Sign;
 
 use crate::along;

@@ -395,7 +395,11 @@ impl Model {
     /// The model with other values of its base parameters in the place of the file's, such as those of a fit; in its order.
     #[must_use]
     pub fn with_values(&self, values: &[f64]) -> Self {
-        assert_eq!(values.len(), self.base.len(), "one value per base parameter");
+        assert_eq!(
+            values.len(),
+            self.base.len(),
+            "one value per base parameter"
+        );
         Self {
             nominal: values.to_vec(),
             identified: vec![true; values.len()],
@@ -406,7 +410,10 @@ impl Model {
     /// The model with the values of another one for all base parameters that both have.
     pub(crate) fn with_values_of(mut self, other: &Self) -> Self {
         for (k, base) in self.base.iter().enumerate() {
-            let same = other.base.iter().position(|one| one.expression == base.expression);
+            let same = other
+                .base
+                .iter()
+                .position(|one| one.expression == base.expression);
             if let Some(i) = same.filter(|i| other.identified[*i]) {
                 self.nominal[k] = other.nominal[i];
                 self.identified[k] = true;

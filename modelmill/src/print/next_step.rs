@@ -25,7 +25,9 @@ impl Identification {
         if vague > 0 && vague as f64 >= MANY * n as f64 {
             let physical = match self.found.refined {
                 Refined::Physical(..) => "",
-                _ => "; option `physical` lets bodies and nominal values say what the recording does not",
+                _ => {
+                    "; option `physical` lets bodies and nominal values say what the recording does not"
+                }
             };
             return format!(
                 "Next: {vague} of {n} base parameters have deviations above half of their values, so the recording hardly \

@@ -54,20 +54,26 @@ impl Format for Csv {
         let time = likely_time(&names).and_then(|time| names.iter().position(|name| name == time));
         let mut record = csv::ByteRecord::new();
         let (mut samples, mut span) = (0, None);
+        let mut kinds = vec!["number"; names.len()];
         while reader.read_byte_record(&mut record).map_err(unreadable)? {
             samples += 1;
+            for (kind, field) in kinds.iter_mut().zip(&record) {
+                if samples == 1 && parse(field) == Field::Text {
+                    *kind = "text";
+                }
+            }
             if let Some(Field::Number(t)) = time.and_then(|place| record.get(place)).map(parse) {
                 span = Some((span.map_or(t, |(first, _)| first), t));
             }
         }
-        let info = |name: String| ColumnInfo {
+        let info = |(name, kind): (String, &str)| ColumnInfo {
             name,
-            kind: "text".to_owned(),
+            kind: kind.to_owned(),
         };
         Ok(vec![TableInfo {
             name: String::new(),
             kind: String::new(),
-            columns: names.into_iter().map(info).collect(),
+            columns: names.into_iter().zip(kinds).map(info).collect(),
             samples,
             time: span,
             remark: None,

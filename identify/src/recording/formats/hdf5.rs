@@ -68,8 +68,12 @@ impl Format for Hdf5 {
             name: column.name.clone(),
             kind: column.number.name(),
         });
-        let remark = (!columns.others.is_empty())
-            .then(|| format!("left aside, of another length or no numbers: {}", list(&columns.others)));
+        let remark = (!columns.others.is_empty()).then(|| {
+            format!(
+                "left aside, of another length or no numbers: {}",
+                list(&columns.others)
+            )
+        });
         Ok(vec![TableInfo {
             name: String::new(),
             kind: String::new(),
@@ -103,7 +107,11 @@ fn read(opened: &File, file: &str, options: &ReadOptions) -> Result<Recording, F
         intake.note(Note::info(format!(
             "{} of {file} {} not of as many samples as the others, or no numbers, and left aside.",
             list(&columns.others),
-            if columns.others.len() == 1 { "is" } else { "are" },
+            if columns.others.len() == 1 {
+                "is"
+            } else {
+                "are"
+            },
         )));
     }
     let is_read = |place: &usize| intake.reads(*place);
@@ -163,7 +171,12 @@ impl Columns {
         let mut others = Vec::new();
         collect(&file.root(), "", 0, &mut found, &mut others)?;
         // The number of samples is the longest side that any dataset has.
-        let samples = found.iter().flat_map(|one| &one.shape).copied().max().unwrap_or(0);
+        let samples = found
+            .iter()
+            .flat_map(|one| &one.shape)
+            .copied()
+            .max()
+            .unwrap_or(0);
         if samples == 0 {
             return Err(broken("it holds no datasets of numbers"));
         }
@@ -190,7 +203,11 @@ impl Columns {
             }
             for k in 0..n {
                 for (field, number) in &one.numbers {
-                    let number_of = if n == 1 { String::new() } else { format!("_{}", k + 1) };
+                    let number_of = if n == 1 {
+                        String::new()
+                    } else {
+                        format!("_{}", k + 1)
+                    };
                     columns.sound.push(Column {
                         name: format!("{}{number_of}{field}", one.name),
                         path: one.path.clone(),
@@ -208,7 +225,10 @@ impl Columns {
     }
 
     fn names(&self) -> Vec<String> {
-        self.sound.iter().map(|column| column.name.clone()).collect()
+        self.sound
+            .iter()
+            .map(|column| column.name.clone())
+            .collect()
     }
 }
 
@@ -236,21 +256,32 @@ fn collect(
     for dataset in group.datasets().map_err(|error| unreadable(&error))? {
         let path = format!("{path}/{dataset}");
         let name = path[1..].replace('/', ".");
-        let dataset = group.dataset(&dataset).map_err(|error| unreadable(&error))?;
+        let dataset = group
+            .dataset(&dataset)
+            .map_err(|error| unreadable(&error))?;
         let (Ok(kind), Ok(shape)) = (dataset.datatype(), dataset.shape()) else {
             others.push(name);
             continue;
         };
         let mut numbers = Vec::new();
-        Number::collect(&kind, String::new(), 0, u64::from(kind.type_size()), &mut numbers);
+        Number::collect(
+            &kind,
+            String::new(),
+            0,
+            u64::from(kind.type_size()),
+            &mut numbers,
+        );
         if numbers.is_empty() || numbers.len() > MOST_COLUMNS {
             others.push(name);
             continue;
         }
         let chunk = dataset.chunk_shape().map_err(|error| unreadable(&error))?;
-        let size = chunk.unwrap_or_default().iter().fold(u64::from(kind.type_size()), |size, side| {
-            size.saturating_mul(*side)
-        });
+        let size = chunk
+            .unwrap_or_default()
+            .iter()
+            .fold(u64::from(kind.type_size()), |size, side| {
+                size.saturating_mul(*side)
+            });
         if size > LARGEST_CHUNK {
             return Err(broken(format!(
                 "`{name}` is stored in chunks of {size} bytes; store it in smaller ones"
@@ -268,7 +299,13 @@ fn collect(
             continue;
         }
         let within = group.group(&inner).map_err(|error| unreadable(&error))?;
-        collect(&within, &format!("{path}/{inner}"), depth + 1, found, others)?;
+        collect(
+            &within,
+            &format!("{path}/{inner}"),
+            depth + 1,
+            found,
+            others,
+        )?;
     }
     Ok(())
 }
@@ -276,7 +313,9 @@ fn collect(
 impl Column {
     /// Its numbers, read in windows that fit into memory.
     fn numbers(&self, file: &File, samples: usize) -> Result<Vec<f64>, Fault> {
-        let dataset = file.dataset(&self.path).map_err(|error| unreadable(&error))?;
+        let dataset = file
+            .dataset(&self.path)
+            .map_err(|error| unreadable(&error))?;
         let mut values = Vec::new();
         let size = self.number.element as usize;
         let mut take = |bytes: &[u8], every: usize, from: usize| {
@@ -285,7 +324,9 @@ impl Column {
         };
         match self.place {
             Place::Row(k) => {
-                let bytes = dataset.read_raw_rows(k, 1).map_err(|error| unreadable(&error))?;
+                let bytes = dataset
+                    .read_raw_rows(k, 1)
+                    .map_err(|error| unreadable(&error))?;
                 take(&bytes, 1, 0);
             }
             Place::Element { of, k } => {
@@ -349,7 +390,11 @@ impl Number {
                     },
                 ..
             } if u32::from(*bit_precision) == 8 * size && matches!(size, 1 | 2 | 4 | 8) => {
-                let kind = if *signed { Kind::Signed } else { Kind::Unsigned };
+                let kind = if *signed {
+                    Kind::Signed
+                } else {
+                    Kind::Unsigned
+                };
                 (*byte_order, kind)
             }
             Datatype::FloatingPoint {
@@ -375,7 +420,9 @@ impl Number {
                 base_type,
                 dimensions,
             } => {
-                let n = dimensions.iter().fold(1_u64, |n, d| n.saturating_mul(u64::from(*d)));
+                let n = dimensions
+                    .iter()
+                    .fold(1_u64, |n, d| n.saturating_mul(u64::from(*d)));
                 for k in 0..n.min(MOST_COLUMNS as u64) {
                     let at = at.saturating_add(k * u64::from(base_type.type_size()));
                     Self::collect(base_type, format!("{name}_{}", k + 1), at, element, numbers);
@@ -402,7 +449,11 @@ impl Number {
         let mut bytes = [0; 8];
         let stored = &element[self.at..self.at + self.size];
         for (k, byte) in bytes.iter_mut().zip(0..self.size) {
-            *k = stored[if self.is_big { self.size - 1 - byte } else { byte }];
+            *k = stored[if self.is_big {
+                self.size - 1 - byte
+            } else {
+                byte
+            }];
         }
         let bits = u64::from_le_bytes(bytes);
         let above = 64 - 8 * self.size;

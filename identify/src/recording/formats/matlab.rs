@@ -64,7 +64,10 @@ impl Format for Matlab5 {
                 read(&mut stream, "", &ReadOptions::only(name)).ok()
             }),
             remark: (!columns.others.is_empty()).then(|| {
-                format!("left aside, of another length or not real: {}", list(&columns.others))
+                format!(
+                    "left aside, of another length or not real: {}",
+                    list(&columns.others)
+                )
             }),
         }])
     }

@@ -63,12 +63,18 @@ fn show(stream: impl Read, bag: &mut Bag<'_>) -> Result<(), Fault> {
     let mut stream = BufReader::with_capacity(1 << 20, stream);
     let mut file = File::default();
     let mut magic = [0; 8];
-    stream.read_exact(&mut magic).map_err(|error| unreadable(&error))?;
+    stream
+        .read_exact(&mut magic)
+        .map_err(|error| unreadable(&error))?;
     loop {
         let mut kind = [0];
-        stream.read_exact(&mut kind).map_err(|error| unreadable(&error))?;
+        stream
+            .read_exact(&mut kind)
+            .map_err(|error| unreadable(&error))?;
         let mut length = [0; 8];
-        stream.read_exact(&mut length).map_err(|error| unreadable(&error))?;
+        stream
+            .read_exact(&mut length)
+            .map_err(|error| unreadable(&error))?;
         let length = u64::from_le_bytes(length);
         match kind[0] {
             // What follows the end of the data repeats it, for those who go to and fro.
@@ -167,7 +173,11 @@ impl File {
                     "" => None,
                     "zstd" => Some(Packing::Zstd),
                     "lz4" => Some(Packing::Lz4),
-                    other => return Err(broken(format!("a chunk in it is packed by `{other}`, which is not read"))),
+                    other => {
+                        return Err(broken(format!(
+                            "a chunk in it is packed by `{other}`, which is not read"
+                        )));
+                    }
                 };
                 self.packed += length;
                 self.unpacked = self.unpacked.saturating_add(unpacked);

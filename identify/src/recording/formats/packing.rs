@@ -113,7 +113,9 @@ impl<R: Read> Zstd<R> {
     fn check_sum(&self) -> io::Result<()> {
         let said = self.decoder.get_checksum_from_data();
         if said.is_some() && said != self.decoder.get_calculated_checksum() {
-            return Err(io::Error::other("a sum over its bytes is not the one it says"));
+            return Err(io::Error::other(
+                "a sum over its bytes is not the one it says",
+            ));
         }
         Ok(())
     }
@@ -179,12 +181,23 @@ impl<R: Read> Read for Bounded<R> {
 pub(super) struct Packed(pub(super) Packing);
 
 impl Packed {
+    /// What reads the inside says that it cannot go on; here it is clear why.
+    fn fault(&self, fault: Fault) -> Fault {
+        match fault {
+            Fault::Unreadable { reason } => self.not_unpacked(&reason),
+            other => other,
+        }
+    }
+
+    fn not_unpacked(&self, reason: &str) -> Fault {
+        Fault::Format {
+            format: self.0.name(),
+            says: format!("it cannot be unpacked: {reason}; is it complete?"),
+        }
+    }
+
     /// What is in the file, by its first bytes, and all of them.
     fn inside<'a>(&self, input: Input<'a>) -> Result<(&'static dyn Format, Input<'a>), Fault> {
-        let unreadable = |error: io::Error| Fault::Format {
-            format: self.0.name(),
-            says: format!("it cannot be unpacked: {error}; is it complete?"),
-        };
         let packed = Rc::new(Cell::new(0));
         let mut stream = Bounded {
             unpacked: self.0.reader(Counted {
@@ -195,8 +208,10 @@ impl Packed {
             packed,
         };
         let mut first = Vec::new();
-        let head = (&mut stream).take(TELLING_BYTES as u64).read_to_end(&mut first);
-        head.map_err(unreadable)?;
+        let head = (&mut stream)
+            .take(TELLING_BYTES as u64)
+            .read_to_end(&mut first);
+        head.map_err(|error| self.not_unpacked(&error.to_string()))?;
         let format = format_of(&first);
         if format.is_packed() {
             return Err(Fault::Format {
@@ -204,7 +219,10 @@ impl Packed {
                 says: "what is in it is packed again; unpack it once".to_owned(),
             });
         }
-        Ok((format, Input::Stream(Box::new(io::Cursor::new(first).chain(stream)))))
+        Ok((
+            format,
+            Input::Stream(Box::new(io::Cursor::new(first).chain(stream))),
+        ))
     }
 }
 
@@ -236,16 +254,19 @@ impl Format for Packed {
         options: &ReadOptions,
     ) -> Result<Recording, Fault> {
         let (format, inside) = self.inside(input)?;
-        format.read(inside, file, options)
+        let found = format.read(inside, file, options);
+        found.map_err(|fault| self.fault(fault))
     }
 
     fn names(&self, input: Input<'_>) -> Result<Vec<String>, Fault> {
         let (format, inside) = self.inside(input)?;
-        format.names(inside)
+        let found = format.names(inside);
+        found.map_err(|fault| self.fault(fault))
     }
 
     fn tables(&self, input: Input<'_>) -> Result<Vec<TableInfo>, Fault> {
         let (format, inside) = self.inside(input)?;
-        format.tables(inside)
+        let found = format.tables(inside);
+        found.map_err(|fault| self.fault(fault))
     }
 }

@@ -11,7 +11,9 @@ use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader}
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::RowGroupMetaData;
-use parquet::file::reader::{ChunkReader, FileReader, Length, RowGroupReader, SerializedFileReader};
+use parquet::file::reader::{
+    ChunkReader, FileReader, Length, RowGroupReader, SerializedFileReader,
+};
 use parquet::file::serialized_reader::SerializedPageReader;
 use parquet::schema::types::{ColumnDescPtr, ColumnDescriptor};
 
@@ -260,7 +262,9 @@ fn tables_of(stream: Shared<impl ChunkReader + 'static>) -> Result<Vec<TableInfo
         kind: String::new(),
         columns: schema.columns().iter().map(info).collect(),
         samples: usize::try_from(rows).unwrap_or(0),
-        time: found_time(&names, |name| read(stream, "", &ReadOptions::only(name)).ok()),
+        time: found_time(&names, |name| {
+            read(stream, "", &ReadOptions::only(name)).ok()
+        }),
         remark: None,
     }])
 }

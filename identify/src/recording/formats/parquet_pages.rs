@@ -120,7 +120,9 @@ impl<P: PageReader> UnpackedPages<P> {
                 let levels = u64::from(def_levels_byte_len) + u64::from(rep_levels_byte_len);
                 let levels = usize::try_from(levels).unwrap_or(usize::MAX);
                 let Some((levels, values)) = buf.split_at_checked(levels) else {
-                    return Err(ParquetError::General("a page is shorter than its levels".to_owned()));
+                    return Err(ParquetError::General(
+                        "a page is shorter than its levels".to_owned(),
+                    ));
                 };
                 let buf = if is_compressed && !values.is_empty() {
                     [levels, &unpack(values)?].concat().into()

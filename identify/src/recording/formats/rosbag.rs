@@ -107,7 +107,9 @@ fn show(stream: &mut dyn ReadSeek, bag: &mut Bag<'_>) -> Result<(), Fault> {
         return Err(fault);
     }
     if !has_messages.map_err(|error| unreadable(&error))? || !has_topics {
-        return Err(broken("it has no tables `topics` and `messages`, so it is no log of a robot"));
+        return Err(broken(
+            "it has no tables `topics` and `messages`, so it is no log of a robot",
+        ));
     }
     Ok(())
 }

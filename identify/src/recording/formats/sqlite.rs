@@ -96,7 +96,14 @@ impl<R: Read + Seek> Database<R> {
         };
         let mut tables = Vec::new();
         database.rows(&schema, &mut |row| {
-            if let [kind, Value::Text(name), _, Value::Whole(root), Value::Text(says), ..] = &row[..]
+            if let [
+                kind,
+                Value::Text(name),
+                _,
+                Value::Whole(root),
+                Value::Text(says),
+                ..,
+            ] = &row[..]
                 && kind.text() == "table"
                 && let Ok(root) = u32::try_from(*root)
             {
@@ -315,7 +322,9 @@ fn record(bytes: &[u8]) -> io::Result<Vec<Value>> {
 fn whole(bytes: &[u8]) -> i64 {
     let sign = bytes.first().is_some_and(|byte| byte & 0x80 != 0);
     let start = if sign { -1 } else { 0 };
-    bytes.iter().fold(start, |value, byte| value << 8 | i64::from(*byte))
+    bytes
+        .iter()
+        .fold(start, |value, byte| value << 8 | i64::from(*byte))
 }
 
 /// Names of the columns that a statement `CREATE TABLE` makes, and which of them is the number of the row.
@@ -343,7 +352,10 @@ fn columns_of(says: &str) -> (Vec<String>, Option<usize>) {
             continue;
         };
         let constraints = ["PRIMARY", "UNIQUE", "CHECK", "FOREIGN", "CONSTRAINT"];
-        if constraints.iter().any(|word| name.eq_ignore_ascii_case(word)) {
+        if constraints
+            .iter()
+            .any(|word| name.eq_ignore_ascii_case(word))
+        {
             continue;
         }
         let rest: Vec<String> = words.map(str::to_ascii_uppercase).collect();

@@ -107,7 +107,9 @@ pub(super) fn read(name: &str, text: &str, ros: Ros) -> Result<Rc<Definition>, S
     for line in text.lines() {
         let trimmed = line.trim();
         if trimmed.len() >= 3 && trimmed.bytes().all(|byte| byte == b'=') {
-            texts.entry(current).or_insert_with(|| std::mem::take(&mut lines));
+            texts
+                .entry(current)
+                .or_insert_with(|| std::mem::take(&mut lines));
             lines.clear();
             current = String::new();
         } else if let (true, Some(name)) = (current.is_empty(), trimmed.strip_prefix("MSG:")) {
@@ -182,7 +184,10 @@ impl Reader<'_> {
     }
 
     fn kind(&mut self, text: &str, within: &str, depth: usize) -> Result<Type, String> {
-        if let Some((of, length)) = text.strip_suffix(']').and_then(|text| text.rsplit_once('[')) {
+        if let Some((of, length)) = text
+            .strip_suffix(']')
+            .and_then(|text| text.rsplit_once('['))
+        {
             let of = self.kind(of, within, depth)?;
             let length = match length {
                 "" => None,
@@ -201,7 +206,9 @@ impl Reader<'_> {
         }
         match (bare, self.ros) {
             ("string", _) => return Ok(Type::Text),
-            ("wstring", _) => return Err(format!("`{within}` holds a `wstring`, which is not read")),
+            ("wstring", _) => {
+                return Err(format!("`{within}` holds a `wstring`, which is not read"));
+            }
             ("time", Ros::One) => return Ok(Type::Time { is_signed: false }),
             ("duration", Ros::One) => return Ok(Type::Time { is_signed: true }),
             _ => {}
@@ -228,7 +235,10 @@ fn well_known(name: &str) -> Option<&'static str> {
 }
 
 const WELL_KNOWN: [(&str, &str); 22] = [
-    ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id"),
+    (
+        "std_msgs/Header",
+        "builtin_interfaces/Time stamp\nstring frame_id",
+    ),
     ("std_msgs/Bool", "bool data"),
     ("std_msgs/Int32", "int32 data"),
     ("std_msgs/Int64", "int64 data"),
@@ -237,18 +247,36 @@ const WELL_KNOWN: [(&str, &str); 22] = [
     ("std_msgs/Float32", "float32 data"),
     ("std_msgs/Float64", "float64 data"),
     ("std_msgs/String", "string data"),
-    ("std_msgs/MultiArrayDimension", "string label\nuint32 size\nuint32 stride"),
-    ("std_msgs/MultiArrayLayout", "MultiArrayDimension[] dim\nuint32 data_offset"),
-    ("std_msgs/Float32MultiArray", "MultiArrayLayout layout\nfloat32[] data"),
-    ("std_msgs/Float64MultiArray", "MultiArrayLayout layout\nfloat64[] data"),
+    (
+        "std_msgs/MultiArrayDimension",
+        "string label\nuint32 size\nuint32 stride",
+    ),
+    (
+        "std_msgs/MultiArrayLayout",
+        "MultiArrayDimension[] dim\nuint32 data_offset",
+    ),
+    (
+        "std_msgs/Float32MultiArray",
+        "MultiArrayLayout layout\nfloat32[] data",
+    ),
+    (
+        "std_msgs/Float64MultiArray",
+        "MultiArrayLayout layout\nfloat64[] data",
+    ),
     (
         "sensor_msgs/JointState",
         "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort",
     ),
     ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z"),
-    ("geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w"),
+    (
+        "geometry_msgs/Quaternion",
+        "float64 x\nfloat64 y\nfloat64 z\nfloat64 w",
+    ),
     ("geometry_msgs/Wrench", "Vector3 force\nVector3 torque"),
-    ("geometry_msgs/WrenchStamped", "std_msgs/Header header\nWrench wrench"),
+    (
+        "geometry_msgs/WrenchStamped",
+        "std_msgs/Header header\nWrench wrench",
+    ),
     (
         "sensor_msgs/Imu",
         "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n\

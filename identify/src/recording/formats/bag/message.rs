@@ -36,7 +36,8 @@ pub(super) struct Reader {
 
 impl Reader {
     pub(super) fn new(definition: Rc<Definition>, ros: Ros) -> Self {
-        let is_time = |field: &(String, Type)| matches!(field, (name, Type::Time { .. }) if name == "stamp");
+        let is_time =
+            |field: &(String, Type)| matches!(field, (name, Type::Time { .. }) if name == "stamp");
         let stamp = definition.fields.iter().position(|field| match field {
             (name, Type::Message(header)) if name == "header" => header.fields.iter().any(is_time),
             other => is_time(other),
@@ -196,7 +197,10 @@ impl Value<'_> {
                 }
             }
             Self::List(values) => {
-                let own = values.iter().map(Self::own_name).collect::<Option<Vec<_>>>();
+                let own = values
+                    .iter()
+                    .map(Self::own_name)
+                    .collect::<Option<Vec<_>>>();
                 let own = own.filter(|own| are_names(own));
                 let beside = names.iter().find(|names| names.len() == values.len());
                 for (i, value) in values.iter().enumerate() {
@@ -260,7 +264,9 @@ impl<'a> Bytes<'a> {
             // The second version of CDR, without tags.
             (Ros::Two, [0, form @ (6 | 7), _, _, bytes @ ..]) => (bytes, *form == 6, 4),
             (Ros::Two, [a, b, ..]) => {
-                return Err(format!("it is encoded in the form {a:02x}{b:02x} of CDR, which is not read"));
+                return Err(format!(
+                    "it is encoded in the form {a:02x}{b:02x} of CDR, which is not read"
+                ));
             }
             (Ros::Two, _) => return Err("it is shorter than its first four bytes".to_owned()),
         };
@@ -275,7 +281,10 @@ impl<'a> Bytes<'a> {
     }
 
     fn take(&mut self, n: usize) -> Result<&'a [u8], String> {
-        let end = self.at.checked_add(n).filter(|end| *end <= self.bytes.len());
+        let end = self
+            .at
+            .checked_add(n)
+            .filter(|end| *end <= self.bytes.len());
         let Some(end) = end else {
             return Err("it is shorter than its type says".to_owned());
         };

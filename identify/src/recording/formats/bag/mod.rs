@@ -122,8 +122,12 @@ impl<'a> Bag<'a> {
         let ros = match (encoding.messages, encoding.definition) {
             ("cdr", "ros2msg" | "") => Ok(Ros::Two),
             ("ros1", "ros1msg") => Ok(Ros::One),
-            ("cdr" | "ros1", other) => Err(format!("its definition is `{other}`, which is not read")),
-            (other, _) => Err(format!("its messages are encoded as `{other}`, which is not read")),
+            ("cdr" | "ros1", other) => {
+                Err(format!("its definition is `{other}`, which is not read"))
+            }
+            (other, _) => Err(format!(
+                "its messages are encoded as `{other}`, which is not read"
+            )),
         };
         let reader = ros.and_then(|ros| {
             let definition = definition::read(kind, encoding.text, ros)?;
@@ -241,13 +245,18 @@ impl Topic {
         if self.columns.len() > MOST_COLUMNS {
             return Err("it has more columns than any recording".to_owned());
         }
-        let known = self.layouts.iter().position(|layout| layout.places == places);
+        let known = self
+            .layouts
+            .iter()
+            .position(|layout| layout.places == places);
         let layout = known.unwrap_or_else(|| {
             for place in &places {
                 self.columns[*place].layouts.insert(self.layouts.len());
             }
             self.layouts.push(Layout {
-                is_kept: places.iter().any(|place| self.columns[*place].values.is_some()),
+                is_kept: places
+                    .iter()
+                    .any(|place| self.columns[*place].values.is_some()),
                 places,
                 count: 0,
                 log: None,
@@ -270,7 +279,10 @@ impl Topic {
     fn tables(self) -> Vec<Table> {
         let mut tables: IndexMap<BTreeSet<usize>, Vec<(String, TopicColumn)>> = IndexMap::new();
         for (name, column) in self.columns {
-            tables.entry(column.layouts.clone()).or_default().push((name, column));
+            tables
+                .entry(column.layouts.clone())
+                .or_default()
+                .push((name, column));
         }
         // Publishers that know no time leave it at zero.
         let has_stamps = self.layouts.iter().all(|layout| layout.has_stamps);
@@ -347,7 +359,11 @@ pub(super) fn read(show: Show<'_>, file: &str, options: &ReadOptions) -> Result<
     }
     let times = || parts.iter().flat_map(|part| &part.2);
     let is_exact = times().all(|t| (-EXACT..EXACT).contains(t));
-    let zero = if is_exact { 0 } else { times().copied().min().unwrap_or(0) };
+    let zero = if is_exact {
+        0
+    } else {
+        times().copied().min().unwrap_or(0)
+    };
     let parts = parts.into_iter().map(|(name, _, time, columns)| Part {
         name,
         time: time.iter().map(|t| seconds(t.wrapping_sub(zero))).collect(),
@@ -400,7 +416,11 @@ pub(super) fn tables(show: Show<'_>) -> Result<Vec<TableInfo>, Fault> {
         }
         let tables = topic.tables();
         if tables.is_empty() {
-            let holds = if bare.samples == 0 { "no messages" } else { "no numbers" };
+            let holds = if bare.samples == 0 {
+                "no messages"
+            } else {
+                "no numbers"
+            };
             found.push(TableInfo {
                 remark: Some(format!("it holds {holds}")),
                 ..bare
@@ -412,7 +432,10 @@ pub(super) fn tables(show: Show<'_>) -> Result<Vec<TableInfo>, Fault> {
             let span = table.span.map(|(least, most)| {
                 let is_exact = -EXACT < least && most < EXACT;
                 let zero = if is_exact { 0 } else { least };
-                (seconds(least.wrapping_sub(zero)), seconds(most.wrapping_sub(zero)))
+                (
+                    seconds(least.wrapping_sub(zero)),
+                    seconds(most.wrapping_sub(zero)),
+                )
             });
             let columns = table.columns.into_iter().map(|(name, kind, _)| ColumnInfo {
                 name,
