@@ -262,11 +262,11 @@ fn with_plain_names<'a>(text: &str, names: &'a [String]) -> (String, Vec<(String
         let mut rest = plain.as_str();
         while let Some(at) = rest.find(name.as_str()) {
             let end = at + name.len();
-            let is_whole = !rest[end..].starts_with(is_part)
-                && !rest[..at].ends_with(is_part)
-                && !(at == 0 && done.ends_with(is_part));
+            let is_within = rest[end..].starts_with(is_part)
+                || rest[..at].ends_with(is_part)
+                || (at == 0 && done.ends_with(is_part));
             done.push_str(&rest[..at]);
-            done.push_str(if is_whole { &stand_in } else { name });
+            done.push_str(if is_within { name } else { &stand_in });
             rest = &rest[end..];
         }
         done.push_str(rest);

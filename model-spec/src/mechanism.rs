@@ -327,4 +327,6 @@ pub struct Recording {
     /// Pairs of our name (`t`, a coordinate, with `_d` or `_dd`, a drive) and theirs: a column, or a sum of columns
     /// as [`crate::read_column`] reads it.
     pub columns: Vec<(String, String)>,
+    /// By what the column of a drive is multiplied to be what acts at the joint, where it measures the motor.
+    pub torque: Vec<(String, f64)>,
 }

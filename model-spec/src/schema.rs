@@ -518,6 +518,18 @@ record! {
         /// or a sum of columns such as `(pos6 - pos5)/32 - pi/2`, with a unit in brackets behind it if it is not in
         /// SI units: `pos1 [deg]`.
         "columns" columns: optional Named<Text>,
+        /// What the columns of drives measure, where it is not what acts at the joint: by the name of the drive.
+        "torque" torque: optional Named<TorqueEntry>,
+    }
+}
+
+record! {
+    /// What the column of a drive measures: the motor's torque or current rather than what acts at the joint.
+    TorqueEntry = "what the column of a drive measures" {
+        /// Turns of the motor for one of the joint, with its sign; 1 if it is not given.
+        "ratio" ratio: optional Number,
+        /// N m/A, where the column is a current.
+        "constant" constant: optional Number,
     }
 }
 

@@ -1,6 +1,7 @@
 //! `recordings`: what files hold.
 
 use modelmill::Host;
+use modelmill::recording::Contents;
 use serde_json::{Value, json};
 
 use crate::args::RecordingsArgs;
@@ -14,7 +15,7 @@ pub(crate) fn run(host: &Host, args: &RecordingsArgs) -> Outcome {
         found.push(host.recordings(path)?);
     }
     if args.json {
-        let found: Vec<Value> = found.iter().map(|contents| contents.json()).collect();
+        let found: Vec<Value> = found.iter().map(Contents::json).collect();
         return terminal::print_json(&json!({ "recordings": found }));
     }
     let texts = found

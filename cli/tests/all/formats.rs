@@ -82,15 +82,22 @@ fn columns_of_topics_can_be_computed_with() {
     let (two_link, data) = (model("two_link.toml"), fixture("run-v8.db3"));
     let maps = maps("joint_states");
     let mut doubled = maps.clone();
-    doubled[5] =
-        "joint1=-2*joint_states.effort.elbow + 0*joint_states.effort.arm/wrist [kN m]".to_owned();
+    doubled[5] = "joint1=-2*joint_states.effort.elbow".to_owned();
+    doubled[7] = "joint2=-0.002*joint_states.effort.arm/wrist [kN m]".to_owned();
     let values = |maps: &[String]| {
         let mut args = vec!["identify", &two_link, "--data", &data, "--json"];
         args.extend(maps.iter().map(String::as_str));
-        number(&json(&args), "/fit/channels/joint1/rms")
+        let found = json(&args);
+        let list = found["parameters"].as_array().expect("a list").clone();
+        list.iter()
+            .map(|p| number(p, "/value"))
+            .collect::<Vec<f64>>()
     };
-    let (one, two) = (values(&maps), values(&doubled));
-    assert!(two > 100.0 * one, "{one} {two}");
+    let (once, twice) = (values(&maps), values(&doubled));
+    assert!(!once.is_empty());
+    for (one, two) in once.iter().zip(&twice) {
+        assert!((two + 2.0 * one).abs() <= 1e-9 * one.abs(), "{one} {two}");
+    }
 }
 
 #[test]
@@ -119,7 +126,7 @@ fn recordings_lists_topics_and_columns() {
         assert!(text.contains(says), "{says}: {text}");
     }
     let says = refused(1, &["recordings", &model("two_link.toml")]);
-    assert!(says.contains("two_link.toml"), "{says}");
+    assert!(says.contains("two_link.toml is a model file"), "{says}");
 }
 
 /// A recording cut into a file of states and one of forces is the recording.
@@ -144,9 +151,9 @@ fn files_of_one_run_are_joined() {
     };
     // Columns: t, two coordinates with rates and accelerations, two forces.
     let states = part("states.csv", &|_, j| j < 8);
-    let forces = part("forces.csv", &|_, j| j < 2 || j > 7);
+    let forces = part("forces.csv", &|_, j| !(2..=7).contains(&j));
     let rare = part("rare.csv", &|i, j| {
-        (i < 1 || i % 4 == 1) && (j < 2 || j > 7)
+        (i < 1 || i % 4 == 1) && !(2..=7).contains(&j)
     });
     let spidermill = model("spidermill.toml");
     let errors = |data: &str| {
@@ -160,7 +167,7 @@ fn files_of_one_run_are_joined() {
     let (n, error, _) = errors(&run("plain-check.csv"));
     let (joined_n, joined_error, _) = errors(&format!("{states}+{forces}"));
     assert!(
-        joined_n == n && (joined_error - error).abs() < 1e-15,
+        (joined_n - n).abs() < 0.5 && (joined_error - error).abs() < 1e-15,
         "{joined_n} {joined_error}"
     );
     let (rare_n, rare_error, found) = errors(&format!("{states}+{rare}"));
@@ -235,11 +242,48 @@ fn fits_travel() {
     assert!(fitted < 0.5 * nominal, "{fitted} {nominal}");
     // A fit of another model is none.
     let says = refused(1, &["adopt", &model("two_link.toml"), &fit]);
-    assert!(says.contains("identify this model again"), "{says}");
+    assert!(says.contains("belongs to another model"), "{says}");
     let unknown = ran(&[
         "adopt",
         &adopted,
         Path::new(&adopted).to_str().expect("text"),
     ]);
     assert_eq!(unknown.status, 1, "{}", unknown.err);
+}
+
+/// A column in motor amperes is the joint's torque by the constants of the drive.
+#[test]
+fn columns_of_motors_are_declared() {
+    let (data, two_link) = (fixture("run.csv"), model("two_link.toml"));
+    let declared = scratch("motors.toml");
+    let text = std::fs::read_to_string(&two_link).expect("a model");
+    let says = "\n[recording.torque]\njoint1 = { ratio = -100, constant = 0.05 }\njoint2 = { ratio = -5 }\n";
+    std::fs::write(&declared, text + says).expect("written");
+    let maps = maps("plain");
+    let values = |model: &str| {
+        let mut args = vec!["identify", model, "--data", &data, "--json"];
+        args.extend(maps.iter().map(String::as_str));
+        let found = json(&args);
+        let list = found["parameters"].as_array().expect("a list").clone();
+        list.iter()
+            .map(|p| number(p, "/value"))
+            .collect::<Vec<f64>>()
+    };
+    for (plain, scaled) in values(&two_link).iter().zip(values(&declared)) {
+        assert!(
+            (scaled + 5.0 * plain).abs() <= 1e-9 * plain.abs(),
+            "{plain} {scaled}"
+        );
+    }
+    for (entry, word) in [
+        ("joint1 = { ratio = 0 }", "zero"),
+        ("joint1 = {}", "says nothing"),
+        ("q1 = { ratio = 2 }", "unknown drive"),
+    ] {
+        let text = std::fs::read_to_string(&two_link).expect("a model");
+        std::fs::write(&declared, format!("{text}\n[recording.torque]\n{entry}\n"))
+            .expect("written");
+        let says = refused(1, &["check", &declared]);
+        assert!(says.contains(word), "{says}");
+    }
 }

@@ -190,6 +190,7 @@ fn positions_alone_give_the_parameters_within_a_fifth_of_a_percent() {
         fit: comparison.finish().expect("figures"),
         check: None,
         data: run.notes.clone(),
+        estimator: modelmill_identify::Estimator::default(),
     };
     let again =
         FitFile::parse(&serde_json::to_string(&fit).expect("JSON"), "fit.json").expect("a fit");

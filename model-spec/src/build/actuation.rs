@@ -276,6 +276,43 @@ pub(super) fn check_place_names(model: &ModelEntry, log: &mut Log) {
     }
 }
 
+/// Reads what columns of drives measure: by what they are multiplied to be what acts at the joint.
+pub(super) fn torque(model: &ModelEntry, drives: &[Drive], log: &mut Log) -> Vec<(String, f64)> {
+    let recording = model.recording.as_ref();
+    let torque = recording.and_then(|entry| entry.torque.as_ref());
+    let mut factors = Vec::new();
+    for (key, entry) in torque.iter().flat_map(|table| &table.entries) {
+        if !drives.iter().any(|drive| drive.name == key.name) {
+            let known = drives.iter().map(|drive| drive.name.as_str());
+            log.push(
+                Diagnostic::error(key.span, format!("unknown drive `{}`", key.name))
+                    .label("expected a drive, whose column is not what acts at the joint")
+                    .help(suggest::advice(&key.name, "drives", known)),
+            );
+            continue;
+        }
+        let given = [&entry.ratio, &entry.constant];
+        if given.iter().all(|number| number.is_none()) && !entry.faulty {
+            log.push(
+                Diagnostic::error(key.span, format!("this says nothing of `{}`", key.name))
+                    .label("expected `ratio`, `constant` (N m/A), or both"),
+            );
+        }
+        let mut factor = 1.0;
+        for number in given.into_iter().flatten() {
+            if number.value == 0.0 {
+                log.push(
+                    Diagnostic::error(number.span, "this is zero")
+                        .label("expected what the column is multiplied by"),
+                );
+            }
+            factor *= number.value;
+        }
+        factors.push((key.name.clone(), factor));
+    }
+    factors
+}
+
 /// Reads how recordings name their columns.
 pub(super) fn recording(
     model: &ModelEntry,

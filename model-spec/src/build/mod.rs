@@ -71,6 +71,7 @@ pub(crate) fn build(
     let limits = limits::limits(model, &symbols.coordinates, &drives, &points.points, log);
     let identified_base = identified::identified(model, &mut symbols, log);
     let columns = actuation::recording(model, &symbols, &drives, log);
+    let torque = actuation::torque(model, &drives, log);
     actuation::check_place_names(model, log);
     if log.n_errors() == 0 {
         symbols::warn_of_unused(&symbols, log);
@@ -101,7 +102,7 @@ pub(crate) fn build(
         identified_base,
         retain,
         limits,
-        recording: Recording { columns },
+        recording: Recording { columns, torque },
     };
     bodies::warn_of_negative(model, &mechanism, log);
     pose::check(&mut mechanism, &places, log);

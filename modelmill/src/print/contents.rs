@@ -1,5 +1,7 @@
 //! What a recording holds, as JSON and for people.
 
+use std::fmt::Write as _;
+
 use modelmill_identify::TableInfo;
 use serde_json::{Value, json};
 
@@ -37,10 +39,10 @@ impl Contents {
             }
             head.push_str(&count(one.samples, "sample", "samples"));
             if let Some((start, end)) = one.time {
-                head.push_str(&format!(" from {} to {} s", number(start), number(end)));
+                let _ = write!(head, " from {} to {} s", number(start), number(end));
             }
             if let Some(rate) = one.rate() {
-                head.push_str(&format!(", {} Hz", significant(rate, 4)));
+                let _ = write!(head, ", {} Hz", significant(rate, 4));
             }
             lines.push(String::new());
             lines.push(format!("  {head}"));

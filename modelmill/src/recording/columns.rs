@@ -69,6 +69,10 @@ pub(crate) fn read_options(
             }
         }
     }
+    for (drive, factor) in &mechanism.recording.torque {
+        mapping.scale(drive, *factor, header);
+        mapping.scale(&format!("{drive}_var"), factor * factor, header);
+    }
     Ok(ReadOptions {
         renames: mapping.renames,
         computed: mapping.computed,
@@ -102,6 +106,26 @@ impl Mapping {
                 offset: sum.offset,
             }),
         }
+    }
+
+    /// Multiplies what becomes a column of ours.
+    fn scale(&mut self, ours: &str, factor: f64, header: &[String]) {
+        if let Some(known) = self.computed.iter_mut().find(|one| one.name == ours) {
+            known.offset *= factor;
+            known.terms.iter_mut().for_each(|(_, term)| *term *= factor);
+            return;
+        }
+        let renamed = self.renames.iter().position(|(name, _)| name == ours);
+        let theirs = match renamed {
+            Some(place) => self.renames.remove(place).1,
+            None if header.iter().any(|name| name == ours) => ours.to_owned(),
+            None => return,
+        };
+        self.computed.push(Computed {
+            name: ours.to_owned(),
+            terms: vec![(theirs, factor)],
+            offset: 0.0,
+        });
     }
 
     /// Whether a column that the user has given another name would be needed under this one.

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use modelmill_identify::RecordingFile;
 
-use crate::error::Outcome;
-use crate::host::Host;
+use crate::error::{Error, Outcome};
+use crate::host::{Host, kinds_of_files};
 
 pub use modelmill_identify::{ColumnInfo, TableInfo};
 
@@ -23,6 +23,12 @@ impl Host {
     ///
     /// Fails when the file cannot be read.
     pub fn recordings(&self, path: impl AsRef<Path>) -> Outcome<Contents> {
+        if let Some(kind) = kinds_of_files::kind(self, path.as_ref()) {
+            let path = path.as_ref().display();
+            return Err(Error::input(format!(
+                "{path} is {kind}; a recording is expected"
+            )));
+        }
         let file = RecordingFile::open(self.files(), path.as_ref())?;
         let tables = self.watched(&format!("reading {}", file.name()), 0, |_| file.tables())??;
         Ok(Contents {

@@ -317,7 +317,7 @@ impl Column {
             .dataset(&self.path)
             .map_err(|error| unreadable(&error))?;
         let mut values = Vec::new();
-        let size = self.number.element as usize;
+        let size = usize::try_from(self.number.element).unwrap_or(usize::MAX);
         let mut take = |bytes: &[u8], every: usize, from: usize| {
             let elements = bytes.chunks_exact(size).skip(from).step_by(every);
             values.extend(elements.map(|element| self.number.value(element)));

@@ -51,7 +51,7 @@ impl Format for Mcap {
 }
 
 /// Shows the messages of a file, which can be done once.
-fn once<'a>(input: Input<'a>) -> impl FnMut(&mut Bag<'_>) -> Result<(), Fault> + use<'a> {
+fn once(input: Input<'_>) -> impl FnMut(&mut Bag<'_>) -> Result<(), Fault> + use<'_> {
     let mut stream = Some(input.stream());
     move |bag| match stream.take() {
         Some(stream) => show(stream, bag),

@@ -246,7 +246,7 @@ fn are_names(texts: &[String]) -> bool {
 
 /// The bytes of a message from its beginning on.
 struct Bytes<'a> {
-    bytes: &'a [u8],
+    all: &'a [u8],
     at: usize,
     is_big: bool,
     /// The largest multiple that numbers stand at.
@@ -271,7 +271,7 @@ impl<'a> Bytes<'a> {
             (Ros::Two, _) => return Err("it is shorter than its first four bytes".to_owned()),
         };
         Ok(Self {
-            bytes,
+            all: bytes,
             at: 0,
             is_big,
             alignment,
@@ -281,14 +281,11 @@ impl<'a> Bytes<'a> {
     }
 
     fn take(&mut self, n: usize) -> Result<&'a [u8], String> {
-        let end = self
-            .at
-            .checked_add(n)
-            .filter(|end| *end <= self.bytes.len());
+        let end = self.at.checked_add(n).filter(|end| *end <= self.all.len());
         let Some(end) = end else {
             return Err("it is shorter than its type says".to_owned());
         };
-        let taken = &self.bytes[self.at..end];
+        let taken = &self.all[self.at..end];
         self.at = end;
         Ok(taken)
     }
@@ -356,7 +353,7 @@ impl<'a> Bytes<'a> {
             None => u32::from_le_bytes(self.of_size()?) as usize,
         };
         let is_number = matches!(of, Type::Number(_));
-        if length > self.bytes.len() - self.at.min(self.bytes.len()) {
+        if length > self.all.len() - self.at.min(self.all.len()) {
             return Err("a list in it is longer than the message".to_owned());
         }
         if !is_number && length > MOST_MESSAGES {
