@@ -353,7 +353,7 @@ mod tests {
     }
 
     fn look(bytes: &[u8], growth: Growth) -> Result<u64, String> {
-        largest(bytes, bytes.len() as u64, packing).map_err(|error| error.to_string())
+        largest(bytes, bytes.len() as u64, growth).map_err(|error| error.to_string())
     }
 
     #[test]

@@ -347,10 +347,12 @@ fn columns_of(says: &str) -> (Vec<String>, Option<usize>) {
     }
     let (mut columns, mut row_number) = (Vec::new(), None);
     for part in parts {
-        let mut words = part.split_whitespace();
-        let Some(name) = words.next() else {
+        let part = part.trim();
+        let end = part.find(|c: char| c.is_whitespace() || c == '(');
+        let (name, rest) = part.split_at(end.unwrap_or(part.len()));
+        if name.is_empty() {
             continue;
-        };
+        }
         let constraints = ["PRIMARY", "UNIQUE", "CHECK", "FOREIGN", "CONSTRAINT"];
         if constraints
             .iter()
@@ -358,7 +360,9 @@ fn columns_of(says: &str) -> (Vec<String>, Option<usize>) {
         {
             continue;
         }
-        let rest: Vec<String> = words.map(str::to_ascii_uppercase).collect();
+        let rest: Vec<String> = (rest.split_whitespace())
+            .map(str::to_ascii_uppercase)
+            .collect();
         if rest.starts_with(&["INTEGER".to_owned(), "PRIMARY".to_owned(), "KEY".to_owned()]) {
             row_number = Some(columns.len());
         }
