@@ -162,10 +162,7 @@ fn whole_numbers_of_all_types_are_read_right() {
                 ("i64", "int64", 1024.0 * x - 4_611_686_018_427_387_904.0),
             ] {
                 let value = recording.column(name).unwrap()[k];
-                assert!(
-                    value.total_cmp(&expected).is_eq() || value == expected,
-                    "{name}: {value}"
-                );
+                assert!((value - expected).abs() < 0.5, "{name}: {value}");
                 let said = kinds.iter().find(|column| column.name == name).unwrap();
                 assert_eq!(said.kind, kind, "{name}");
             }
@@ -255,18 +252,13 @@ fn messages_of_any_type_become_columns() {
         "{:?}",
         current.notes()
     );
-    assert_eq!(
-        one("status.drives.left.count")
-            .column("status.drives.left.count")
-            .unwrap()[1],
-        9_007_199_254_741_002.0
-    );
-    assert_eq!(
-        one("status.temperatures_2")
-            .column("status.temperatures_2")
-            .unwrap()[2],
-        31.0
-    );
+    for (name, k, expected) in [
+        ("status.drives.left.count", 1, 9_007_199_254_741_002.0),
+        ("status.temperatures_2", 2, 31.0),
+    ] {
+        let value = one(name).column(name).unwrap()[k];
+        assert!((value - expected).abs() < 1e-9, "{name}: {value}");
+    }
 }
 
 /// The slower topic gives the times, and the faster one is interpolated: linearly, so that a straight line stays one.
