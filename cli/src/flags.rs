@@ -113,7 +113,8 @@ impl Spelling for Flags {
 }
 
 /// Fields of the library's options whose flags are called otherwise.
-const FLAGS: [(&str, &str); 3] = [
+const FLAGS: [(&str, &str); 4] = [
+    ("band_hz", "band"),
     ("columns", "map"),
     ("cutoff_hz", "cutoff"),
     ("source", "derivatives"),

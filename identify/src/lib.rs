@@ -46,13 +46,14 @@ pub use estimate::{
     Deviations, Direction, LeastSquares, LeastSquaresError, RANK_TOLERANCE, Solution, Triangle,
 };
 pub use figures::{
-    ChannelFigures, Comparison, Estimator, Figures, FiguresError, FitFault, FitFile, FitFileError,
-    FitParameter, LocateOptions, ParameterInfo, Region, Status, TIME_COLUMN, compare,
-    fit_parameters, locate,
+    BandError, ChannelFigures, Comparison, Estimator, Figures, FiguresError, FilteredFigures, FitFault,
+    FitFile, FitFileError, FitParameter, InBand, LocateOptions, ParameterInfo, Region, Status,
+    TIME_COLUMN, TRIMMED_PART, compare, fit_parameters, in_band, locate,
 };
 pub use motion::{
-    DerivativeSource, Preparation, PreparedAs, Repeats, Run, Smoothed, Smoothing, decimate,
-    decimate_columns, decimate_table, decimate_time, differentiate, filter_and_differentiate,
+    DerivativeSource, PASSED_BY_DECIMATION, Preparation, PreparedAs, Repeats, Run, Smoothed,
+    Smoothing, decimate, decimate_columns, decimate_table, decimate_time, differentiate,
+    filter_and_differentiate,
 };
 pub use recording::{
     ColumnInfo, Computed, Fault, NotFinite, Note, ReadOptions, Recording, RecordingError,

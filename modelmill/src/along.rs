@@ -1,20 +1,19 @@
 //! A model along a recording: its forces and reactions, the measured ones, and variables on which an error may depend.
 
 use modelmill_codegen::{Evaluator, PoseFault, PoseReason, Reactions, States};
-use modelmill_identify::decimate_columns;
+use modelmill_identify::{PASSED_BY_DECIMATION, decimate_columns};
 use modelmill_spec::DriveKind;
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::stretch::Stretch;
 
-/// The model's forces along a recording for given base parameters, `[drive][sample]`, decimated.
+/// The model's forces along a recording for given base parameters, `[drive][sample]`, of every sample.
 pub fn forces(model: &Model, data: &Stretch, values: &[f64]) -> Outcome<Vec<Vec<f64>>> {
     let evaluator = Evaluator::new(&model.derivation);
-    let columns = columns(model, data, |states| {
+    columns(model, data, |states| {
         evaluator.inverse_dynamics(states, values)
-    })?;
-    decimated(columns, data)
+    })
 }
 
 /// Determined components of the reactions along a recording for nominal parameters, `[component][sample]`, decimated.
@@ -153,6 +152,16 @@ pub fn decimated(columns: Vec<Vec<f64>>, data: &Stretch) -> Outcome<Vec<Vec<f64>
             }
         })
         .collect())
+}
+
+/// Up to which frequency the parallel filter passes forces, Hz.
+pub fn passed_by_decimation(data: &Stretch) -> f64 {
+    let time = &data.run.time;
+    let rate = match time.as_slice() {
+        [first, .., last] => (time.len() - 1) as f64 / (last - first),
+        _ => 0.0,
+    };
+    PASSED_BY_DECIMATION * rate / data.decimation() as f64
 }
 
 /// Rates of the drives, `[drive][sample]`, before decimation: from the drives' Jacobian, since a drive may act along a rod

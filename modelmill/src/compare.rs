@@ -1,7 +1,9 @@
 //! `compare`: how far a model is off along recordings, and where the error lives.
 
-use modelmill_identify::{Comparison, Figures, Note, Region};
-use modelmill_identify::{LocateOptions, TIME_COLUMN, locate};
+use modelmill_identify::{
+    BandError, Comparison, Figures, FilteredFigures, LocateOptions, Note, Region, TIME_COLUMN,
+    in_band, locate,
+};
 
 use crate::along::{self, interleaved, variables};
 use crate::error::Outcome;
@@ -29,16 +31,19 @@ impl Model {
     /// Fails when a recording lacks the force of a drive, or leads where the mechanism cannot stand.
     pub fn compare(&self, recordings: &[&Recording], values: &[f64]) -> Outcome<Compared> {
         let [data, _] = recording::stretches(self, recordings, &[]);
-        let measured = (data.iter().map(along::measured)).collect::<Outcome<Vec<_>>>()?;
         let forces = data
             .iter()
             .map(|one| along::forces(self, one, values))
             .collect::<Outcome<Vec<_>>>()?;
-        let pairs = (measured.iter().map(Vec::as_slice)).zip(forces.iter().map(Vec::as_slice));
+        let figures = figures(self, &data, &forces, band(&data))?;
+        let measured = (data.iter().map(along::measured)).collect::<Outcome<Vec<_>>>()?;
+        let forces = (forces.into_iter().zip(&data))
+            .map(|(forces, one)| along::decimated(forces, one))
+            .collect::<Outcome<Vec<_>>>()?;
         Ok(Compared {
             model: self.name.clone(),
             files: data.iter().map(|one| one.run.file.clone()).collect(),
-            figures: figures(&self.drives(), pairs)?,
+            figures,
             places: places(self, &data, &measured, &forces)?,
             notes: {
                 let notes = data.iter().flat_map(Stretch::notes).cloned();
@@ -48,16 +53,70 @@ impl Model {
     }
 }
 
-/// Error figures over several recordings; forces are `[drive][sample]` for each.
-pub fn figures<'a>(
-    drives: &[String],
-    pairs: impl IntoIterator<Item = (&'a [Vec<f64>], &'a [Vec<f64>])>,
+/// Up to which frequency forces along some recordings are compared, Hz: the lowest of their bands.
+pub fn band(data: &[Stretch]) -> Option<f64> {
+    let bands = data.iter().filter_map(|one| one.run.prepared.band_hz);
+    bands.reduce(f64::min)
+}
+
+/// Error figures over several recordings, of every sample whose force was measured, and in the band; `forces` are the
+/// model's, `[drive][sample]` for each.
+pub fn figures(
+    model: &Model,
+    data: &[Stretch],
+    forces: &[Vec<Vec<f64>>],
+    band_hz: Option<f64>,
 ) -> Outcome<Figures> {
-    let mut comparison = Comparison::new(drives.iter().cloned());
-    for (measured, model) in pairs {
-        comparison.add(&interleaved(measured), &interleaved(model))?;
+    let mut raw = comparison(model);
+    for (one, forces) in data.iter().zip(forces) {
+        let measured = one.run.measured()?;
+        raw.add_counted(
+            &interleaved(measured),
+            &interleaved(forces),
+            |sample, drive| one.run.counts(drive, sample),
+        )?;
     }
-    Ok(comparison.finish()?)
+    let mut figures = raw.finish()?;
+    figures.band = band_hz.and_then(|band_hz| {
+        let mut filtered = comparison(model);
+        for (one, forces) in data.iter().zip(forces) {
+            let measured = one.run.measured().ok()?;
+            // A stretch that is too short for the filter has no samples left between its ends.
+            match in_band(&mut filtered, &one.run.time, measured, forces, band_hz) {
+                Ok(()) | Err(BandError::Filter(_)) => {}
+                Err(BandError::Figures(_)) => return None,
+            }
+        }
+        let found = filtered.finish().ok()?;
+        Some(FilteredFigures::new(band_hz, &found))
+    });
+    Ok(figures)
+}
+
+/// Error figures of the rows that a fit was made from, where the parallel filter made fewer of them.
+pub fn figures_of_rows(
+    model: &Model,
+    data: &[Stretch],
+    forces: &[Vec<Vec<f64>>],
+) -> Outcome<Option<FilteredFigures>> {
+    let Some(first) = data.iter().find(|one| one.decimation() > 1) else {
+        return Ok(None);
+    };
+    let mut rows = comparison(model);
+    for (one, forces) in data.iter().zip(forces) {
+        let measured = along::measured(one)?;
+        let forces = along::decimated(forces.clone(), one)?;
+        rows.add(&interleaved(&measured), &interleaved(&forces))?;
+    }
+    let passed = along::passed_by_decimation(first);
+    Ok(Some(FilteredFigures::new(passed, &rows.finish()?)))
+}
+
+/// A comparison of the model's drives, without samples yet.
+fn comparison(model: &Model) -> Comparison {
+    let drives = model.drives();
+    let units = (0..drives.len()).map(|d| model.force_unit(d).to_owned());
+    Comparison::new(drives.clone()).with_units(units)
 }
 
 /// Errors below this fraction of the measured force are rounding of the numbers in the recording; where they sit says

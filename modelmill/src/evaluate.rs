@@ -34,7 +34,8 @@ impl Model {
     ) -> Outcome<Evaluated> {
         let mut found = Evaluated::new(self.drives(), Vec::new());
         for stretch in &recording::read_as_recorded(self, path.as_ref(), reading)? {
-            found.extend(&stretch.time(), along::forces(self, stretch, values)?);
+            let forces = along::forces(self, stretch, values)?;
+            found.extend(&stretch.time(), along::decimated(forces, stretch)?);
         }
         Ok(found)
     }

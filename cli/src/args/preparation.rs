@@ -38,6 +38,10 @@ pub(crate) struct PreparationArgs {
     /// Period of the motion, s, for `--smoothing fourier`, which it asks for; found from the positions if not given
     #[arg(long, value_name = "S", value_parser = parse_period)]
     pub(crate) period: Option<f64>,
+    /// Up to which frequency measured and model force are compared beside the raw figures, Hz; the cut-off, or what the motion
+    /// reaches, if not given
+    #[arg(long, value_name = "HZ", value_parser = parse_cutoff, allow_negative_numbers = true)]
+    pub(crate) band: Option<f64>,
     /// Leave out samples with NaN, infinite or empty fields instead of refusing the recording
     #[arg(long)]
     pub(crate) skip_bad_samples: bool,
@@ -86,6 +90,7 @@ impl PreparationArgs {
             order: self.order.unwrap_or(USUAL_ORDER),
             trim: self.trim,
             decimate: self.decimate,
+            band_hz: self.band,
             source: match self.derivatives {
                 DerivativesArg::Recorded => DerivativeSource::RecordedFirst,
                 DerivativesArg::Positions => DerivativeSource::Positions,

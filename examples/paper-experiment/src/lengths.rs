@@ -59,6 +59,7 @@ fn at(host: &Host, series: &[Series], distance: f64) -> Outcome<Length> {
         qdd: motion.qdd,
         force: None,
         missing_force: Vec::new(),
+        left_out: Vec::new(),
         lines: (0..time.len() as u64).collect(),
         time,
         repeats: None,

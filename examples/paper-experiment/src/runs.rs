@@ -139,6 +139,7 @@ pub(crate) fn run(rig: &Rig, model: &Model, periodic: &Periodic, rate: f64) -> O
         qdd: state(|s| &s.qdd),
         force: Some(drives.iter().map(force).collect()),
         missing_force: Vec::new(),
+        left_out: Vec::new(),
         lines: (0..time.len() as u64).collect(),
         time,
         repeats: None,

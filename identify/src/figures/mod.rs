@@ -5,7 +5,10 @@
 //! stacked for the total. `mean_relative` is the paper's mean of `|error| / |measured|`, whose
 //! peaks where the measured force passes through zero are the reason to read `nrms` beside it.
 //! `abs_ratio` is `sum |error| / sum |measured|`, as Volkmann et al. (IEEE ICMA 2020) give it.
+//! Figures are of every sample as it was recorded, whatever a fit was made from; beside them stand those after one low-pass
+//! on both forces ([`FilteredFigures`]), which do not count the noise of the force above the motion.
 
+mod filtered;
 mod fit_error;
 mod fit_file;
 mod locate;
@@ -15,6 +18,7 @@ use std::fmt;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
+pub use filtered::{BandError, FilteredFigures, InBand, TRIMMED_PART, in_band};
 pub use fit_error::{FitFault, FitFileError};
 pub use fit_file::{Estimator, FitFile, FitParameter, ParameterInfo, Status, fit_parameters};
 pub use locate::{LocateOptions, Region, TIME_COLUMN, locate};
@@ -22,14 +26,22 @@ pub use locate::{LocateOptions, Region, TIME_COLUMN, locate};
 /// Error figures of a comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
-    /// Relative error over all channels stacked; absent when nothing but zero was measured.
+    /// Relative error over all channels stacked; absent when nothing but zero was measured, and where channels have different
+    /// units, whose squares have no sum.
     pub nrms: Option<f64>,
-    /// Root mean square of the error over all channels, in the unit of the forces.
-    pub rms: f64,
+    /// Root mean square of the error over all channels, in the unit of the forces; absent where channels have different units.
+    #[serde(default)]
+    pub rms: Option<f64>,
     /// Samples, each of all channels.
     pub samples: usize,
     /// The figures of each channel, in the order of the drives.
     pub channels: IndexMap<String, ChannelFigures>,
+    /// Measured and model force through the same low-pass.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub band: Option<FilteredFigures>,
+    /// The rows that the fit was made from, where these are not the samples: forces after the parallel filter, fewer of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rows: Option<FilteredFigures>,
 }
 
 /// Error figures of one channel.
@@ -47,6 +59,12 @@ pub struct ChannelFigures {
     pub max_abs: f64,
     /// Root mean square of the error, in the unit of the force.
     pub rms: f64,
+    /// The unit of the force; empty where it is not known.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub unit: String,
+    /// Samples whose force was not measured, or is told apart as a fault of the sensor; no figure counts them.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub not_counted: usize,
     /// Samples that `mean_relative` leaves out because exactly zero was measured.
     pub zero_measured: usize,
 }
@@ -117,6 +135,8 @@ pub struct Comparison {
 
 #[derive(Debug, Clone, Default)]
 struct Sums {
+    unit: String,
+    not_counted: usize,
     error: f64,
     measured: f64,
     relative: f64,
@@ -138,9 +158,28 @@ impl Comparison {
         }
     }
 
+    /// The same with the units of the channels, in their order.
+    #[must_use]
+    pub fn with_units(mut self, units: impl IntoIterator<Item = String>) -> Self {
+        for (sums, unit) in self.channels.values_mut().zip(units) {
+            sums.unit = unit;
+        }
+        self
+    }
+
     /// Takes whole samples, interleaved `[sample * n_channels + channel]`.
     /// Fails when the lengths do not fit or a value is not finite.
     pub fn add(&mut self, measured: &[f64], model: &[f64]) -> Result<(), FiguresError> {
+        self.add_counted(measured, model, |_, _| true)
+    }
+
+    /// The same, of which only those values count of which `counts(sample, channel)` says so.
+    pub fn add_counted(
+        &mut self,
+        measured: &[f64],
+        model: &[f64],
+        counts: impl Fn(usize, usize) -> bool,
+    ) -> Result<(), FiguresError> {
         let channels = self.channels.len();
         if channels == 0
             || measured.len() != model.len()
@@ -152,11 +191,14 @@ impl Comparison {
                 channels,
             });
         }
-        for (measured, model) in measured
-            .chunks_exact(channels)
-            .zip(model.chunks_exact(channels))
-        {
-            for ((name, sums), (y, m)) in self.channels.iter_mut().zip(measured.iter().zip(model)) {
+        let samples = measured.chunks_exact(channels);
+        for (sample, (measured, model)) in samples.zip(model.chunks_exact(channels)).enumerate() {
+            let values = measured.iter().zip(model).enumerate();
+            for ((name, sums), (channel, (y, m))) in self.channels.iter_mut().zip(values) {
+                if !counts(sample, channel) {
+                    sums.not_counted += 1;
+                    continue;
+                }
                 let error = (y - m).abs();
                 if !error.is_finite() {
                     return Err(FiguresError::NotFinite {
@@ -185,29 +227,44 @@ impl Comparison {
         if self.samples == 0 {
             return Err(FiguresError::NoSamples);
         }
-        let samples = self.samples as f64;
         let ratio = |error: f64, measured: f64| (measured > 0.0).then(|| (error / measured).sqrt());
-        let error: f64 = self.channels.values().map(|sums| sums.error).sum();
-        let measured: f64 = self.channels.values().map(|sums| sums.measured).sum();
+        let total = |of: fn(&Sums) -> f64| self.channels.values().map(of).sum::<f64>();
+        let (error, measured) = (total(|sums| sums.error), total(|sums| sums.measured));
+        let counted = |sums: &Sums| self.samples - sums.not_counted;
+        let all: usize = self.channels.values().map(counted).sum();
+        let mut units = self.channels.values().map(|sums| &sums.unit);
+        let is_one_unit = units
+            .next()
+            .is_some_and(|first| units.all(|unit| unit == first));
         let channels = self.channels.iter().map(|(name, sums)| {
-            let counted = self.samples - sums.zero_measured;
+            let samples = counted(sums);
+            let counted = samples - sums.zero_measured;
             let figures = ChannelFigures {
                 nrms: ratio(sums.error, sums.measured),
                 mean_relative: (counted > 0).then(|| sums.relative / counted as f64),
                 abs_ratio: (sums.abs_measured > 0.0).then(|| sums.abs_error / sums.abs_measured),
                 max_abs: sums.max_abs,
-                rms: (sums.error / samples).sqrt(),
+                rms: (sums.error / samples.max(1) as f64).sqrt(),
+                unit: sums.unit.clone(),
+                not_counted: sums.not_counted,
                 zero_measured: sums.zero_measured,
             };
             (name.clone(), figures)
         });
         Ok(Figures {
-            nrms: ratio(error, measured),
-            rms: (error / (samples * self.channels.len() as f64)).sqrt(),
+            nrms: is_one_unit.then(|| ratio(error, measured)).flatten(),
+            rms: is_one_unit.then(|| (error / all.max(1) as f64).sqrt()),
             samples: self.samples,
             channels: channels.collect(),
+            band: None,
+            rows: None,
         })
     }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde asks")]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// Figures of whole columns, `measured[channel][sample]` and `model[channel][sample]`.
@@ -260,10 +317,28 @@ mod tests {
             (1.0_f64.to_bits(), 1)
         );
         assert!((figures.nrms.unwrap() - (2.25_f64 / 25.0).sqrt()).abs() < 1e-15);
-        assert!((figures.rms - (2.25_f64 / 8.0).sqrt()).abs() < 1e-15);
+        assert!((figures.rms.unwrap() - (2.25_f64 / 8.0).sqrt()).abs() < 1e-15);
         let json = serde_json::to_value(&figures).unwrap();
         assert!(json["channels"]["b"]["mean_relative"].is_number());
         assert_eq!(serde_json::from_value::<Figures>(json).unwrap(), figures);
+    }
+
+    /// Squares of newtons and of newton metres have no sum.
+    #[test]
+    fn different_units_have_no_total_and_some_samples_do_not_count() {
+        let names = ["a".to_owned(), "b".to_owned()];
+        let mut comparison = Comparison::new(names).with_units(["N".to_owned(), "N m".to_owned()]);
+        let (measured, model) = (
+            [3.0, 1.0, 9e9, 1.0, 4.0, 1.0],
+            [3.0, 1.5, 0.0, 1.0, 5.0, 1.0],
+        );
+        let counts = |sample, channel| (sample, channel) != (1, 0);
+        comparison.add_counted(&measured, &model, counts).unwrap();
+        let figures = comparison.finish().unwrap();
+        assert_eq!((figures.nrms, figures.rms), (None, None));
+        let a = &figures.channels["a"];
+        assert_eq!((a.nrms, a.not_counted), (Some(0.2), 1));
+        assert_eq!((a.rms, a.unit.as_str()), (0.5_f64.sqrt(), "N"));
     }
 
     #[test]

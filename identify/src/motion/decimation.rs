@@ -5,10 +5,13 @@ use crate::signal::{FilterError, LowPass};
 /// Columns that are filtered side by side.
 const LANES: usize = 8;
 
+/// The parallel filter passes this part of the sampling rate that is left.
+pub const PASSED_BY_DECIMATION: f64 = 0.4;
+
 /// The low-pass that [`decimate`] uses: Chebyshev 1, order 8, 0.05 dB, up to 0.8 of the new
 /// half rate.
 fn anti_alias(factor: usize) -> Result<LowPass, FilterError> {
-    LowPass::chebyshev1(8, 0.05, 0.4 / factor as f64, 1.0)
+    LowPass::chebyshev1(8, 0.05, PASSED_BY_DECIMATION / factor as f64, 1.0)
 }
 
 /// Every `factor`-th sample, starting with the first, of the zero-phase low-passed signal

@@ -40,6 +40,10 @@ impl Run {
         };
         cut(&mut self.time);
         self.force.iter_mut().flatten().for_each(cut);
+        for out in &mut self.left_out {
+            out.truncate(end);
+            out.drain(..start);
+        }
         self.lines.truncate(end);
         self.lines.drain(..start);
         Some((start, n - end))
@@ -78,6 +82,7 @@ mod tests {
             qdd: column(|t| 6.0 * t),
             force: Some(vec![time.clone()]),
             missing_force: Vec::new(),
+            left_out: Vec::new(),
             lines: (2..u64::from(n) + 2).collect(),
             repeats: None,
             prepared: PreparedAs::default(),

@@ -51,6 +51,9 @@ pub struct Preparation {
     pub source: DerivativeSource,
     /// How they are prepared.
     pub smoothing: Smoothing,
+    /// Up to which frequency forces are compared beside the raw figures, Hz; the cut-off, or what the motion reaches, when
+    /// absent.
+    pub band_hz: Option<f64>,
 }
 
 impl Default for Preparation {
@@ -62,6 +65,7 @@ impl Default for Preparation {
             decimate: 1,
             source: DerivativeSource::RecordedFirst,
             smoothing: Smoothing::Automatic,
+            band_hz: None,
         }
     }
 }

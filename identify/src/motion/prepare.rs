@@ -2,6 +2,7 @@
 
 use crate::motion::cutoff::{LONGEST_TRIM, Signal, TRIMMED_PERIODS, choose_cutoff};
 use crate::motion::derivatives::mean_rate;
+use crate::motion::even::{is_even, on_even_times};
 use crate::motion::options::{Preparation, Smoothing};
 use crate::motion::prepared_as::PreparedAs;
 use crate::motion::series::{self, Periodic};
@@ -56,7 +57,17 @@ impl Recording {
         // One cut-off for all coordinates keeps loops consistent.
         let chosen = || {
             let sources: Vec<Signal<'_>> = incomplete.iter().map(|c| c.source()).collect();
-            choose_cutoff(&sources, rate, order)
+            if is_even(time) {
+                return choose_cutoff(&sources, rate, order);
+            }
+            let even: Vec<Vec<f64>> = sources
+                .iter()
+                .map(|signal| on_even_times(time, signal.values))
+                .collect();
+            let even: Vec<Signal<'_>> = (sources.iter().zip(&even))
+                .map(|(signal, values)| Signal { values, ..*signal })
+                .collect();
+            choose_cutoff(&even, rate, order)
         };
         let cutoff = match &found {
             Some(found) => found.harmonics as f64 / found.period,

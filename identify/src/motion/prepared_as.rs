@@ -9,6 +9,9 @@ pub struct PreparedAs {
     pub cutoff_hz: Option<f64>,
     /// Whether the cut-off was chosen from the signal rather than given.
     pub cutoff_chosen: bool,
+    /// Up to which frequency forces are compared beside the raw figures, Hz.
+    #[serde(default)]
+    pub band_hz: Option<f64>,
     /// Period of the Fourier series that the motion was taken for, s, if it was.
     #[serde(default)]
     pub period: Option<f64>,

@@ -5,12 +5,14 @@
 
 use std::fmt::Write as _;
 
+use crate::motion::band;
+use crate::motion::even;
 use crate::motion::options::{DerivativeSource, Preparation, Smoothing};
 use crate::motion::periods::Repeats;
 use crate::motion::prepare::series_of;
 use crate::motion::prepared_as::PreparedAs;
 use crate::motion::smooth::Recorded;
-use crate::recording::{Fault, GAP, Note, Recording, RecordingError, Severity};
+use crate::recording::{Fault, GAP, Note, Recording, RecordingError, Severity, place_word};
 use crate::signal::median;
 use crate::words::{count_of, list};
 
@@ -32,6 +34,9 @@ pub struct Run {
     pub force: Option<Vec<Vec<f64>>>,
     /// Drives whose force the file lacks.
     pub missing_force: Vec<String>,
+    /// `left_out[drive][sample]`: forces that were not measured there, or are told apart as faults of a sensor; what stands
+    /// in their place joins their neighbours. Empty if every force counts.
+    pub left_out: Vec<Vec<bool>>,
     /// Line in the file for each sample.
     pub lines: Vec<u64>,
     /// How well the run repeats itself, if its motion is periodic and the forces are known.
@@ -197,6 +202,10 @@ impl Recording {
             ..PreparedAs::default()
         };
         let states = self.prepare_states(time, &columns, preparation, &mut prepared, &mut notes)?;
+        prepared.band_hz = preparation
+            .band_hz
+            .or(prepared.cutoff_hz)
+            .or_else(|| band::of_motion(time, &states));
         prepared.trimmed = preparation.trim.unwrap_or(prepared.trimmed);
         prepared.trim_asked_for = preparation.trim.is_some();
         let mut run = Run {
@@ -207,6 +216,7 @@ impl Recording {
             qdd: Vec::new(),
             force,
             missing_force,
+            left_out: Vec::new(),
             lines: (0..time.len()).map(|i| self.line(i).unwrap_or(0)).collect(),
             repeats: None,
             prepared,
@@ -259,27 +269,31 @@ impl Recording {
         let median = median(steps.clone());
         let shortest = steps.iter().copied().fold(f64::INFINITY, f64::min);
         let longest = steps.iter().copied().fold(0.0, f64::max);
+        if even::is_even(time) {
+            return Ok(());
+        }
         let gaps = steps.iter().filter(|step| **step > 1.5 * median).count();
-        if gaps > 0 {
+        let lost = if gaps > 0 {
             let first = time
                 .windows(2)
                 .position(|w| w[1] - w[0] > 1.5 * median)
                 .unwrap_or(0);
-            notes.push(Note::warning(format!(
-                "{} has {} in time: steps up to {longest:.6} s where {median:.6} s is usual, the first after line {}. \
-                 Derivatives and filters, where any are made, bridge them as they are.",
-                self.file(),
-                count_of(gaps, "gap", "gaps"),
+            format!(
+                "; {} samples are missing where steps are longer than usual, the first after {} {}",
+                (steps.iter().map(|step| (step / median).round() - 1.0))
+                    .fold(0.0, |sum, n| sum + n.max(0.0)),
+                place_word(self.file()),
                 self.line(first).unwrap_or(0)
-            )));
-        } else if longest - shortest > 0.01 * median {
-            notes.push(Note::warning(format!(
-                "The steps of {} are uneven, from {shortest:.6} s to {longest:.6} s; \
-                 differences use the true times, the low-pass takes the steps as even \
-                 (option `smoothing` = `savitzky-golay` uses the true times there too).",
-                self.file()
-            )));
-        }
+            )
+        } else {
+            String::new()
+        };
+        notes.push(Note::info(format!(
+            "The steps of {} are uneven, from {shortest:.6} s to {longest:.6} s with {median:.6} s in the middle{lost}. Where \
+             anything is filtered, positions are put on even times by the spline through them at their true times, and \
+             states are read off at these again.",
+            self.file()
+        )));
         Ok(())
     }
 
@@ -307,6 +321,10 @@ impl Recording {
         cut(&mut run.time);
         run.lines.truncate(have - end);
         run.lines.drain(..start);
+        for out in &mut run.left_out {
+            out.truncate(have - end);
+            out.drain(..start);
+        }
         let forces = run.force.iter_mut().flatten();
         for column in run
             .q
@@ -344,6 +362,11 @@ impl Run {
                 drives: self.missing_force.clone(),
             },
         })
+    }
+
+    /// Whether the force of a drive was measured in a sample, so that it counts.
+    pub fn counts(&self, drive: usize, sample: usize) -> bool {
+        self.left_out.get(drive).is_none_or(|out| !out[sample])
     }
 
     /// The measured forces interleaved per sample, `[sample * n_drives + drive]`, as the rows of

@@ -1,9 +1,9 @@
 //! From what a file holds of a coordinate to its position, rate and acceleration, by one of the ways of smoothing.
 
 use crate::motion::cutoff::Signal;
-use crate::motion::derivatives::{differentiate, filter_and_differentiate, mean_rate};
+use crate::motion::derivatives::{Smoothed, filter_and_differentiate};
+use crate::motion::even::{Spline, Steps, even_times, spread_times, steps};
 use crate::motion::{local_polynomials, series};
-use crate::signal::LowPass;
 use crate::words::{count_of, seven_digits};
 
 /// What the file holds of a coordinate.
@@ -34,7 +34,8 @@ impl Recorded<'_> {
         }
     }
 
-    /// What is recorded is kept; what is missing is derived from the nearest that is there.
+    /// What is missing is derived from the nearest that is there; positions and rates pass the same filter then, so that all
+    /// states are those of one motion. A recorded acceleration is kept.
     /// `None` if there are too few samples.
     pub(crate) fn prepare(
         &self,
@@ -57,9 +58,7 @@ impl Recorded<'_> {
             ]));
         }
         let smooth = |values: &[f64]| match way {
-            Way::Butterworth { order } => {
-                filter_and_differentiate(time, values, cutoff, order).map(Some)
-            }
+            Way::Butterworth { order } => on_true_times(time, values, cutoff, order).map(Some),
             Way::Polynomials { half_width } => {
                 Ok(local_polynomials::smooth(time, values, half_width))
             }
@@ -68,17 +67,40 @@ impl Recorded<'_> {
             }
         };
         if let Some(qd) = self.qd {
-            if let Way::Butterworth { order } = way {
-                let smooth =
-                    LowPass::butterworth(order, cutoff, mean_rate(time))?.zero_phase(qd)?;
-                let qdd = differentiate(time, &smooth);
-                return Ok(Some([self.q.to_vec(), qd.to_vec(), qdd]));
-            }
-            return Ok(smooth(qd)?.map(|all| [self.q.to_vec(), qd.to_vec(), all.qd]));
+            let (Some(q), Some(rate)) = (smooth(self.q)?, smooth(qd)?) else {
+                return Ok(None);
+            };
+            return Ok(Some([q.q, rate.q, rate.qd]));
         }
         let qdd = self.qdd.map(<[f64]>::to_vec);
         Ok(smooth(self.q)?.map(|all| [all.q, all.qd, qdd.unwrap_or(all.qdd)]))
     }
+}
+
+/// [`filter_and_differentiate`] of samples at any times: what is uneven is put on even times first, by the spline through
+/// the samples, and what comes out is read off at the true times again.
+fn on_true_times(
+    time: &[f64],
+    values: &[f64],
+    cutoff: f64,
+    order: usize,
+) -> Result<Smoothed, crate::FilterError> {
+    match steps(time) {
+        Steps::Even => return filter_and_differentiate(time, values, cutoff, order),
+        Steps::Rounded => {
+            return filter_and_differentiate(&even_times(time), values, cutoff, order);
+        }
+        Steps::Uneven => {}
+    }
+    let even = spread_times(time);
+    let values = Spline::new(time, values).at_all(&even);
+    let smooth = filter_and_differentiate(&even, &values, cutoff, order)?;
+    let back = |values: &[f64]| Spline::new(&even, values).at_all(time);
+    Ok(Smoothed {
+        q: back(&smooth.q),
+        qd: back(&smooth.qd),
+        qdd: back(&smooth.qdd),
+    })
 }
 
 /// Whether all values are the same.

@@ -69,7 +69,7 @@ impl Version {
                 is_check: k >= n_fit,
                 time: one.time(),
                 measured: along::measured(one)?,
-                forces: along::forces(&model, one, &values)?,
+                forces: along::decimated(along::forces(&model, one, &values)?, one)?,
             });
         }
         Ok(Self {

@@ -435,6 +435,7 @@ fn recording(plant: &ModelPlant<'_>, motion: &Motion) -> Option<Stretch> {
             qdd: motion.qdd.clone(),
             force: Some(plant.forces(motion)?),
             missing_force: Vec::new(),
+            left_out: Vec::new(),
             lines: Vec::new(),
             repeats: None,
             prepared: PreparedAs {

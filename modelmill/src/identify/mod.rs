@@ -15,7 +15,7 @@ use modelmill_spec::Sign;
 
 use crate::along;
 use crate::compare;
-use crate::error::Outcome;
+use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::{self, Recording};
 use crate::stretch::Stretch;
@@ -107,7 +107,9 @@ pub fn identify(
     let notes = remarks(model, &found, &parameters);
     let values: Vec<f64> = parameters.iter().map(|p| p.value).collect();
     let names: Vec<String> = unknown.into_iter().map(|info| info.expression).collect();
-    let (fit, nominal_fit) = both_figures(model, data, &values)?;
+    // One band for fit and check, so that their figures can be compared.
+    let band = compare::band(data);
+    let (fit, nominal_fit) = both_figures(model, data, &values, band)?;
     let recordings = data.iter().chain(check);
     let repeats = recordings
         .clone()
@@ -116,7 +118,7 @@ pub fn identify(
     let (check, nominal_check) = if check.is_empty() {
         (None, None)
     } else {
-        let (identified, nominal) = both_figures(model, check, &values)?;
+        let (identified, nominal) = both_figures(model, check, &values, band)?;
         (Some(identified), Some(nominal))
     };
     let finite = |value: f64| value.is_finite().then_some(value);
@@ -292,21 +294,20 @@ fn kept(p: &FitParameter) -> String {
 }
 
 /// Figures with identified and with nominal values.
-fn both_figures(model: &Model, data: &[Stretch], values: &[f64]) -> Outcome<(Figures, Figures)> {
-    let measured = data
-        .iter()
-        .map(along::measured)
-        .collect::<Outcome<Vec<_>>>()?;
+fn both_figures(
+    model: &Model,
+    data: &[Stretch],
+    values: &[f64],
+    band_hz: Option<f64>,
+) -> Outcome<(Figures, Figures)> {
     let figures_of = |values: &[f64]| {
         let forces = data
             .iter()
             .map(|one| along::forces(model, one, values))
             .collect::<Outcome<Vec<_>>>()?;
-        let pairs = measured
-            .iter()
-            .map(Vec::as_slice)
-            .zip(forces.iter().map(Vec::as_slice));
-        compare::figures(&model.drives(), pairs)
+        let mut figures = compare::figures(model, data, &forces, band_hz)?;
+        figures.rows = compare::figures_of_rows(model, data, &forces)?;
+        Ok::<_, Error>(figures)
     };
     Ok((figures_of(values)?, figures_of(&model.nominal)?))
 }

@@ -378,6 +378,14 @@ impl Model {
         drives.map(|d| d.name.clone()).collect()
     }
 
+    /// Unit of a drive's force: N or N m.
+    pub fn force_unit(&self, drive: usize) -> &'static str {
+        let mechanism = &self.derivation.mechanism;
+        mechanism.drives[drive]
+            .kind
+            .force_unit(&mechanism.coordinates)
+    }
+
     /// The base parameters as a fit describes them.
     pub fn infos(&self) -> Vec<ParameterInfo> {
         self.base

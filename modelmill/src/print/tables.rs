@@ -1,10 +1,10 @@
 //! Results in text, for people: parameters, figures and regions.
 
-use modelmill_identify::{Figures, FitParameter, Status};
+use modelmill_identify::{Figures, FitParameter, Status, TRIMMED_PART};
 
 use crate::compare::{Places, ROUNDING};
 use crate::model::Model;
-use crate::text::table::{Align, number, percent, significant, table};
+use crate::text::table::{Align, count, number, percent, significant, table};
 
 /// Identified base parameters beside their nominal values.
 pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
@@ -60,44 +60,86 @@ pub fn expressions(indent: usize, model: &Model) -> Vec<String> {
         .collect()
 }
 
-/// Error figures of several comparisons, one line for the total and one for each channel.
+/// Error figures of several comparisons, one line for the total, where there is one, and one for each channel.
 pub fn figures(named: &[(&str, &Figures)]) -> Vec<String> {
     let mut rows = Vec::new();
     for (name, figures) in named {
-        rows.push(vec![
-            (*name).to_owned(),
-            "all".to_owned(),
-            percent(figures.nrms),
-            String::new(),
-            String::new(),
-            significant(figures.rms, 4),
-            String::new(),
-        ]);
-        for (channel, one) in &figures.channels {
+        let mut name = (*name).to_owned();
+        if let Some(rms) = figures.rms {
             rows.push(vec![
+                std::mem::take(&mut name),
+                "all".to_owned(),
+                percent(figures.nrms),
+                figures
+                    .band
+                    .as_ref()
+                    .map_or_else(String::new, |band| percent(band.nrms)),
                 String::new(),
+                String::new(),
+                significant(rms, 4),
+                String::new(),
+                common_unit(figures),
+            ]);
+        }
+        for (channel, one) in &figures.channels {
+            let band = figures.band.as_ref();
+            let band = band.and_then(|band| band.channels.get(channel));
+            rows.push(vec![
+                std::mem::take(&mut name),
                 channel.clone(),
                 percent(one.nrms),
+                band.map_or_else(String::new, |band| percent(band.nrms)),
                 percent(one.abs_ratio),
                 percent(one.mean_relative),
                 significant(one.rms, 4),
                 significant(one.max_abs, 4),
+                one.unit.clone(),
             ]);
         }
     }
-    table(
+    let mut lines = table(
         2,
         &[
             ("", Align::Left),
             ("drive", Align::Left),
             ("nrms", Align::Right),
+            ("in band", Align::Right),
             ("sum|e|/sum|f|", Align::Right),
             ("mean relative", Align::Right),
             ("rms", Align::Right),
             ("largest", Align::Right),
+            ("unit", Align::Left),
         ],
         &rows,
-    )
+    );
+    if let Some(band) = named.iter().find_map(|(_, figures)| figures.band.as_ref()) {
+        lines.push(format!(
+            "  in band: nrms with both forces below {} Hz (Butterworth of order 4, both ways; {} of the samples dropped at \
+             each end)",
+            significant(band.cutoff_hz, 3),
+            percent(Some(TRIMMED_PART)),
+        ));
+    }
+    for (name, figures) in named {
+        let Some(rows) = &figures.rows else { continue };
+        let drives = rows.channels.iter();
+        let drives = drives.map(|(drive, one)| format!("{drive} {}", percent(one.nrms)));
+        let drives: Vec<String> = drives.collect();
+        lines.push(format!(
+            "  {name}: {} in the {} that are left of it, both forces below {} Hz ({})",
+            percent(rows.nrms),
+            count(rows.samples, "sample", "samples"),
+            significant(rows.cutoff_hz, 3),
+            drives.join(", ")
+        ));
+    }
+    lines
+}
+
+/// The unit that all drives have.
+fn common_unit(figures: &Figures) -> String {
+    let first = figures.channels.values().next();
+    first.map_or_else(String::new, |one| one.unit.clone())
 }
 
 /// Where an error lives, one sentence for each region.

@@ -4,9 +4,7 @@ use crate::model::Model;
 
 /// Unit of a drive's force.
 pub(crate) fn force_unit(model: &Model, drive: usize) -> &'static str {
-    let mechanism = &model.derivation.mechanism;
-    let kind = mechanism.drives[drive].kind;
-    kind.force_unit(&mechanism.coordinates)
+    model.force_unit(drive)
 }
 
 /// Unit of a variable by its name: a coordinate or the length of a drive, their rates and accelerations, a force, the time.

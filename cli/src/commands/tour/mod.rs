@@ -167,7 +167,7 @@ impl Seen {
             .first()
             .ok_or_else(|| Failure::Input("the bundled recording has no sample".to_owned()))?;
         let measured = along::measured(one)?;
-        let forces = along::forces(model, one, &model.nominal)?;
+        let forces = along::decimated(along::forces(model, one, &model.nominal)?, one)?;
         let errors = measured
             .iter()
             .zip(&forces)
