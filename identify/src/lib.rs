@@ -51,7 +51,7 @@ pub use figures::{
     TIME_COLUMN, TRIMMED_PART, compare, fit_parameters, in_band, locate,
 };
 pub use motion::{
-    DerivativeSource, PASSED_BY_DECIMATION, Preparation, PreparedAs, Repeats, Run, Smoothed,
+    DerivativeSource, Open, PASSED_BY_DECIMATION, Preparation, PreparedAs, Repeats, Run, Smoothed,
     Smoothing, decimate, decimate_columns, decimate_table, decimate_time, differentiate,
     filter_and_differentiate,
 };

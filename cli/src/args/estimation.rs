@@ -11,7 +11,7 @@ use super::preparation::parse_map;
 pub(crate) struct EstimatorArgs {
     /// What each equation counts: `channels` divides each drive's by the standard deviation of its residuals (iterated),
     /// `variance` each sample's by that of the recording's columns `DRIVE_var`
-    #[arg(long, value_enum, default_value = "none")]
+    #[arg(long, value_enum, default_value = "channels")]
     pub(crate) weights: WeightsArg,
     /// Huber's robust estimate: residuals beyond BOUND standard deviations (taken from their median) count less
     #[arg(long, value_name = "BOUND", num_args = 0..=1, default_missing_value = "1.345",
@@ -41,9 +41,9 @@ pub(crate) struct EstimatorArgs {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub(crate) enum WeightsArg {
     /// All the same
-    #[default]
     None,
     /// By the residuals of each drive
+    #[default]
     Channels,
     /// By the recording's columns
     Variance,

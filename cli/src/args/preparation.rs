@@ -16,7 +16,8 @@ pub(crate) struct PreparationArgs {
     /// with `_var` for the variance of its force
     #[arg(long, value_name = "OURS=THEIRS", value_parser = parse_map)]
     pub(crate) map: Vec<(String, String)>,
-    /// Cut-off of the low-pass on positions, Hz; chosen from the signal if not given
+    /// Cut-off of the low-pass on positions, Hz; chosen by what is left of the forces on held-out time if not given, or from
+    /// the positions where no forces are
     #[arg(long, value_name = "HZ", value_parser = parse_cutoff, allow_negative_numbers = true)]
     pub(crate) cutoff: Option<f64>,
     /// Order of the Butterworth low-pass, which runs forwards and backwards [default: 4]
@@ -26,7 +27,8 @@ pub(crate) struct PreparationArgs {
     /// counts for both ends
     #[arg(long, value_name = "N[,N]", value_parser = parse_trim, allow_hyphen_values = true)]
     pub(crate) trim: Option<(usize, usize)>,
-    /// Keep every n-th sample, after a low-pass on forces and regressor alike
+    /// Keep every n-th sample, after a low-pass on forces and regressor alike; chosen with the cut-off where neither that nor
+    /// the smoothing nor this is given
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = parse_decimate, allow_negative_numbers = true)]
     pub(crate) decimate: usize,
     /// Which rates and accelerations are taken
@@ -106,6 +108,7 @@ impl PreparationArgs {
                     period: self.period,
                 },
             },
+            ..Preparation::default()
         }
     }
 }

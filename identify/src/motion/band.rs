@@ -1,20 +1,28 @@
-//! The band of a motion that was not filtered: states go in, a frequency comes out below which they are and above which a
-//! force can hardly be theirs.
+//! The band of a motion: positions go in, a frequency comes out below which they are, and above which a force can hardly be
+//! theirs.
 
 use crate::motion::derivatives::mean_rate;
+use crate::motion::even::{is_even, on_even_times};
 use crate::signal::hann_power;
 
-/// The part of the power of a rate that lies in its band.
+/// The part of the power of a position that lies below the highest frequency of its motion. Positions decide, not rates: the
+/// noise of a clock or of an encoder is a large part of these.
 const PART: f64 = 0.999;
-/// Forces hold products of rates, and friction that reverses with them: harmonics up to this one count.
-const HARMONICS: f64 = 3.0;
+/// Forces hold accelerations, products of rates, and friction that reverses with them: they reach so many times as far.
+const FARTHER: f64 = 10.0;
 
-/// Up to where forces follow a motion, Hz: three times the frequency below which nearly all of the power of any rate lies, at
-/// most a fifth of the sampling rate. `None` if nothing moves.
-pub(crate) fn of_motion(time: &[f64], states: &[[Vec<f64>; 3]]) -> Option<f64> {
+/// Up to where forces follow a motion, Hz; at most a fifth of the sampling rate. `None` if nothing moves.
+pub(crate) fn of_motion<'a>(
+    time: &[f64],
+    positions: impl IntoIterator<Item = &'a [f64]>,
+) -> Option<f64> {
     let rate = mean_rate(time);
-    let reach = states.iter().filter_map(|[_, qd, _]| {
-        let power = hann_power(qd);
+    let reach = positions.into_iter().filter_map(|q| {
+        let power = if is_even(time) {
+            hann_power(q)
+        } else {
+            hann_power(&on_even_times(time, q))
+        };
         let total: f64 = power.iter().sum();
         let mut sum = 0.0;
         let within = power.iter().position(|one| {
@@ -24,7 +32,9 @@ pub(crate) fn of_motion(time: &[f64], states: &[[Vec<f64>; 3]]) -> Option<f64> {
         (total > 0.0).then(|| 0.5 * rate * within.max(1) as f64 / (power.len() - 1) as f64)
     });
     let reach = reach.fold(0.0, f64::max);
-    (reach > 0.0).then(|| (HARMONICS * reach).clamp(4.0 * rate / time.len() as f64, 0.2 * rate))
+    let highest = 0.2 * rate;
+    let lowest = (4.0 * rate / time.len() as f64).min(highest);
+    (reach > 0.0).then(|| (FARTHER * reach).clamp(lowest, highest))
 }
 
 #[cfg(test)]
@@ -34,14 +44,13 @@ mod tests {
     #[test]
     fn the_band_reaches_beyond_the_fastest_motion() {
         let time: Vec<f64> = (0..4000).map(|k| 0.005 * f64::from(k)).collect();
-        let rate = |hz: f64| -> Vec<f64> {
+        let tone = |hz: f64| -> Vec<f64> {
             let angle = |t: &f64| (std::f64::consts::TAU * hz * t).sin();
             time.iter().map(angle).collect()
         };
-        let states = [0.3, 2.0].map(|hz| [vec![0.0; 4000], rate(hz), vec![0.0; 4000]]);
-        let band = of_motion(&time, &states).unwrap();
-        assert!((5.8..7.0).contains(&band), "{band}");
-        let still = [[vec![1.0; 4000], vec![0.0; 4000], vec![0.0; 4000]]];
-        assert_eq!(of_motion(&time, &still), None);
+        let motion = [tone(0.3), tone(2.0)];
+        let band = of_motion(&time, motion.iter().map(Vec::as_slice)).unwrap();
+        assert!((19.0..22.0).contains(&band), "{band}");
+        assert_eq!(of_motion(&time, [[1.0; 4000].as_slice()]), None);
     }
 }

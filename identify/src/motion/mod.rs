@@ -25,5 +25,6 @@ pub use derivatives::{Smoothed, differentiate, filter_and_differentiate};
 pub(crate) use even::{is_even, on_even_times};
 pub use options::{DerivativeSource, Preparation, Smoothing};
 pub use periods::Repeats;
+pub use prepare::Open;
 pub use prepared_as::PreparedAs;
 pub use run::Run;

@@ -54,6 +54,9 @@ pub struct Preparation {
     /// Up to which frequency forces are compared beside the raw figures, Hz; the cut-off, or what the motion reaches, when
     /// absent.
     pub band_hz: Option<f64>,
+    /// Whether cut-off, smoothing and decimation were chosen by what they leave of the forces rather than asked for.
+    #[serde(skip)]
+    pub chosen: bool,
 }
 
 impl Default for Preparation {
@@ -66,6 +69,7 @@ impl Default for Preparation {
             source: DerivativeSource::RecordedFirst,
             smoothing: Smoothing::Automatic,
             band_hz: None,
+            chosen: false,
         }
     }
 }

@@ -110,7 +110,7 @@ impl Recording {
             }
         };
         prepared.cutoff_hz = Some(cutoff);
-        prepared.cutoff_chosen = preparation.cutoff_hz.is_none();
+        prepared.cutoff_chosen = preparation.cutoff_hz.is_none() || preparation.chosen;
         // A series has no transients at its ends.
         if !matches!(way, Way::Series { .. }) {
             prepared.trimmed = self.transients(rate / cutoff, time.len(), preparation, notes);
@@ -183,6 +183,48 @@ impl Recording {
         }
         let count = spoilt.unwrap_or(most);
         (count, count)
+    }
+}
+
+/// What is open in the preparation of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Open {
+    /// Mean sampling rate, Hz.
+    pub rate_hz: f64,
+    /// Up to where forces follow the motion, Hz.
+    pub band_hz: f64,
+    /// The cut-off that the spectra of the positions alone propose, Hz.
+    pub cutoff_hz: f64,
+}
+
+impl Recording {
+    /// What there is to choose where the preparation leaves cut-off, smoothing and decimation open; `None` where it does not,
+    /// where all derivatives are recorded, where a Fourier series leaves nothing but noise, and where nothing moves.
+    /// Fails as [`Recording::runs_with`] does.
+    pub fn open(
+        &self,
+        coordinates: &[String],
+        drives: &[String],
+        preparation: &Preparation,
+    ) -> Result<Option<Open>, RecordingError> {
+        let usual = Preparation::default();
+        let is_open = preparation.cutoff_hz.is_none()
+            && preparation.smoothing == usual.smoothing
+            && preparation.decimate <= 1;
+        if !is_open {
+            return Ok(None);
+        }
+        let runs = self.runs_with(coordinates, drives, preparation)?;
+        let longest = runs.iter().max_by_key(|run| run.samples());
+        let found = longest.and_then(|run| {
+            let prepared = &run.prepared;
+            Some(Open {
+                rate_hz: mean_rate(&run.time),
+                band_hz: prepared.band_hz?,
+                cutoff_hz: prepared.cutoff_hz.filter(|_| prepared.period.is_none())?,
+            })
+        });
+        Ok(found)
     }
 }
 

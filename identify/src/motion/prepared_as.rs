@@ -25,4 +25,7 @@ pub struct PreparedAs {
     /// The parallel decimation that the regression is to apply to the columns of the regressor
     /// and to the forces ([`crate::decimate_table`]); the columns here are not decimated.
     pub decimate: usize,
+    /// Whether the decimation was chosen rather than asked for.
+    #[serde(default)]
+    pub decimate_chosen: bool,
 }

@@ -16,6 +16,9 @@ use crate::recording::{Fault, GAP, Note, Recording, RecordingError, Severity, pl
 use crate::signal::median;
 use crate::words::{count_of, list};
 
+/// A gap of this part of a period of the highest frequency at which forces follow a motion is bridged by the spline.
+const BRIDGED: f64 = 0.25;
+
 /// States along a run, ready for the regressor. All columns have the length of `time`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
@@ -73,7 +76,9 @@ impl Recording {
         let columns = columns?;
         let is_filtered = preparation.decimate > 1 || columns.iter().any(|c| !c.is_complete());
         let stretches = if is_filtered {
-            self.stretches()
+            let positions = columns.iter().map(|c| c.q);
+            let bridged = band::of_motion(self.column("t")?, positions).map(|band| BRIDGED / band);
+            self.stretches(bridged.unwrap_or(0.0))
         } else {
             Vec::new()
         };
@@ -125,10 +130,11 @@ impl Recording {
         let breaks = stretches[..stretches.len() - 1].iter();
         let places = breaks.filter_map(|stretch| stretch.line(stretch.samples() - 1));
         let mut says = format!(
-            "{} has {} in time of more than {GAP} usual steps, the first after line {}: the {} stretches are filtered and \
-             differentiated each on its own.",
+            "{} has {} in time of more than {GAP} usual steps that {} too long for this motion to be bridged, the first after \
+             line {}: the {} stretches are filtered and differentiated each on its own.",
             self.file(),
             count_of(stretches.len() - 1, "gap", "gaps"),
+            if stretches.len() == 2 { "is" } else { "are" },
             places.min().unwrap_or(0),
             stretches.len(),
         );
@@ -204,8 +210,8 @@ impl Recording {
         let states = self.prepare_states(time, &columns, preparation, &mut prepared, &mut notes)?;
         prepared.band_hz = preparation
             .band_hz
-            .or(prepared.cutoff_hz)
-            .or_else(|| band::of_motion(time, &states));
+            .or_else(|| band::of_motion(time, columns.iter().map(|c| c.q)));
+        prepared.decimate_chosen = preparation.chosen;
         prepared.trimmed = preparation.trim.unwrap_or(prepared.trimmed);
         prepared.trim_asked_for = preparation.trim.is_some();
         let mut run = Run {

@@ -7,15 +7,17 @@ use crate::signal::median;
 pub(crate) const GAP: f64 = 5.0;
 
 impl Recording {
-    /// The recording cut at its gaps in time, each stretch with its lines; the whole if there are none.
-    pub(crate) fn stretches(&self) -> Vec<Self> {
+    /// The recording cut at its gaps in time that are longer than `bridged`, s, each stretch with its lines; the whole if there
+    /// are none.
+    pub(crate) fn stretches(&self, bridged: f64) -> Vec<Self> {
         let Ok(time) = self.column("t") else {
             return vec![self.clone()];
         };
         let usual = median(time.windows(2).map(|w| w[1] - w[0]).collect());
         let mut edges = vec![0];
         edges.extend(
-            (1..time.len()).filter(|i| time[*i] - time[*i - 1] > GAP * usual && usual > 0.0),
+            (1..time.len())
+                .filter(|i| time[*i] - time[*i - 1] > (GAP * usual).max(bridged) && usual > 0.0),
         );
         edges.push(time.len());
         if edges.len() == 2 {

@@ -2,7 +2,8 @@
 
 use crate::identify::refine::Refinement;
 
-/// How parameters are estimated; [`Estimation::default`] is plain least squares.
+/// How parameters are estimated; [`Estimation::default`] is least squares with each drive by its own
+/// residuals.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Estimation {
     /// What each equation counts.
@@ -20,10 +21,10 @@ pub struct Estimation {
 /// What each equation counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Weights {
-    /// All the same.
-    #[default]
+    /// All the same: ordinary least squares.
     None,
-    /// Each drive's are divided by the standard deviation of its residuals (iterated).
+    /// Each drive's are divided by the standard deviation of its residuals (iterated), for drives differ in size and unit.
+    #[default]
     Channels,
     /// Each sample's are divided by the standard deviation of the recording's columns `DRIVE_var`.
     Variance,

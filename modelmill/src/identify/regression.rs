@@ -85,7 +85,8 @@ pub fn identify(
     enough(data, &runs, unknown.len(), model)?;
     not_idle(data, &runs)?;
     // Plain least squares: one pass for the solution, two for the deviations. How often rows are reweighted nobody knows.
-    let reweighted = args.weights == Weights::Channels || args.robust.is_some();
+    let by_channel = args.weights == Weights::Channels && model.drives().len() > 1;
+    let reweighted = by_channel || args.robust.is_some();
     let passes = if reweighted { 0 } else { 3 };
     model
         .host()
@@ -113,7 +114,7 @@ pub fn identify(
                 });
             }
             let options = EstimateOptions {
-                by_channel: args.weights == Weights::Channels,
+                by_channel,
                 huber: args.robust,
                 ..EstimateOptions::default()
             };

@@ -1,6 +1,7 @@
 //! Recordings of a model: read with the names that the model and the user give, prepared, and looked at before anything is
 //! believed.
 
+mod choice;
 mod columns;
 mod contents;
 mod options;
@@ -52,12 +53,33 @@ pub(crate) fn read_as_recorded(
     reading: &Reading,
 ) -> Outcome<Vec<Stretch>> {
     let raw = read_raw(model, &[path], reading)?;
+    let (mut reading, note) = settled(model, &raw, reading)?;
+    if reading.preparation.chosen {
+        // Rows of a fit are of no interest here.
+        reading.preparation.decimate = 1;
+    }
+    let reading = &reading;
     let mut data = prepare(model, &raw, reading, 0.0)?;
+    if let (Some(note), Some(first)) = (note, data.first_mut()) {
+        first.run.notes.push(note);
+    }
     note_idle_options(&mut data, reading);
     for note in data.iter().flat_map(Stretch::notes) {
         model.host().note(note);
     }
     Ok(data)
+}
+
+/// The reading with what it leaves open of the preparation chosen, and what was chosen.
+fn settled(model: &Model, raw: &Raw, reading: &Reading) -> Outcome<(Reading, Option<Note>)> {
+    let says = format!("choosing how {} is smoothed", raw.file());
+    let chosen = model
+        .host()
+        .watched(&says, 0, |_| choice::choose(model, raw, reading))??;
+    Ok(match chosen {
+        Some((reading, note)) => (reading, Some(note)),
+        None => (reading.clone(), None),
+    })
 }
 
 /// Gives every force the states of the moment at which it acted, by the model's delay.
@@ -215,12 +237,16 @@ impl Model {
 impl Recording {
     fn new(model: &Model, raw: Raw, reading: &Reading) -> Outcome<Self> {
         let raw = Arc::new(raw);
-        let mut stretches = prepared(model, &raw, reading)?;
+        let (reading, note) = settled(model, &raw, reading)?;
+        let mut stretches = prepared(model, &raw, &reading)?;
+        if let (Some(note), Some(first)) = (note, stretches.first_mut()) {
+            first.note(model, note);
+        }
         audit::examine(model, &mut stretches);
         Ok(Self {
             stretches,
             raw,
-            reading: reading.clone(),
+            reading,
         })
     }
 
