@@ -17,7 +17,7 @@ use crate::signal::median;
 use crate::words::{count_of, list};
 
 /// A gap of this part of a period of the highest frequency at which forces follow a motion is bridged by the spline.
-const BRIDGED: f64 = 0.25;
+const BRIDGED: f64 = 0.5;
 
 /// States along a run, ready for the regressor. All columns have the length of `time`.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,9 +3,10 @@
 //!
 //! Spectra of positions alone cannot tell noise of clocks and encoders from motion; forces can. For each cut-off of a ladder
 //! the model's regressor, with friction and an offset of every drive beside, is fitted to the forces on four fifths of the
-//! time and held against the last one, both sides through one low-pass at the band of the motion, so that all candidates are
-//! judged by the same forces on the same samples. The figure is the geometric mean of the drives' relative errors: the
-//! likelihood of errors whose size is not known, which knows no units.
+//! time, both through one low-pass at the band of the motion, and held against the last fifth. A cut-off that is too low leaves
+//! of the forces what the model could explain, one that is too high hides it in noise. Octaves above the band count as far as
+//! the model explains anything of them. The figure is the geometric mean over the drives of what is left: the likelihood of
+//! errors whose size is not known, which knows no units.
 
 use modelmill_codegen::{Evaluator, States};
 use modelmill_identify::{LowPass, Note, Open, PASSED_BY_DECIMATION, Recording as Raw, Run};
@@ -21,17 +22,25 @@ const RATIO: f64 = 1.6;
 /// The highest cut-off, in parts of the sampling rate: beyond, differences take more than the filter leaves.
 const HIGHEST: f64 = 0.2;
 /// The lowest cut-off, in parts of the band of the forces.
-const LOWEST: f64 = 0.3;
+const LOWEST: f64 = 0.15;
 /// Parts of the time, each of which is held out once.
 const FOLDS: usize = 5;
+/// Octaves above the band of the motion that are looked at.
+const OCTAVES: usize = 2;
 /// Samples that are looked at for each candidate, at most; beyond, windows are spread over the recording.
 const LOOKED_AT: usize = 12_000;
+/// Samples in a period of the highest frequency that is looked at.
+const FINE: f64 = 5.0;
 /// Windows of a long recording.
 const WINDOWS: usize = 10;
-/// Periods of the band that are dropped at both ends of a window.
-const DROPPED: f64 = 1.5;
+/// Periods of the band that are dropped at both ends of a stretch that is held out, and the part of it that may be dropped.
+const DROPPED: (f64, f64) = (1.5, 0.2);
 /// Bands of the parallel filter that are tried, in parts of the band of the forces.
-const PARALLEL: [f64; 3] = [1.0, 2.0, 4.0];
+const PARALLEL: [f64; 3] = [0.5, 1.0, 2.0];
+/// Fewest samples of a window.
+const FEWEST: usize = 40;
+/// What is left of a force below this part of it is rounding.
+const ROUNDING: f64 = 1e-6;
 /// A candidate must be better by this part of the error to be preferred to one that smooths less.
 const BETTER: f64 = 0.005;
 /// A cut-off that leaves so much more than the best ends the search downwards.
@@ -61,8 +70,14 @@ pub(super) fn choose(
     }))
 }
 
-/// A candidate with what it leaves: the logarithm of the geometric mean of the drives' relative errors.
-type Judged = (f64, f64);
+/// What is left of the forces on held-out time.
+#[derive(Clone, Copy)]
+struct Left {
+    /// The logarithm of the geometric mean over the drives of what is left, in units of the forces.
+    figure: f64,
+    /// The geometric mean over the drives of their relative errors below the band of the motion.
+    relative: f64,
+}
 
 struct Search<'a> {
     model: &'a Model,
@@ -90,76 +105,74 @@ impl Search<'_> {
         // The lowest cut-off drops most samples; what it leaves is looked at for all.
         let runs = self.runs(ladder[ladder.len() - 1])?;
         let looked_at = self.windows(&runs);
-        let mut judged: Vec<Judged> = Vec::new();
+        let mut judged: Vec<(f64, Left)> = Vec::new();
         let mut least = f64::INFINITY;
         for cutoff in ladder {
-            let Some(rows) = self.rows(cutoff, &looked_at) else {
-                continue;
-            };
-            let Some(left) = held_out(&rows, &rows) else {
+            let Some(left) = self.left(cutoff, band_hz, &looked_at) else {
                 continue;
             };
             judged.push((cutoff, left));
-            least = least.min(left);
-            if left > least + HOPELESS.ln() && judged.len() > 3 {
+            least = least.min(left.figure);
+            if left.figure > least + HOPELESS.ln() && judged.len() > 3 {
                 break;
             }
         }
         let best = judged
             .iter()
-            .position(|(_, left)| *left <= least + BETTER)?;
+            .position(|(_, left)| left.figure <= least + BETTER)?;
         let (cutoff, left) = judged[best];
         let (decimate, left) = self.decimation(cutoff, &looked_at).unwrap_or((1, left));
         let mut reading = self.reading.clone();
         reading.preparation.cutoff_hz = Some(cutoff);
         reading.preparation.decimate = decimate;
         reading.preparation.chosen = true;
-        let shown = |left: f64| percent(Some(left.exp()));
         let neighbours: Vec<String> = [best.checked_sub(1), Some(best + 1)]
             .into_iter()
             .filter_map(|at| {
-                let (cutoff, left) = judged.get(at?)?;
-                Some(format!(
-                    "{} at {} Hz",
-                    shown(*left),
-                    significant(*cutoff, 3)
-                ))
+                let (cutoff, other) = judged.get(at?)?;
+                let more = (other.figure - judged[best].1.figure).exp() - 1.0;
+                let cost = if more.abs() < 1e-3 {
+                    "as much".to_owned()
+                } else if more < 0.0 {
+                    format!("{} less", percent(Some(-more)))
+                } else {
+                    format!("{} more", percent(Some(more)))
+                };
+                Some(format!("{cost} at {} Hz", significant(*cutoff, 3)))
             })
             .collect();
         let neighbours = if neighbours.is_empty() {
             String::new()
         } else {
-            format!(" ({})", neighbours.join(", "))
+            format!(", {}", neighbours.join(" and "))
         };
         let every = if decimate > 1 {
             format!(
-                ", and every {decimate}th sample after the parallel filter on forces and regressor"
+                ", and one in {decimate} samples kept after the parallel filter on forces and regressor"
             )
         } else {
             String::new()
         };
         let says = format!(
-            "{} is smoothed at {} Hz{every}: chosen by what is left of the forces below {} Hz on held-out time, {} (geometric \
+            "{} is smoothed at {} Hz{every}, since that leaves least of the forces on held-out time: {} below {} Hz (geometric \
              mean over the drives){neighbours}; options `cutoff_hz` and `decimate` say otherwise.",
             self.raw.file(),
             significant(cutoff, 3),
+            percent(Some(left.relative)),
             significant(band_hz, 3),
-            shown(left),
         );
         Some((reading, Note::info(says)))
     }
 
     /// The factor of decimation, and what is left with it on held-out time.
-    fn decimation(&self, cutoff: f64, looked_at: &[Window]) -> Option<(usize, f64)> {
-        let rows = self.rows(cutoff, looked_at)?;
-        let mut best: Option<(usize, f64)> = None;
+    fn decimation(&self, cutoff: f64, looked_at: &[Window]) -> Option<(usize, Left)> {
+        let mut best: Option<(usize, Left)> = None;
         for part in PARALLEL {
             let passed = part * self.open.band_hz;
             let factor = whole(PASSED_BY_DECIMATION * self.open.rate_hz / passed).max(1);
             let passed = if factor == 1 { f64::INFINITY } else { passed };
-            let fitted = self.rows_in(cutoff, looked_at, passed)?;
-            let left = held_out(&fitted, &rows)?;
-            if best.is_none_or(|(_, least)| left < least - BETTER) {
+            let left = self.left(cutoff, passed, looked_at)?;
+            if best.is_none_or(|(_, least)| left.figure < least.figure - BETTER) {
                 best = Some((factor, left));
             }
             if factor == 1 {
@@ -187,7 +200,7 @@ impl Search<'_> {
     /// The stretches of time that all candidates have, or windows of them.
     fn windows(&self, runs: &[Run]) -> Vec<Window> {
         let total: f64 = runs.iter().map(duration).sum();
-        let step = self.open.band_hz.recip() / 12.0;
+        let step = self.fine().recip();
         let most = step * LOOKED_AT as f64;
         let share = if total > most { most / total } else { 1.0 };
         let mut windows = Vec::new();
@@ -208,112 +221,143 @@ impl Search<'_> {
         windows
     }
 
-    fn rows(&self, cutoff: f64, windows: &[Window]) -> Option<Vec<Rows>> {
-        self.rows_in(cutoff, windows, self.open.band_hz)
+    /// The highest frequency that is looked at, Hz.
+    fn highest(&self) -> f64 {
+        let octaves = 2.0_f64.powi(i32::try_from(OCTAVES).unwrap_or(0));
+        (octaves * self.open.band_hz).min(HIGHEST * self.open.rate_hz)
     }
 
-    /// Rows of regressor and forces below `passed`, Hz, of all windows, by folds.
-    fn rows_in(&self, cutoff: f64, windows: &[Window], passed: f64) -> Option<Vec<Rows>> {
+    /// Samples per second at which the model is evaluated.
+    fn fine(&self) -> f64 {
+        (FINE * self.highest()).min(self.open.rate_hz)
+    }
+
+    /// What is left on held-out time by a cut-off, where rows below `passed`, Hz, are fitted.
+    fn left(&self, cutoff: f64, passed: f64, windows: &[Window]) -> Option<Left> {
         let runs = self.runs(cutoff)?;
-        let n_drives = self.model.drives().len();
-        let total: f64 = windows.iter().map(|w| w.to - w.from).sum();
+        let every = whole(self.open.rate_hz / self.fine()).max(1);
+        let rate = self.open.rate_hz / every as f64;
+        let slack = 1.0 / self.open.rate_hz;
+        let samples = windows
+            .iter()
+            .map(|window| {
+                let run = runs.iter().find(|run| {
+                    run.time[0] <= window.from + slack
+                        && run.time[run.time.len() - 1] >= window.to - slack
+                })?;
+                self.samples(run, window, every)
+            })
+            .collect::<Option<Vec<Samples>>>()?;
+        let total: usize = samples.iter().map(|one| one.forces.nrows()).sum();
+        let mut before = 0;
         let mut folds: Vec<Rows> = Vec::new();
-        let mut before = 0.0;
-        for window in windows {
-            let run = runs.iter().find(|run| {
-                let slack = 1.0 / self.open.rate_hz;
-                run.time[0] <= window.from + slack
-                    && run.time[run.time.len() - 1] >= window.to - slack
-            })?;
-            let part = self.window(run, window, passed, cutoff)?;
-            for (time, row) in part.time.iter().zip(part.rows.chunks_exact(n_drives)) {
-                let at = (before + time - window.from) / total;
-                let fold = whole(at * FOLDS as f64).min(FOLDS - 1);
-                for (drive, (row, force)) in row.iter().enumerate() {
-                    if folds.is_empty() {
-                        folds = vec![Rows::new(n_drives, row.len()); FOLDS];
-                    }
-                    folds[fold].add(drive, row, *force);
+        let mut parts: Vec<(usize, usize, usize, usize)> = Vec::new();
+        for (window, one) in samples.iter().enumerate() {
+            let n = one.forces.nrows();
+            let filtered = one.below(passed, rate)?;
+            let margin = margin(n, rate, self.open.band_hz);
+            let thin = whole(rate / (4.0 * passed.min(self.open.band_hz * 4.0))).max(1);
+            if folds.is_empty() {
+                folds = vec![Rows::new(one.forces.ncols(), one.regressor.ncols()); FOLDS];
+            }
+            let fold_of = |i: usize| ((before + i) * FOLDS / total).min(FOLDS - 1);
+            for i in (margin..n - margin).step_by(thin) {
+                folds[fold_of(i)].add(&filtered, i);
+            }
+            let mut start = 0;
+            while start < n {
+                let fold = fold_of(start);
+                let end = (start + 1..n).find(|i| fold_of(*i) != fold).unwrap_or(n);
+                parts.push((window, fold, start, end));
+                start = end;
+            }
+            before += n;
+        }
+        let values = fitted(&folds)?;
+        let drives = samples.first()?.forces.ncols();
+        let edges: Vec<f64> = (0..=OCTAVES)
+            .map(|k| self.open.band_hz * 2.0_f64.powi(i32::try_from(k).unwrap_or(0)))
+            .filter(|edge| *edge < 0.45 * rate)
+            .collect();
+        let mut octaves = vec![vec![Octave::default(); edges.len()]; drives];
+        for (window, fold, start, end) in parts {
+            let one = &samples[window];
+            let margin = margin(end - start, rate, self.open.band_hz);
+            for (d, octaves) in octaves.iter_mut().enumerate() {
+                let (measured, model): (Vec<f64>, Vec<f64>) = (start..end)
+                    .map(|i| {
+                        let row = one.regressor.row(i * drives + d);
+                        let products = row.iter().zip(values[fold].iter()).map(|(h, p)| h * p);
+                        (one.forces[(i, d)], products.sum::<f64>())
+                    })
+                    .unzip();
+                let mut below: [Option<Vec<f64>>; 2] = [None, None];
+                for (octave, edge) in octaves.iter_mut().zip(&edges) {
+                    let passed = LowPass::butterworth(4, *edge, rate).and_then(|low_pass| {
+                        Ok([
+                            low_pass.zero_phase(&measured)?,
+                            low_pass.zero_phase(&model)?,
+                        ])
+                    });
+                    // A part that is too short to be filtered is passed over.
+                    let Ok(passed) = passed else { continue };
+                    let [y, m] = [0, 1].map(|k| match &below[k] {
+                        Some(below) => passed[k].iter().zip(below).map(|(a, b)| a - b).collect(),
+                        None => passed[k].clone(),
+                    });
+                    octave.add(&y[margin..y.len() - margin], &m[margin..m.len() - margin]);
+                    below = passed.map(Some);
                 }
             }
-            before += window.to - window.from;
         }
-        (!folds.is_empty()).then_some(folds)
+        let mut figure = 0.0;
+        let mut relative = 0.0;
+        for octaves in &octaves {
+            let size = octaves.first()?.measured;
+            if size <= 0.0 {
+                return None;
+            }
+            let rounding = ROUNDING * ROUNDING * size;
+            let above: f64 = octaves[1..].iter().map(|octave| octave.left(true)).sum();
+            let within = octaves[0].left(false).max(rounding);
+            figure += 0.5 * (within + above).ln();
+            relative += 0.5 * (within / size).ln();
+        }
+        let n = drives as f64;
+        Some(Left {
+            figure: figure / n,
+            relative: (relative / n).exp(),
+        })
     }
 
-    /// Filtered rows along one window.
-    fn window(&self, run: &Run, window: &Window, passed: f64, cutoff: f64) -> Option<Filtered> {
-        let band = self.open.band_hz;
-        let rate = self.open.rate_hz;
-        let every = whole(rate / (12.0 * band).max(4.0 * cutoff.min(3.0 * band))).max(1);
+    /// Regressor and forces at every so many samples of a window.
+    fn samples(&self, run: &Run, window: &Window, every: usize) -> Option<Samples> {
         let forces = run.force.as_deref()?;
         let start = run.time.partition_point(|t| *t < window.from);
         let end = run.time.partition_point(|t| *t <= window.to);
         let samples: Vec<usize> = (start..end).step_by(every).collect();
-        if samples.len() < 40 {
+        if samples.len() < FEWEST {
             return None;
         }
-        let mut columns = self.regressor(run, &samples)?;
-        let width = columns.ncols();
-        let n = forces.len();
-        // Row of sample and drive: forces stand behind the regressor, filtered at the full rate, so that their noise does not
-        // fold down.
-        columns = columns.resize_horizontally(width + 1, 0.0);
+        let regressor = self.regressor(run, &samples)?;
+        let mut picked = DMatrix::zeros(samples.len(), forces.len());
         for (d, force) in forces.iter().enumerate() {
-            let even = if passed.is_finite() {
-                LowPass::butterworth(4, passed, rate)
-                    .ok()?
-                    .zero_phase(force)
-                    .ok()?
+            // The noise of the forces must not fold down.
+            let smooth = if every > 1 {
+                let rate = self.open.rate_hz;
+                let low_pass = LowPass::butterworth(4, 0.4 * rate / every as f64, rate).ok()?;
+                low_pass.zero_phase(force).ok()?
             } else {
                 force.clone()
             };
             for (i, sample) in samples.iter().enumerate() {
-                columns[(i * n + d, width)] = even[*sample];
+                picked[(i, d)] = smooth[*sample];
             }
         }
-        let coarse = rate / every as f64;
-        let low_pass = (passed < 0.45 * coarse)
-            .then(|| LowPass::butterworth(4, passed, coarse).ok())
-            .flatten();
-        let mut filtered = DMatrix::zeros(columns.nrows(), width + 1);
-        for k in 0..=width {
-            for d in 0..n {
-                let column: Vec<f64> = (0..samples.len())
-                    .map(|i| columns[(i * n + d, k)])
-                    .collect();
-                let column = match &low_pass {
-                    Some(low_pass) if k < width && column.iter().any(|x| *x != 0.0) => {
-                        low_pass.zero_phase(&column).ok()?
-                    }
-                    _ => column,
-                };
-                for (i, value) in column.into_iter().enumerate() {
-                    filtered[(i * n + d, k)] = value;
-                }
-            }
-        }
-        let margin = whole(DROPPED * coarse / band);
-        // Filtered rows resemble their neighbours: four in a period of the band tell all.
-        let thin = if passed.is_finite() {
-            whole(coarse / (4.0 * passed)).max(1)
-        } else {
-            1
-        };
-        let kept = (margin..samples.len().saturating_sub(margin)).step_by(thin);
-        let mut found = Filtered {
-            time: Vec::new(),
-            rows: Vec::new(),
-        };
-        for i in kept {
-            found.time.push(run.time[samples[i]]);
-            for d in 0..n {
-                let row = filtered.row(i * n + d);
-                let regressor = row.columns(0, width).transpose();
-                found.rows.push((regressor, row[width]));
-            }
-        }
-        Some(found)
+        Some(Samples {
+            regressor,
+            forces: picked,
+        })
     }
 
     /// The model's regressor at some samples, with friction and an offset of every drive beside; row of sample and drive.
@@ -355,10 +399,74 @@ struct Window {
     to: f64,
 }
 
-/// Filtered rows of a window: times, and per sample and drive a row with its force.
-struct Filtered {
-    time: Vec<f64>,
-    rows: Vec<(DVector<f64>, f64)>,
+/// Rows of the regressor per sample and drive, and forces per sample.
+struct Samples {
+    regressor: DMatrix<f64>,
+    forces: DMatrix<f64>,
+}
+
+impl Samples {
+    /// The same below a frequency, Hz; `None` where there are too few samples.
+    fn below(&self, passed: f64, rate: f64) -> Option<Self> {
+        let mut filtered = Self {
+            regressor: self.regressor.clone(),
+            forces: self.forces.clone(),
+        };
+        if passed >= 0.45 * rate {
+            return Some(filtered);
+        }
+        let low_pass = LowPass::butterworth(4, passed, rate).ok()?;
+        let (n, drives) = self.forces.shape();
+        for d in 0..drives {
+            let force: Vec<f64> = self.forces.column(d).iter().copied().collect();
+            let force = low_pass.zero_phase(&force).ok()?;
+            filtered.forces.column_mut(d).copy_from_slice(&force);
+            for mut column in filtered.regressor.column_iter_mut() {
+                let values: Vec<f64> = (0..n).map(|i| column[i * drives + d]).collect();
+                if values.iter().all(|x| *x == 0.0) {
+                    continue;
+                }
+                for (i, value) in low_pass.zero_phase(&values).ok()?.into_iter().enumerate() {
+                    column[i * drives + d] = value;
+                }
+            }
+        }
+        Some(filtered)
+    }
+}
+
+/// Inner products of measured and model force in an octave.
+#[derive(Clone, Default)]
+struct Octave {
+    measured: f64,
+    product: f64,
+    model: f64,
+}
+
+impl Octave {
+    fn add(&mut self, measured: &[f64], model: &[f64]) {
+        for (y, m) in measured.iter().zip(model) {
+            self.measured += y * y;
+            self.product += y * m;
+            self.model += m * m;
+        }
+    }
+
+    /// What the model leaves of the measured force. It may be damped where it says less than it adds, as a filter will do
+    /// above the band of the motion: noise there costs nothing but what it hides.
+    fn left(&self, may_be_damped: bool) -> f64 {
+        let scale = if may_be_damped && self.model > 0.0 {
+            (self.product / self.model).clamp(0.0, 1.0)
+        } else {
+            1.0
+        };
+        self.measured - 2.0 * scale * self.product + scale * scale * self.model
+    }
+}
+
+/// Samples at both ends of `n` that a low-pass at `band` spoils.
+fn margin(n: usize, rate: f64, band: f64) -> usize {
+    whole((DROPPED.0 * rate / band).min(DROPPED.1 * n as f64))
 }
 
 /// Inner products of the rows of one fold, drive by drive.
@@ -388,70 +496,62 @@ impl Rows {
         }
     }
 
-    fn add(&mut self, drive: usize, row: &DVector<f64>, force: f64) {
-        let one = &mut self.drives[drive];
-        one.normal.syger(1.0, row, row, 1.0);
-        one.right.axpy(force, row, 1.0);
-        one.size += force * force;
-        one.rows += 1;
+    fn add(&mut self, samples: &Samples, i: usize) {
+        let drives = self.drives.len();
+        for (d, one) in self.drives.iter_mut().enumerate() {
+            let row = samples.regressor.row(i * drives + d).transpose();
+            let force = samples.forces[(i, d)];
+            one.normal.syger(1.0, &row, &row, 1.0);
+            one.right.axpy(force, &row, 1.0);
+            one.size += force * force;
+            one.rows += 1;
+        }
     }
 }
 
-/// What is left of the forces of each fold of `judge` when the others of `fit` are fitted; `None` where there are too few
-/// rows, or nothing is measured.
-fn held_out(fit: &[Rows], judge: &[Rows]) -> Option<f64> {
-    let n = fit.first()?.drives.len();
-    let width = fit[0].drives[0].right.len();
-    let sizes: Vec<f64> = (0..n)
-        .map(|d| judge.iter().map(|fold| fold.drives[d].size).sum())
-        .collect();
-    let mut weights: Vec<f64> = (0..n)
-        .map(|d| {
-            let size: f64 = fit.iter().map(|fold| fold.drives[d].size).sum();
-            let rows: usize = fit.iter().map(|fold| fold.drives[d].rows).sum();
-            (size > 0.0).then(|| rows as f64 / size)
-        })
-        .collect::<Option<_>>()?;
-    let rows: usize = fit
-        .iter()
-        .flat_map(|fold| &fold.drives)
-        .map(|one| one.rows)
-        .sum();
-    if rows < 3 * width || sizes.iter().any(|size| *size <= 0.0) {
+/// For each fold the values that fit the others; `None` where there are too few rows, or nothing is measured.
+fn fitted(folds: &[Rows]) -> Option<Vec<DVector<f64>>> {
+    let n = folds.first()?.drives.len();
+    let width = folds[0].drives[0].right.len();
+    let total = |d: usize| -> f64 { folds.iter().map(|fold| fold.drives[d].size).sum() };
+    let sizes: Vec<f64> = (0..n).map(total).collect();
+    let rows: usize = folds.iter().map(|fold| fold.drives[0].rows).sum();
+    if rows * n < 3 * width || sizes.iter().any(|size| *size <= 0.0) {
         return None;
     }
-    let mut left = vec![0.0; n];
     // Drives count alike at first, then by what is left of them.
+    let mut left = sizes.clone();
+    let mut values = Vec::new();
     for _ in 0..2 {
+        let weights: Vec<f64> = (left.iter().zip(&sizes))
+            .map(|(left, size)| rows as f64 / left.max(ROUNDING * ROUNDING * size))
+            .collect();
         left = vec![0.0; n];
-        for (out, judged) in judge.iter().enumerate() {
+        values.clear();
+        for (out, judged) in folds.iter().enumerate() {
             let mut normal = DMatrix::zeros(width, width);
             let mut right = DVector::zeros(width);
-            for (_, fold) in fit.iter().enumerate().filter(|(k, _)| *k != out) {
+            for (_, fold) in folds.iter().enumerate().filter(|(k, _)| *k != out) {
                 for (one, weight) in fold.drives.iter().zip(&weights) {
                     normal += &one.normal * *weight;
                     right += &one.right * *weight;
                 }
             }
-            let values = solved(normal, &right)?;
+            let found = solved(&normal, &right)?;
             for (left, one) in left.iter_mut().zip(&judged.drives) {
                 let explained =
-                    2.0 * one.right.dot(&values) - (symmetric(&one.normal) * &values).dot(&values);
+                    2.0 * one.right.dot(&found) - (symmetric(&one.normal) * &found).dot(&found);
                 *left += (one.size - explained).max(0.0);
             }
-        }
-        for ((weight, left), size) in weights.iter_mut().zip(&left).zip(&sizes) {
-            *weight = rows as f64 / left.max(1e-12 * size);
+            values.push(found);
         }
     }
-    let relative = left.iter().zip(&sizes);
-    let logarithms = relative.map(|(left, size)| 0.5 * (left / size).max(1e-24).ln());
-    Some(logarithms.sum::<f64>() / n as f64)
+    Some(values)
 }
 
 /// Values of scaled normal equations with a trace of a ridge, since columns may be the same.
-fn solved(normal: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let mut normal = symmetric(&normal);
+fn solved(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    let mut normal = symmetric(normal);
     let n = right.len();
     let scale: Vec<f64> = (0..n)
         .map(|i| normal[(i, i)].max(0.0).sqrt())
