@@ -28,6 +28,18 @@ pub fn measured(data: &Stretch) -> Outcome<Vec<Vec<f64>>> {
     decimated(data.run.measured()?.to_vec(), data)
 }
 
+/// The measured forces without those that do not count, `[drive][sample]`, decimated; [`crate::stretch::Stretch`] leaves the same
+/// rows of a regressor empty, so that both sides of each equation stay alike whatever filter they pass.
+pub fn counted(data: &Stretch) -> Outcome<Vec<Vec<f64>>> {
+    let mut forces = data.run.measured()?.to_vec();
+    for (force, out) in forces.iter_mut().zip(&data.run.left_out) {
+        for (force, _) in force.iter_mut().zip(out).filter(|(_, out)| **out) {
+            *force = 0.0;
+        }
+    }
+    decimated(forces, data)
+}
+
 /// `[sample * n_drives + drive]`.
 pub fn interleaved(channels: &[Vec<f64>]) -> Vec<f64> {
     let samples = channels.first().map_or(0, Vec::len);

@@ -425,6 +425,6 @@ mod tests {
         assert_eq!(runs[1].lines.len(), runs[1].samples());
         // Recorded rates need no filter, hence no cut.
         let recorded = recording(100, |t| if t < 0.2 { t } else { t + 1.0 }, q, qd);
-        assert_eq!(recorded.stretches().len(), 2);
+        assert_eq!(recorded.stretches(0.0).len(), 2);
     }
 }

@@ -4,12 +4,18 @@
 use std::f64::consts::PI;
 
 use crate::recording::{Note, Recording, place_word};
-use crate::words::{count_of, seven_digits};
+use crate::signal::white_noise;
+use crate::words::{count_of, seven_digits, with_digits};
 
 /// Angles beyond this many rad are likely in degrees: two turns to each side.
 const LARGE_ANGLE: f64 = 4.0 * PI;
 /// Samples at a limit before a force counts as saturated.
 const FEWEST_AT_LIMIT: usize = 8;
+
+/// Noise about a limit, in standard deviations of white noise.
+const SPREAD: f64 = 5.0;
+/// What slope times length of a plateau must be of its spread; 8 for the top of a parabola.
+const STEEP: f64 = 30.0;
 
 impl Recording {
     /// Warnings about single signals. `coordinates` are `(name, whether it is an angle)`; columns that cannot be used
@@ -32,7 +38,8 @@ impl Recording {
                 continue;
             };
             notes.extend(self.held(drive, force));
-            notes.extend(self.saturated(drive, force, &positions));
+            let saturated = self.saturated(drive, force, &positions);
+            notes.extend(saturated.or_else(|| self.saturated_in_noise(drive, force, &positions)));
         }
         notes
     }
@@ -76,6 +83,66 @@ impl Recording {
                 self.maps_from_degrees(name)
             ))
         })
+    }
+
+    /// A force that stays at a limit but for noise, although it comes to it and leaves it at a slope.
+    fn saturated_in_noise(&self, name: &str, force: &[f64], positions: &[&[f64]]) -> Option<Note> {
+        let n = force.len();
+        if n < 20 * FEWEST_AT_LIMIT {
+            return None;
+        }
+        let mut found: Vec<(f64, usize, usize)> = Vec::new();
+        for is_high in [true, false] {
+            let (level, spread) = crowded(force, is_high)?;
+            let is_near = |i: usize| (force[i] - level).abs() <= spread;
+            let (mut count, mut first) = (0, None);
+            let mut i = 0;
+            while i < n {
+                let start = i;
+                while i < n && is_near(i) {
+                    i += 1;
+                }
+                let length = i - start;
+                // Before the first sample of a plateau and behind its last one, over a few samples.
+                let slope = |a: Option<usize>, b: usize| {
+                    let (a, b) = (force.get(a?)?, force.get(b)?);
+                    Some((a - b).abs() / 3.0)
+                };
+                let before = slope(start.checked_sub(4), start.saturating_sub(1));
+                let behind = slope(Some(i + 3), i);
+                let steepest = [before, behind].into_iter().flatten().fold(0.0, f64::max);
+                // A parabola that leaves the band has 8 times its half width in slope times length.
+                let moves = |q: &&[f64]| length > 0 && q[start].total_cmp(&q[i - 1]).is_ne();
+                let is_moving = positions.iter().any(moves);
+                if is_moving
+                    && length >= FEWEST_AT_LIMIT
+                    && steepest * length as f64 > STEEP * spread
+                {
+                    count += length;
+                    first.get_or_insert(start);
+                }
+                i = i.max(start + 1);
+            }
+            if let Some(first) = first {
+                found.push((level, count, first));
+            }
+        }
+        let (level, count, first) = *found.first()?;
+        let other = found.get(1).map(|(level, count, _)| {
+            let samples = count_of(*count, "sample", "samples");
+            format!(", and {samples} at {}", with_digits(*level, 5))
+        });
+        Some(Note::warning(format!(
+            "The force of `{name}` in {} stays at {} but for noise for {}, first in {} {}{}: the drive or its measurement seems \
+             to be saturated. The true force is not known there; use a gentler motion, or leave these times out (option \
+             `between`).",
+            self.file(),
+            with_digits(level, 5),
+            count_of(count, "sample", "samples"),
+            place_word(self.file()),
+            self.line(first).unwrap_or(0),
+            other.unwrap_or_default(),
+        )))
     }
 
     /// A force that stays exactly at its largest or smallest value while something moves.
@@ -130,6 +197,25 @@ impl Recording {
             self.line(first).unwrap_or(0),
         )))
     }
+}
+
+/// A level near an end of the range of a force at which samples crowd: its value and how far they spread about it.
+fn crowded(force: &[f64], is_high: bool) -> Option<(f64, f64)> {
+    let mut sorted = force.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    if !is_high {
+        sorted.reverse();
+    }
+    let n = sorted.len();
+    let few = (n / 100).max(FEWEST_AT_LIMIT);
+    let upper = &sorted[n - n / 3..];
+    let crowd = (0..upper.len().checked_sub(few)?).min_by(|a, b| {
+        let width = |i: usize| (upper[i + few] - upper[i]).abs();
+        width(*a).total_cmp(&width(*b))
+    })?;
+    let width = (upper[crowd + few] - upper[crowd]).abs();
+    let level = upper[crowd + few / 2];
+    Some((level, (SPREAD * white_noise(force)).max(2.0 * width)))
 }
 
 /// A recorded number as it stands in the file, unless it is very long.
@@ -192,6 +278,18 @@ mod tests {
         assert!(
             found[0].contains("stays exactly at 15") && found[0].contains("at -15"),
             "{found:?}"
+        );
+        let found = says(
+            |t| (3.0 * t).sin(),
+            |t| (20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0) + 1e-3 * (9e4 * t).sin(),
+        );
+        assert!(
+            found.len() == 1 && found[0].contains("but for noise"),
+            "{found:?}"
+        );
+        let found = says(
+            |t| (3.0 * t).sin(),
+            |t| (20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0),
         );
         // sin(7 t) passes 3/4 at t = 0.1212 s, in the 61st sample, on line 63.
         assert!(found[0].contains("first in line 63"), "{found:?}");

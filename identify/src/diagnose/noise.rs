@@ -1,22 +1,6 @@
 //! How noisy a force is by itself, and how many of its residuals are worth counting.
 
-/// White noise of a signal that is smooth otherwise: the robust spread of its fourth differences, which neither slow motion
-/// nor a few jumps change. An estimate from below where the noise was filtered.
-///
-/// Source: the idea of J. von Neumann's mean square successive difference (Ann. Math. Stat. 12, 1941), with the median
-/// absolute deviation for jumps.
-pub fn white_noise(values: &[f64]) -> f64 {
-    if values.len() < 10 {
-        return 0.0;
-    }
-    let mut differences: Vec<f64> = values
-        .windows(5)
-        .map(|w| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs())
-        .collect();
-    differences.sort_by(f64::total_cmp);
-    // The variance of such a difference is 70 times that of the noise; the median of its magnitude 0.6745 of its spread.
-    differences[differences.len() / 2] / (0.674_489_75 * 70.0_f64.sqrt())
-}
+pub use crate::signal::white_noise;
 
 /// How many independent values a series is worth: `n / (1 + 2 sum of its autocorrelations)`, summed as long as pairs of
 /// neighbours stay positive (C. J. Geyer, Statistical Science 7, 1992).

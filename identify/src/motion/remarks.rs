@@ -1,14 +1,44 @@
 //! What a prepared run tells of itself: periods and the spread of its forces over them, and standstill.
 
+use std::f64::consts::TAU;
+
+use crate::motion::derivatives::mean_rate;
 use crate::motion::periods;
 use crate::motion::run::Run;
 use crate::motion::series::Periodic;
 use crate::motion::smooth::Recorded;
 use crate::recording::{Note, Recording};
-use crate::words::{count_of, list, seven_digits};
+use crate::words::{count_of, list, seven_digits, with_digits};
 
 /// A series that leaves more of a motion than this part is not its series.
 const LEFT_OVER: f64 = 1e-2;
+
+/// Encoder steps count where they leave more noise of the accelerations than this part.
+const COARSE: f64 = 0.005;
+/// Positions are on a grid if this part of their steps are whole multiples of its step.
+const ON_GRID: f64 = 0.99;
+
+/// The step of an encoder, if neighbouring positions are often the same and all others differ by whole steps.
+fn encoder_step(q: &[f64]) -> Option<f64> {
+    let steps: Vec<f64> = q.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+    let largest = steps.iter().copied().fold(0.0, f64::max);
+    let is_same = |step: &&f64| **step <= 1e-9 * largest;
+    let same = steps.iter().filter(is_same).count();
+    if 10 * same < steps.len() {
+        return None;
+    }
+    let step = steps
+        .iter()
+        .copied()
+        .filter(|step| *step > 1e-9 * largest)
+        .reduce(f64::min)?;
+    let is_whole = |size: &&f64| {
+        let multiple = **size / step;
+        (multiple - multiple.round()).abs() < 0.02
+    };
+    let whole = steps.iter().filter(is_whole).count();
+    (whole as f64 >= ON_GRID * steps.len() as f64).then_some(step)
+}
 
 impl Recording {
     /// Looks for a period, unless that of the motion's series is known; the spread of the forces over it is the noise floor.
@@ -69,6 +99,43 @@ impl Recording {
                     self.file()
                 )));
             }
+        }
+    }
+
+    /// Says which encoders have steps so coarse that they are a part of the accelerations.
+    pub(crate) fn note_encoder_steps(&self, columns: &[Recorded<'_>], run: &mut Run) {
+        let Some(cutoff) = run.prepared.cutoff_hz else {
+            return;
+        };
+        let rate = mean_rate(&run.time);
+        let mut found = Vec::new();
+        for (column, qdd) in columns.iter().zip(&run.qdd) {
+            if column.qd.is_some() {
+                continue;
+            }
+            let Some(step) = encoder_step(column.q) else {
+                continue;
+            };
+            // White noise of a step's twelfth below the cut-off, differentiated twice.
+            let noise =
+                step / 12.0_f64.sqrt() * (2.0 / rate * TAU.powi(4) * cutoff.powi(5) / 5.0).sqrt();
+            let size = (qdd.iter().map(|a| a * a).sum::<f64>() / qdd.len() as f64).sqrt();
+            if noise > COARSE * size && size > 0.0 {
+                found.push(format!(
+                    "`{}` of {} ({:.1} %)",
+                    column.name,
+                    with_digits(step, 3),
+                    100.0 * noise / size
+                ));
+            }
+        }
+        if !found.is_empty() {
+            run.notes.push(Note::warning(format!(
+                "Positions in {} come in steps of the encoder: {}; in brackets the noise that they leave of the accelerations. \
+                 It makes inertias too small and hides weak effects; a motion that repeats itself, or a finer encoder, helps.",
+                self.file(),
+                found.join(", ")
+            )));
         }
     }
 

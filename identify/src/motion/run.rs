@@ -222,7 +222,15 @@ impl Recording {
             qdd: Vec::new(),
             force,
             missing_force,
-            left_out: Vec::new(),
+            left_out: if drives.iter().any(|drive| self.lost(drive).is_some()) {
+                let lost = |drive: &String| {
+                    let lost = self.lost(drive).map(<[bool]>::to_vec);
+                    lost.unwrap_or_else(|| vec![false; time.len()])
+                };
+                drives.iter().map(lost).collect()
+            } else {
+                Vec::new()
+            },
             lines: (0..time.len()).map(|i| self.line(i).unwrap_or(0)).collect(),
             repeats: None,
             prepared,
@@ -235,6 +243,7 @@ impl Recording {
             run.qdd.push(qdd);
         }
         self.trim(&mut run)?;
+        self.note_encoder_steps(&columns, &mut run);
         self.note_standstill(coordinates, &mut run);
         Ok(run)
     }

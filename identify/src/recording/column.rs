@@ -31,6 +31,8 @@ pub(crate) struct Column {
     pub(crate) values: Vec<f64>,
     pub(crate) text: Option<Defect>,
     pub(crate) not_finite: Option<Defect>,
+    /// Samples where the value joins its neighbours because none was measured or a sensor failed; empty if there are none.
+    pub(crate) lost: Vec<bool>,
 }
 
 /// Fields of a column that cannot be used: the first of them and how many there are.

@@ -24,6 +24,8 @@ pub(crate) struct Intake<'a> {
     names: Vec<String>,
     /// Places of the columns that are kept.
     kept: Vec<bool>,
+    /// Places of columns that only those need of which single values may be missing.
+    may_lack: Vec<bool>,
     columns: Vec<Column>,
     lines: Vec<u64>,
     /// The first sample that was left out, and how many were.
@@ -66,6 +68,17 @@ impl<'a> Intake<'a> {
             wanted.is_none_or(|wanted| wanted.contains(name))
         };
         let mut kept: Vec<bool> = names.iter().map(is_wanted).collect();
+        let is_optional = |name: &String| options.may_lack.contains(name);
+        let mut may_lack: Vec<bool> = names.iter().map(is_optional).collect();
+        for (name, may_lack) in names.iter().zip(&mut may_lack) {
+            // A column that nobody wants by itself is a source of computed ones.
+            *may_lack |= !is_wanted(name);
+        }
+        for computed in &options.computed {
+            for (name, _) in &computed.terms {
+                may_lack[place(name)?] &= is_optional(&computed.name);
+            }
+        }
         for place in sources {
             kept[place] = true;
         }
@@ -92,6 +105,7 @@ impl<'a> Intake<'a> {
             theirs,
             names,
             kept,
+            may_lack,
             lines: Vec::new(),
             left_out: None,
             time,
@@ -134,7 +148,7 @@ impl<'a> Intake<'a> {
                 return Ok(Flow::Stop);
             }
         }
-        let is_read = |place: usize| self.kept[place];
+        let is_read = |place: usize| self.kept[place] && !self.may_lack[place];
         if self.options.not_finite == NotFinite::LeaveOut
             && (0..sample.len()).any(|i| is_read(i) && sample[i] == Field::NotFinite)
         {

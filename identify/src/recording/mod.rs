@@ -16,6 +16,7 @@ mod options;
 mod read;
 mod tables;
 mod together;
+mod repair;
 
 use indexmap::IndexMap;
 
@@ -62,6 +63,12 @@ impl Recording {
     /// Whether there is a column of that name.
     pub fn has(&self, name: &str) -> bool {
         self.columns.contains_key(name)
+    }
+
+    /// Samples whose value of a column joins its neighbours, since none was measured or a sensor failed; `None` if there are none.
+    pub(crate) fn lost(&self, name: &str) -> Option<&[bool]> {
+        let lost = &self.columns.get(name)?.lost;
+        lost.contains(&true).then_some(lost.as_slice())
     }
 
     /// Line of a sample in the file, from 1; for messages.
@@ -124,6 +131,7 @@ impl Recording {
         let columns = self.columns.iter().map(|(name, column)| {
             let column = Column {
                 values: column.values[start..end].to_vec(),
+                lost: column.lost.get(start..end).unwrap_or(&[]).to_vec(),
                 ..column.clone()
             };
             (name.clone(), column)

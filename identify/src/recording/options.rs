@@ -6,7 +6,8 @@ pub enum NotFinite {
     /// A column that holds such fields is refused when it is asked for.
     #[default]
     Refuse,
-    /// Samples where any column holds such a field are left out, counted and said in the notes.
+    /// Samples where any column holds such a field are left out, counted and said in the notes; those that lack only values
+    /// of [`ReadOptions::may_lack`] stay.
     LeaveOut,
 }
 
@@ -33,6 +34,9 @@ pub struct ReadOptions {
     /// Our names of the columns that are needed; the others are neither looked at nor kept.
     /// All are kept if there is no such list.
     pub wanted: Option<Vec<String>>,
+    /// Our names of columns of which single values may be missing where [`NotFinite::LeaveOut`] is asked for: forces, whose
+    /// samples still hold positions.
+    pub may_lack: Vec<String>,
     /// Only samples whose time `t` lies between these two, s; the others are passed over, counted and said.
     pub between: Option<(f64, f64)>,
     /// Most numbers that are kept, the line of each sample among them; a recording that holds more is refused before memory runs out.
@@ -67,6 +71,7 @@ impl Default for ReadOptions {
             computed: Vec::new(),
             not_finite: NotFinite::default(),
             wanted: None,
+            may_lack: Vec::new(),
             between: None,
             most_numbers: 1 << 26,
         }

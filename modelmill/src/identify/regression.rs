@@ -5,7 +5,7 @@ use modelmill_codegen::{Evaluator, PoseFault, States};
 use modelmill_identify::estimate::{EstimateOptions, Visit, Weighting, estimate, instrumental};
 use modelmill_identify::{Deviations, LeastSquaresError, Solution, decimate_table};
 
-use crate::along::{interleaved, measured};
+use crate::along::{counted, interleaved};
 use crate::error::{Error, Outcome};
 use crate::identify::options::{Estimation, Weights};
 use crate::identify::refine::{Refined, refine};
@@ -229,7 +229,7 @@ impl<'a> Rows<'a> {
             instruments,
             known,
             unknown,
-            measured: interleaved(&measured(data)?),
+            measured: interleaved(&counted(data)?),
             factors,
             kept: None,
         })
@@ -332,6 +332,12 @@ impl<'a> Rows<'a> {
             let place = width - self.model.base.len();
             if let Err(fault) = fill(&evaluator, states, drives, width, place, &mut rows) {
                 return Ok(Err(fault));
+            }
+            let first = start - states.len();
+            for (d, out) in self.data.run.left_out.iter().enumerate() {
+                for (i, _) in (out[first..start].iter().enumerate()).filter(|(_, out)| **out) {
+                    rows[(i * drives + d) * width..][..width].fill(0.0);
+                }
             }
             visit(&rows)?;
             Ok(Ok(()))

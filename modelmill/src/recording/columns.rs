@@ -82,6 +82,7 @@ pub(crate) fn read_options(
             NotFinite::Refuse
         },
         wanted: Some(known.into_iter().map(|(name, _)| name).collect()),
+        may_lack: model.drives(),
         between: args.between,
         ..ReadOptions::default()
     })

@@ -29,9 +29,11 @@ fn read_raw(model: &Model, paths: &[&Path], reading: &Reading) -> Outcome<Raw> {
     let file = RecordingFiles::open(model.host().files(), paths)?;
     let name = file.name();
     let options = read_options(model, reading, &file.names()?, name)?;
-    Ok(model
+    let mut raw = model
         .host()
-        .watched(&format!("reading {name}"), 0, |_| file.read(&options))??)
+        .watched(&format!("reading {name}"), 0, |_| file.read(&options))??;
+    raw.repair(&model.active(), &model.drives(), reading.skip_bad_samples);
+    Ok(raw)
 }
 
 /// The stretches of a recording; where the model says that forces are read late, each force has the states of the moment at
