@@ -78,6 +78,8 @@ impl Recording {
             )));
         }
         notes.extend(rates);
+        let names: Vec<&str> = coordinates.iter().map(|(name, _)| name.as_str()).collect();
+        notes.extend(self.clock(&names));
         notes
     }
 

@@ -154,7 +154,8 @@ pub(crate) fn from_influences<E>(
         .zip(&solution.classical_std)
         .map(|(std, classical)| {
             if std.is_finite() {
-                samples as f64 * (classical / std).powi(2)
+                // Residuals that alternate make deviations smaller than independent ones, but no more samples.
+                samples as f64 * (classical / std).powi(2).min(1.0)
             } else {
                 0.0
             }

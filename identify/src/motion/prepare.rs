@@ -125,7 +125,7 @@ impl Recording {
                 "Derivatives of {} in {} are prepared: {}.",
                 list(&prepared.coordinates),
                 self.file(),
-                way.describe(cutoff, prepared.cutoff_chosen),
+                way.describe(cutoff, prepared.cutoff_chosen && !preparation.chosen),
             )));
         }
         let states = self.smoothed(time, columns, cutoff, way)?;

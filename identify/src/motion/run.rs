@@ -68,6 +68,10 @@ impl Recording {
     ) -> Result<Vec<Run>, RecordingError> {
         // What is wrong with the whole is said of the whole, before it is cut.
         let wanted = wanted_names(coordinates, drives);
+        let needed: Vec<String> = std::iter::once("t".to_owned())
+            .chain(coordinates.iter().cloned())
+            .collect();
+        self.check_columns(&needed, &wanted)?;
         self.check_time(self.column_beside("t", &wanted)?, &mut Vec::new())?;
         let columns: Result<Vec<Recorded<'_>>, _> = coordinates
             .iter()
@@ -176,6 +180,10 @@ impl Recording {
         preparation: &Preparation,
     ) -> Result<Run, RecordingError> {
         let wanted = wanted_names(coordinates, drives);
+        let needed: Vec<String> = std::iter::once("t".to_owned())
+            .chain(coordinates.iter().cloned())
+            .collect();
+        self.check_columns(&needed, &wanted)?;
         let time = self.column_beside("t", &wanted)?;
         let mut notes = self.notes().to_vec();
         self.check_time(time, &mut notes)?;
@@ -288,27 +296,26 @@ impl Recording {
             return Ok(());
         }
         let gaps = steps.iter().filter(|step| **step > 1.5 * median).count();
-        let lost = if gaps > 0 {
-            let first = time
-                .windows(2)
-                .position(|w| w[1] - w[0] > 1.5 * median)
-                .unwrap_or(0);
-            format!(
-                "; {} samples are missing where steps are longer than usual, the first after {} {}",
-                (steps.iter().map(|step| (step / median).round() - 1.0))
-                    .fold(0.0, |sum, n| sum + n.max(0.0)),
+        let how = "Where anything is filtered, positions are put on even times by the spline through them at their true \
+                   times, and states are read off at these again.";
+        notes.push(if gaps > 0 {
+            let lost = steps.iter().map(|step| (step / median).round() - 1.0);
+            let first = steps.iter().position(|step| *step > 1.5 * median);
+            Note::warning(format!(
+                "{} has {} in time: steps up to {longest:.6} s where {median:.6} s is usual, {} samples too few, the first \
+                 after {} {}. {how}",
+                self.file(),
+                count_of(gaps, "gap", "gaps"),
+                lost.fold(0.0, |sum, n| sum + n.max(0.0)),
                 place_word(self.file()),
-                self.line(first).unwrap_or(0)
-            )
+                self.line(first.unwrap_or(0)).unwrap_or(0)
+            ))
         } else {
-            String::new()
-        };
-        notes.push(Note::info(format!(
-            "The steps of {} are uneven, from {shortest:.6} s to {longest:.6} s with {median:.6} s in the middle{lost}. Where \
-             anything is filtered, positions are put on even times by the spline through them at their true times, and \
-             states are read off at these again.",
-            self.file()
-        )));
+            Note::info(format!(
+                "The steps of {} are uneven, from {shortest:.6} s to {longest:.6} s. {how}",
+                self.file(),
+            ))
+        });
         Ok(())
     }
 

@@ -122,6 +122,13 @@ pub enum Fault {
         /// Whether the name comes from a renaming (`theirs`).
         by_renaming: bool,
     },
+    /// Several columns that are needed are not there.
+    MissingColumns {
+        /// The names that were looked for, each with the closest name that is there.
+        missing: Vec<(String, Option<String>)>,
+        /// All names that are there.
+        present: Vec<String>,
+    },
     /// A needed column holds text that is no number.
     NotANumber {
         /// The column.
@@ -362,6 +369,36 @@ impl fmt::Display for Fault {
                         nearest.as_deref().unwrap_or("THEIRS")
                     )
                 }
+            }
+            Self::MissingColumns { missing, present } => {
+                let all: Vec<String> = missing
+                    .iter()
+                    .map(|(name, nearest)| match nearest {
+                        Some(nearest) => format!("`{name}` (is `{nearest}` meant?)"),
+                        None => format!("`{name}`"),
+                    })
+                    .collect();
+                let maps: Vec<String> = missing
+                    .iter()
+                    .map(|(name, nearest)| {
+                        format!(
+                            "option `columns` = `{name}={}`",
+                            nearest.as_deref().unwrap_or("THEIRS")
+                        )
+                    })
+                    .collect();
+                write!(
+                    f,
+                    "there are no columns {}. The columns are: {}.",
+                    all.join(", "),
+                    list(present)
+                )?;
+                if present.first().is_some_and(|first| first.starts_with('#')) {
+                    f.write_str(
+                        " The first line must name the columns: comment lines are not read, delete them.",
+                    )?;
+                }
+                write!(f, " Map one onto each of them with {}.", maps.join(" "))
             }
             Self::NotANumber {
                 column,

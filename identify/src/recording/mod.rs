@@ -126,6 +126,32 @@ impl Recording {
         Err(self.fault(fault))
     }
 
+    /// Fails when more than one of the names `needed` is no column, and says all of them at once; columns of the names `wanted`
+    /// are not proposed, and none twice.
+    pub(crate) fn check_columns(
+        &self,
+        needed: &[String],
+        wanted: &[String],
+    ) -> Result<(), RecordingError> {
+        let missing: Vec<&String> = needed.iter().filter(|name| !self.has(name)).collect();
+        if missing.len() < 2 {
+            return Ok(());
+        }
+        let mut others: Vec<&str> = self
+            .names()
+            .filter(|name| !wanted.iter().any(|w| w == name))
+            .collect();
+        let missing = missing.into_iter().map(|name| {
+            let found = nearest(name, others.iter().copied()).map(str::to_owned);
+            others.retain(|other| Some(*other) != found.as_deref());
+            (name.clone(), found)
+        });
+        Err(self.fault(Fault::MissingColumns {
+            missing: missing.collect(),
+            present: self.names().map(str::to_owned).collect(),
+        }))
+    }
+
     /// The samples from `start` to before `end` as a recording of its own, without the notes.
     pub(crate) fn stretch(&self, file: String, start: usize, end: usize) -> Self {
         let columns = self.columns.iter().map(|(name, column)| {

@@ -3,7 +3,7 @@
 
 use modelmill_codegen::{Evaluator, PoseFault, States};
 use modelmill_identify::estimate::{EstimateOptions, Visit, Weighting, estimate, instrumental};
-use modelmill_identify::{Deviations, LeastSquaresError, Solution, decimate_table};
+use modelmill_identify::{Deviations, FilterError, LeastSquaresError, Solution, decimate_table};
 
 use crate::along::{counted, interleaved};
 use crate::error::{Error, Outcome};
@@ -17,6 +17,10 @@ use crate::text::table::count;
 
 /// Numbers of the regressor that are kept between passes: 32 MB; beyond, making them again costs less than memory.
 const KEPT: usize = 1 << 22;
+
+/// Samples that are kept to either side beyond which the parallel filter reaches no more: its slowest pole falls by a factor of
+/// 1e9 there.
+const REACH: usize = 120;
 
 /// What least squares found.
 pub struct Identified {
@@ -240,24 +244,46 @@ impl<'a> Rows<'a> {
         self.model.base.len() * (1 + usize::from(self.instruments.is_some()))
     }
 
-    /// Decimation needs the whole table at hand; else it is kept if it is not too large.
+    /// Decimation needs neighbours of all rows at hand; else they are kept if they are not too many.
     fn keep_if_small(&mut self, job: &Job) -> Outcome {
         let width = self.width() * self.model.drives().len();
         let decimation = self.data.decimation();
-        if decimation == 1 && self.data.samples() * width > KEPT {
+        let samples = self.data.samples();
+        if decimation == 1 && samples * width > KEPT {
             return Ok(());
         }
-        let mut table = Vec::with_capacity(self.data.samples() * width);
+        let mut kept = Vec::with_capacity(samples.div_ceil(decimation) * width);
+        let mut window = Window {
+            first: 0,
+            next: 0,
+            table: Vec::new(),
+        };
+        let reach = REACH * decimation;
+        let longest = (KEPT / width.max(1)).max(6 * reach);
+        let failed = |error| Error::input(format!("{}: {error}", self.data.run.file));
         self.blocks::<Error>(&mut |w| {
             job.add(w.len() / width.max(1));
-            table.extend_from_slice(w);
+            if decimation == 1 {
+                kept.extend_from_slice(w);
+                return Ok(());
+            }
+            window.table.extend_from_slice(w);
+            let have = window.table.len() / width;
+            if have > longest {
+                window
+                    .decimate(width, decimation, have - reach, &mut kept)
+                    .map_err(failed)?;
+                window.forget(width, decimation, reach);
+            }
             Ok(())
         })?;
         if decimation > 1 {
-            table = decimate_table(&table, width, decimation)
-                .map_err(|error| Error::input(format!("{}: {error}", self.data.run.file)))?;
+            let have = window.table.len() / width;
+            window
+                .decimate(width, decimation, have, &mut kept)
+                .map_err(failed)?;
         }
-        self.kept = Some(table);
+        self.kept = Some(kept);
         Ok(())
     }
 
@@ -342,6 +368,41 @@ impl<'a> Rows<'a> {
             visit(&rows)?;
             Ok(Ok(()))
         })
+    }
+}
+
+/// Some rows in a row while they are decimated: all of them, unless they are too many to be held at once.
+struct Window {
+    /// The first sample of the table, one of those that are kept.
+    first: usize,
+    /// The first sample that is not yet decimated.
+    next: usize,
+    table: Vec<f64>,
+}
+
+impl Window {
+    /// Decimates what stands before `end`, counted from the first sample of the table.
+    fn decimate(
+        &mut self,
+        width: usize,
+        decimation: usize,
+        end: usize,
+        kept: &mut Vec<f64>,
+    ) -> Result<(), FilterError> {
+        let short = decimate_table(&self.table, width, decimation)?;
+        while self.next < self.first + end {
+            let at = (self.next - self.first) / decimation * width;
+            kept.extend_from_slice(&short[at..at + width]);
+            self.next += decimation;
+        }
+        Ok(())
+    }
+
+    /// Lets rows go that the filter does not reach from those that are to come.
+    fn forget(&mut self, width: usize, decimation: usize, reach: usize) {
+        let from = self.next.saturating_sub(reach).max(self.first) / decimation * decimation;
+        self.table.drain(..(from - self.first) * width);
+        self.first = from;
     }
 }
 

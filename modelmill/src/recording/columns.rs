@@ -19,14 +19,18 @@ pub(crate) fn read_options(
     let mechanism = &model.derivation.mechanism;
     let known = mechanism.columns();
     let mut mapping = Mapping::default();
+    // All faults are told at once.
+    let mut faults = Vec::new();
     for (k, (ours, text)) in args.columns.iter().enumerate() {
         let Some(quantity) = quantity_of(&known, ours) else {
-            return Err(unknown(model, &known, ours));
+            faults.push(unknown(model, &known, ours));
+            continue;
         };
         if args.columns[..k].iter().any(|(other, _)| other == ours) {
-            return Err(Error::options(format!(
+            faults.push(Error::options(format!(
                 "option `columns` = `{ours}=...`: `{ours}` is mapped twice; give each name one mapping"
             )));
+            continue;
         }
         match read(model, text, quantity, header) {
             Ok(sum) => mapping.add(ours, sum),
@@ -35,13 +39,13 @@ pub(crate) fn read_options(
                 mapping.renames.push((ours.clone(), text.clone()));
             }
             Err(fault @ ColumnFault::Missing { .. }) => {
-                return Err(Error::input(format!(
+                faults.push(Error::input(format!(
                     "{file}: option `columns` = `{ours}={text}`: {fault} {}",
                     listed(header)
                 )));
             }
             Err(fault) => {
-                return Err(Error::options(format!(
+                faults.push(Error::options(format!(
                     "option `columns` = `{ours}={text}`: {fault}"
                 )));
             }
@@ -61,7 +65,7 @@ pub(crate) fn read_options(
             Err(ColumnFault::Missing { .. })
                 if header.contains(ours) || can_lack(ours, quantity) => {}
             Err(fault) => {
-                return Err(Error::input(format!(
+                faults.push(Error::input(format!(
                     "{file}: the model file takes `{ours}` from `{text}`, but {fault} {} \
                      Map one onto it with option `columns` = `{ours}=THEIRS`",
                     listed(header)
@@ -72,6 +76,8 @@ pub(crate) fn read_options(
     for (drive, factor) in &mechanism.recording.torque {
         mapping.scale(drive, *factor, header);
         mapping.scale(&format!("{drive}_var"), factor * factor, header);
+    if let Some(fault) = together(faults) {
+        return Err(fault);
     }
     Ok(ReadOptions {
         renames: mapping.renames,
@@ -85,6 +91,27 @@ pub(crate) fn read_options(
         may_lack: model.drives(),
         between: args.between,
         ..ReadOptions::default()
+    })
+}
+
+/// Several faults as one, each on a line of its own; wrong options weigh more than what the recording lacks.
+fn together(mut faults: Vec<Error>) -> Option<Error> {
+    if faults.len() < 2 {
+        return faults.pop();
+    }
+    let is_wrong_option = faults
+        .iter()
+        .any(|fault| matches!(fault, Error::Options(_)));
+    let lines: Vec<String> = faults.iter().map(|fault| format!("- {fault}")).collect();
+    let says = format!(
+        "{} mappings of columns are at fault:\n{}",
+        faults.len(),
+        lines.join("\n")
+    );
+    Some(if is_wrong_option {
+        Error::options(says)
+    } else {
+        Error::input(says)
     })
 }
 

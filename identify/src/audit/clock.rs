@@ -1,0 +1,177 @@
+//! The clock of a recording, held against rates that the machine recorded itself: a position changes by the integral of its
+//! rate, whatever the joint does, so that all coordinates tell of one time. Samples that were written twice show where all
+//! positions stay while the rates go on.
+
+use std::collections::BTreeMap;
+
+use crate::motion::mean_rate;
+use crate::recording::{Note, Recording};
+use crate::signal::median;
+use crate::words::{list, with_digits};
+
+/// A clock that is off by less may be the scale of a sensor, or its noise.
+const OFF: f64 = 0.005;
+/// Coordinates must agree on the clock to this part of what it is off.
+const AGREE: f64 = 0.35;
+/// Ratios beyond are slips of units, which are told elsewhere.
+const CLOCKS: std::ops::Range<f64> = 0.9..1.1;
+/// Pieces of the recording, at most, over which rates are summed.
+const PIECES: usize = 400;
+/// A piece has at least so many samples.
+const SHORTEST: usize = 8;
+/// Part of all samples that repeat their neighbour before it is told.
+const REPEATED: f64 = 0.005;
+
+impl Recording {
+    /// Warnings about the times of samples. `coordinates` are names of positions.
+    pub(crate) fn clock(&self, coordinates: &[&str]) -> Vec<Note> {
+        let Ok(time) = self.column("t") else {
+            return Vec::new();
+        };
+        let mut notes: Vec<Note> = self.wrong_clock(time, coordinates).into_iter().collect();
+        notes.extend(self.repeated(time, coordinates));
+        notes
+    }
+
+    fn wrong_clock(&self, time: &[f64], coordinates: &[&str]) -> Option<Note> {
+        let mut ratios: BTreeMap<String, f64> = BTreeMap::new();
+        for name in coordinates {
+            let rate = format!("{name}_d");
+            let (Ok(q), true) = (self.column(name), self.has(&rate)) else {
+                continue;
+            };
+            if let Ok(qd) = self.column(&rate)
+                && let Some(ratio) = change_by_integral(time, q, qd)
+            {
+                ratios.insert(rate, ratio);
+            }
+        }
+        let middle = median(ratios.values().copied().collect());
+        let off = middle - 1.0;
+        if ratios.is_empty() || !CLOCKS.contains(&middle) || off.abs() < OFF {
+            return None;
+        }
+        let agree = ratios
+            .values()
+            .filter(|ratio| (*ratio - middle).abs() < AGREE * off.abs());
+        if 3 * agree.count() < 2 * ratios.len() {
+            return None;
+        }
+        let names: Vec<String> = ratios.keys().cloned().collect();
+        let (runs, should) = if off > 0.0 {
+            ("too slowly", "longer")
+        } else {
+            ("too fast", "shorter")
+        };
+        let duration = time[time.len() - 1] - time[0];
+        Some(Note::warning(format!(
+            "`t` in {} runs {runs}: positions change by {} times what the recorded {} tell, so that the run takes {} s rather \
+             than {} s, {should} by {} %. Are samples counted (steps of {} s) instead of stamps read? Give the true times as `t`; \
+             derivatives made of positions are off by as much, accelerations twice.",
+            self.file(),
+            with_digits(middle, 4),
+            list(&names),
+            with_digits(duration * middle, 5),
+            with_digits(duration, 5),
+            with_digits(100.0 * off.abs(), 2),
+            with_digits(mean_rate(time).recip(), 4),
+        )))
+    }
+
+    fn repeated(&self, time: &[f64], coordinates: &[&str]) -> Option<Note> {
+        let positions: Vec<&[f64]> = coordinates
+            .iter()
+            .filter_map(|name| self.column(name).ok())
+            .filter(|q| q.iter().any(|v| v.total_cmp(&q[0]).is_ne()))
+            .collect();
+        let n = time.len();
+        if positions.len() < 2 || n < 100 {
+            return None;
+        }
+        let same = |q: &[f64], i: usize| q[i].total_cmp(&q[i - 1]).is_eq();
+        let all = (1..n)
+            .filter(|i| positions.iter().all(|q| same(q, *i)))
+            // At rest everything stays.
+            .filter(|i| {
+                let around = [i.saturating_sub(2), (*i + 1).min(n - 1)];
+                positions
+                    .iter()
+                    .filter(|q| around.iter().all(|k| *k == 0 || *k == *i || !same(q, *k)))
+                    .count()
+                    > 0
+            })
+            .count();
+        // Steps of an encoder stay by chance, each by itself.
+        let by_chance: f64 = positions
+            .iter()
+            .map(|q| (1..n).filter(|i| same(q, *i)).count() as f64 / n as f64)
+            .product();
+        let part = all as f64 / n as f64;
+        (part > REPEATED + 3.0 * by_chance).then(|| {
+            Note::warning(format!(
+                "In {all} of {n} samples of {} all positions stay exactly as they were while the mechanism moves: samples were \
+                 written twice, or read later than they are stamped. Derivatives of positions hear of it; recorded rates, \
+                 or a lower cut-off (option `cutoff_hz`), help.",
+                self.file(),
+            ))
+        })
+    }
+}
+
+/// How many times as far as its rate tells a position changes, over pieces of the recording; `None` where it hardly moves.
+fn change_by_integral(time: &[f64], q: &[f64], qd: &[f64]) -> Option<f64> {
+    let n = time.len();
+    let piece = (n / PIECES).max(SHORTEST);
+    let (mut qi, mut ii, mut qq) = (0.0, 0.0, 0.0);
+    for start in (0..n.saturating_sub(piece)).step_by(piece) {
+        let integral: f64 = (start..start + piece)
+            .map(|i| 0.5 * (qd[i] + qd[i + 1]) * (time[i + 1] - time[i]))
+            .sum();
+        let change = q[start + piece] - q[start];
+        qi += change * integral;
+        ii += integral * integral;
+        qq += change * change;
+    }
+    // What the rate does not explain is no matter of the clock.
+    let is_explained = qi * qi > 0.95 * qq * ii;
+    (ii > 0.0 && is_explained).then(|| qi / ii)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+
+    use super::*;
+    use crate::ReadOptions;
+
+    fn recording(stamp: impl Fn(u32) -> f64, repeated: bool) -> Vec<Note> {
+        let mut text = "t,a,a_d,b,b_d\n".to_owned();
+        for i in 0..4000 {
+            let k = if repeated && i % 50 == 7 { i - 1 } else { i };
+            // True steps of 1.02 ms.
+            let t = 1.02e-3 * f64::from(k);
+            let (a, b) = ((2.0 * t).sin(), (3.0 * t).cos());
+            let (a_d, b_d) = (2.0 * (2.0 * t).cos(), -3.0 * (3.0 * t).sin());
+            writeln!(text, "{},{a},{a_d},{b},{b_d}", stamp(i)).unwrap();
+        }
+        let read = Recording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default());
+        read.unwrap().clock(&["a", "b"])
+    }
+
+    #[test]
+    fn counted_samples_and_repeated_ones_are_told() {
+        assert_eq!(recording(|i| 1.02e-3 * f64::from(i), false), []);
+        let counted = recording(|i| 1e-3 * f64::from(i), false);
+        assert_eq!(counted.len(), 1);
+        let says = &counted[0].says;
+        assert!(
+            says.contains("too slowly") && says.contains("1.02 times"),
+            "{says}"
+        );
+        let repeated = recording(|i| 1.02e-3 * f64::from(i), true);
+        assert!(
+            repeated.len() == 1 && repeated[0].says.contains("In 80 of 4000"),
+            "{repeated:?}"
+        );
+    }
+}
