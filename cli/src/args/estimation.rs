@@ -11,7 +11,7 @@ use super::preparation::parse_map;
 pub(crate) struct EstimatorArgs {
     /// What each equation counts: `channels` divides each drive's by the standard deviation of its residuals (iterated),
     /// `variance` each sample's by that of the recording's columns `DRIVE_var`
-    #[arg(long, value_enum, default_value = "channels")]
+    #[arg(long, value_enum, default_value = "auto")]
     pub(crate) weights: WeightsArg,
     /// Huber's robust estimate: residuals beyond BOUND standard deviations (taken from their median) count less
     #[arg(long, value_name = "BOUND", num_args = 0..=1, default_missing_value = "1.345",
@@ -40,10 +40,12 @@ pub(crate) struct EstimatorArgs {
 /// What each equation counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub(crate) enum WeightsArg {
+    /// By the residuals of each drive where drives have different units, and where cut-off and decimation are chosen
+    #[default]
+    Auto,
     /// All the same
     None,
     /// By the residuals of each drive
-    #[default]
     Channels,
     /// By the recording's columns
     Variance,
@@ -64,6 +66,7 @@ impl EstimatorArgs {
     pub(crate) fn options(&self, standstill: &StandstillArgs) -> Estimation {
         Estimation {
             weights: match self.weights {
+                WeightsArg::Auto => Weights::Automatic,
                 WeightsArg::None => Weights::None,
                 WeightsArg::Channels => Weights::Channels,
                 WeightsArg::Variance => Weights::Variance,

@@ -47,6 +47,9 @@ pub(crate) struct PreparationArgs {
     /// Leave out samples with NaN, infinite or empty fields instead of refusing the recording
     #[arg(long)]
     pub(crate) skip_bad_samples: bool,
+    /// Leave out the forces of contacts and pushes, intervals of time in which no parameters explain them
+    #[arg(long)]
+    pub(crate) leave_out_events: bool,
     /// Read only the samples between these times, s
     #[arg(long, value_name = "FROM,TO", value_parser = parse_between, allow_hyphen_values = true)]
     pub(crate) between: Option<(f64, f64)>,
@@ -82,6 +85,7 @@ impl PreparationArgs {
             columns: self.map.clone(),
             preparation: self.preparation(),
             skip_bad_samples: self.skip_bad_samples,
+            leave_out_events: self.leave_out_events,
             between: self.between,
         }
     }

@@ -45,7 +45,7 @@ fn identified(more: &[&str]) -> Option<Value> {
 #[test]
 fn the_error_of_the_fit_is_that_of_the_ladder() {
     let Some(fit) = identified(&[]) else { return };
-    let nrms = 100.0 * number(&fit, "/fit/nrms");
+    let nrms = 100.0 * number(&fit, "/fit/rows/nrms");
     println!(
         "TX40, rigid body with friction, drive inertia and offset: {nrms:.2} % (11.9 % elsewhere)"
     );

@@ -20,7 +20,7 @@ const PIECES: usize = 400;
 /// A piece has at least so many samples.
 const SHORTEST: usize = 8;
 /// Part of all samples that repeat their neighbour before it is told.
-const REPEATED: f64 = 0.005;
+const REPEATED: f64 = 0.02;
 
 impl Recording {
     /// Warnings about the times of samples. `coordinates` are names of positions.

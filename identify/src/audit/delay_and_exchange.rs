@@ -18,6 +18,8 @@ pub struct ForceAudit {
 pub struct ForceDelay {
     /// In steps of the recording; negative where the forces come first.
     pub samples: f64,
+    /// Standard deviation of `samples`, from the residual and how much it resembles its neighbours.
+    pub std: f64,
     /// Relative error of the best fit without and with the delay taken out.
     pub error: [f64; 2],
 }
@@ -61,10 +63,23 @@ impl ForceAudit {
     /// must lie in it (asserted).
     /// `None` where the best shift is the largest one, or nothing is measured.
     pub fn delay(&self, samples: &[usize], forces: &[Vec<f64>], most: usize) -> Option<ForceDelay> {
+        self.delay_counted(samples, forces, most, |_, _| true)
+    }
+
+    /// The same of the rows only of which `counts(row, channel)` says so; the others must be zero in the regressor.
+    pub fn delay_counted(
+        &self,
+        samples: &[usize],
+        forces: &[Vec<f64>],
+        most: usize,
+        counts: impl Fn(usize, usize) -> bool,
+    ) -> Option<ForceDelay> {
+        let counts = &counts;
         let shifted = |shift: usize| {
-            let rows = samples.iter().flat_map(|sample| {
+            let rows = samples.iter().enumerate().flat_map(|(row, sample)| {
                 let at = sample + shift - most;
-                forces.iter().map(move |channel| channel[at])
+                let channels = forces.iter().enumerate();
+                channels.map(move |(c, channel)| if counts(row, c) { channel[at] } else { 0.0 })
             });
             DVector::from_iterator(samples.len() * forces.len(), rows)
         };
@@ -83,7 +98,17 @@ impl ForceAudit {
         } else {
             0.0
         };
+        let rows = (0..samples.len())
+            .flat_map(|row| (0..forces.len()).map(move |c| (row, c)))
+            .filter(|(row, c)| counts(*row, *c))
+            .count();
+        let forces_then = shifted(best);
+        let residual = &forces_then - &self.q * self.q.tr_mul(&forces_then);
+        let alike = alike(&residual, forces.len());
+        // The curvature of the squared error over the shift tells how sharply it is known.
+        let variance = 2.0 * b / (rows.max(1) as f64 * bend.max(f64::MIN_POSITIVE));
         Some(ForceDelay {
+            std: (variance * (1.0 + alike) / (1.0 - alike)).sqrt(),
             samples: best as f64 - most as f64 + fraction,
             error: [errors[most], errors[best]],
         })
@@ -108,6 +133,18 @@ impl ForceAudit {
             .chain((0..n).map(Suspect::Turned))
             .filter_map(|change| Some((change, [now, self.error(&changed(change))?])))
             .min_by(|a, b| a.1[1].total_cmp(&b.1[1]))
+    }
+}
+
+/// Correlation of neighbouring rows of a channel, all channels together, at most 0.99.
+fn alike(residual: &DVector<f64>, channels: usize) -> f64 {
+    let n = residual.len();
+    let pairs = (0..n.saturating_sub(channels)).map(|i| residual[i] * residual[i + channels]);
+    let size = residual.norm_squared();
+    if size > 0.0 {
+        (pairs.sum::<f64>() / size).clamp(0.0, 0.99)
+    } else {
+        0.0
     }
 }
 
@@ -156,6 +193,7 @@ mod tests {
                 "{found:?} instead of {delay}"
             );
             assert!(found.error[1] <= found.error[0] && found.error[1] < 0.02);
+            assert!(found.std < 0.05 && (found.samples - delay).abs() < 5.0 * found.std + 0.02);
         }
         let (samples, forces) = forces(25.0, 0.01);
         let explained = ForceAudit::new(rows(|k| k as f64 * 0.002, &samples), 2).unwrap();

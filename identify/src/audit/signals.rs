@@ -17,6 +17,9 @@ const SPREAD: f64 = 5.0;
 /// What slope times length of a plateau must be of its spread; 8 for the top of a parabola.
 const STEEP: f64 = 30.0;
 
+/// Spread of a limit, as a part of it, at most.
+const SHARP: f64 = 0.01;
+
 impl Recording {
     /// Warnings about single signals. `coordinates` are `(name, whether it is an angle)`; columns that cannot be used
     /// are passed over.
@@ -94,6 +97,16 @@ impl Recording {
         let mut found: Vec<(f64, usize, usize)> = Vec::new();
         for is_high in [true, false] {
             let (level, spread) = crowded(force, is_high)?;
+            // Friction holds a level too, but not as sharply.
+            if spread > SHARP * level.abs() {
+                continue;
+            }
+            // Nothing lies beyond a limit but noise.
+            let sign = if is_high { 1.0 } else { -1.0 };
+            let beyond = force.iter().filter(|f| sign * (*f - level) > spread);
+            if beyond.count() > n / 1000 {
+                continue;
+            }
             let is_near = |i: usize| (force[i] - level).abs() <= spread;
             let (mut count, mut first) = (0, None);
             let mut i = 0;

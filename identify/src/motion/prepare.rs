@@ -186,6 +186,9 @@ impl Recording {
     }
 }
 
+/// A series of more harmonics is no plan of a motion, but takes up whatever is there; forces must tell.
+const MANY_HARMONICS: f64 = 25.5;
+
 /// What is open in the preparation of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Open {
@@ -214,14 +217,24 @@ impl Recording {
         if !is_open {
             return Ok(None);
         }
-        let runs = self.runs_with(coordinates, drives, preparation)?;
+        // The band that figures are asked for is none of the motion.
+        let preparation = Preparation {
+            band_hz: None,
+            ..preparation.clone()
+        };
+        let runs = self.runs_with(coordinates, drives, &preparation)?;
         let longest = runs.iter().max_by_key(|run| run.samples());
         let found = longest.and_then(|run| {
             let prepared = &run.prepared;
             Some(Open {
                 rate_hz: mean_rate(&run.time),
                 band_hz: prepared.band_hz?,
-                cutoff_hz: prepared.cutoff_hz.filter(|_| prepared.period.is_none())?,
+                cutoff_hz: prepared.cutoff_hz.filter(|cutoff| {
+                    let harmonics = prepared
+                        .period
+                        .map_or(f64::INFINITY, |period| cutoff * period);
+                    harmonics > MANY_HARMONICS
+                })?,
             })
         });
         Ok(found)

@@ -107,6 +107,9 @@ impl Recording {
         let Some(cutoff) = run.prepared.cutoff_hz else {
             return;
         };
+        // What lies above the band of the forces is filtered off their rows.
+        let band = run.prepared.band_hz.unwrap_or(cutoff);
+        let cutoff = cutoff.min(band);
         let rate = mean_rate(&run.time);
         let mut found = Vec::new();
         for (column, qdd) in columns.iter().zip(&run.qdd) {

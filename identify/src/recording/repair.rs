@@ -44,10 +44,10 @@ impl Recording {
                 self.notes.retain(|note| !note.says.starts_with(&prefix));
                 let first = lost.iter().position(|lost| *lost).unwrap_or(0);
                 notes.push(Note::warning(format!(
-                    "{} of `{name}` in {} not measured, the first in {place} {}: positions there are kept, and the force of \
-                     this drive counts in no equation and no figure.",
-                    count_of(n, "sample", "samples"),
-                    if n == 1 { format!("{} was", self.file) } else { format!("{} were", self.file) },
+                    "{n} of {} samples of {} lack the force of `{name}`, the first in {place} {}: positions there are kept, \
+                     and the force of this drive counts in no equation and no figure.",
+                    lost.len(),
+                    self.file,
                     self.lines[first]
                 )));
                 column.lost = lost;
@@ -326,7 +326,7 @@ mod tests {
         assert!((found.column("motor").unwrap()[700] - force(700)).abs() < 0.5);
         let says: Vec<&str> = found.notes().iter().map(|n| n.says.as_str()).collect();
         assert_eq!(says.len(), 2, "{says:?}");
-        assert!(says[0].contains("2 samples of `motor`") && says[0].contains("line 302"));
+        assert!(says[0].contains("2 of 1000 samples") && says[0].contains("line 302"));
         assert!(
             says[1].contains("1 spike") && says[1].contains("1000000"),
             "{says:?}"

@@ -1,10 +1,11 @@
 //! What a model says of a recording before anything is believed: delays between force and motion, columns that are
 //! exchanged or turned round, angles in degrees. Everything goes into the notes.
 
+mod events;
 mod nominal_forces;
 
 use modelmill_codegen::{Evaluator, States};
-use modelmill_identify::{ForceAudit, Note, Suspect, differentiate};
+use modelmill_identify::{ForceAudit, ForceDelay, Note, Suspect, differentiate};
 use nalgebra::{DMatrix, DVector};
 
 use crate::along::drive_rates;
@@ -16,15 +17,23 @@ use crate::text::table::percent;
 const LOOKED_AT: usize = 1500;
 /// Largest delay that is looked for, in samples.
 const LONGEST_DELAY: usize = 25;
+/// Part of a drive's fastest rate below which its friction may be about to reverse.
+const SLOW: f64 = 0.1;
+/// Standard deviations within which 99 of 100 values lie.
+const SURE: f64 = 2.58;
 /// Relative errors below this one raise no suspicion of exchanged columns.
 const BEARABLE: f64 = 0.3;
 /// An exchange must lower the error to this part.
 const BETTER: f64 = 0.5;
 
-/// Looks at every recording that has forces, and adds what it finds to their notes.
-pub fn examine(model: &Model, data: &mut [Stretch]) {
+/// Looks at every recording that has forces, and adds what it finds to their notes; the forces of contacts and pushes count no
+/// more where `leave_out_events`.
+pub fn examine(model: &Model, data: &mut [Stretch], leave_out_events: bool) {
     for one in data {
         for note in findings(model, one) {
+            one.note(model, note);
+        }
+        for note in events::found(model, one, leave_out_events) {
             one.note(model, note);
         }
     }
@@ -93,37 +102,95 @@ fn findings(model: &Model, data: &Stretch) -> Vec<Note> {
     if notes.is_empty() {
         notes = beside;
     }
-    if notes.is_empty()
-        && let Some(with_friction) = with_friction(model, data, &samples)
-        && let Some(delay) = with_friction.delay(&samples, forces, LONGEST_DELAY)
-    {
-        let [before, after] = delay.error;
-        let seconds = (run.time[n - 1] - run.time[0]) / (n - 1) as f64;
-        // Less than a thirtieth of the error is no matter, and may be chance.
-        let gain = 1.0 - after / before.max(f64::MIN_POSITIVE);
-        if gain > 0.03 && delay.samples.abs() >= 0.3 {
-            let (which, behind) = if delay.samples > 0.0 {
-                ("come later than", "behind")
-            } else {
-                ("come earlier than", "before")
-            };
-            let says = format!(
-                "The forces in {} {which} the motion that the model explains them by: {:.1} samples or {:.3} ms {behind} it. \
-                 Without this shift the best fit would be off by {} rather than {}.",
-                run.file,
-                delay.samples.abs(),
-                1e3 * seconds * delay.samples.abs(),
-                percent(Some(after)),
-                percent(Some(before))
-            );
-            notes.push(if gain > 0.1 {
-                Note::warning(says)
-            } else {
-                Note::info(says)
-            });
-        }
+    if notes.is_empty() {
+        notes.extend(delay(model, data, &samples));
     }
     notes
+}
+
+/// What the forces come later or earlier than the motion by, all drives together and each by itself.
+fn delay(model: &Model, data: &Stretch, samples: &[usize]) -> Option<Note> {
+    let run = &data.run;
+    let forces = run.force.as_deref()?;
+    let n = run.time.len();
+    let rates = drive_rates(model, data).ok()?;
+    let drives = forces.len();
+    // Friction that reverses has its own way of coming late.
+    let fastest: Vec<f64> = rates
+        .iter()
+        .map(|rate| rate.iter().fold(0.0_f64, |most, v| most.max(v.abs())))
+        .collect();
+    let moves = |row: usize, d: usize| {
+        rates[d][samples[row]].abs() > SLOW * fastest[d] && run.counts(d, samples[row])
+    };
+    let regressor = with_friction(model, data, samples)?;
+    let found = |wanted: &dyn Fn(usize) -> bool| {
+        let mut rows = regressor.clone();
+        for i in 0..samples.len() {
+            for d in 0..drives {
+                if !(wanted(d) && moves(i, d)) {
+                    rows.row_mut(i * drives + d).fill(0.0);
+                }
+            }
+        }
+        let counts = |row: usize, d: usize| wanted(d) && moves(row, d);
+        ForceAudit::new(rows, drives)?.delay_counted(samples, forces, LONGEST_DELAY, counts)
+    };
+    let all = found(&|_| true)?;
+    let [before, after] = all.error;
+    let seconds = (run.time[n - 1] - run.time[0]) / (n - 1) as f64;
+    let gain = 1.0 - after / before.max(f64::MIN_POSITIVE);
+    if gain <= 0.003 || all.samples.abs() < 0.3_f64.max(SURE * all.std) {
+        return None;
+    }
+    let alone: Vec<Option<ForceDelay>> = if drives > 1 {
+        (0..drives).map(|d| found(&|other| other == d)).collect()
+    } else {
+        Vec::new()
+    };
+    // A clock delays all forces alike; where drives differ, it is a law that the model lacks.
+    let agree = alone.iter().flatten().all(|one| {
+        let apart = (one.samples - all.samples).abs();
+        apart < SURE * one.std.hypot(all.std) + 0.1
+    });
+    let needs_more = if drives > 1 { 0.003 } else { 0.03 };
+    if gain <= needs_more || !agree {
+        return None;
+    }
+    let (which, behind) = if all.samples > 0.0 {
+        ("come later than", "behind")
+    } else {
+        ("come earlier than", "before")
+    };
+    let each = if alone.is_empty() {
+        String::new()
+    } else {
+        let each = model.drives().into_iter().zip(&alone).map(|(name, one)| {
+            one.map_or_else(
+                || format!("`{name}` does not tell"),
+                |one| format!("`{name}` {:.1} +- {:.1}", one.samples, SURE * one.std),
+            )
+        });
+        format!(
+            " Each drive by itself, in samples: {}.",
+            each.collect::<Vec<_>>().join(", ")
+        )
+    };
+    let says = format!(
+        "The forces in {} {which} the motion that the model explains them by: {:.1} samples or {:.3} ms {behind} it (+- {:.3} ms, \
+         99 %). Without this shift the best fit would be off by {} rather than {}.{each}",
+        run.file,
+        all.samples.abs(),
+        1e3 * seconds * all.samples.abs(),
+        1e3 * seconds * SURE * all.std,
+        percent(Some(after)),
+        percent(Some(before))
+    );
+    Some(if gain > 0.1 {
+        Note::warning(says)
+    } else {
+        Note::info(says)
+    })
 }
 
 /// Signs and units of the forces, held against those that the nominal values give.
@@ -150,7 +217,7 @@ fn beside_nominal(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<Note>
 
 /// The regressor with friction, inertia and an offset at every drive besides: where a model lacks these, their force
 /// would pass for a delay.
-fn with_friction(model: &Model, data: &Stretch, samples: &[usize]) -> Option<ForceAudit> {
+fn with_friction(model: &Model, data: &Stretch, samples: &[usize]) -> Option<DMatrix<f64>> {
     let regressor = regressor(model, data, samples, &|_| {})?;
     let rates = drive_rates(model, data).ok()?;
     let n = rates.len();
@@ -170,7 +237,7 @@ fn with_friction(model: &Model, data: &Stretch, samples: &[usize]) -> Option<For
             }
         }
     }
-    ForceAudit::new(more, n)
+    Some(more)
 }
 
 /// Positions, rates and accelerations, `[order][coordinate][sample]`.

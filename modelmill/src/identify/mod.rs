@@ -75,11 +75,31 @@ impl Model {
             standstill::leave_out(self, &mut fit, part)?;
         }
         let instruments = instruments::along(&fit, instruments, options)?;
-        let found = identify(self, &fit, &instruments, &check, options)?;
+        let options = Estimation {
+            weights: settled(self, &fit, &instruments, options.weights),
+            ..options.clone()
+        };
+        let found = identify(self, &fit, &instruments, &check, &options)?;
         for note in &found.notes {
             self.host().note(note);
         }
         Ok(found)
+    }
+}
+
+/// What equations count where that is left open: each drive by its own residuals, where squares of different units would add
+/// up, and where nobody has said how a recording is prepared. Instruments do without.
+fn settled(model: &Model, data: &[Stretch], instruments: &[Stretch], weights: Weights) -> Weights {
+    if weights != Weights::Automatic {
+        return weights;
+    }
+    let drives = model.drives().len();
+    let differ = (1..drives).any(|d| model.force_unit(d) != model.force_unit(0));
+    let chosen = data.iter().any(|one| one.run.prepared.decimate_chosen);
+    if instruments.is_empty() && drives > 1 && (differ || chosen) {
+        Weights::Channels
+    } else {
+        Weights::None
     }
 }
 

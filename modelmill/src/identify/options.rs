@@ -2,8 +2,8 @@
 
 use crate::identify::refine::Refinement;
 
-/// How parameters are estimated; [`Estimation::default`] is least squares with each drive by its own
-/// residuals.
+/// How parameters are estimated; [`Estimation::default`] is least squares, where need be with each drive by
+/// its own residuals.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Estimation {
     /// What each equation counts.
@@ -21,10 +21,12 @@ pub struct Estimation {
 /// What each equation counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Weights {
+    /// `Channels` where drives have different units, and where cut-off and decimation are chosen; else `None`.
+    #[default]
+    Automatic,
     /// All the same: ordinary least squares.
     None,
-    /// Each drive's are divided by the standard deviation of its residuals (iterated), for drives differ in size and unit.
-    #[default]
+    /// Each drive's are divided by the standard deviation of its residuals (iterated).
     Channels,
     /// Each sample's are divided by the standard deviation of the recording's columns `DRIVE_var`.
     Variance,
@@ -34,6 +36,7 @@ impl Weights {
     /// What the JSON calls it.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Automatic => "automatic",
             Self::None => "none",
             Self::Channels => "channels",
             Self::Variance => "variance",

@@ -89,7 +89,7 @@ pub fn identify(
     enough(data, &runs, unknown.len(), model)?;
     not_idle(data, &runs)?;
     // Plain least squares: one pass for the solution, two for the deviations. How often rows are reweighted nobody knows.
-    let by_channel = args.weights == Weights::Channels && model.drives().len() > 1;
+    let by_channel = args.weights == Weights::Channels;
     let reweighted = by_channel || args.robust.is_some();
     let passes = if reweighted { 0 } else { 3 };
     model

@@ -17,6 +17,8 @@ use crate::error::Outcome;
 use crate::model::Model;
 use crate::text::table::{percent, significant};
 
+/// And in parts of the band of the forces: noise above says nothing of them, and makes the model's forces rough.
+const FARTHEST: f64 = 8.0;
 /// Ratio of neighbouring cut-offs.
 const RATIO: f64 = 1.6;
 /// The highest cut-off, in parts of the sampling rate: beyond, differences take more than the filter leaves.
@@ -41,7 +43,7 @@ const PARALLEL: [f64; 3] = [0.5, 1.0, 2.0];
 const FEWEST: usize = 40;
 /// What is left of a force below this part of it is rounding.
 const ROUNDING: f64 = 1e-6;
-/// A candidate must be better by this part of the error to be preferred to one that smooths less.
+/// A candidate must be better by this part of the error to be preferred to one that smooths more.
 const BETTER: f64 = 0.005;
 /// A cut-off that leaves so much more than the best ends the search downwards.
 const HOPELESS: f64 = 1.5;
@@ -93,7 +95,7 @@ impl Search<'_> {
             band_hz,
             cutoff_hz,
         } = self.open;
-        let highest = HIGHEST * rate_hz;
+        let highest = (HIGHEST * rate_hz).min(FARTHEST * band_hz);
         let lowest = (LOWEST * band_hz).min(cutoff_hz);
         let mut ladder = vec![cutoff_hz.min(highest)];
         while ladder[0] * RATIO <= highest && ladder.len() < 3 {
@@ -119,7 +121,7 @@ impl Search<'_> {
         }
         let best = judged
             .iter()
-            .position(|(_, left)| left.figure <= least + BETTER)?;
+            .rposition(|(_, left)| left.figure <= least + BETTER)?;
         let (cutoff, left) = judged[best];
         let (decimate, left) = self.decimation(cutoff, &looked_at).unwrap_or((1, left));
         let mut reading = self.reading.clone();

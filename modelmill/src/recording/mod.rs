@@ -244,7 +244,7 @@ impl Recording {
         if let (Some(note), Some(first)) = (note, stretches.first_mut()) {
             first.note(model, note);
         }
-        audit::examine(model, &mut stretches);
+        audit::examine(model, &mut stretches, reading.leave_out_events);
         Ok(Self {
             stretches,
             raw,

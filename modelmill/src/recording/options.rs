@@ -13,6 +13,8 @@ pub struct Reading {
     pub preparation: Preparation,
     /// Leave out samples with NaN, infinite or empty fields instead of refusing the recording.
     pub skip_bad_samples: bool,
+    /// Leave the forces of contacts and pushes out of fits and figures: intervals in which no parameters explain them.
+    pub leave_out_events: bool,
     /// Read only the samples between these times, s.
     pub between: Option<(f64, f64)>,
 }
