@@ -10,6 +10,7 @@ mod bombs;
 mod boundary;
 mod cloos;
 mod common;
+mod damaged_recordings;
 mod diagnose;
 mod diagnose_made;
 mod effects;

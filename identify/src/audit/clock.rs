@@ -11,8 +11,9 @@ use crate::words::{list, with_digits};
 
 /// A clock that is off by less may be the scale of a sensor, or its noise.
 const OFF: f64 = 0.005;
-/// Coordinates must agree on the clock to this part of what it is off.
-const AGREE: f64 = 0.35;
+/// Two thirds of the coordinates must see this part of what the clock is off: one that walks is off otherwise at other times, when
+/// others move.
+const AGREE: f64 = 0.4;
 /// Ratios beyond are slips of units, which are told elsewhere.
 const CLOCKS: std::ops::Range<f64> = 0.9..1.1;
 /// Pieces of the recording, at most, over which rates are summed.
@@ -53,7 +54,7 @@ impl Recording {
         }
         let agree = ratios
             .values()
-            .filter(|ratio| (*ratio - middle).abs() < AGREE * off.abs());
+            .filter(|ratio| (*ratio - 1.0) * off.signum() > AGREE * off.abs());
         if 3 * agree.count() < 2 * ratios.len() {
             return None;
         }
