@@ -51,6 +51,6 @@ mod tests {
         let motion = [tone(0.3), tone(2.0)];
         let band = of_motion(&time, motion.iter().map(Vec::as_slice)).unwrap();
         assert!((38.0..44.0).contains(&band), "{band}");
-        assert_eq!(of_motion(&time, [[1.0; 4000].as_slice()]), None);
+        assert_eq!(of_motion(&time, [vec![1.0; 4000].as_slice()]), None);
     }
 }

@@ -55,20 +55,7 @@ impl Recording {
         }
         let found = series_of(time, columns, preparation);
         // One cut-off for all coordinates keeps loops consistent.
-        let chosen = || {
-            let sources: Vec<Signal<'_>> = incomplete.iter().map(|c| c.source()).collect();
-            if is_even(time) {
-                return choose_cutoff(&sources, rate, order);
-            }
-            let even: Vec<Vec<f64>> = sources
-                .iter()
-                .map(|signal| on_even_times(time, signal.values))
-                .collect();
-            let even: Vec<Signal<'_>> = (sources.iter().zip(&even))
-                .map(|(signal, values)| Signal { values, ..*signal })
-                .collect();
-            choose_cutoff(&even, rate, order)
-        };
+        let chosen = || cutoff_of(time, &incomplete, order);
         let cutoff = match &found {
             Some(found) => found.harmonics as f64 / found.period,
             None => preparation.cutoff_hz.or_else(chosen).unwrap_or(0.1 * rate),
@@ -184,6 +171,23 @@ impl Recording {
         let count = spoilt.unwrap_or(most);
         (count, count)
     }
+}
+
+/// The cut-off that suits what is to be differentiated, on even times.
+fn cutoff_of(time: &[f64], columns: &[&Recorded<'_>], order: usize) -> Option<f64> {
+    let rate = mean_rate(time);
+    let sources: Vec<Signal<'_>> = columns.iter().map(|c| c.source()).collect();
+    if is_even(time) {
+        return choose_cutoff(&sources, rate, order);
+    }
+    let even: Vec<Vec<f64>> = sources
+        .iter()
+        .map(|signal| on_even_times(time, signal.values))
+        .collect();
+    let even: Vec<Signal<'_>> = (sources.iter().zip(&even))
+        .map(|(signal, values)| Signal { values, ..*signal })
+        .collect();
+    choose_cutoff(&even, rate, order)
 }
 
 /// A series of more harmonics is no plan of a motion, but takes up whatever is there; forces must tell.

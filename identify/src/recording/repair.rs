@@ -79,6 +79,14 @@ impl Recording {
                 column.join();
             }
         }
+        notes.extend(self.take_jumps_out(coordinates));
+        self.notes.extend(notes);
+    }
+
+    /// Takes jumps out of positions, and says which.
+    fn take_jumps_out(&mut self, coordinates: &[String]) -> Vec<Note> {
+        let place = place_word(&self.file);
+        let mut notes = Vec::new();
         let time = self.columns.get("t").map(|t| t.values.clone());
         for name in coordinates {
             let Some(column) = self.columns.get_mut(name) else {
@@ -125,7 +133,7 @@ impl Recording {
                 with_digits(excess(&column.values, largest.unwrap_or(0.0)), 2),
             )));
         }
-        self.notes.extend(notes);
+        notes
     }
 }
 
