@@ -10,6 +10,7 @@ use modelmill::diagnose::{Question, Verdict};
 use modelmill::identify::Estimation;
 use modelmill::recording::Reading;
 use modelmill_codegen::{Derivation, Evaluator, States};
+use modelmill_identify::Figures;
 use modelmill_spec::Mechanism;
 
 /// Noise of each force beside its root mean square.
@@ -143,6 +144,15 @@ fn recording(name: &str, derivation: &Derivation) -> PathBuf {
     file
 }
 
+/// Relative error over all drives, also of those with different units, each beside its own force.
+fn relative(figures: &Figures) -> f64 {
+    figures.nrms.unwrap_or_else(|| {
+        let squares = figures.channels.values().filter_map(|one| one.nrms);
+        let squares = squares.map(|nrms| nrms * nrms);
+        (squares.sum::<f64>() / figures.channels.len() as f64).sqrt()
+    })
+}
+
 fn scratch(name: &str) -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join(name)
 }
@@ -167,7 +177,7 @@ fn check(name: &str, path: &Path) {
 
     let identified = model.identify(&[&run], &[], &Estimation::default());
     let identified = identified.unwrap_or_else(|e| fault(e)).fit;
-    let fit = identified.fit.nrms.expect("forces");
+    let fit = relative(&identified.fit);
     // Base parameters take a little of the noise along.
     assert!((0.7 * NOISE..1.05 * NOISE).contains(&fit), "{name}: {fit}");
     assert!(
@@ -178,11 +188,7 @@ fn check(name: &str, path: &Path) {
     let values: Vec<f64> = identified.parameters.iter().map(|p| p.value).collect();
     let nrms = |values: &[f64]| -> f64 {
         let compared = model.compare(&[&run], values);
-        compared
-            .unwrap_or_else(|e| fault(e))
-            .figures
-            .nrms
-            .expect("forces")
+        relative(&compared.unwrap_or_else(|e| fault(e)).figures)
     };
     let compared = nrms(&values);
     assert!(
