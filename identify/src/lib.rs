@@ -46,9 +46,9 @@ pub use estimate::{
     Deviations, Direction, LeastSquares, LeastSquaresError, RANK_TOLERANCE, Solution, Triangle,
 };
 pub use figures::{
-    BandError, ChannelFigures, Comparison, Estimator, Figures, FiguresError, FilteredFigures, FitFault,
-    FitFile, FitFileError, FitParameter, InBand, LocateOptions, ParameterInfo, Region, Status,
-    TIME_COLUMN, TRIMMED_PART, compare, fit_parameters, in_band, locate,
+    BandError, ChannelFigures, Comparison, Estimator, Figures, FiguresError, FilteredFigures,
+    FitFault, FitFile, FitFileError, FitParameter, InBand, LocateOptions, ParameterInfo, Region,
+    Status, TIME_COLUMN, TRIMMED_PART, compare, fit_parameters, in_band, locate,
 };
 pub use motion::{
     DerivativeSource, Open, PASSED_BY_DECIMATION, Preparation, PreparedAs, Repeats, Run, Smoothed,

@@ -14,9 +14,9 @@ mod join;
 mod notes;
 mod options;
 mod read;
+mod repair;
 mod tables;
 mod together;
-mod repair;
 
 use indexmap::IndexMap;
 

@@ -76,6 +76,7 @@ pub(crate) fn read_options(
     for (drive, factor) in &mechanism.recording.torque {
         mapping.scale(drive, *factor, header);
         mapping.scale(&format!("{drive}_var"), factor * factor, header);
+    }
     if let Some(fault) = together(faults) {
         return Err(fault);
     }
