@@ -25,10 +25,12 @@
 //! - `estimate`: rows to parameters
 //! - `figures`: how far off, and where; the file of a fit
 //! - `diagnose`: which effects are missing
+//! - `changes`: what differs between runs
 //! - `excite`: motion for a recording
 //! - `interpret`: physical parameters
 
 mod audit;
+pub mod changes;
 pub mod diagnose;
 pub mod estimate;
 pub mod excite;

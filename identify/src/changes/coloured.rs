@@ -1,0 +1,117 @@
+//! Noise with a memory, and the filter that makes it white.
+
+/// The highest order that is tried.
+const HIGHEST: usize = 40;
+
+/// An autoregression: `e_t = a_1 e_(t-1) + ... + a_p e_(t-p) + w_t` with white `w` (Box and Jenkins, Time Series Analysis).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coloured {
+    /// `a_1` to `a_p`; none for white noise.
+    pub coefficients: Vec<f64>,
+    /// Standard deviation of `w`, in the unit of the residual; 0 where the residual is zero.
+    pub deviation: f64,
+}
+
+impl Coloured {
+    /// The autoregression of a residual in stretches, by the equations of Yule and Walker (recursion of Levinson and Durbin),
+    /// with the order that Schwarz' criterion takes.
+    pub fn of(stretches: &[&[f64]]) -> Self {
+        let n: usize = stretches.iter().map(|s| s.len()).sum();
+        let highest = HIGHEST.min(n / 20);
+        let covariance: Vec<f64> = (0..=highest)
+            .map(|lag| {
+                let of_stretch = |s: &&[f64]| -> f64 {
+                    let later = s.get(lag..).unwrap_or_default();
+                    later.iter().zip(s.iter()).map(|(a, b)| a * b).sum()
+                };
+                stretches.iter().map(of_stretch).sum::<f64>() / n.max(1) as f64
+            })
+            .collect();
+        let mut best = (f64::INFINITY, Vec::new(), covariance[0]);
+        let (mut a, mut variance): (Vec<f64>, f64) = (Vec::new(), covariance[0]);
+        for order in 0..=highest {
+            if order > 0 {
+                let known: f64 = (0..order - 1)
+                    .map(|i| a[i] * covariance[order - 1 - i])
+                    .sum();
+                let reflection = (covariance[order] - known) / variance;
+                let before = a.clone();
+                for i in 0..order - 1 {
+                    a[i] = before[i] - reflection * before[order - 2 - i];
+                }
+                a.push(reflection);
+                variance *= 1.0 - reflection * reflection;
+            }
+            if variance <= 1e-12 * covariance[0] {
+                break;
+            }
+            let cost = n as f64 * variance.ln() + order as f64 * (n as f64).ln();
+            if cost < best.0 {
+                best = (cost, a.clone(), variance);
+            }
+        }
+        Self {
+            coefficients: best.1,
+            deviation: best.2.max(0.0).sqrt(),
+        }
+    }
+
+    /// A series of one stretch as it would be had its noise no memory, in standard deviations of `w`. The first numbers have
+    /// no past and come out as 0.
+    pub fn whitened(&self, series: &[f64]) -> Vec<f64> {
+        let order = self.coefficients.len();
+        let white = |t: usize| {
+            if t < order {
+                return 0.0;
+            }
+            let past = self.coefficients.iter().enumerate();
+            let known: f64 = past.map(|(i, a)| a * series[t - 1 - i]).sum();
+            (series[t] - known) / self.deviation
+        };
+        (0..series.len()).map(white).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_noise::Noise;
+
+    #[test]
+    fn noise_through_a_filter_comes_out_white() {
+        let mut noise = Noise::new(4);
+        let truth = [1.6, -0.8];
+        let mut series = vec![0.0; 20_000];
+        for t in 2..series.len() {
+            series[t] = truth[0] * series[t - 1] + truth[1] * series[t - 2] + 0.3 * noise.normal();
+        }
+        let (first, second) = series.split_at(7_000);
+        let found = Coloured::of(&[first, second]);
+        assert!((found.deviation - 0.3).abs() < 0.01, "{found:?}");
+        assert_eq!(found.coefficients.len(), 2, "{found:?}");
+        for (a, b) in found.coefficients.iter().zip(truth) {
+            assert!((a - b).abs() < 0.02, "{found:?}");
+        }
+        let white = found.whitened(&series);
+        let n = white.len() as f64;
+        let product = |lag: usize| -> f64 {
+            white[lag..]
+                .iter()
+                .zip(&white)
+                .map(|(a, b)| a * b)
+                .sum::<f64>()
+                / n
+        };
+        assert!((product(0) - 1.0).abs() < 0.05);
+        assert!((1..20).all(|lag| product(lag).abs() < 0.03));
+    }
+
+    #[test]
+    fn white_noise_and_nothing_have_no_memory() {
+        let mut noise = Noise::new(9);
+        let white: Vec<f64> = (0..5_000).map(|_| noise.normal()).collect();
+        assert!(Coloured::of(&[&white]).coefficients.len() < 3);
+        let nothing = Coloured::of(&[&[0.0; 100]]);
+        assert_eq!((nothing.coefficients.len(), nothing.deviation), (0, 0.0));
+    }
+}

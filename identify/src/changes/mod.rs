@@ -1,0 +1,20 @@
+//! What is different between two runs of one machine.
+//!
+//! Both runs share the base parameters `p`; the later one may have changes besides, each a group of columns with
+//! coefficients `c`:
+//!
+//! ```text
+//! y_0 = H_0 p + e_0,    y_1 = H_1 p + X_1 c + e_1
+//! ```
+//!
+//! Rows are made white first, drive by drive ([`Coloured`]), so that sums of squares count independent numbers, and each run
+//! is kept as sums over its rows ([`Moments`]), block by block. [`search`] then finds the fewest changes that explain what
+//! the runs do not share.
+
+mod coloured;
+mod moments;
+mod search;
+
+pub use coloured::Coloured;
+pub use moments::{Moments, Solved};
+pub use search::{Change, Runs, Search, search};

@@ -1,0 +1,295 @@
+//! The fewest changes that explain what a later run does not share with the one before.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::changes::moments::{Moments, Solved};
+
+/// How many times the logarithm of the number of rows a value must gain: 1 is Schwarz' criterion, which holds for white noise;
+/// what is left of real runs is never quite white.
+const STRICTER: f64 = 3.0;
+/// The part of a change's gain that must be there on blocks that had no part in its fit.
+const HELD_OUT: f64 = 0.3;
+/// Changes that differ by less than this part of the gain cannot be told apart.
+const NEAR: f64 = 0.02;
+
+/// Two runs as sums over rows of variance 1.
+#[derive(Clone, Debug)]
+pub struct Runs {
+    /// The run before, over the base columns, block by block.
+    pub reference: Vec<Moments>,
+    /// The later run, over the base columns and those of all changes, block by block.
+    pub later: Vec<Moments>,
+}
+
+/// What a later run may have.
+#[derive(Clone, Debug)]
+pub struct Search {
+    /// Columns of each change that is possible, counted with the base columns before them.
+    pub changes: Vec<Vec<usize>>,
+}
+
+/// A change that was found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    /// Which of the possible ones.
+    pub which: usize,
+    /// The values of its columns.
+    pub values: DVector<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+    /// Which values are known by themselves.
+    pub determined: Vec<bool>,
+    /// By how much the sum of squares would rise without it, over the variance of what is left.
+    pub gain: f64,
+    /// The same on blocks that had no part in the fit.
+    pub held_out: f64,
+    /// Changes that explain nearly as much in its place.
+    pub rivals: Vec<usize>,
+}
+
+/// The fewest changes that explain the later run, the largest first; none where the runs differ by chance alone.
+pub fn search(runs: &Runs, search: &Search) -> Vec<Change> {
+    let bench = Bench::new(runs, search);
+    let mut chosen: Vec<usize> = Vec::new();
+    loop {
+        let candidates = (0..search.changes.len()).filter(|g| !chosen.contains(g));
+        let tried = candidates.map(|g| (g, bench.cost(&with(&chosen, g))));
+        let Some((best, cost)) = tried.min_by(|a, b| a.1.total_cmp(&b.1)) else {
+            break;
+        };
+        if cost >= bench.cost(&chosen) || !bench.holds(&chosen, best) {
+            break;
+        }
+        chosen.push(best);
+        bench.settle(&mut chosen);
+    }
+    let mut found: Vec<Change> = chosen.iter().map(|g| bench.change(&chosen, *g)).collect();
+    found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    found
+}
+
+fn sum<'a>(columns: usize, blocks: impl Iterator<Item = &'a Moments>) -> Moments {
+    let mut sum = Moments::new(columns);
+    for block in blocks {
+        sum.merge(block);
+    }
+    sum
+}
+
+fn with(chosen: &[usize], further: usize) -> Vec<usize> {
+    chosen.iter().copied().chain([further]).collect()
+}
+
+fn without(chosen: &[usize], one: usize) -> Vec<usize> {
+    chosen.iter().copied().filter(|g| *g != one).collect()
+}
+
+struct Bench<'a> {
+    runs: &'a Runs,
+    search: &'a Search,
+    /// How many base columns there are.
+    base: usize,
+    /// All blocks of both runs.
+    sums: [Moments; 2],
+    /// Variance of what no change explains.
+    noise: f64,
+    /// What a value must gain.
+    price: f64,
+}
+
+impl<'a> Bench<'a> {
+    fn new(runs: &'a Runs, search: &'a Search) -> Self {
+        let base = runs.reference.first().map_or(0, |m| m.rhs.len());
+        let columns = runs.later.first().map_or(base, |m| m.rhs.len());
+        let sums = [
+            sum(base, runs.reference.iter()),
+            sum(columns, runs.later.iter()),
+        ];
+        let rows = (sums[0].rows + sums[1].rows) as f64;
+        let mut bench = Self {
+            runs,
+            search,
+            base,
+            sums,
+            noise: 1.0,
+            price: STRICTER * rows.max(2.0).ln(),
+        };
+        let all: Vec<usize> = (0..search.changes.len()).collect();
+        let solved = bench.solved(&all);
+        bench.noise = (solved.rest / (rows - solved.rank as f64).max(1.0)).max(1.0);
+        bench
+    }
+
+    /// The base columns and those of some changes.
+    fn columns(&self, chosen: &[usize]) -> Vec<usize> {
+        let of = |g: &usize| self.search.changes[*g].iter().copied();
+        (0..self.base).chain(chosen.iter().flat_map(of)).collect()
+    }
+
+    /// Rows of both runs together.
+    fn together(&self, [reference, later]: [&Moments; 2], chosen: &[usize]) -> Moments {
+        let mut all = later.of(&self.columns(chosen));
+        let n = self.base;
+        let mut gram = all.gram.view_mut((0, 0), (n, n));
+        gram += &reference.gram;
+        let mut rhs = all.rhs.rows_mut(0, n);
+        rhs += &reference.rhs;
+        all.total += reference.total;
+        all.rows += reference.rows;
+        all
+    }
+
+    fn solved(&self, chosen: &[usize]) -> Solved {
+        self.together(self.sums.each_ref(), chosen).solve()
+    }
+
+    /// What some changes leave, with a price on each value.
+    fn cost(&self, chosen: &[usize]) -> f64 {
+        let solved = self.solved(chosen);
+        solved.rest / self.noise + self.price * solved.rank as f64
+    }
+
+    /// Takes out and exchanges for as long as that costs less.
+    fn settle(&self, chosen: &mut Vec<usize>) {
+        loop {
+            let now = self.cost(chosen);
+            let mut better: Option<(f64, Vec<usize>)> = None;
+            for one in chosen.clone() {
+                let rest = without(chosen, one);
+                let others = (0..self.search.changes.len()).filter(|g| !chosen.contains(g));
+                let exchanged = others.map(|g| with(&rest, g));
+                for tried in exchanged.chain([rest.clone()]) {
+                    let cost = self.cost(&tried);
+                    if cost < better.as_ref().map_or(now - 1e-6 * now.abs(), |b| b.0) {
+                        better = Some((cost, tried));
+                    }
+                }
+            }
+            match better {
+                Some((_, set)) => *chosen = set,
+                None => return,
+            }
+        }
+    }
+
+    /// By how much a further change lowers the sum of squares, and by how much on blocks that had no part in the fit.
+    fn gains(&self, chosen: &[usize], further: usize) -> (f64, f64) {
+        let both = with(chosen, further);
+        let gain = (self.solved(chosen).rest - self.solved(&both).rest) / self.noise;
+        let mut held_out = 0.0;
+        for (run, blocks) in [&self.runs.reference, &self.runs.later]
+            .into_iter()
+            .enumerate()
+        {
+            for k in 0..blocks.len() {
+                let others = blocks.iter().enumerate().filter(|(i, _)| *i != k);
+                let others = sum(self.sums[run].rhs.len(), others.map(|(_, other)| other));
+                let mut sums = self.sums.each_ref();
+                sums[run] = &others;
+                let rest = |set: &[usize]| {
+                    let values = self.together(sums, set).solve().values;
+                    let columns = self.columns(if run == 0 { &[] } else { set });
+                    let own = values.rows(0, columns.len()).into_owned();
+                    blocks[k].of(&columns).rest(&own)
+                };
+                held_out += (rest(chosen) - rest(&both)) / self.noise;
+            }
+        }
+        (gain, held_out)
+    }
+
+    fn holds(&self, chosen: &[usize], further: usize) -> bool {
+        let (gain, held_out) = self.gains(chosen, further);
+        held_out > HELD_OUT * gain
+    }
+
+    fn change(&self, chosen: &[usize], which: usize) -> Change {
+        let rest = without(chosen, which);
+        let order = with(&rest, which);
+        let solved = self.solved(&order);
+        let n = self.search.changes[which].len();
+        let at = solved.values.len() - n;
+        let (gain, held_out) = self.gains(&rest, which);
+        let cost = self.cost(&order);
+        let near = (NEAR * gain).max(self.price);
+        let others = (0..self.search.changes.len()).filter(|g| !chosen.contains(g));
+        Change {
+            which,
+            values: solved.values.rows(at, n).into_owned(),
+            covariance: self.noise * solved.covariance.view((at, at), (n, n)),
+            determined: solved.determined[at..].to_vec(),
+            gain,
+            held_out,
+            rivals: others
+                .filter(|g| self.cost(&with(&rest, *g)) < cost + near)
+                .collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_noise::Noise;
+
+    const ROWS: usize = 400;
+
+    /// Runs with three base columns; the later one has changes of one, two and one columns, of which the second column of
+    /// the second is a twin of the first base column.
+    fn runs(seed: u64, changed: &[(usize, f64)]) -> Runs {
+        let mut noise = Noise::new(seed);
+        let mut moments = |extra: bool| {
+            let mut z: Vec<Vec<f64>> = (0..7)
+                .map(|_| (0..ROWS).map(|_| noise.normal()).collect())
+                .collect();
+            z[5] = z[0].clone();
+            let y: Vec<f64> = (0..ROWS)
+                .map(|i| {
+                    let base = 2.0 * z[0][i] - z[1][i] + 0.5 * z[2][i];
+                    let more: f64 = changed.iter().map(|(k, c)| c * z[*k][i]).sum();
+                    base + if extra { more } else { 0.0 } + noise.normal()
+                })
+                .collect();
+            let n = if extra { 7 } else { 3 };
+            let mut one = Moments::new(n);
+            let columns: Vec<Option<&[f64]>> = z[..n].iter().map(|c| Some(&c[..])).collect();
+            one.add_rows(&columns, &y);
+            one
+        };
+        Runs {
+            reference: (0..5).map(|_| moments(false)).collect(),
+            later: (0..5).map(|_| moments(true)).collect(),
+        }
+    }
+
+    fn possible() -> Search {
+        Search {
+            changes: vec![vec![3], vec![4, 5], vec![6]],
+        }
+    }
+
+    #[test]
+    fn what_changed_is_found_and_nothing_else() {
+        for seed in 0..30 {
+            assert_eq!(search(&runs(seed, &[]), &possible()), []);
+            let found = search(&runs(seed, &[(5, 1.0), (6, 0.3)]), &possible());
+            let which: Vec<usize> = found.iter().map(|c| c.which).collect();
+            assert_eq!(which, [1, 2], "seed {seed}");
+            let [pair, single] = &found[..] else {
+                unreachable!()
+            };
+            assert!((pair.values[1] - 1.0).abs() < 5.0 * pair.covariance[(1, 1)].sqrt());
+            assert!((single.values[0] - 0.3).abs() < 5.0 * single.covariance[(0, 0)].sqrt());
+            assert!(pair.determined[1] && single.determined[0]);
+            assert!(single.held_out > 0.5 * single.gain && single.rivals.is_empty());
+        }
+    }
+
+    /// A change that one block alone has is no change of the run.
+    #[test]
+    fn a_single_block_decides_nothing() {
+        let mut runs = runs(1, &[]);
+        runs.later[2] = self::runs(2, &[(3, 1.0)]).later[0].clone();
+        assert_eq!(search(&runs, &possible()), []);
+    }
+}
