@@ -154,7 +154,7 @@
 //!
 //! In the order of the flow, each standing on those before it: [`text`], [`error`], [`progress`], [`host`], [`model`],
 //! [`stretch`], [`along`], [`audit`], [`recording`], [`compare`], [`evaluate`], [`identify`], [`diagnose`], [`add`], [`adopt`],
-//! [`interpret`], [`excite`], [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@print`], [`report`].
+//! [`runs`], [`interpret`], [`excite`], [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@print`], [`report`].
 
 pub mod add;
 pub mod adopt;
@@ -176,6 +176,7 @@ pub mod progress;
 pub mod recording;
 pub mod reduce;
 pub mod report;
+pub mod runs;
 pub mod simulate;
 pub mod stretch;
 pub mod text;

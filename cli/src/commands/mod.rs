@@ -19,6 +19,7 @@ pub(crate) mod interpret;
 pub(crate) mod recordings;
 pub(crate) mod reduce;
 pub(crate) mod report;
+pub(crate) mod runs;
 pub(crate) mod simulate;
 pub(crate) mod tour;
 

@@ -10,7 +10,7 @@ mod candidates;
 mod chosen;
 mod columns;
 mod findings;
-mod numbers;
+pub(crate) mod numbers;
 mod places;
 mod problem;
 mod tilt;

@@ -12,6 +12,7 @@ mod identification;
 mod interpretation;
 mod next_step;
 mod reduction;
+mod runs;
 mod spelling;
 mod summary;
 pub mod tables;

@@ -1,0 +1,400 @@
+//! Rows of a run: the base columns, and those of everything that may have changed.
+
+use modelmill_codegen::Evaluator;
+use modelmill_identify::changes::{Coloured, Moments};
+use modelmill_identify::diagnose::Column;
+use nalgebra::DVector;
+
+use crate::along::{self, decimated, measured};
+use crate::diagnose::numbers::regressor;
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::recording::Recording;
+use crate::runs::payload::{Payloads, TEN};
+use crate::stretch::Stretch;
+
+/// Blocks of a run that decide for each other.
+const BLOCKS: usize = 5;
+/// Rounds of weighing the drives by what is left.
+const ROUNDS: usize = 2;
+/// The part by which a clock is turned to see what that does.
+const TURNED: f64 = 1e-3;
+
+/// Where columns stand.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Layout {
+    pub(crate) base: usize,
+    pub(crate) payloads: usize,
+    pub(crate) drives: usize,
+}
+
+impl Layout {
+    pub(crate) fn new(model: &Model, payloads: &Payloads) -> Self {
+        Self {
+            base: (0..model.base.len())
+                .filter(|k| !model.is_known(*k))
+                .count(),
+            payloads: payloads.frames.len(),
+            drives: model.drives().len(),
+        }
+    }
+
+    pub(crate) fn payload(self, frame: usize) -> usize {
+        self.base + TEN * frame
+    }
+
+    /// Dry friction of a drive, then viscous friction.
+    pub(crate) fn friction(self, drive: usize) -> usize {
+        self.payload(self.payloads) + 2 * drive
+    }
+
+    pub(crate) fn offset(self, drive: usize) -> usize {
+        self.friction(self.drives) + drive
+    }
+
+    pub(crate) fn scale(self, drive: usize) -> usize {
+        self.offset(self.drives) + drive
+    }
+
+    pub(crate) fn clock(self) -> usize {
+        self.scale(self.drives)
+    }
+
+    fn total(self) -> usize {
+        self.clock() + 1
+    }
+}
+
+/// The rows of one run.
+pub(crate) struct Rows {
+    layout: Layout,
+    stretches: Vec<Laid>,
+    /// Base parameters on which scales and clocks are built: those of the first run.
+    pub(crate) values: DVector<f64>,
+}
+
+/// The rows of one stretch, drive by drive.
+struct Laid {
+    columns: Vec<Column>,
+    /// Measured forces less those of known parameters, `[drive][sample]`.
+    forces: Vec<Vec<f64>>,
+    /// Which of them count.
+    counts: Vec<Vec<bool>>,
+}
+
+/// A run whose rows are white: what it says, block by block.
+pub(crate) struct White {
+    pub(crate) n_base: Layout,
+    pub(crate) blocks: Vec<Moments>,
+}
+
+impl White {
+    pub(crate) fn base_columns(&self) -> Vec<usize> {
+        (0..self.n_base.base).collect()
+    }
+
+    /// All blocks, of the base columns alone.
+    pub(crate) fn base(&self) -> Moments {
+        let mut all = Moments::new(self.n_base.base);
+        for block in &self.blocks {
+            all.merge(&block.of(&self.base_columns()));
+        }
+        all
+    }
+}
+
+impl Rows {
+    /// The rows of a recording; `values` are base parameters of the run before, without which those of this run are found and
+    /// nothing is made of scales and clocks.
+    pub(crate) fn new(
+        model: &Model,
+        recording: &Recording,
+        payloads: &Payloads,
+        values: Option<&DVector<f64>>,
+    ) -> Outcome<Self> {
+        let layout = Layout::new(model, payloads);
+        let mut rows = Self {
+            layout,
+            stretches: Vec::new(),
+            values: DVector::zeros(layout.base),
+        };
+        for stretch in &recording.stretches {
+            rows.stretches.push(laid(model, stretch, payloads, layout)?);
+        }
+        match values {
+            Some(values) => {
+                rows.values = values.clone();
+                for (stretch, laid) in recording.stretches.iter().zip(&mut rows.stretches) {
+                    laid.columns
+                        .extend(of_prediction(model, stretch, laid, values)?);
+                }
+            }
+            None => {
+                let base: Vec<usize> = (0..layout.base).collect();
+                let found = rows.weighed(&base)?.0;
+                rows.values = found;
+            }
+        }
+        Ok(rows)
+    }
+
+    /// Least squares for some columns with every drive weighed by what is left on it: values, and deviations of the drives.
+    fn weighed(&self, columns: &[usize]) -> Outcome<(DVector<f64>, Vec<f64>)> {
+        let drives = 0..self.layout.drives;
+        let mut deviations: Vec<f64> = drives.clone().map(|d| self.size(d, None)).collect();
+        let mut values = DVector::zeros(columns.len());
+        for _ in 0..=ROUNDS {
+            let mut all = Moments::new(columns.len());
+            for drive in drives.clone().filter(|d| deviations[*d] > 0.0) {
+                let mut one = Moments::new(columns.len());
+                for laid in &self.stretches {
+                    let z: Vec<Option<&[f64]>> =
+                        columns.iter().map(|k| laid.column(*k, drive)).collect();
+                    one.add_rows(&z, &laid.forces[drive]);
+                }
+                let weight = deviations[drive].powi(-2);
+                one.gram *= weight;
+                one.rhs *= weight;
+                one.total *= weight;
+                all.merge(&one);
+            }
+            values = all.solve().values;
+            let floors: Vec<f64> = drives.clone().map(|d| 1e-9 * self.size(d, None)).collect();
+            deviations = drives
+                .clone()
+                .map(|d| self.size(d, Some((columns, &values))).max(floors[d]))
+                .collect();
+        }
+        if values.iter().any(|x| !x.is_finite()) {
+            return Err(Error::input(
+                "a run has numbers that are too large to be fitted; look at its units".to_owned(),
+            ));
+        }
+        Ok((values, deviations))
+    }
+
+    /// Effective value of a drive's force, or of what a solution leaves of it.
+    fn size(&self, drive: usize, solution: Option<(&[usize], &DVector<f64>)>) -> f64 {
+        let mut n = 0;
+        let mut sum = 0.0;
+        for laid in &self.stretches {
+            let rest = laid.rest(drive, solution);
+            n += rest.len();
+            sum += rest.iter().map(|x| x * x).sum::<f64>();
+        }
+        (sum / f64::from(u32::try_from(n.max(1)).unwrap_or(u32::MAX))).sqrt()
+    }
+
+    /// The rows with the memory of each drive's noise taken out, as sums.
+    pub(crate) fn white(&self, _model: &Model) -> Outcome<White> {
+        let n = self.layout.total();
+        let has_all = self.stretches.iter().all(|laid| laid.columns.len() == n);
+        let used: Vec<usize> = (0..if has_all { n } else { self.layout.scale(0) }).collect();
+        let (values, _) = self.weighed(&used)?;
+        let mut blocks = vec![Moments::new(n); BLOCKS];
+        let length: usize = self.stretches.iter().map(Laid::samples).sum();
+        for drive in 0..self.layout.drives {
+            let rests: Vec<Vec<f64>> = (self.stretches.iter())
+                .map(|laid| laid.rest(drive, Some((&used, &values))))
+                .collect();
+            let pieces: Vec<(usize, std::ops::Range<usize>)> = (self.stretches.iter().enumerate())
+                .flat_map(|(s, laid)| laid.pieces(drive).into_iter().map(move |piece| (s, piece)))
+                .collect();
+            let parts: Vec<&[f64]> = pieces
+                .iter()
+                .map(|(s, piece)| &rests[*s][piece.clone()])
+                .collect();
+            let noise = Coloured::of(&parts);
+            if noise.deviation == 0.0 {
+                continue;
+            }
+            let mut before = 0;
+            let mut last = 0;
+            for (s, piece) in pieces {
+                if s != last {
+                    before += (last..s)
+                        .map(|k| self.stretches[k].samples())
+                        .sum::<usize>();
+                    last = s;
+                }
+                let laid = &self.stretches[s];
+                let white = |values: &[f64]| noise.whitened(&values[piece.clone()]);
+                let y = white(&laid.forces[drive]);
+                let z: Vec<Option<Vec<f64>>> = used
+                    .iter()
+                    .map(|k| laid.column(*k, drive).map(white))
+                    .collect();
+                // Neighbouring blocks, each of a fifth of the run.
+                let block_of = |i: usize| {
+                    (BLOCKS * (before + piece.start + i) / length.max(1)).min(BLOCKS - 1)
+                };
+                let mut start = 0;
+                while start < y.len() {
+                    let block = block_of(start);
+                    let end = (start..y.len())
+                        .find(|i| block_of(*i) != block)
+                        .unwrap_or(y.len());
+                    let mut cut: Vec<Option<&[f64]>> = z
+                        .iter()
+                        .map(|c| c.as_ref().map(|c| &c[start..end]))
+                        .collect();
+                    cut.resize(n, None);
+                    blocks[block].add_rows(&cut, &y[start..end]);
+                    start = end;
+                }
+            }
+        }
+        Ok(White {
+            n_base: self.layout,
+            blocks,
+        })
+    }
+}
+
+impl Laid {
+    fn samples(&self) -> usize {
+        self.forces.first().map_or(0, Vec::len)
+    }
+
+    fn column(&self, k: usize, drive: usize) -> Option<&[f64]> {
+        self.columns.get(k)?.0.get(drive)?.as_deref()
+    }
+
+    /// What a solution leaves of a drive's force, 0 where that does not count.
+    fn rest(&self, drive: usize, solution: Option<(&[usize], &DVector<f64>)>) -> Vec<f64> {
+        let mut rest = self.forces[drive].clone();
+        for (k, value) in solution
+            .into_iter()
+            .flat_map(|(c, x)| c.iter().zip(x.iter()))
+        {
+            for (r, z) in rest
+                .iter_mut()
+                .zip(self.column(*k, drive).unwrap_or_default())
+            {
+                *r -= value * z;
+            }
+        }
+        for (r, counts) in rest.iter_mut().zip(&self.counts[drive]) {
+            if !counts {
+                *r = 0.0;
+            }
+        }
+        rest
+    }
+
+    /// Stretches of samples that count.
+    fn pieces(&self, drive: usize) -> Vec<std::ops::Range<usize>> {
+        let counts = &self.counts[drive];
+        let mut pieces = Vec::new();
+        let mut start = 0;
+        for end in 0..=counts.len() {
+            if end == counts.len() || !counts[end] {
+                if end > start {
+                    pieces.push(start..end);
+                }
+                start = end + 1;
+            }
+        }
+        pieces
+    }
+}
+
+/// All columns of a stretch but those that are built on predicted forces.
+fn laid(model: &Model, stretch: &Stretch, payloads: &Payloads, layout: Layout) -> Outcome<Laid> {
+    let runs = [(stretch, false)];
+    let base = regressor(&runs, &Evaluator::new(&model.derivation), model)?;
+    let mut forces = measured(stretch)?;
+    let mut columns = Vec::with_capacity(layout.total());
+    for (k, column) in base.into_iter().enumerate() {
+        if model.is_known(k) {
+            for (force, known) in forces.iter_mut().zip(&column.0) {
+                for (f, x) in force.iter_mut().zip(known.iter().flatten()) {
+                    *f -= model.nominal[k] * x;
+                }
+            }
+        } else {
+            columns.push(column);
+        }
+    }
+    let of_payloads = regressor(&runs, &Evaluator::new(&payloads.derivation), model)?;
+    for ten in &payloads.columns {
+        columns.extend(ten.map(|k| k.map(|k| of_payloads[k].clone()).unwrap_or_default()));
+    }
+    let evaluator = Evaluator::new(&model.derivation);
+    let motion = along::columns(model, stretch, |states| evaluator.drives(states))?;
+    let n = layout.drives;
+    let only = |drive: usize, values: Vec<f64>| {
+        let mut column = Column(vec![None; n]);
+        column.0[drive] = Some(values);
+        column
+    };
+    for drive in 0..n {
+        let rate = motion[n + drive].clone();
+        let sign = rate
+            .iter()
+            .map(|x| if *x == 0.0 { 0.0 } else { x.signum() })
+            .collect();
+        for values in decimated(vec![sign, rate], stretch)? {
+            columns.push(only(drive, values));
+        }
+    }
+    let samples = forces.first().map_or(0, Vec::len);
+    columns.extend((0..n).map(|drive| only(drive, vec![1.0; samples])));
+    let counts = |drive: usize| -> Vec<bool> {
+        let Some(weights) = &stretch.weights else {
+            return vec![true; samples];
+        };
+        (0..samples).map(|i| weights[i * n + drive] > 0.0).collect()
+    };
+    Ok(Laid {
+        columns,
+        forces,
+        counts: (0..n).map(counts).collect(),
+    })
+}
+
+/// Columns that are built on predicted forces: a scale of each drive, and a clock that runs by a part slower, so that rates
+/// and accelerations come out larger by once and twice that part.
+fn of_prediction(
+    model: &Model,
+    stretch: &Stretch,
+    laid: &Laid,
+    values: &DVector<f64>,
+) -> Outcome<Vec<Column>> {
+    let n = laid.forces.len();
+    let mut columns = Vec::new();
+    let of_base: Vec<usize> = (0..values.len()).collect();
+    for drive in 0..n {
+        let rest = laid.rest(drive, Some((&of_base, values)));
+        let mut column = Column(vec![None; n]);
+        let pairs = laid.forces[drive].iter().zip(&rest);
+        column.0[drive] = Some(pairs.map(|(y, r)| y - r).collect());
+        columns.push(column);
+    }
+    let mut next = values.iter();
+    let all: Vec<f64> = (0..model.base.len())
+        .map(|k| match model.is_known(k) {
+            true => model.nominal[k],
+            false => next.next().copied().unwrap_or(0.0),
+        })
+        .collect();
+    let turned = |part: f64| {
+        let mut turned = stretch.clone();
+        for (values, factor) in [
+            (&mut turned.run.qd, 1.0 + part),
+            (&mut turned.run.qdd, (1.0 + part).powi(2)),
+        ] {
+            for x in values.iter_mut().flatten() {
+                *x *= factor;
+            }
+        }
+        along::forces(model, &turned, &all).and_then(|forces| decimated(forces, stretch))
+    };
+    let (faster, slower) = (turned(TURNED)?, turned(-TURNED)?);
+    let slope = |drive: usize| -> Vec<f64> {
+        let pairs = faster[drive].iter().zip(&slower[drive]);
+        pairs.map(|(a, b)| (a - b) / (2.0 * TURNED)).collect()
+    };
+    columns.push(Column::new((0..n).map(slope).collect()));
+    Ok(columns)
+}

@@ -1,0 +1,179 @@
+//! `runs`: what is different between recordings of one machine.
+//!
+//! Each run is fitted alone and all are fitted together. Every run after the first is then held against the first: which
+//! changes, said in physics, explain what the two do not share. Possible are another load on any body, other friction of a
+//! drive, an offset or another scale of its force, and another clock. Payloads are columns of their own, ten for each body,
+//! derived from the model with such a body besides, so that they need no parameter of the model file.
+
+mod changes;
+mod columns;
+mod payload;
+
+use modelmill_identify::changes::{Moments, Runs, Search, search};
+use modelmill_identify::{Note, ParameterInfo};
+use nalgebra::DVector;
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::recording::Recording;
+
+pub use changes::{Changed, Estimate, What};
+use columns::Rows;
+use payload::Payloads;
+
+/// A difference of a base parameter counts as moved from this many standard deviations on.
+const MOVED: f64 = 4.0;
+
+/// A value with its standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fitted {
+    /// The value, in the unit of the parameter.
+    pub value: f64,
+    /// Its standard deviation; `None` where the run does not determine the parameter.
+    pub deviation: Option<f64>,
+}
+
+/// One run.
+#[derive(Clone, Debug)]
+pub struct OneRun {
+    /// What messages call its recording.
+    pub file: String,
+    /// Samples that were used.
+    pub samples: usize,
+    /// Base parameters fitted to this run alone.
+    pub alone: Vec<Fitted>,
+    /// Base parameters, by position, that differ from those of the first run by more than four deviations.
+    pub moved: Vec<usize>,
+    /// What changed against the first run, the largest first.
+    pub changes: Vec<Changed>,
+}
+
+/// What differs between runs.
+pub struct Compared {
+    /// Name of the model.
+    pub model: String,
+    /// The base parameters.
+    pub parameters: Vec<ParameterInfo>,
+    /// Base parameters fitted to all runs at once.
+    pub together: Vec<Fitted>,
+    /// All runs; the first is the one that the others are held against.
+    pub runs: Vec<OneRun>,
+    /// Remarks on the recordings.
+    pub notes: Vec<Note>,
+}
+
+impl Model {
+    /// Holds runs of one machine against the first of them and says what changed.
+    ///
+    /// Fails with fewer than two runs, where no force was measured, or where a recording leads where the mechanism cannot
+    /// stand.
+    pub fn runs(&self, recordings: &[&Recording]) -> Outcome<Compared> {
+        let [first, later @ ..] = recordings else {
+            return Err(Error::options("there is no recording; give two or more"));
+        };
+        if later.is_empty() {
+            return Err(Error::options(format!(
+                "{} is the only recording; what changed is told between two or more, the first of which is how things were",
+                first.file()
+            )));
+        }
+        let payloads = Payloads::new(self)?;
+        let job = "holding runs against the first";
+        self.host().watched(job, recordings.len(), |job| {
+            let reference = Rows::new(self, first, &payloads, None)?;
+            job.step(1)?;
+            let before = reference.white(self)?;
+            let mut together = before.base();
+            let mut runs = vec![one(self, first, &before.base(), &before.base())];
+            for recording in later {
+                let rows = Rows::new(self, recording, &payloads, Some(&reference.values))?;
+                let run = rows.white(self)?;
+                together.merge(&run.base());
+                let mut found = one(self, recording, &run.base(), &before.base());
+                found.changes = changes(self, &payloads, &reference.values, &before, &run);
+                runs.push(found);
+                job.step(1)?;
+            }
+            Ok(Compared {
+                model: self.name.clone(),
+                parameters: self.infos(),
+                together: fitted(self, &together),
+                runs,
+                notes: recordings
+                    .iter()
+                    .flat_map(|one| one.notes())
+                    .cloned()
+                    .collect(),
+            })
+        })?
+    }
+}
+
+/// A run fitted alone.
+fn one(model: &Model, recording: &Recording, own: &Moments, before: &Moments) -> OneRun {
+    let [alone, reference] = [own, before].map(|moments| fitted(model, moments));
+    let differs = |(a, b): (&Fitted, &Fitted)| match (a.deviation, b.deviation) {
+        (Some(x), Some(y)) => (a.value - b.value).abs() > MOVED * x.hypot(y),
+        _ => false,
+    };
+    let pairs = alone.iter().zip(&reference).map(differs);
+    let moved = pairs
+        .enumerate()
+        .filter_map(|(k, d)| d.then_some(k))
+        .collect();
+    OneRun {
+        file: recording.file().to_owned(),
+        samples: own.rows / model.drives().len().max(1),
+        alone,
+        moved,
+        changes: Vec::new(),
+    }
+}
+
+/// The base parameters that some rows of variance 1 give; those that are numbers of the file keep them.
+fn fitted(model: &Model, moments: &Moments) -> Vec<Fitted> {
+    let solved = moments.solve();
+    let noise = (solved.rest / (moments.rows as f64 - solved.rank as f64).max(1.0)).max(1.0);
+    let mut next = 0;
+    let of = |k: usize| {
+        if model.is_known(k) {
+            return Fitted {
+                value: model.nominal[k],
+                deviation: Some(0.0),
+            };
+        }
+        let i = next;
+        next += 1;
+        Fitted {
+            value: solved.values[i],
+            deviation: solved.determined[i].then(|| (noise * solved.covariance[(i, i)]).sqrt()),
+        }
+    };
+    (0..model.base.len()).map(of).collect()
+}
+
+fn changes(
+    model: &Model,
+    payloads: &Payloads,
+    values: &DVector<f64>,
+    before: &columns::White,
+    run: &columns::White,
+) -> Vec<Changed> {
+    let possible = changes::possible(model, payloads, run.n_base);
+    let columns = possible.iter().map(|one| one.columns.clone()).collect();
+    let found = search(
+        &Runs {
+            reference: before
+                .blocks
+                .iter()
+                .map(|block| block.of(&before.base_columns()))
+                .collect(),
+            later: run.blocks.clone(),
+        },
+        &Search { changes: columns },
+    );
+    let told = found
+        .iter()
+        .map(|one| changes::told(model, &possible, one, values));
+    told.collect()
+}

@@ -1,0 +1,91 @@
+//! What a further body on each body of a mechanism adds to the forces: ten columns for each, linear in its mass, first moments
+//! and inertia about the frame's origin.
+
+use modelmill_codegen::{Derivation, derive_columns};
+use modelmill_spec::{Exact, FrameIdx, Inertial, Mechanism, Parameter, ParameterIdx, Part, Symbol};
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+
+/// Parameters of a body: mass, first moments x, y, z, and inertia xx, xy, xz, yy, yz, zz.
+pub(crate) const TEN: usize = 10;
+
+/// Columns of further bodies.
+pub(crate) struct Payloads {
+    /// Frames that carry them, one after the other.
+    pub(crate) frames: Vec<String>,
+    /// For each frame the columns of the derivation that are those of its ten parameters; `None` where one has no effect.
+    pub(crate) columns: Vec<[Option<usize>; TEN]>,
+    /// H for these parameters alone.
+    pub(crate) derivation: Derivation,
+}
+
+impl Payloads {
+    /// Of all frames that carry parts or lumped masses.
+    pub(crate) fn new(model: &Model) -> Outcome<Self> {
+        let mechanism = &model.derivation.mechanism;
+        let mut frames: Vec<FrameIdx> = Vec::new();
+        let parts = mechanism.parts.iter().map(|part| part.frame);
+        for frame in parts.chain(mechanism.lumped_masses.iter().map(|mass| mass.frame)) {
+            if frame.0 > 0 && !frames.contains(&frame) {
+                frames.push(frame);
+            }
+        }
+        frames.sort_by_key(|frame| frame.0);
+        let (variant, own) = with_bodies(mechanism, &frames);
+        let is_wanted =
+            |product: &modelmill_codegen::Monomial| matches!(product.0[..], [(p, 1)] if p >= own);
+        let derivation = derive_columns(&variant, &is_wanted)
+            .map_err(|error| Error::derivation(&model.path, error))?;
+        let reduction = &derivation.reduction;
+        let products: Vec<usize> = reduction
+            .retained
+            .iter()
+            .filter_map(|k| reduction.products[*k].0.first().map(|(p, _)| *p))
+            .collect();
+        let column = |parameter: usize| products.iter().position(|p| *p == parameter);
+        Ok(Self {
+            columns: (0..frames.len())
+                .map(|f| std::array::from_fn(|i| column(own + TEN * f + i)))
+                .collect(),
+            frames: frames
+                .iter()
+                .map(|frame| mechanism.frames[frame.0].name.clone())
+                .collect(),
+            derivation,
+        })
+    }
+}
+
+/// The mechanism with a further body on each of some frames, and where the parameters of these bodies begin.
+fn with_bodies(mechanism: &Mechanism, frames: &[FrameIdx]) -> (Mechanism, usize) {
+    let mut variant = mechanism.clone();
+    let own = variant.parameters.len();
+    for frame in frames {
+        let first = variant.parameters.len();
+        let value = |i: usize| Exact::Symbol(Symbol::Parameter(ParameterIdx(first + i)));
+        variant.parts.push(Part {
+            name: format!("payload of {}", variant.frames[frame.0].name),
+            frame: *frame,
+            inertial: Inertial::Linear {
+                mass: value(0),
+                first_moment: std::array::from_fn(|i| value(1 + i)),
+                inertia: std::array::from_fn(|i| value(4 + i)),
+            },
+        });
+        for i in 0..TEN {
+            let unit = match i {
+                0 => "kg",
+                1..=3 => "kg m",
+                _ => "kg m^2",
+            };
+            variant.parameters.push(Parameter {
+                name: format!("payload{first}_{i}"),
+                nominal: 0.0,
+                unit: unit.to_owned(),
+                note: None,
+            });
+        }
+    }
+    (variant, own)
+}
