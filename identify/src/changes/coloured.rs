@@ -14,11 +14,12 @@ pub struct Coloured {
 
 impl Coloured {
     /// The autoregression of a residual in stretches, by the equations of Yule and Walker (recursion of Levinson and Durbin),
-    /// with the order that Schwarz' criterion takes.
-    pub fn of(stretches: &[&[f64]]) -> Self {
+    /// with the order that Schwarz' criterion takes. `floor` is the effective value of white noise that is there besides, in
+    /// the unit of the residual: a model that is nearly right leaves so little that what is left is foreseen all too well.
+    pub fn of(stretches: &[&[f64]], floor: f64) -> Self {
         let n: usize = stretches.iter().map(|s| s.len()).sum();
         let highest = HIGHEST.min(n / 20);
-        let covariance: Vec<f64> = (0..=highest)
+        let mut covariance: Vec<f64> = (0..=highest)
             .map(|lag| {
                 let of_stretch = |s: &&[f64]| -> f64 {
                     let later = s.get(lag..).unwrap_or_default();
@@ -27,6 +28,7 @@ impl Coloured {
                 stretches.iter().map(of_stretch).sum::<f64>() / n.max(1) as f64
             })
             .collect();
+        covariance[0] += floor * floor;
         let mut best = (f64::INFINITY, Vec::new(), covariance[0]);
         let (mut a, mut variance): (Vec<f64>, f64) = (Vec::new(), covariance[0]);
         for order in 0..=highest {
@@ -86,7 +88,7 @@ mod tests {
             series[t] = truth[0] * series[t - 1] + truth[1] * series[t - 2] + 0.3 * noise.normal();
         }
         let (first, second) = series.split_at(7_000);
-        let found = Coloured::of(&[first, second]);
+        let found = Coloured::of(&[first, second], 0.0);
         assert!((found.deviation - 0.3).abs() < 0.01, "{found:?}");
         assert_eq!(found.coefficients.len(), 2, "{found:?}");
         for (a, b) in found.coefficients.iter().zip(truth) {
@@ -110,8 +112,12 @@ mod tests {
     fn white_noise_and_nothing_have_no_memory() {
         let mut noise = Noise::new(9);
         let white: Vec<f64> = (0..5_000).map(|_| noise.normal()).collect();
-        assert!(Coloured::of(&[&white]).coefficients.len() < 3);
-        let nothing = Coloured::of(&[&[0.0; 100]]);
+        assert!(Coloured::of(&[&white], 0.0).coefficients.len() < 3);
+        let nothing = Coloured::of(&[&[0.0; 100]], 0.0);
         assert_eq!((nothing.coefficients.len(), nothing.deviation), (0, 0.0));
+        // A wave is foreseen without an error, but not below the floor.
+        let wave: Vec<f64> = (0..5_000).map(|i| (0.1 * f64::from(i)).sin()).collect();
+        assert!(Coloured::of(&[&wave], 0.0).deviation < 0.01);
+        assert!(Coloured::of(&[&wave], 0.1).deviation > 0.1);
     }
 }

@@ -74,7 +74,7 @@ pub enum What {
     },
     /// Another clock.
     Clock {
-        /// By which factor rates come out larger than they were; 1 where nothing changed.
+        /// How many times as fast as its time stamps say the run was; 1 where nothing changed.
         factor: Estimate,
     },
 }
@@ -311,9 +311,8 @@ fn says(model: &Model, what: &What) -> String {
             factor.text("")
         ),
         What::Clock { factor } => format!(
-            "the time base: rates come out {} times as large, so that a second of this run's clock lasts {} s",
-            factor.text(""),
-            number(factor.value)
+            "the time base: this run was {} times as fast as its time stamps say",
+            factor.text("")
         ),
     }
 }

@@ -17,6 +17,8 @@ use crate::stretch::Stretch;
 const BLOCKS: usize = 5;
 /// Rounds of weighing the drives by what is left.
 const ROUNDS: usize = 2;
+/// Noise that every run is taken to have besides, as a part of a drive's effective force: no model is better.
+const FLOOR: f64 = 1e-3;
 /// The part by which a clock is turned to see what that does.
 const TURNED: f64 = 1e-3;
 
@@ -84,18 +86,18 @@ struct Laid {
 
 /// A run whose rows are white: what it says, block by block.
 pub(crate) struct White {
-    pub(crate) n_base: Layout,
+    pub(crate) layout: Layout,
     pub(crate) blocks: Vec<Moments>,
 }
 
 impl White {
     pub(crate) fn base_columns(&self) -> Vec<usize> {
-        (0..self.n_base.base).collect()
+        (0..self.layout.base).collect()
     }
 
     /// All blocks, of the base columns alone.
     pub(crate) fn base(&self) -> Moments {
-        let mut all = Moments::new(self.n_base.base);
+        let mut all = Moments::new(self.layout.base);
         for block in &self.blocks {
             all.merge(&block.of(&self.base_columns()));
         }
@@ -182,11 +184,38 @@ impl Rows {
             n += rest.len();
             sum += rest.iter().map(|x| x * x).sum::<f64>();
         }
-        (sum / f64::from(u32::try_from(n.max(1)).unwrap_or(u32::MAX))).sqrt()
+        (sum / n.max(1) as f64).sqrt()
+    }
+
+    /// How large the force of some columns is on the drive where it is largest, as a part of what that drive does.
+    pub(crate) fn part(&self, columns: &[usize], values: &DVector<f64>) -> f64 {
+        let of_drive = |drive: usize| {
+            let mut sum = 0.0;
+            for laid in &self.stretches {
+                let mut force = vec![0.0; laid.samples()];
+                for (k, value) in columns.iter().zip(values.iter()) {
+                    for (f, z) in force
+                        .iter_mut()
+                        .zip(laid.column(*k, drive).unwrap_or_default())
+                    {
+                        *f += value * z;
+                    }
+                }
+                sum += force.iter().map(|f| f * f).sum::<f64>();
+            }
+            let samples: usize = self.stretches.iter().map(Laid::samples).sum();
+            let size = self.size(drive, None);
+            if size > 0.0 {
+                (sum / samples as f64).sqrt() / size
+            } else {
+                0.0
+            }
+        };
+        (0..self.layout.drives).map(of_drive).fold(0.0, f64::max)
     }
 
     /// The rows with the memory of each drive's noise taken out, as sums.
-    pub(crate) fn white(&self, _model: &Model) -> Outcome<White> {
+    pub(crate) fn white(&self) -> Outcome<White> {
         let n = self.layout.total();
         let has_all = self.stretches.iter().all(|laid| laid.columns.len() == n);
         let used: Vec<usize> = (0..if has_all { n } else { self.layout.scale(0) }).collect();
@@ -204,7 +233,7 @@ impl Rows {
                 .iter()
                 .map(|(s, piece)| &rests[*s][piece.clone()])
                 .collect();
-            let noise = Coloured::of(&parts);
+            let noise = Coloured::of(&parts, FLOOR * self.size(drive, None));
             if noise.deviation == 0.0 {
                 continue;
             }
@@ -245,7 +274,7 @@ impl Rows {
             }
         }
         Ok(White {
-            n_base: self.layout,
+            layout: self.layout,
             blocks,
         })
     }

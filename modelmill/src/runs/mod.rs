@@ -9,20 +9,22 @@ mod changes;
 mod columns;
 mod payload;
 
-use modelmill_identify::changes::{Moments, Runs, Search, search};
+use modelmill_identify::changes::{Change, Moments, Runs, Search, search};
 use modelmill_identify::{Note, ParameterInfo};
-use nalgebra::DVector;
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::Recording;
 
 pub use changes::{Changed, Estimate, What};
-use columns::Rows;
+use columns::{Rows, White};
 use payload::Payloads;
 
 /// A difference of a base parameter counts as moved from this many standard deviations on.
 const MOVED: f64 = 4.0;
+
+/// A change must move one of the drives by this part of its effective force: less is within what no model knows.
+const LEAST: f64 = 2e-3;
 
 /// A value with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,15 +84,15 @@ impl Model {
         self.host().watched(job, recordings.len(), |job| {
             let reference = Rows::new(self, first, &payloads, None)?;
             job.step(1)?;
-            let before = reference.white(self)?;
+            let before = reference.white()?;
             let mut together = before.base();
             let mut runs = vec![one(self, first, &before.base(), &before.base())];
             for recording in later {
                 let rows = Rows::new(self, recording, &payloads, Some(&reference.values))?;
-                let run = rows.white(self)?;
+                let run = rows.white()?;
                 together.merge(&run.base());
                 let mut found = one(self, recording, &run.base(), &before.base());
-                found.changes = changes(self, &payloads, &reference.values, &before, &run);
+                found.changes = changes(self, &payloads, &rows, &before, &run);
                 runs.push(found);
                 job.step(1)?;
             }
@@ -152,28 +154,26 @@ fn fitted(model: &Model, moments: &Moments) -> Vec<Fitted> {
     (0..model.base.len()).map(of).collect()
 }
 
+/// What changed in a run, the largest first; what hardly moves any drive is left out.
 fn changes(
     model: &Model,
     payloads: &Payloads,
-    values: &DVector<f64>,
-    before: &columns::White,
-    run: &columns::White,
+    rows: &Rows,
+    before: &White,
+    run: &White,
 ) -> Vec<Changed> {
-    let possible = changes::possible(model, payloads, run.n_base);
+    let possible = changes::possible(model, payloads, run.layout);
     let columns = possible.iter().map(|one| one.columns.clone()).collect();
+    let base = before.base_columns();
     let found = search(
         &Runs {
-            reference: before
-                .blocks
-                .iter()
-                .map(|block| block.of(&before.base_columns()))
-                .collect(),
+            reference: before.blocks.iter().map(|block| block.of(&base)).collect(),
             later: run.blocks.clone(),
         },
         &Search { changes: columns },
     );
-    let told = found
-        .iter()
-        .map(|one| changes::told(model, &possible, one, values));
-    told.collect()
+    let moves = |one: &&Change| rows.part(&possible[one.which].columns, &one.values) > LEAST;
+    let told = found.iter().filter(moves);
+    told.map(|one| changes::told(model, &possible, one, &rows.values))
+        .collect()
 }
