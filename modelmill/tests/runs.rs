@@ -1,0 +1,302 @@
+//! `runs` on forces of models with a further body, other friction, another scale and another clock, along motions of their own,
+//! with noise that has a memory: what changed is told as such, and nothing else.
+
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use modelmill::Model;
+use modelmill::recording::{Reading, Recording};
+use modelmill::runs::{Changed, What};
+use modelmill_codegen::{Evaluator, States};
+
+const SAMPLES: usize = 2000;
+/// Time between two samples, s.
+const STEP: f64 = 0.01;
+/// Noise of each force beside its effective value, and how much of it a sample keeps of the one before.
+const NOISE: f64 = 0.01;
+const KEPT: f64 = 0.6;
+
+/// Uniform and normal numbers, the same on every machine.
+struct Draws(u64);
+
+impl Draws {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^= z >> 31;
+        (z >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// What is done to a run.
+#[derive(Clone, Copy, Debug)]
+enum Made<'a> {
+    Nothing,
+    /// A further part, as its entry in the model file.
+    Body(&'a str),
+    /// Dry and viscous friction on a drive.
+    Friction(usize, f64, f64),
+    Scale(usize, f64),
+    Offset(usize, f64),
+    /// The clock counts so many seconds in one.
+    Clock(f64),
+}
+
+/// A recording of a bundled model's positions and forces, along a motion of its own.
+fn run(name: &str, seed: u64, made: Made) -> PathBuf {
+    let mut text = std::fs::read_to_string(bundled(name)).expect("a model");
+    if let Made::Body(part) = made {
+        text.push_str(part);
+    }
+    let model = Model::from_text(name, &text).expect("the model");
+    let mut draws = Draws(seed);
+    let active = model.active();
+    let mut columns = [(); 3].map(|()| vec![vec![0.0; SAMPLES]; active.len()]);
+    let coordinates = &model.derivation.mechanism.coordinates;
+    for (i, coordinate) in coordinates.iter().filter(|c| !c.passive).enumerate() {
+        columns[0][i].fill(coordinate.nominal);
+        // Loops leave less room.
+        let wide = if model.derivation.mechanism.loops.is_empty() {
+            1.0
+        } else {
+            0.3
+        };
+        let reach = wide
+            * if coordinate.motion.is_angle() {
+                0.35
+            } else {
+                0.1
+            };
+        for _ in 0..4 {
+            let rate = TAU * (0.1 + 0.9 * draws.uniform());
+            let phase = TAU * draws.uniform();
+            let amplitude = reach * (0.3 + draws.uniform()) / 2.0;
+            for k in 0..SAMPLES {
+                let (sin, cos) = (rate * STEP * k as f64 + phase).sin_cos();
+                columns[0][i][k] += amplitude * sin;
+                columns[1][i][k] += amplitude * rate * cos;
+                columns[2][i][k] -= amplitude * rate * rate * sin;
+            }
+        }
+    }
+    let [q, qd, qdd] = columns
+        .each_ref()
+        .map(|all| all.iter().map(Vec::as_slice).collect());
+    let states = States {
+        q,
+        qd,
+        qdd,
+        load: Vec::new(),
+    };
+    let evaluator = Evaluator::new(&model.derivation);
+    let mut forces = evaluator
+        .inverse_dynamics(&states, &model.nominal)
+        .expect("forces");
+    let motion = evaluator.drives(&states).expect("drives");
+    let drives = model.drives();
+    let mut clock = 1.0;
+    for (d, force) in forces.iter_mut().enumerate() {
+        let rate = &motion[drives.len() + d];
+        for (f, rate) in force.iter_mut().zip(rate) {
+            match made {
+                Made::Friction(drive, dry, viscous) if drive == d => {
+                    *f += dry * rate.signum() + viscous * rate
+                }
+                Made::Scale(drive, factor) if drive == d => *f *= factor,
+                Made::Offset(drive, offset) if drive == d => *f += offset,
+                Made::Clock(factor) => clock = factor,
+                _ => {}
+            }
+        }
+        let size = (force.iter().map(|f| f * f).sum::<f64>() / SAMPLES as f64).sqrt();
+        let mut noise = 0.0;
+        for f in force {
+            noise = KEPT * noise + (1.0 - KEPT * KEPT).sqrt() * draws.normal();
+            *f += NOISE * size * noise;
+        }
+    }
+    let mut text = format!("t,{},{}", active.join(","), drives.join(","));
+    for k in 0..SAMPLES {
+        let _ = write!(text, "\n{}", clock * STEP * k as f64);
+        for column in columns[0].iter().chain(&forces) {
+            let _ = write!(text, ",{}", column[k]);
+        }
+    }
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("runs-{name}-{seed}.csv"));
+    std::fs::write(&file, text + "\n").expect("a recording");
+    file
+}
+
+fn bundled(name: &str) -> PathBuf {
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/models");
+    models.join(format!("{name}.toml"))
+}
+
+/// What is told of a run against one to which nothing was done.
+fn told(name: &str, seed: u64, made: Made) -> Vec<Changed> {
+    let model = Model::open(bundled(name)).expect("the model");
+    let files = [run(name, seed, Made::Nothing), run(name, seed + 1, made)];
+    let read = |file: &PathBuf| -> Recording {
+        model
+            .recording(file, &Reading::default())
+            .expect("the recording")
+    };
+    let [before, later] = files.each_ref().map(read);
+    let mut found = model.runs(&[&before, &later]).expect("an answer");
+    assert!(found.runs[0].changes.is_empty());
+    found.runs.remove(1).changes
+}
+
+/// A value within five deviations of the truth and so many parts of it.
+#[track_caller]
+fn is_near(found: &modelmill::runs::Estimate, truth: f64, part: f64) {
+    let off = (found.value - truth).abs();
+    assert!(
+        off < part * truth.abs() && off < 6.0 * found.deviation,
+        "{found:?} is not {truth}"
+    );
+}
+
+#[test]
+fn nothing_is_told_where_nothing_changed() {
+    for (k, name) in ["puma560", "scara", "five_bar", "spidermill"]
+        .iter()
+        .enumerate()
+    {
+        let found = told(name, 100 + 2 * k as u64, Made::Nothing);
+        assert!(found.is_empty(), "{name}: {found:#?}");
+    }
+}
+
+/// The body is part of the model file of the run, so that its forces go the way of all bodies.
+#[test]
+fn a_load_is_weighed_and_placed() {
+    let part = "\n[[part]]\nname = \"tool\"\non = \"link6\"\nmass = 2.8\ncentre = [0.03, -0.02, 0.08]\n\
+                inertia = { xx = 0.004, yy = 0.005, zz = 0.006 }\n";
+    let found = told("puma560", 300, Made::Body(part));
+    let [
+        Changed {
+            what:
+                What::Payload {
+                    frame,
+                    mass: Some(mass),
+                    centre,
+                },
+            ..
+        },
+    ] = &found[..]
+    else {
+        panic!("{found:#?}");
+    };
+    assert_eq!(frame, "link6");
+    is_near(mass, 2.8, 0.05);
+    for (found, truth) in centre.iter().zip([0.03, -0.02, 0.08]) {
+        let found = found.expect("a known place");
+        assert!((found.value - truth).abs() < 0.01, "{found:?}");
+    }
+}
+
+/// Bodies of a loop share what can be known of them, so that another one may be named beside the one that carries the load.
+#[test]
+fn a_load_in_a_loop_is_told_where_it_is() {
+    let model = Model::open(bundled("five_bar")).expect("the model");
+    let mechanism = &model.derivation.mechanism;
+    let part = mechanism.parts.last().expect("a part");
+    let last = mechanism.frames[part.frame.0].name.clone();
+    let part = format!(
+        "\n[[part]]\nname = \"tool\"\non = \"{last}\"\nlinear = {{ MX = 0.5, MY = 0.2, ZZ = 0.3 }}\n"
+    );
+    let found = told("five_bar", 400, Made::Body(&part));
+    let [
+        Changed {
+            what: What::Payload { frame, .. },
+            rivals,
+            ..
+        },
+    ] = &found[..]
+    else {
+        panic!("{found:#?}");
+    };
+    let named = rivals.iter().any(|rival| rival.contains(&last));
+    assert!(*frame == last || named, "{found:#?}");
+}
+
+#[test]
+fn drives_and_clocks_are_told_apart() {
+    let found = told("scara", 500, Made::Friction(1, 0.6, 0.3));
+    let [
+        Changed {
+            what:
+                What::Friction {
+                    drive,
+                    dry,
+                    viscous,
+                    ..
+                },
+            ..
+        },
+    ] = &found[..]
+    else {
+        panic!("{found:#?}");
+    };
+    assert_eq!(drive, "joint2");
+    is_near(dry, 0.6, 0.1);
+    is_near(viscous, 0.3, 0.1);
+
+    let found = told("puma560", 600, Made::Scale(2, 1.05));
+    let [
+        Changed {
+            what: What::Scale { drive, factor },
+            ..
+        },
+    ] = &found[..]
+    else {
+        panic!("{found:#?}");
+    };
+    let model = Model::open(bundled("puma560")).expect("the model");
+    assert_eq!(*drive, model.drives()[2]);
+    is_near(factor, 1.05, 0.01);
+
+    let found = told("puma560", 700, Made::Offset(1, 4.0));
+    let [
+        Changed {
+            what: What::Offset { drive, force },
+            ..
+        },
+    ] = &found[..]
+    else {
+        panic!("{found:#?}");
+    };
+    assert_eq!(*drive, model.drives()[1]);
+    is_near(force, 4.0, 0.1);
+
+    let found = told("puma560", 800, Made::Clock(1.02));
+    let [
+        Changed {
+            what: What::Clock { factor },
+            ..
+        },
+    ] = &found[..]
+    else {
+        panic!("{found:#?}");
+    };
+    assert!((factor.value - 1.02).abs() < 0.003, "{factor:?}");
+}
+
+#[test]
+fn one_run_alone_is_refused() {
+    let model = Model::open(bundled("scara")).expect("the model");
+    let file = run("scara", 900, Made::Nothing);
+    let one = model
+        .recording(&file, &Reading::default())
+        .expect("the recording");
+    let error = model.runs(&[&one]).err().expect("a refusal");
+    assert!(error.to_string().contains("two or more"), "{error}");
+}
