@@ -1,11 +1,14 @@
 //! What is different between two runs of one machine.
 //!
-//! Both runs share the base parameters `p`; the later one may have changes besides, each a group of columns with
-//! coefficients `c`:
+//! Both runs share the base parameters `p` and whatever else the model lacks in both, with coefficients `s`; the later one may
+//! have changes besides, each a group of columns with coefficients `c` of its own:
 //!
 //! ```text
-//! y_0 = H_0 p + e_0,    y_1 = H_1 p + X_1 c + e_1
+//! y_0 = H_0 p + X_0 s + e_0,    y_1 = H_1 p + X_1 (s + c) + e_1
 //! ```
+//!
+//! Columns of `X` that are combinations of those of `H`, as a payload's are of a body's own, leave `s` at 0 and are a change in
+//! `c` all the same.
 //!
 //! Rows are made white first, drive by drive ([`Coloured`]), so that sums of squares count independent numbers, and each run
 //! is kept as sums over its rows ([`Moments`]), block by block. [`search`] then finds the fewest changes that explain what

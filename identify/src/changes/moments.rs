@@ -31,6 +31,8 @@ pub struct Solved {
     pub rest: f64,
     /// How many columns say something of their own.
     pub rank: usize,
+    /// Which columns these are: of columns that say the same the first.
+    pub kept: Vec<bool>,
 }
 
 impl Moments {
@@ -119,6 +121,7 @@ impl Moments {
             determined: (0..n).map(determined).collect(),
             rest: table[(n, n)].max(0.0),
             rank: kept.iter().filter(|kept| **kept).count(),
+            kept,
         }
     }
 }

@@ -12,19 +12,21 @@ const HELD_OUT: f64 = 0.3;
 /// Changes that differ by less than this part of the gain cannot be told apart.
 const NEAR: f64 = 0.02;
 
-/// Two runs as sums over rows of variance 1.
+/// Two runs as sums over rows of variance 1, block by block and over the same columns.
 #[derive(Clone, Debug)]
 pub struct Runs {
-    /// The run before, over the base columns, block by block.
+    /// The run before.
     pub reference: Vec<Moments>,
-    /// The later run, over the base columns and those of all changes, block by block.
+    /// The later run.
     pub later: Vec<Moments>,
 }
 
-/// What a later run may have.
+/// What is asked of two runs.
 #[derive(Clone, Debug)]
 pub struct Search {
-    /// Columns of each change that is possible, counted with the base columns before them.
+    /// Columns whose coefficients both runs share: those of the model, and those of what it may lack in both.
+    pub shared: Vec<usize>,
+    /// Columns of each change that is possible, which have coefficients of their own in the later run.
     pub changes: Vec<Vec<usize>>,
 }
 
@@ -68,9 +70,10 @@ pub fn search(runs: &Runs, search: &Search) -> Vec<Change> {
     found
 }
 
-fn sum<'a>(columns: usize, blocks: impl Iterator<Item = &'a Moments>) -> Moments {
-    let mut sum = Moments::new(columns);
-    for block in blocks {
+/// All blocks but one.
+fn sum(blocks: &[Moments], but: Option<usize>) -> Moments {
+    let mut sum = Moments::new(blocks.first().map_or(0, |block| block.rhs.len()));
+    for (_, block) in blocks.iter().enumerate().filter(|(k, _)| Some(*k) != but) {
         sum.merge(block);
     }
     sum
@@ -87,8 +90,8 @@ fn without(chosen: &[usize], one: usize) -> Vec<usize> {
 struct Bench<'a> {
     runs: &'a Runs,
     search: &'a Search,
-    /// How many base columns there are.
-    base: usize,
+    /// Columns that both runs share and that say something of their own.
+    shared: Vec<usize>,
     /// All blocks of both runs.
     sums: [Moments; 2],
     /// Variance of what no change explains.
@@ -99,17 +102,19 @@ struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     fn new(runs: &'a Runs, search: &'a Search) -> Self {
-        let base = runs.reference.first().map_or(0, |m| m.rhs.len());
-        let columns = runs.later.first().map_or(base, |m| m.rhs.len());
-        let sums = [
-            sum(base, runs.reference.iter()),
-            sum(columns, runs.later.iter()),
-        ];
+        let sums = [sum(&runs.reference, None), sum(&runs.later, None)];
+        let mut all = sums[0].of(&search.shared);
+        all.merge(&sums[1].of(&search.shared));
+        let telling = all.solve().kept;
+        let shared = search.shared.iter().zip(telling);
         let rows = (sums[0].rows + sums[1].rows) as f64;
         let mut bench = Self {
             runs,
             search,
-            base,
+            shared: shared
+                .filter(|(_, telling)| *telling)
+                .map(|(k, _)| *k)
+                .collect(),
             sums,
             noise: 1.0,
             price: STRICTER * rows.max(2.0).ln(),
@@ -120,16 +125,18 @@ impl<'a> Bench<'a> {
         bench
     }
 
-    /// The base columns and those of some changes.
+    /// The shared columns, and once more those of some changes.
     fn columns(&self, chosen: &[usize]) -> Vec<usize> {
         let of = |g: &usize| self.search.changes[*g].iter().copied();
-        (0..self.base).chain(chosen.iter().flat_map(of)).collect()
+        let shared = self.shared.iter().copied();
+        shared.chain(chosen.iter().flat_map(of)).collect()
     }
 
     /// Rows of both runs together.
     fn together(&self, [reference, later]: [&Moments; 2], chosen: &[usize]) -> Moments {
         let mut all = later.of(&self.columns(chosen));
-        let n = self.base;
+        let reference = reference.of(&self.shared);
+        let n = self.shared.len();
         let mut gram = all.gram.view_mut((0, 0), (n, n));
         gram += &reference.gram;
         let mut rhs = all.rhs.rows_mut(0, n);
@@ -182,8 +189,7 @@ impl<'a> Bench<'a> {
             .enumerate()
         {
             for k in 0..blocks.len() {
-                let others = blocks.iter().enumerate().filter(|(i, _)| *i != k);
-                let others = sum(self.sums[run].rhs.len(), others.map(|(_, other)| other));
+                let others = sum(blocks, Some(k));
                 let mut sums = self.sums.each_ref();
                 sums[run] = &others;
                 let rest = |set: &[usize]| {
@@ -250,9 +256,8 @@ mod tests {
                     base + if extra { more } else { 0.0 } + noise.normal()
                 })
                 .collect();
-            let n = if extra { 7 } else { 3 };
-            let mut one = Moments::new(n);
-            let columns: Vec<Option<&[f64]>> = z[..n].iter().map(|c| Some(&c[..])).collect();
+            let mut one = Moments::new(7);
+            let columns: Vec<Option<&[f64]>> = z.iter().map(|c| Some(&c[..])).collect();
             one.add_rows(&columns, &y);
             one
         };
@@ -264,6 +269,7 @@ mod tests {
 
     fn possible() -> Search {
         Search {
+            shared: (0..7).collect(),
             changes: vec![vec![3], vec![4, 5], vec![6]],
         }
     }
@@ -282,6 +288,16 @@ mod tests {
             assert!((single.values[0] - 0.3).abs() < 5.0 * single.covariance[(0, 0)].sqrt());
             assert!(pair.determined[1] && single.determined[0]);
             assert!(single.held_out > 0.5 * single.gain && single.rivals.is_empty());
+        }
+    }
+
+    /// What the model lacks in both runs is no change.
+    #[test]
+    fn what_both_runs_have_is_no_change() {
+        for seed in 0..10 {
+            let mut both = runs(seed, &[(3, 1.0)]);
+            both.reference = runs(seed + 100, &[(3, 1.0)]).later;
+            assert_eq!(search(&both, &possible()), []);
         }
     }
 

@@ -62,7 +62,7 @@ impl Layout {
         self.scale(self.drives)
     }
 
-    fn total(self) -> usize {
+    pub(crate) fn total(self) -> usize {
         self.clock() + 1
     }
 }
@@ -91,7 +91,7 @@ pub(crate) struct White {
 }
 
 impl White {
-    pub(crate) fn base_columns(&self) -> Vec<usize> {
+    fn base_columns(&self) -> Vec<usize> {
         (0..self.layout.base).collect()
     }
 
@@ -106,8 +106,8 @@ impl White {
 }
 
 impl Rows {
-    /// The rows of a recording; `values` are base parameters of the run before, without which those of this run are found and
-    /// nothing is made of scales and clocks.
+    /// The rows of a recording; `values` are base parameters of the run before, in whose place come those of this run where there
+    /// is none before.
     pub(crate) fn new(
         model: &Model,
         recording: &Recording,
@@ -123,25 +123,19 @@ impl Rows {
         for stretch in &recording.stretches {
             rows.stretches.push(laid(model, stretch, payloads, layout)?);
         }
-        match values {
-            Some(values) => {
-                rows.values = values.clone();
-                for (stretch, laid) in recording.stretches.iter().zip(&mut rows.stretches) {
-                    laid.columns
-                        .extend(of_prediction(model, stretch, laid, values)?);
-                }
-            }
-            None => {
-                let base: Vec<usize> = (0..layout.base).collect();
-                let found = rows.weighed(&base)?.0;
-                rows.values = found;
-            }
+        rows.values = match values {
+            Some(values) => values.clone(),
+            None => rows.weighed(&(0..layout.base).collect::<Vec<usize>>())?,
+        };
+        for (stretch, laid) in recording.stretches.iter().zip(&mut rows.stretches) {
+            let further = of_prediction(model, stretch, laid, &rows.values)?;
+            laid.columns.extend(further);
         }
         Ok(rows)
     }
 
-    /// Least squares for some columns with every drive weighed by what is left on it: values, and deviations of the drives.
-    fn weighed(&self, columns: &[usize]) -> Outcome<(DVector<f64>, Vec<f64>)> {
+    /// Least squares for some columns with every drive weighed by what is left on it: their values.
+    fn weighed(&self, columns: &[usize]) -> Outcome<DVector<f64>> {
         let drives = 0..self.layout.drives;
         let mut deviations: Vec<f64> = drives.clone().map(|d| self.size(d, None)).collect();
         let mut values = DVector::zeros(columns.len());
@@ -172,7 +166,7 @@ impl Rows {
                 "a run has numbers that are too large to be fitted; look at its units".to_owned(),
             ));
         }
-        Ok((values, deviations))
+        Ok(values)
     }
 
     /// Effective value of a drive's force, or of what a solution leaves of it.
@@ -217,9 +211,8 @@ impl Rows {
     /// The rows with the memory of each drive's noise taken out, as sums.
     pub(crate) fn white(&self) -> Outcome<White> {
         let n = self.layout.total();
-        let has_all = self.stretches.iter().all(|laid| laid.columns.len() == n);
-        let used: Vec<usize> = (0..if has_all { n } else { self.layout.scale(0) }).collect();
-        let (values, _) = self.weighed(&used)?;
+        let used: Vec<usize> = (0..n).collect();
+        let values = self.weighed(&used)?;
         let mut blocks = vec![Moments::new(n); BLOCKS];
         let length: usize = self.stretches.iter().map(Laid::samples).sum();
         for drive in 0..self.layout.drives {
@@ -263,11 +256,10 @@ impl Rows {
                     let end = (start..y.len())
                         .find(|i| block_of(*i) != block)
                         .unwrap_or(y.len());
-                    let mut cut: Vec<Option<&[f64]>> = z
+                    let cut: Vec<Option<&[f64]>> = z
                         .iter()
                         .map(|c| c.as_ref().map(|c| &c[start..end]))
                         .collect();
-                    cut.resize(n, None);
                     blocks[block].add_rows(&cut, &y[start..end]);
                     start = end;
                 }

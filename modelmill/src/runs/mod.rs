@@ -24,7 +24,7 @@ use payload::Payloads;
 const MOVED: f64 = 4.0;
 
 /// A change must move one of the drives by this part of its effective force: less is within what no model knows.
-const LEAST: f64 = 2e-3;
+const LEAST: f64 = 4e-3;
 
 /// A value with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -164,13 +164,15 @@ fn changes(
 ) -> Vec<Changed> {
     let possible = changes::possible(model, payloads, run.layout);
     let columns = possible.iter().map(|one| one.columns.clone()).collect();
-    let base = before.base_columns();
     let found = search(
         &Runs {
-            reference: before.blocks.iter().map(|block| block.of(&base)).collect(),
+            reference: before.blocks.clone(),
             later: run.blocks.clone(),
         },
-        &Search { changes: columns },
+        &Search {
+            shared: (0..run.layout.total()).collect(),
+            changes: columns,
+        },
     );
     let moves = |one: &&Change| rows.part(&possible[one.which].columns, &one.values) > LEAST;
     let told = found.iter().filter(moves);
