@@ -87,7 +87,7 @@ impl Report {
                     let names: Vec<&str> = alike.iter().map(|f| f.about.as_str()).collect();
                     let _ = writeln!(text, "  {}\n  {:<16}{}", names.join(", "), "", one.says);
                 } else {
-                    let _ = writeln!(text, "  {:<16}{}", one.about, one.says);
+                    let _ = writeln!(text, "  {:<15} {}", one.about, one.says);
                 }
                 if !one.sizes.is_empty() {
                     let sizes: Vec<String> = one.sizes.iter().map(ToString::to_string).collect();

@@ -70,7 +70,14 @@ impl Axis {
         if self.log {
             return self.decade_ticks(most);
         }
-        let step = round_step((self.to - self.from) / most.max(1) as f64);
+        let mut step = round_step((self.to - self.from) / most.max(1) as f64);
+        // One value alone gives no scale.
+        let within = |step: f64| (self.to / step + 1e-9).floor() - (self.from / step - 1e-9).ceil();
+        for _ in 0..2 {
+            if within(step) < 1.0 && most > 1 {
+                step = round_step(0.4 * step);
+            }
+        }
         let first = (self.from / step - 1e-9).ceil();
         let mut ticks = Vec::new();
         for k in 0..=2 * most.max(1) {
@@ -287,6 +294,13 @@ mod tests {
         let axis = Axis::new([-0.37, 1.13], [0.0, 100.0]);
         let labels: Vec<String> = axis.ticks(6).into_iter().map(|(_, l)| l).collect();
         assert_eq!(labels, ["0", "0.5", "1.0"]);
+        // Few ticks are two at least.
+        let axis = Axis::new([-4.5, 4.5], [0.0, 100.0]);
+        let labels: Vec<String> = axis.ticks(2).into_iter().map(|(_, l)| l).collect();
+        assert_eq!(
+            labels,
+            ["-4", "-2", "0", "2", "4"].map(|l| l.replace('-', "\u{2212}"))[..]
+        );
         let axis = Axis::decades([3e-4, 0.2], [0.0, 100.0]);
         let ticks: Vec<f64> = axis.ticks(6).into_iter().map(|(v, _)| v).collect();
         assert_eq!(ticks.len(), 3);

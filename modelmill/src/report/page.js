@@ -25,9 +25,14 @@
   };
 
   const ticks = (from, to, most) => {
-    const rough = Math.max((to - from) / most, Number.MIN_VALUE * 1e10);
-    const decade = Math.pow(10, Math.floor(Math.log10(rough)));
-    const step = [1, 2, 5, 10].find((s) => s * decade >= rough * 0.999) * decade;
+    const round = (rough) => {
+      const decade = Math.pow(10, Math.floor(Math.log10(rough)));
+      return [1, 2, 5, 10].find((s) => s * decade >= rough * 0.999) * decade;
+    };
+    let step = round(Math.max((to - from) / most, Number.MIN_VALUE * 1e10));
+    // One value alone gives no scale.
+    const within = (s) => Math.floor(to / s + 1e-9) - Math.ceil(from / s - 1e-9);
+    for (let tries = 0; tries < 2; tries++) if (within(step) < 1 && most > 1) step = round(0.4 * step);
     const decimals = Math.min(12, Math.max(0, -Math.floor(Math.log10(step * 1.001))));
     const label = (v) => {
       if (Math.abs(v) < 1e-9 * step) return '0';
