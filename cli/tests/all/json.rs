@@ -242,3 +242,36 @@ fn generate_prints_rust_and_completions_name_the_commands() {
         );
     }
 }
+
+/// A run held against itself has not changed; the deviations are those of one run.
+#[test]
+fn runs_says_what_changed() {
+    let recording = run("plain-fit.csv");
+    let found = json(&[
+        "runs",
+        &model("spidermill.toml"),
+        "--data",
+        &recording,
+        "--data",
+        &recording,
+        "--json",
+    ]);
+    assert_eq!(keys(&found), ["model", "reference", "together", "runs"]);
+    let [first, second] = &found["runs"].as_array().expect("runs")[..] else {
+        panic!("{found:#}");
+    };
+    assert_eq!(
+        keys(second),
+        ["file", "samples", "parameters", "moved", "changes"]
+    );
+    assert_eq!(second["changes"], value!([]));
+    assert_eq!(first["parameters"], second["parameters"]);
+    let text = printed(&[
+        "runs",
+        &model("spidermill.toml"),
+        "--data",
+        &recording,
+        &recording,
+    ]);
+    assert!(text.contains("nothing changed"), "{text}");
+}
