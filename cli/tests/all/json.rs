@@ -256,16 +256,47 @@ fn runs_says_what_changed() {
         &recording,
         "--json",
     ]);
-    assert_eq!(keys(&found), ["model", "reference", "together", "runs"]);
+    assert_eq!(
+        keys(&found),
+        ["model", "together", "runs", "moved", "changes"]
+    );
     let [first, second] = &found["runs"].as_array().expect("runs")[..] else {
         panic!("{found:#}");
     };
-    assert_eq!(
-        keys(second),
-        ["file", "samples", "parameters", "moved", "changes"]
-    );
-    assert_eq!(second["changes"], value!([]));
+    assert_eq!(keys(second), ["file", "samples", "parameters"]);
     assert_eq!(first["parameters"], second["parameters"]);
+    assert_eq!(
+        keys(&second["parameters"][0]),
+        ["name", "expression", "value", "std", "unit"]
+    );
+    assert_eq!(
+        (&found["moved"], &found["changes"]),
+        (&value!([]), &value!([]))
+    );
+    let other = json(&[
+        "runs",
+        &model("spidermill.toml"),
+        "--data",
+        &recording,
+        &run("with-rods-fit.csv"),
+        "--json",
+    ]);
+    let moved = &other["moved"][0];
+    assert!(number(&moved["sigmas"]) > 4.0, "{moved}");
+    let change = &other["changes"][0];
+    assert_eq!(
+        keys(change),
+        [
+            "kind",
+            "at",
+            "estimates",
+            "between",
+            "gain",
+            "indistinguishable_from",
+            "says"
+        ]
+    );
+    assert_eq!(change["between"], value!([0, 1]));
     let text = printed(&[
         "runs",
         &model("spidermill.toml"),

@@ -1,49 +1,62 @@
 //! What differs between runs as JSON and for people.
 
-use serde_json::{Map, Value, json};
+use modelmill_identify::ParameterInfo;
+use serde_json::{Value, json};
 
-use crate::runs::{Compared, Estimate, Fitted, OneRun, What};
+use crate::runs::{Changed, Compared, Fitted, OneRun};
 use crate::text::Style;
 use crate::text::table::{Align, count, number, table};
 
 impl Compared {
     /// All that was found as one JSON object.
     pub fn json(&self) -> Value {
+        let later = || self.runs.iter().enumerate().skip(1);
+        let moved =
+            later().flat_map(|(k, run)| run.moved.iter().map(move |p| self.moved_json(k, *p)));
+        let changes = later()
+            .flat_map(|(k, run)| run.changes.iter().map(move |change| change_json(k, change)));
+        let runs = self.runs.iter().map(|run| {
+            json!({
+                "file": run.file,
+                "samples": run.samples,
+                "parameters": self.parameters_json(&run.alone),
+            })
+        });
         json!({
             "model": self.model,
-            "reference": self.runs.first().map(|run| &run.file),
             "together": self.parameters_json(&self.together),
-            "runs": self.runs.iter().map(|run| self.run_json(run)).collect::<Vec<_>>(),
+            "runs": runs.collect::<Vec<_>>(),
+            "moved": moved.collect::<Vec<_>>(),
+            "changes": changes.collect::<Vec<_>>(),
         })
     }
 
-    fn parameters_json(&self, fitted: &[Fitted]) -> Value {
-        let entries = self.parameters.iter().zip(fitted).map(|(info, fitted)| {
-            let value = json!({
+    fn parameters_json(&self, fitted: &[Fitted]) -> Vec<Value> {
+        let pairs = self.parameters.iter().zip(fitted);
+        let one = |(info, fitted): (&ParameterInfo, &Fitted)| {
+            json!({
+                "name": info.name,
+                "expression": info.expression,
                 "value": fitted.value,
                 "std": fitted.deviation,
                 "unit": info.unit,
-                "expression": info.expression,
-            });
-            (info.name.clone(), value)
-        });
-        Value::Object(entries.collect::<Map<_, _>>())
+            })
+        };
+        pairs.map(one).collect()
     }
 
-    fn run_json(&self, run: &OneRun) -> Value {
-        let changes = run.changes.iter().map(|change| {
-            let mut object = what_json(&change.what);
-            object["says"] = json!(change.says);
-            object["gain"] = json!(change.gain);
-            object["instead"] = json!(change.rivals);
-            object
-        });
+    /// A base parameter of a run that differs from that of the first.
+    fn moved_json(&self, run: usize, k: usize) -> Value {
+        let (before, now) = (self.runs[0].alone[k], self.runs[run].alone[k]);
+        let deviation = before.beside(now);
         json!({
-            "file": run.file,
-            "samples": run.samples,
-            "parameters": self.parameters_json(&run.alone),
-            "moved": run.moved.iter().map(|k| &self.parameters[*k].name).collect::<Vec<_>>(),
-            "changes": changes.collect::<Vec<_>>(),
+            "parameter": self.parameters[k].name,
+            "sigmas": (now.value - before.value).abs() / deviation,
+            "before": before.value,
+            "now": now.value,
+            "std": deviation,
+            "unit": self.parameters[k].unit,
+            "between": [0, run],
         })
     }
 
@@ -100,57 +113,30 @@ impl Compared {
 
     fn moved(&self, first: &OneRun, run: &OneRun, k: usize) -> Vec<String> {
         let (before, now) = (first.alone[k], run.alone[k]);
-        let deviation = before
-            .deviation
-            .unwrap_or(0.0)
-            .hypot(now.deviation.unwrap_or(0.0));
         let info = &self.parameters[k];
         vec![
             info.name.clone(),
             number(before.value),
             number(now.value),
-            number(deviation),
+            number(before.beside(now)),
             info.unit.clone(),
             info.expression.clone(),
         ]
     }
 }
 
-fn estimate(estimate: &Estimate) -> Value {
-    json!({ "value": estimate.value, "std": estimate.deviation })
-}
-
-fn what_json(what: &What) -> Value {
-    match what {
-        What::Payload {
-            frame,
-            mass,
-            centre,
-        } => json!({
-            "kind": "payload",
-            "at": frame,
-            "mass": mass.as_ref().map(estimate),
-            "centre": centre.each_ref().map(|at| at.as_ref().map(estimate)),
-        }),
-        What::Friction {
-            drive,
-            dry,
-            viscous,
-            parts,
-        } => json!({
-            "kind": "friction",
-            "at": drive,
-            "dry": estimate(dry),
-            "viscous": estimate(viscous),
-            "dry_part": parts[0],
-            "viscous_part": parts[1],
-        }),
-        What::Offset { drive, force } => {
-            json!({ "kind": "offset", "at": drive, "force": estimate(force) })
-        }
-        What::Scale { drive, factor } => {
-            json!({ "kind": "scale", "at": drive, "factor": estimate(factor) })
-        }
-        What::Clock { factor } => json!({ "kind": "clock", "factor": estimate(factor) }),
-    }
+fn change_json(run: usize, change: &Changed) -> Value {
+    let (kind, at, estimates) = change.what.parts(change.unit);
+    let estimates = estimates.iter().map(|(name, estimate, unit)| {
+        json!({ "name": name, "value": estimate.value, "std": estimate.deviation, "unit": unit })
+    });
+    json!({
+        "kind": kind,
+        "at": [at],
+        "estimates": estimates.collect::<Vec<_>>(),
+        "between": [0, run],
+        "gain": change.gain,
+        "indistinguishable_from": change.rivals,
+        "says": change.says,
+    })
 }

@@ -77,6 +77,54 @@ pub enum What {
         /// How many times as fast as its time stamps say the run was; 1 where nothing changed.
         factor: Estimate,
     },
+    /// Another zero of an encoder.
+    EncoderZero {
+        /// The coordinate.
+        coordinate: String,
+        /// By how much the true position lies above the recorded one, rad or m.
+        shift: Estimate,
+    },
+}
+
+impl What {
+    /// What scripts call it, where it is, and its values with their names and units; `unit` is that of the force or coordinate.
+    pub fn parts(
+        &self,
+        unit: &'static str,
+    ) -> (
+        &'static str,
+        &str,
+        Vec<(&'static str, Estimate, &'static str)>,
+    ) {
+        match self {
+            Self::Payload {
+                frame,
+                mass,
+                centre,
+            } => {
+                let of_mass = mass.iter().map(|mass| ("m", *mass, "kg"));
+                let at = ["x", "y", "z"].into_iter().zip(centre);
+                let at = at.filter_map(|(axis, at)| Some((axis, (*at)?, "m")));
+                ("payload", frame, of_mass.chain(at).collect())
+            }
+            Self::Friction {
+                drive,
+                dry,
+                viscous,
+                ..
+            } => (
+                "friction",
+                drive,
+                vec![("Fc", *dry, unit), ("Fv", *viscous, per_rate(unit))],
+            ),
+            Self::Offset { drive, force } => ("offset", drive, vec![("F0", *force, unit)]),
+            Self::Scale { drive, factor } => ("drive_gain", drive, vec![("gain", *factor, "1")]),
+            Self::Clock { factor } => ("time_base", "t", vec![("factor", *factor, "1")]),
+            Self::EncoderZero { coordinate, shift } => {
+                ("encoder_zero", coordinate, vec![("shift", *shift, unit)])
+            }
+        }
+    }
 }
 
 /// A change of a run against the first one.
@@ -86,6 +134,8 @@ pub struct Changed {
     pub what: What,
     /// By how much the sum of squares of the white residual would rise without it.
     pub gain: f64,
+    /// Unit of its values where it is that of a drive or a coordinate.
+    pub unit: &'static str,
     /// Changes that explain nearly as much in its place, in words.
     pub rivals: Vec<String>,
     /// The change in words.
@@ -100,6 +150,7 @@ enum Kind {
     Offset(usize),
     Scale(usize),
     Clock,
+    EncoderZero(usize),
 }
 
 /// A change that is possible.
@@ -134,6 +185,10 @@ pub(crate) fn possible(model: &Model, payloads: &Payloads, layout: Layout) -> Ve
         kind: Kind::Clock,
         columns: vec![layout.clock()],
     });
+    all.extend((0..layout.coordinates).map(|i| Possible {
+        kind: Kind::EncoderZero(i),
+        columns: vec![layout.zero(i)],
+    }));
     all
 }
 
@@ -147,6 +202,7 @@ pub(crate) fn told(
     let what = what(model, &possible[found.which].kind, found, values);
     Changed {
         says: says(model, &what),
+        unit: unit(model, &possible[found.which].kind),
         what,
         gain: found.gain,
         rivals: found
@@ -206,7 +262,26 @@ fn what(model: &Model, kind: &Kind, found: &Change, values: &DVector<f64>) -> Wh
         Kind::Clock => What::Clock {
             factor: one_more(estimate(0)),
         },
+        Kind::EncoderZero(i) => What::EncoderZero {
+            coordinate: model.active()[*i].clone(),
+            shift: estimate(0),
+        },
     }
+}
+
+/// The unit of a force of a drive, or of a coordinate.
+fn unit(model: &Model, kind: &Kind) -> &'static str {
+    match kind {
+        Kind::Friction(d) | Kind::Offset(d) | Kind::Scale(d) => model.force_unit(*d),
+        Kind::EncoderZero(i) if model.motions()[*i].1 => "rad",
+        Kind::EncoderZero(_) | Kind::Payload(_) => "m",
+        Kind::Clock => "1",
+    }
+}
+
+/// The unit of viscous friction of a drive whose force has the unit.
+fn per_rate(unit: &str) -> &'static str {
+    if unit == "N" { "N s/m" } else { "N m s/rad" }
 }
 
 fn one_more(part: Estimate) -> Estimate {
@@ -244,6 +319,7 @@ fn name(model: &Model, kind: &Kind) -> String {
         Kind::Offset(d) => format!("a constant force on {}", drive(d)),
         Kind::Scale(d) => format!("the scale of {}", drive(d)),
         Kind::Clock => "the clock".to_owned(),
+        Kind::EncoderZero(i) => format!("the zero of {}", model.active()[*i]),
     }
 }
 
@@ -294,11 +370,12 @@ fn says(model: &Model, what: &What) -> String {
                 "warmer, run in, or other grease"
             };
             format!(
-                "friction of {drive}: dry {} {}{}, viscous {}{}; {why}",
+                "friction of {drive}: dry {} {}{}, viscous {} {}{}; {why}",
                 signed(*dry),
                 unit(drive),
                 part(parts[0]),
                 signed(*viscous),
+                per_rate(unit(drive)),
                 part(parts[1]),
             )
         }
@@ -314,6 +391,14 @@ fn says(model: &Model, what: &What) -> String {
             "the time base: this run was {} times as fast as its time stamps say",
             factor.text("")
         ),
+        What::EncoderZero { coordinate, shift } => {
+            let is_angle = |(name, is): &(String, bool)| name == coordinate && *is;
+            let is_angle = model.motions().iter().any(is_angle);
+            format!(
+                "the zero of {coordinate}: it stands {} from where its encoder says",
+                shift.text(if is_angle { "rad" } else { "m" })
+            )
+        }
     }
 }
 

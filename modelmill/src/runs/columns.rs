@@ -19,7 +19,7 @@ const BLOCKS: usize = 5;
 const ROUNDS: usize = 2;
 /// Noise that every run is taken to have besides, as a part of a drive's effective force: no model is better.
 const FLOOR: f64 = 1e-3;
-/// The part by which a clock is turned to see what that does.
+/// The part by which a clock, and the rad or m by which an encoder is turned to see what that does.
 const TURNED: f64 = 1e-3;
 
 /// Where columns stand.
@@ -28,6 +28,7 @@ pub(crate) struct Layout {
     pub(crate) base: usize,
     pub(crate) payloads: usize,
     pub(crate) drives: usize,
+    pub(crate) coordinates: usize,
 }
 
 impl Layout {
@@ -38,6 +39,7 @@ impl Layout {
                 .count(),
             payloads: payloads.frames.len(),
             drives: model.drives().len(),
+            coordinates: model.active().len(),
         }
     }
 
@@ -62,8 +64,13 @@ impl Layout {
         self.scale(self.drives)
     }
 
+    /// The zero of a coordinate's encoder.
+    pub(crate) fn zero(self, coordinate: usize) -> usize {
+        self.clock() + 1 + coordinate
+    }
+
     pub(crate) fn total(self) -> usize {
-        self.clock() + 1
+        self.zero(self.coordinates)
     }
 }
 
@@ -374,8 +381,8 @@ fn laid(model: &Model, stretch: &Stretch, payloads: &Payloads, layout: Layout) -
     })
 }
 
-/// Columns that are built on predicted forces: a scale of each drive, and a clock that runs by a part slower, so that rates
-/// and accelerations come out larger by once and twice that part.
+/// Columns that are built on predicted forces: a scale of each drive; a clock that runs by a part slower, so that rates and
+/// accelerations come out larger by once and twice that part; and each encoder with another zero.
 fn of_prediction(
     model: &Model,
     stretch: &Stretch,
@@ -399,23 +406,40 @@ fn of_prediction(
             false => next.next().copied().unwrap_or(0.0),
         })
         .collect();
-    let turned = |part: f64| {
-        let mut turned = stretch.clone();
-        for (values, factor) in [
-            (&mut turned.run.qd, 1.0 + part),
-            (&mut turned.run.qdd, (1.0 + part).powi(2)),
-        ] {
-            for x in values.iter_mut().flatten() {
-                *x *= factor;
-            }
+    let forces = |turned: &Stretch| {
+        along::forces(model, turned, &all).and_then(|forces| decimated(forces, stretch))
+    };
+    // Central differences.
+    let slope = |turn: &dyn Fn(&mut Stretch, f64)| -> Outcome<Column> {
+        let [ahead, back] = [TURNED, -TURNED].map(|by| {
+            let mut turned = stretch.clone();
+            turn(&mut turned, by);
+            forces(&turned)
+        });
+        let pairs = ahead?.into_iter().zip(back?);
+        let of_drive = |(a, b): (Vec<f64>, Vec<f64>)| -> Vec<f64> {
+            a.iter()
+                .zip(&b)
+                .map(|(a, b)| (a - b) / (2.0 * TURNED))
+                .collect()
+        };
+        Ok(Column::new(pairs.map(of_drive).collect()))
+    };
+    let scaled = |values: &mut [Vec<f64>], factor: f64| {
+        for x in values.iter_mut().flatten() {
+            *x *= factor;
         }
-        along::forces(model, &turned, &all).and_then(|forces| decimated(forces, stretch))
     };
-    let (faster, slower) = (turned(TURNED)?, turned(-TURNED)?);
-    let slope = |drive: usize| -> Vec<f64> {
-        let pairs = faster[drive].iter().zip(&slower[drive]);
-        pairs.map(|(a, b)| (a - b) / (2.0 * TURNED)).collect()
-    };
-    columns.push(Column::new((0..n).map(slope).collect()));
+    columns.push(slope(&|turned, part| {
+        scaled(&mut turned.run.qd, 1.0 + part);
+        scaled(&mut turned.run.qdd, (1.0 + part).powi(2));
+    })?);
+    for coordinate in 0..stretch.run.q.len() {
+        columns.push(slope(&|turned, by| {
+            for q in &mut turned.run.q[coordinate] {
+                *q += by;
+            }
+        })?);
+    }
     Ok(columns)
 }

@@ -35,6 +35,14 @@ pub struct Fitted {
     pub deviation: Option<f64>,
 }
 
+impl Fitted {
+    /// The standard deviation of its difference from another one.
+    pub fn beside(self, other: Self) -> f64 {
+        let [a, b] = [self, other].map(|one| one.deviation.unwrap_or(0.0));
+        a.hypot(b)
+    }
+}
+
 /// One run.
 #[derive(Clone, Debug)]
 pub struct OneRun {
@@ -114,9 +122,9 @@ impl Model {
 /// A run fitted alone.
 fn one(model: &Model, recording: &Recording, own: &Moments, before: &Moments) -> OneRun {
     let [alone, reference] = [own, before].map(|moments| fitted(model, moments));
-    let differs = |(a, b): (&Fitted, &Fitted)| match (a.deviation, b.deviation) {
-        (Some(x), Some(y)) => (a.value - b.value).abs() > MOVED * x.hypot(y),
-        _ => false,
+    let differs = |(a, b): (&Fitted, &Fitted)| {
+        let is_known = a.deviation.is_some() && b.deviation.is_some();
+        is_known && (a.value - b.value).abs() > MOVED * a.beside(*b)
     };
     let pairs = alone.iter().zip(&reference).map(differs);
     let moved = pairs
