@@ -102,7 +102,7 @@ impl What {
                 mass,
                 centre,
             } => {
-                let of_mass = mass.iter().map(|mass| ("m", *mass, "kg"));
+                let of_mass = mass.iter().map(|mass| ("mass", *mass, "kg"));
                 let at = ["x", "y", "z"].into_iter().zip(centre);
                 let at = at.filter_map(|(axis, at)| Some((axis, (*at)?, "m")));
                 ("payload", frame, of_mass.chain(at).collect())
