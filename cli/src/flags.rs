@@ -186,10 +186,14 @@ fn command(model: &str, effect: &NewEffect) -> String {
     command
 }
 
-/// Libraries of kinds of one's own, as the command line has them.
+/// How models are read, as the command line has it: libraries of kinds of one's own, and whether constants stand as numbers.
 fn with_libraries(model: &Model) -> String {
     let option = |path: &PathBuf| format!(" --library {}", quoted(&path.display().to_string()));
-    model.host().libraries().iter().map(option).collect()
+    let mut options: String = model.host().libraries().iter().map(option).collect();
+    if model.host().is_at_values() {
+        options.push_str(" --at-values");
+    }
+    options
 }
 
 /// `KIND@PLACE,PLACE:NAME=VALUE`.

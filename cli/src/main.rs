@@ -31,6 +31,7 @@ fn main() -> ExitCode {
     let host = Host::new()
         .with_files(Arc::new(output::disk().clone()))
         .with_libraries(cli.library)
+        .at_values(cli.at_values)
         .with_progress(Arc::new(Terminal::new()));
     match run(&host, &cli.command) {
         Ok(()) => ExitCode::SUCCESS,

@@ -5,6 +5,7 @@
 
 mod additions;
 mod angle;
+mod at_values;
 mod build;
 mod column;
 mod diagnostic;

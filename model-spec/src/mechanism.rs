@@ -62,6 +62,8 @@ pub struct Mechanism {
     pub identified_base: Vec<(String, f64)>,
     /// How recordings name their columns: ours to theirs.
     pub recording: Recording,
+    /// Whether constants of the file were replaced by their values, see [`Mechanism::at_values`].
+    pub is_at_values: bool,
 }
 
 /// A known quantity.

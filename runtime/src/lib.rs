@@ -5,6 +5,7 @@
 
 mod arithmetic;
 pub mod blocks;
+mod geometry;
 mod lanes;
 mod loops;
 mod model;
@@ -24,6 +25,7 @@ use core::cmp::Ordering;
 use core::fmt;
 
 pub use arithmetic::{Product, Term, Value, Var};
+pub use geometry::{SpecialGeometry, divisor};
 pub use lanes::{LARGEST_ANGLE, sin_cos_lanes};
 pub use loops::{Loops, Scales, correct, follow, settle};
 pub use model::{
@@ -40,8 +42,8 @@ pub use solve::solve;
 pub mod emitted {
     pub use crate::{
         Assembly, BaseParameter, Linearised, Loops, Numbers, One, PoseError, Quantity, Real, Run,
-        Scales, Term, Var, accelerations, at, check_base, check_finite, plainly, read, settle,
-        values, variables,
+        Scales, SpecialGeometry, Term, Var, accelerations, at, check_base, check_finite, divisor,
+        plainly, read, settle, values, variables,
     };
 }
 

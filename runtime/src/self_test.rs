@@ -60,6 +60,8 @@ pub enum SelfTestError {
         /// Number of base parameters.
         expected: usize,
     },
+    /// The geometry is special: base parameters divide by what vanishes there.
+    Geometry(crate::SpecialGeometry),
     /// Base parameters do not give the forces of all parameters.
     Forces {
         /// Which forces: of `H_min p_min`, or of the inverse dynamics.
@@ -71,9 +73,16 @@ pub enum SelfTestError {
     },
 }
 
+impl From<crate::SpecialGeometry> for SelfTestError {
+    fn from(special: crate::SpecialGeometry) -> Self {
+        Self::Geometry(special)
+    }
+}
+
 impl fmt::Display for SelfTestError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Geometry(special) => special.fmt(f),
             Self::TooFewStates {
                 found,
                 needed,

@@ -1,10 +1,11 @@
 //! This crate's own source, for crates that are handed on in a folder of their own.
 
 /// Place in the crate's folder and text of every file.
-pub const FILES: [(&str, &str); 15] = [
+pub const FILES: [(&str, &str); 16] = [
     ("Cargo.toml", MANIFEST),
     ("src/arithmetic.rs", include_str!("arithmetic.rs")),
     ("src/blocks.rs", include_str!("blocks.rs")),
+    ("src/geometry.rs", include_str!("geometry.rs")),
     ("src/lanes.rs", include_str!("lanes.rs")),
     ("src/lib.rs", include_str!("lib.rs")),
     ("src/loops.rs", include_str!("loops.rs")),

@@ -165,7 +165,7 @@ macro_rules! models {
                     use modelmill_generated::$model as module;
                     let geometry = module::Geometry::<f64>::default();
                     let model = module::Model::new(&geometry);
-                    let base = module::base_parameters(&geometry, &module::Parameters::default());
+                    let base = module::base_parameters(&geometry, &module::Parameters::default()).unwrap();
                     let dynamics = module::InverseDynamics::new(&geometry, &base);
                     let mechanism = model_of($name);
                     let drawn = Sample::random(&mechanism, 4 * STATES, 0.2, &mut Stream::new(5));

@@ -161,7 +161,7 @@ macro_rules! emitted {
                 fn inverse_dynamics(bencher: Bencher) {
                     let states = each_state();
                     let geometry = module::Geometry::default();
-                    let base = module::base_parameters(&geometry, &module::Parameters::default());
+                    let base = module::base_parameters(&geometry, &module::Parameters::default()).unwrap();
                     let dynamics = module::InverseDynamics::new(&geometry, &base);
                     bencher.counter(ItemsCount::new(STATES)).bench_local(|| {
                         for state in &states {

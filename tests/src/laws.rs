@@ -155,12 +155,32 @@ impl Case {
 
     /// The drives supply what d'Alembert's principle asks for, along every independent motion.
     pub fn forces_satisfy_dalembert(&self, n_states: usize) -> Result<f64, String> {
+        self.forces_satisfy_dalembert_to(ACCURACY, n_states)
+    }
+
+    /// The same to an accuracy of one's own.
+    pub fn forces_satisfy_dalembert_to(
+        &self,
+        accuracy: f64,
+        n_states: usize,
+    ) -> Result<f64, String> {
+        let (worst, says) = self.worst_beside_dalembert(n_states)?;
+        // What is no number is no accuracy.
+        if worst <= accuracy {
+            Ok(worst)
+        } else {
+            Err(says)
+        }
+    }
+
+    /// The largest error with where it is, or the first that is no number.
+    fn worst_beside_dalembert(&self, n_states: usize) -> Result<(f64, String), String> {
         let mechanism = self.mechanism();
         let evaluator = Evaluator::new(&self.derivation);
         let parameters = nominal(mechanism);
         let p_min = base(&self.derivation, &parameters);
         let numbers = Numbers::new(mechanism, parameters);
-        let mut worst: f64 = 0.0;
+        let (mut worst, mut says) = (0.0, String::new());
         for i in 0..self.sample.len().min(n_states) {
             let one = self.sample.only(i);
             let forces = evaluator
@@ -183,15 +203,18 @@ impl Case {
                 let needed = numbers.virtual_power(&motion, &direction, &load);
                 let scale = needed.magnitude + supplied.iter().map(|x| x.abs()).sum::<f64>() + 1e-9;
                 let error = (supplied.iter().sum::<f64>() - needed.value).abs() / scale;
-                worst = worst.max(error);
-                if error.is_nan() || error > ACCURACY {
-                    return Err(self.breach(&format!(
+                if error.is_nan() || error > worst {
+                    worst = error;
+                    says = self.breach(&format!(
                         "along {direction:?} the drives supply {supplied:?}, needed are {needed:?}, error {error:.1e}"
-                    )));
+                    ));
+                }
+                if error.is_nan() {
+                    return Ok((worst, says));
                 }
             }
         }
-        Ok(worst)
+        Ok((worst, says))
     }
 
     /// The points that loops join coincide, and so do their velocities and accelerations.

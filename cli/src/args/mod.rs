@@ -39,6 +39,10 @@ pub(crate) struct Cli {
     /// A library of further kinds of effects (TOML), for every model that is read; may be repeated
     #[arg(long, global = true, value_name = "FILE")]
     pub(crate) library: Vec<PathBuf>,
+    /// Derive models for their files' values alone: constants stand as numbers, so that fewer base parameters remain where
+    /// lengths are zero or equal, and emitted code has no geometry to change
+    #[arg(long, global = true)]
+    pub(crate) at_values: bool,
 }
 
 /// The commands.

@@ -23,7 +23,7 @@ int main(int argc, char **argv) {
   /* The table has the parameters in the order of the model file. */
   read_table(argv[1], "pinocchio-panda-parameters.csv", (double *)&parameters, 1, sizeof parameters / sizeof(double));
   panda_default_geometry(&geometry);
-  panda_base_parameters(&geometry, &parameters, base);
+  check(panda_base_parameters(&geometry, &parameters, base) == PANDA_OK, "base parameters");
   check(panda_prepare(&dynamics, &geometry, base) == PANDA_OK, "prepare");
   check(panda_prepare_reactions(&reactions, &geometry, &parameters) == PANDA_OK, "prepare reactions");
   for (i = 0; i < STATES; ++i) {

@@ -22,7 +22,7 @@ int main(int argc, char **argv) {
   read_table(argv[1], "spidermill-paper-H.csv", &table[0][0], STATES, COLUMNS);
   spidermill_paper_default_geometry(&geometry);
   spidermill_paper_nominal_parameters(&parameters);
-  spidermill_paper_base_parameters(&geometry, &parameters, base);
+  check(spidermill_paper_base_parameters(&geometry, &parameters, base) == SPIDERMILL_PAPER_OK, "base parameters");
   check(spidermill_paper_prepare(&dynamics, &geometry, base) == SPIDERMILL_PAPER_OK, "prepare");
   for (i = 0; i < STATES; ++i) {
     const double *q = table[i], *qd = q + 2, *qdd = q + 4;

@@ -24,7 +24,7 @@ int main(void) {
   double worst = 0, largest = 0;
   three_rrr_default_geometry(geometry);
   three_rrr_nominal_parameters(parameters);
-  three_rrr_base_parameters(geometry, parameters, base);
+  check(three_rrr_base_parameters(geometry, parameters, base) == THREE_RRR_OK, "base parameters");
   check(three_rrr_prepare(&dynamics, geometry, base) == THREE_RRR_OK, "prepare");
   for (int i = 0; i < 50; ++i) {
     double q[3], qd[3], qdd[3];

@@ -113,6 +113,7 @@ impl Dependences {
             dependencies,
             method: Method::Exact {
                 confirmed_at: CONFIRMED_WITH * CONFIRMED_AT,
+                at_values: mechanism.is_at_values,
             },
         })
     }

@@ -5,12 +5,14 @@
 //! of the model's constants. A wrong answer has a probability below 1e-15 (Schwartz 1980, Zippel 1979).
 
 pub(crate) mod base;
+mod conditioned;
 mod constants;
 mod dependences;
 mod factors;
 mod fit;
 mod numeric;
 mod oracle;
+mod preference;
 mod print;
 mod rational_function;
 mod reconstruct;
@@ -29,15 +31,16 @@ use crate::DeriveError;
 use crate::expr::independent::SEED;
 use crate::expr::{ExprId, Graph};
 use crate::regressor::Equations;
-use crate::regressor::projection::Projection;
 use crate::tree::expressions::Monomial;
 use constants::{occurrences, root_radicands};
 use dependences::Dependences;
+use preference::preference;
 use sample::sampled;
 
 /// Reduces the columns `columns[k][d]` (product by drive) to a base.
 ///
-/// Products that the model file wants to retain are tried first, then all others in order.
+/// Products that the model file wants to retain are tried first, then the others as [`preference`] orders them; those at
+/// which factors explode with the file's values are exchanged ([`conditioned`]).
 pub(crate) fn reduce(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -52,12 +55,12 @@ pub(crate) fn reduce(
     let effective: Vec<usize> = (0..columns.len())
         .filter(|k| columns[*k].iter().any(|x| *x != Graph::ZERO))
         .collect();
-    let order = preference(mechanism, candidates, &effective);
+    let (order, n_named) = preference(graph, mechanism, equations, &effective);
     let outputs: Vec<ExprId> = (0..projection.drives.len())
         .flat_map(|d| effective.iter().map(move |k| columns[*k][d]))
         .collect();
     let exact = reduce_exactly(
-        graph, mechanism, projection, candidates, &effective, &order, &outputs,
+        graph, mechanism, equations, &effective, &order, n_named, &outputs,
     );
     let exact = exact.and_then(|found| {
         // Loops are sampled on their algebraic variety; machines live on the branch of the nominal pose.
@@ -91,15 +94,33 @@ pub(crate) fn reduce(
 fn reduce_exactly(
     graph: &mut Graph,
     mechanism: &Mechanism,
-    projection: &Projection,
-    candidates: &[Monomial],
+    equations: &Equations,
     effective: &[usize],
     order: &[usize],
+    n_named: usize,
     outputs: &[ExprId],
 ) -> Result<Reduction, DeriveError> {
+    let (projection, candidates) = (&equations.projection, &equations.products);
     let regressor = sampled(graph, mechanism, projection, outputs, effective.len())?;
     let mut stream = Stream::new(SEED);
-    let dependences = Dependences::find(&regressor, order, &mut stream)?;
+    let mut dependences = Dependences::find(&regressor, order, &mut stream)?;
+    let columns: Vec<Vec<ExprId>> = (effective.iter())
+        .map(|k| equations.columns[*k].clone())
+        .collect();
+    let better = conditioned::exchanged(
+        graph,
+        mechanism,
+        projection,
+        &columns,
+        &dependences.pivots,
+        &dependences.dependent,
+        &order[..n_named],
+    );
+    if let Some(better) = better {
+        let (first, rest): (Vec<usize>, Vec<usize>) =
+            order.iter().partition(|k| better.contains(k));
+        dependences = Dependences::find(&regressor, &[first, rest].concat(), &mut stream)?;
+    }
     let roots = root_radicands(graph, outputs, &projection.loops.residual);
     let variables = occurrences(graph, outputs, &projection.loops.residual);
     let factors = factors::find(
@@ -114,26 +135,6 @@ fn reduce_exactly(
     let reduction = dependences.reduction(mechanism, candidates, &names, factors)?;
     reduction.confirm(&regressor, &dependences.shown, &mut stream)?;
     Ok(reduction)
-}
-
-/// Order in which columns are tried as retained ones: those that the file names, then the others as they stand.
-fn preference(mechanism: &Mechanism, candidates: &[Monomial], effective: &[usize]) -> Vec<usize> {
-    let mut order: Vec<usize> = mechanism
-        .retain
-        .iter()
-        .filter_map(|powers| {
-            let wanted = powers.iter().fold(Monomial::default(), |m, (p, n)| {
-                m.times(&Monomial(vec![(p.0, *n)]))
-            });
-            effective.iter().position(|k| candidates[*k] == wanted)
-        })
-        .collect();
-    for k in 0..effective.len() {
-        if !order.contains(&k) {
-            order.push(k);
-        }
-    }
-    order
 }
 
 /// The products that are wanted and have an effect, all retained.

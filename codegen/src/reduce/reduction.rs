@@ -22,10 +22,13 @@ pub struct Reduction {
 /// How a reduction was found.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Method {
-    /// In the prime field: it holds for all values of the constants but special ones.
+    /// In the prime field: it holds for all values of the constants but special ones, and for the file's own where these
+    /// were put in their place.
     Exact {
         /// At how many points of motion `H p_g = H_min p_min` was shown, with fresh constants.
         confirmed_at: usize,
+        /// Whether the constants stand as numbers, so that it holds for the file's values alone.
+        at_values: bool,
     },
     /// Not at all: every product that was asked for is retained.
     Unreduced,
@@ -44,7 +47,13 @@ impl Method {
     /// What a reader of a numeric reduction must know, in words; `None` where the reduction holds for general values.
     pub fn caution(&self) -> Option<String> {
         match self {
-            Self::Exact { .. } | Self::Unreduced => None,
+            Self::Exact {
+                at_values: false, ..
+            }
+            | Self::Unreduced => None,
+            Self::Exact { .. } => Some(
+                "the constants stand as the numbers of this file: base and equations hold for these values alone".to_owned(),
+            ),
             Self::Numeric { because, .. } => Some(format!(
                 "the base parameters were found numerically, on the values of this file: {because}; factors are rounded, and \
                  base and factors hold for these values alone"

@@ -150,7 +150,7 @@ pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
         return;
     }
     page.paragraph([text(match &reduction.method {
-        Method::Exact { confirmed_at } => format!(
+        Method::Exact { confirmed_at, .. } => format!(
             "Columns that are constant combinations of retained ones at every state, eq. (6). \
              They were found in exact arithmetic and confirmed at {confirmed_at} further states with other values of the constants."
         ),

@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// Runs everything; the lines that are printed.
 fn report(rig: &modelmill_rig::Rig, task: &Reference) -> Result<Vec<String>, Box<dyn Error>> {
     let geometry = spidermill::Geometry::default();
-    let nominal = spidermill::base_parameters(&geometry, &spidermill::Parameters::default());
+    let nominal = spidermill::base_parameters(&geometry, &spidermill::Parameters::default())?;
     let nominal = spidermill::InverseDynamics::new(&geometry, &nominal);
     let drives = spidermill::Model::new(&geometry);
 

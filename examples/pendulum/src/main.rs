@@ -2,11 +2,12 @@
 
 include!(concat!(env!("OUT_DIR"), "/models.rs"));
 
+use modelmill_runtime::SpecialGeometry;
 use pendulum::{BASE_PARAMETERS, Geometry, InverseDynamics, Parameters, State, base_parameters};
 
-fn main() {
+fn main() -> Result<(), SpecialGeometry> {
     let geometry = Geometry::<f64>::default();
-    let base = base_parameters(&geometry, &Parameters::default());
+    let base = base_parameters(&geometry, &Parameters::default())?;
     for (parameter, value) in BASE_PARAMETERS.iter().zip(&base) {
         println!(
             "{} = {} = {value:.4} {}",
@@ -24,6 +25,7 @@ fn main() {
             Err(error) => println!("q = {q:.1} rad: {error}"),
         }
     }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -39,7 +41,7 @@ mod tests {
             I: 0.07,
             Fv_motor: 0.2,
         };
-        let dynamics = InverseDynamics::new(&geometry, &base_parameters(&geometry, &p));
+        let dynamics = InverseDynamics::new(&geometry, &base_parameters(&geometry, &p).unwrap());
         let (q, qd, qdd) = (0.7_f64, -1.3, 2.1);
         let [torque] = dynamics
             .forces(&State {

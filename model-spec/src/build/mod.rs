@@ -103,6 +103,7 @@ pub(crate) fn build(
         retain,
         limits,
         recording: Recording { columns, torque },
+        is_at_values: false,
     };
     bodies::warn_of_negative(model, &mechanism, log);
     pose::check(&mut mechanism, &places, log);

@@ -21,6 +21,7 @@ use crate::progress::{Job, Progress, Silent, watched};
 pub struct Host {
     files: Arc<dyn Files>,
     libraries: Vec<PathBuf>,
+    is_at_values: bool,
     progress: Arc<dyn Progress>,
 }
 
@@ -29,6 +30,7 @@ impl Default for Host {
         Self {
             files: Arc::new(Disk::default()),
             libraries: Vec::new(),
+            is_at_values: false,
             progress: Arc::new(Silent),
         }
     }
@@ -64,6 +66,19 @@ impl Host {
     pub fn with_progress(mut self, progress: Arc<dyn Progress>) -> Self {
         self.progress = progress;
         self
+    }
+
+    /// Whether models are derived for their files' values alone: constants stand as numbers ([`modelmill_spec::Mechanism::at_values`]),
+    /// so that fewer base parameters remain where geometry is special, and emitted code has no geometry to change.
+    #[must_use]
+    pub fn at_values(mut self, is_wanted: bool) -> Self {
+        self.is_at_values = is_wanted;
+        self
+    }
+
+    /// Whether models are derived for their files' values alone.
+    pub fn is_at_values(&self) -> bool {
+        self.is_at_values
     }
 
     /// The libraries that every model may use.

@@ -85,7 +85,10 @@ impl Host {
     /// Derives a model that was read from `path`.
     ///
     /// Fails with the reason why it cannot be derived.
-    pub fn derive(&self, path: &str, loaded: Loaded) -> Outcome<Model> {
+    pub fn derive(&self, path: &str, mut loaded: Loaded) -> Outcome<Model> {
+        if self.is_at_values() {
+            loaded.mechanism = loaded.mechanism.at_values();
+        }
         let mechanism = &loaded.mechanism;
         let derivation = self
             .watched(&format!("deriving {}", mechanism.name), 0, |_| {

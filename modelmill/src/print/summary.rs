@@ -2,7 +2,7 @@
 
 use modelmill_boundary::text::plain;
 use modelmill_codegen::review::NumericMethod;
-use modelmill_codegen::{Derivation, Reduction, module_name};
+use modelmill_codegen::{Derivation, Method, Reduction, module_name};
 use modelmill_spec::{Diagnostic, DriveKind, Failure, Mechanism, Motion, Severity, Sources};
 use serde_json::{Value, json};
 
@@ -175,11 +175,15 @@ impl Summary {
                 ),
             ),
         );
-        if reduction.method.caution().is_some() {
-            line(
+        match reduction.method {
+            Method::Numeric { .. } => line(
                 "reduced",
                 "numerically, on the values of this file".to_owned(),
-            );
+            ),
+            Method::Exact {
+                at_values: true, ..
+            } => line("reduced", "for the values of this file alone".to_owned()),
+            Method::Exact { .. } | Method::Unreduced => {}
         }
         if let Some(rank) = rank {
             line("numeric rank", rank.text());
@@ -192,7 +196,10 @@ impl Summary {
 fn reduction(reduction: &Reduction) -> Value {
     match NumericMethod::from_reduction(reduction) {
         Some(method) => json!(method),
-        None => json!({ "name": "exact" }),
+        None => json!({
+            "name": "exact",
+            "at_values": matches!(reduction.method, Method::Exact { at_values: true, .. }),
+        }),
     }
 }
 

@@ -69,7 +69,7 @@ macro_rules! models {
                     let geometry = module::Geometry::<f64>::default();
                     let base: [f64; module::N_BASE] = match base {
                         Some(base) => base.try_into().map_err(|_| "wrong number of base parameters".to_owned())?,
-                        None => module::base_parameters(&geometry, &module::Parameters::default()),
+                        None => module::base_parameters(&geometry, &module::Parameters::default()).unwrap(),
                     };
                     let dynamics = module::InverseDynamics::new(&geometry, &base);
                     let mut forces = vec![Vec::new(); module::N_DRIVES];
@@ -96,7 +96,7 @@ macro_rules! models {
                 $($name => {
                     use modelmill_generated::$model as module;
                     let geometry = module::Geometry::<f64>::default();
-                    let base = module::base_parameters(&geometry, &module::Parameters::default());
+                    let base = module::base_parameters(&geometry, &module::Parameters::default()).unwrap();
                     let model = module::Model::new(&geometry);
                     let dynamics = module::InverseDynamics::new(&geometry, &base);
                     let states = module::States::<f64> {

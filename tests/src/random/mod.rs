@@ -25,11 +25,15 @@ pub enum Matter {
     Physical,
     /// Bodies with missing entries, ties, centres of mass, lumped masses placed once or twice, effects.
     Anything,
+    /// Anything, more lumped masses, and constants that are zero, quarter turns, or those of others, to the last digit or
+    /// nearly.
+    Special,
 }
 
 /// A mechanism in the making.
 struct Draft {
     stream: Stream,
+    matter: Matter,
     mechanism: Mechanism,
 }
 
@@ -49,7 +53,7 @@ fn small(n: usize) -> i64 {
 }
 
 impl Draft {
-    fn new(kind: &str, seed: u64) -> Self {
+    fn new(kind: &str, seed: u64, matter: Matter) -> Self {
         let base = Frame {
             name: "base".to_owned(),
             parent: FrameIdx(0),
@@ -58,6 +62,7 @@ impl Draft {
         };
         Self {
             stream: Stream::new(seed),
+            matter,
             mechanism: Mechanism {
                 name: format!("{kind}_{seed}"),
                 title: None,
@@ -77,12 +82,14 @@ impl Draft {
                 retain: Vec::new(),
                 limits: Limits::default(),
                 recording: Recording::default(),
+                is_at_values: false,
             },
         }
     }
 
     fn constant(&mut self, prefix: &str, value: f64, unit: &str) -> ConstantIdx {
         let i = self.mechanism.constants.len();
+        let value = self.value(value, unit);
         self.mechanism.constants.push(Constant {
             name: format!("{prefix}{i}"),
             value,
@@ -91,6 +98,28 @@ impl Draft {
             note: None,
         });
         ConstantIdx(i)
+    }
+
+    /// The value that was drawn for a constant, or a special one in its place.
+    fn value(&mut self, drawn: f64, unit: &str) -> f64 {
+        const GAPS: [f64; 8] = [0.0, 0.0, 2e-16, 1e-14, 1e-12, 1e-9, 1e-6, 1e-3];
+        if self.matter != Matter::Special || drawn == 0.0 {
+            return drawn;
+        }
+        let gap = *self.stream.pick(&GAPS);
+        let others = self.mechanism.constants.iter();
+        let others: Vec<f64> = (others.filter(|c| c.unit == unit))
+            .map(|c| c.value)
+            .collect();
+        match self.stream.below(10) {
+            0..4 if !others.is_empty() => {
+                let other = *self.stream.pick(&others);
+                other + gap * other.abs()
+            }
+            4 => 0.0,
+            5 if unit == "rad" => std::f64::consts::FRAC_PI_2 * (1.0 + gap),
+            _ => drawn,
+        }
     }
 
     fn length(&mut self, low: f64, high: f64) -> Exact {
@@ -299,9 +328,10 @@ impl Draft {
         }
     }
 
-    /// Up to two lumped masses; half of them are seen elsewhere by the balance of moments.
+    /// Up to two lumped masses, or six; half of them are seen elsewhere by the balance of moments.
     fn lumps(&mut self, planar: bool) {
-        for _ in 0..self.stream.below(3) {
+        let most = if self.matter == Matter::Special { 7 } else { 3 };
+        for _ in 0..self.stream.below(most) {
             let frame = FrameIdx(1 + self.stream.below(self.mechanism.frames.len() - 1));
             let value = self.stream.between(0.5, 3.0);
             let mass = self.symbol("ml", value);

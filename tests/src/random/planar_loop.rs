@@ -25,7 +25,7 @@ pub fn planar_loop(seed: u64, matter: Matter) -> Mechanism {
 }
 
 fn draw(seed: u64, matter: Matter) -> Option<Mechanism> {
-    let mut draft = Draft::new("loop", seed);
+    let mut draft = Draft::new("loop", seed, matter);
     let n = 3 + draft.stream.below(3);
     let n_left = 1 + draft.stream.below(n - 1);
     let mut joints = Vec::new();
@@ -63,14 +63,14 @@ fn draw(seed: u64, matter: Matter) -> Option<Mechanism> {
     }
     draft.gravity(true);
     draft.bodies(1, true, matter);
-    if matter == Matter::Anything {
+    if matter != Matter::Physical {
         draft.lumps(true);
     }
     draft.drives(&joints, true);
     if !draft.drives_move() {
         return None;
     }
-    if matter == Matter::Anything {
+    if matter != Matter::Physical {
         draft.effects();
     }
     Some(draft.mechanism)

@@ -17,7 +17,7 @@ pub fn tree(seed: u64, matter: Matter) -> Mechanism {
 }
 
 fn draw(seed: u64, matter: Matter) -> Option<Mechanism> {
-    let mut draft = Draft::new("tree", seed);
+    let mut draft = Draft::new("tree", seed, matter);
     let n = 1 + draft.stream.below(4);
     let mut joints: Vec<(CoordinateIdx, FrameIdx)> = Vec::new();
     for i in 0..n {
@@ -30,14 +30,14 @@ fn draw(seed: u64, matter: Matter) -> Option<Mechanism> {
     }
     draft.gravity(false);
     draft.bodies(1, false, matter);
-    if matter == Matter::Anything {
+    if matter != Matter::Physical {
         draft.lumps(false);
     }
     draft.drives(&joints, false);
     if !draft.drives_move() {
         return None;
     }
-    if matter == Matter::Anything {
+    if matter != Matter::Physical {
         draft.effects();
     }
     Some(draft.mechanism)

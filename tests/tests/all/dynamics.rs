@@ -186,7 +186,7 @@ macro_rules! agrees_at_random {
             let mechanism = random::$function($seed, Matter::Anything);
             let case = Case::new(&mechanism, 12, 0.3).expect("regular states");
             let geometry = module::Geometry::<f64>::default();
-            let p_min = module::base_parameters(&geometry, &module::Parameters::default());
+            let p_min = module::base_parameters(&geometry, &module::Parameters::default()).unwrap();
             let emitted = module::Dynamics::new(&geometry, &p_min);
             let inverse = module::InverseDynamics::new(&geometry, &p_min);
             for i in 0..case.sample.len() {

@@ -52,7 +52,7 @@ macro_rules! run {
     (@ $models:ident, $model:ident, $T:ty, $sample:expr, $passive:expr) => {{
         use $models::$model as module;
         let geometry = module::Geometry::<$T>::default();
-        let base = module::base_parameters(&geometry, &module::Parameters::default());
+        let base = module::base_parameters(&geometry, &module::Parameters::default()).unwrap();
         let model = module::Model::new(&geometry);
         let dynamics = module::InverseDynamics::new(&geometry, &base);
         let sample: &Sample = $sample;

@@ -22,6 +22,7 @@ mod emitted;
 mod loops_in_space;
 mod many_states;
 mod many_twists;
+mod near_coincidence;
 mod no_numbers;
 mod on_request;
 mod operation_counts;

@@ -23,7 +23,7 @@ macro_rules! check {
         let [q, qd, qdd] = [&sample.q, &sample.qd, &sample.qdd]
             .map(|columns| columns.iter().map(column).collect::<Vec<_>>());
         let geometry = $model::Geometry::<$float>::default();
-        let base = $model::base_parameters(&geometry, &$model::Parameters::default());
+        let base = $model::base_parameters(&geometry, &$model::Parameters::default()).unwrap();
         let dynamics = $model::InverseDynamics::new(&geometry, &base);
         let model = $model::Model::new(&geometry);
         let state = |i: usize| $model::State {
@@ -111,7 +111,7 @@ fn forces_with(n: usize, at: usize, q: f64) -> (Result<(), BlockError>, Vec<Vec<
     let mut odd = column.clone();
     odd[at] = q;
     let geometry = panda::Geometry::default();
-    let base = panda::base_parameters(&geometry, &panda::Parameters::default());
+    let base = panda::base_parameters(&geometry, &panda::Parameters::default()).unwrap();
     let dynamics = panda::InverseDynamics::new(&geometry, &base);
     let mut states = panda::States {
         q: [&column[..]; 7],

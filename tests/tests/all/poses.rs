@@ -169,7 +169,7 @@ fn a_pose_is_followed_from_the_last_one() {
     use three_rrr::{Geometry, InverseDynamics, Model, PASSIVE, Parameters, State};
     let geometry = Geometry::<f64>::default();
     let model = Model::new(&geometry);
-    let base = three_rrr::base_parameters(&geometry, &Parameters::default());
+    let base = three_rrr::base_parameters(&geometry, &Parameters::default()).unwrap();
     let dynamics = InverseDynamics::new(&geometry, &base);
     let nominal = [-0.37568, 1.70899, -2.37896];
     let mut passive = model.passive_position(&nominal).expect("the nominal pose");
@@ -308,7 +308,7 @@ fn newtons_method_reports_the_earliest_fault() {
 fn inputs_that_are_no_numbers_are_named() {
     use spidermill::{Geometry, InverseDynamics, Model, Parameters, State};
     let geometry = Geometry::<f64>::default();
-    let base = spidermill::base_parameters(&geometry, &Parameters::default());
+    let base = spidermill::base_parameters(&geometry, &Parameters::default()).unwrap();
     let fine = State {
         q: [1.8, 1.35],
         qd: [0.1, 0.2],
@@ -390,7 +390,7 @@ fn terms_without_a_finite_value_are_errors() {
     let derivation = derived("undefined_effects");
     let geometry = Geometry::<f64>::default();
     let model = Model::new(&geometry);
-    let base = base_parameters(&geometry, &Parameters::default());
+    let base = base_parameters(&geometry, &Parameters::default()).unwrap();
     let dynamics = InverseDynamics::new(&geometry, &base);
     // At a quotient's pole, beyond what an exponential reaches, and where a root is imaginary.
     for (q, is_fine) in [

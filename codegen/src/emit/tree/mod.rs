@@ -23,8 +23,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::Derivation;
 use crate::expr::Atom;
+use crate::expr::print::Formula;
 use crate::lower::{Op, Program};
 use crate::programs::PassivePosition;
+use crate::reduce::base;
 
 /// A program as statements.
 #[derive(Clone, Debug)]
@@ -165,11 +167,23 @@ pub(in crate::emit) fn reads_passive(derivation: &Derivation, program: &Program)
         .any(|op| matches!(op, Op::Input(Atom::Coordinate(i)) if passive.contains(i)))
 }
 
-/// Base parameters as eq. (16) gives them, term by term, and what they read.
-pub(in crate::emit) fn base_parameters(
-    derivation: &Derivation,
-    scope: &Scope,
-) -> (Vec<Expression>, BTreeSet<Atom>) {
+/// Base parameters as eq. (16) gives them, term by term.
+pub(in crate::emit) struct BaseParameters {
+    pub(in crate::emit) values: Vec<Expression>,
+    pub(in crate::emit) divisors: Vec<Divisor>,
+    /// What values and divisors read.
+    pub(in crate::emit) read: BTreeSet<Atom>,
+}
+
+/// A denominator that must not vanish beside its size.
+pub(in crate::emit) struct Divisor {
+    pub(in crate::emit) text: String,
+    pub(in crate::emit) value: Expression,
+    pub(in crate::emit) size: Expression,
+}
+
+/// The base parameters of a derivation, by the names of a scope.
+pub(in crate::emit) fn base_parameters(derivation: &Derivation, scope: &Scope) -> BaseParameters {
     let mechanism = &derivation.mechanism;
     let constants = mechanism.constants.iter().enumerate();
     let parameters = mechanism.parameters.iter().enumerate();
@@ -180,15 +194,29 @@ pub(in crate::emit) fn base_parameters(
         .collect();
     let called: BTreeMap<&str, Atom> = atoms.values().map(|a| (scope.name(*a), *a)).collect();
     let mut read = BTreeSet::new();
-    let values = (0..derivation.reduction.retained.len()).map(|k| {
-        let formula =
-            crate::reduce::base::written_out(&derivation.mechanism, &derivation.reduction, k);
-        let value = Expression::of_formula(&formula, &|name| match atoms.get(name) {
+    let mut expression = |formula: &Formula| {
+        let value = Expression::of_formula(formula, &|name| match atoms.get(name) {
             Some(atom) => scope.name(*atom).to_owned(),
             None => name.to_owned(),
         });
         value.for_each_name(&mut |name| read.extend(called.get(name)));
         value
-    });
-    (values.collect(), read)
+    };
+    let reduction = &derivation.reduction;
+    let values = (0..reduction.retained.len())
+        .map(|k| expression(&base::written_out(mechanism, reduction, k)))
+        .collect();
+    let denominators = base::denominators(mechanism, reduction).into_iter();
+    let divisors = denominators
+        .map(|denominator| Divisor {
+            value: expression(&denominator.value),
+            size: expression(&denominator.size),
+            text: denominator.text,
+        })
+        .collect();
+    BaseParameters {
+        values,
+        divisors,
+        read,
+    }
 }

@@ -10,7 +10,7 @@ use crate::emit::language::c99::RESERVED;
 use crate::emit::language::{EmittedFile, Source};
 
 /// What a function returns, with its name in the header after the prefix, and its meaning.
-pub(super) const STATUS: [(&str, &str); 8] = [
+pub(super) const STATUS: [(&str, &str); 9] = [
     ("OK", "all is well"),
     (
         "OUT_OF_REACH",
@@ -28,6 +28,10 @@ pub(super) const STATUS: [(&str, &str); 8] = [
     ),
     ("NULL_POINTER", "an argument is a null pointer"),
     ("LENGTH", "arrays of different lengths"),
+    (
+        "SPECIAL",
+        "base parameters divide by what vanishes for this geometry",
+    ),
 ];
 
 /// The files of the crate, without reactions and self-test. It needs `modelmill-runtime` in the folder `modelmill-runtime`
@@ -341,8 +345,13 @@ fn items(face: &Face<'_>) -> TokenStream {
             }) else {
                 return NULL_POINTER;
             };
-            *base = model::base_parameters(&self::geometry(geometry), &self::parameters(values));
-            OK
+            match model::base_parameters(&self::geometry(geometry), &self::parameters(values)) {
+                Ok(found) => {
+                    *base = found;
+                    OK
+                }
+                Err(_) => SPECIAL,
+            }
         }
 
         #[unsafe(no_mangle)]

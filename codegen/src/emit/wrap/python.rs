@@ -290,7 +290,8 @@ fn items(face: &Face<'_>) -> TokenStream {
         ) -> PyResult<Bound<'py, PyArray1<f64>>> {
             let names = model::PARAMETERS.map(|c| c.name);
             let values = replaced(parameters_values(), &names, parameters)?;
-            let base = model::base_parameters(&geometry_of(geometry)?, &self::parameters(&values));
+            let base = model::base_parameters(&geometry_of(geometry)?, &self::parameters(&values))
+                .map_err(|special| value_error(special.to_string()))?;
             Ok(PyArray1::from_slice(py, &base))
         }
 

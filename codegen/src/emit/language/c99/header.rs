@@ -7,7 +7,7 @@ use super::{Function, Unit};
 use crate::emit::language::syntax::Syntax;
 
 /// What functions return, with its name after the prefix, and its meaning.
-const STATUS: [(&str, &str); 5] = [
+const STATUS: [(&str, &str); 6] = [
     ("OK", "all is well"),
     (
         "OUT_OF_REACH",
@@ -18,6 +18,10 @@ const STATUS: [(&str, &str); 5] = [
     (
         "NOT_FINITE",
         "an input is no number, or too large to compute with",
+    ),
+    (
+        "SPECIAL",
+        "base parameters divide by what vanishes for this geometry",
     ),
 ];
 
@@ -43,7 +47,7 @@ pub(super) fn header(unit: &Unit<'_>) -> String {
  *     double base[{upper}_N_BASE];
  *     {name}_default_geometry(&geometry);
  *     {name}_nominal_parameters(&parameters);
- *     {name}_base_parameters(&geometry, &parameters, base);
+ *     status = {name}_base_parameters(&geometry, &parameters, base);
  *     {name}_prepare(&dynamics, &geometry, base);
  *     status = {name}_inverse_dynamics(&dynamics, {}, forces);
  *
@@ -163,7 +167,7 @@ void {name}_default_geometry({name}_geometry *geometry);
 void {name}_nominal_parameters({name}_parameters *parameters);
 
 /* Base parameters of physical ones, eq. (16). */
-void {name}_base_parameters(const {name}_geometry *geometry, const {name}_parameters *parameters, double *base);
+int {name}_base_parameters(const {name}_geometry *geometry, const {name}_parameters *parameters, double *base);
 
 /* Computes what depends on geometry and base parameters alone; says what is wrong with them, as all functions then do. */
 int {name}_prepare({name}_dynamics *dynamics, const {name}_geometry *geometry, const double *base);"
@@ -234,7 +238,7 @@ int {name}_prepare_reactions({name}_reactions *reactions, const {name}_geometry 
             "
 /* Holds the base parameters against all parameters at random states around the nominal pose: 0 if H and H_min have rank
  * {upper}_N_BASE and H p = H_min p_min; 1 if too few states have an answer; 2 for the rank of H_min; 3 for that of H; 4 if
- * H_min p_min differs; 5 if the inverse dynamics differ. */
+ * H_min p_min differs; 5 if the inverse dynamics differ; 6 if base parameters divide by what vanishes for this geometry. */
 int {name}_self_test(const {name}_geometry *geometry);"
         );
     }

@@ -124,7 +124,7 @@ typedef struct {{
         lines.push(format!("products[{k}] = {value};"));
     }
     lines.push(format!(
-        "{name}_base_parameters(geometry, &parameters, base);"
+        "if ({name}_base_parameters(geometry, &parameters, base) != {upper}_OK)\n        return 6;"
     ));
     lines.push(format!("(void){name}_prepare(&dynamics, geometry, base);"));
     lines.push(format!("{name}_prepare_columns(&all, geometry);"));

@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use super::header::{forward, signature};
-use super::statements::C;
+use super::statements::{C, comment};
 use super::{Function, Unit, newton, self_test};
 use crate::emit::language::syntax::Syntax;
-use crate::emit::tree::{Expression, Once, inputs_of_state};
+use crate::emit::tree::{BaseParameters, Expression, Once, inputs_of_state};
 use crate::expr::Atom;
 use crate::lower::{OperationCount, Stage};
 
@@ -129,10 +129,14 @@ fn records(unit: &Unit<'_>, text: &mut String) {
 fn base_parameters(unit: &Unit<'_>, text: &mut String) {
     let (name, c) = (&unit.name, unit.syntax());
     let derivation = unit.source.derivation;
-    let (values, read) = crate::emit::tree::base_parameters(derivation, &unit.scope);
+    let BaseParameters {
+        values,
+        divisors,
+        read,
+    } = crate::emit::tree::base_parameters(derivation, &unit.scope);
     _ = writeln!(
         text,
-        "\nvoid {name}_base_parameters(const {name}_geometry *geometry, const {name}_parameters *parameters, double *base)\n{{"
+        "\nint {name}_base_parameters(const {name}_geometry *geometry, const {name}_parameters *parameters, double *base)\n{{"
     );
     let mut lines = Vec::new();
     given(unit, &read, "geometry->", "parameters->", "", &mut lines);
@@ -142,12 +146,22 @@ fn base_parameters(unit: &Unit<'_>, text: &mut String) {
     if !read.iter().any(|atom| matches!(atom, Atom::Parameter(_))) {
         lines.push("(void)parameters;".to_owned());
     }
+    for divisor in &divisors {
+        lines.push(format!(
+            "if (!(fabs({}) > SINGULAR_SHARE * {})) return {}_SPECIAL; /* {} vanishes */",
+            c.term(&divisor.value),
+            c.whole(&divisor.size),
+            unit.upper,
+            comment(&divisor.text)
+        ));
+    }
     for (k, value) in values.iter().enumerate() {
         lines.push(format!("base[{k}] = {};", c.term(value)));
     }
     if values.is_empty() {
         lines.push("(void)base;".to_owned());
     }
+    lines.push(format!("return {}_OK;", unit.upper));
     body(&lines, text);
     text.push_str("}\n");
 }
@@ -490,7 +504,7 @@ int {name}_prepare_reactions({name}_reactions *reactions, const {name}_geometry 
     );
     let mut lines = once_lines(unit, once, "geometry->", "parameters->", "base");
     lines.push(format!(
-        "{name}_base_parameters(geometry, parameters, base);"
+        "if ({name}_base_parameters(geometry, parameters, base) != {upper}_OK)\n        return self->dynamics.input = {upper}_SPECIAL;"
     ));
     lines.push(format!(
         "(void){name}_prepare(&self->dynamics, geometry, base);"

@@ -12,7 +12,7 @@ use super::statements::{Rust, filled, lines, number as signed, verbatim};
 use crate::Derivation;
 use crate::emit::identifier::of_field;
 use crate::emit::language::syntax::Syntax;
-use crate::emit::tree::{Expression, Scope, inputs_of_state, uses_load};
+use crate::emit::tree::{BaseParameters, Expression, Scope, inputs_of_state, uses_load};
 use crate::expr::Atom;
 use crate::expr::coordinates_of;
 use crate::lower::{OperationCount, Program, Stage};
@@ -248,7 +248,11 @@ pub(super) fn nominal<'a>(
 
 /// Base parameters as eq. (16) gives them, term by term.
 fn base_parameters(derivation: &Derivation, scope: &Scope) -> TokenStream {
-    let (values, read) = crate::emit::tree::base_parameters(derivation, scope);
+    let BaseParameters {
+        values,
+        divisors,
+        read,
+    } = crate::emit::tree::base_parameters(derivation, scope);
     let n_base = values.len();
     // An argument that nothing reads is called so.
     let argument = |name: &str, is_its: fn(&Atom) -> bool| {
@@ -264,14 +268,23 @@ fn base_parameters(derivation: &Derivation, scope: &Scope) -> TokenStream {
         .collect();
     let written = names.iter().zip(&values);
     let written = written.flat_map(|(name, value)| sum(&format!("let {name} = "), value));
-    let written = lines(&written.collect::<Vec<String>>());
+    let divisors = divisors.iter().map(|divisor| {
+        let [value, size] = [&divisor.value, &divisor.size].map(|x| Rust.term(x));
+        format!("divisor({:?}, {value}, {size})?;", divisor.text)
+    });
+    let written = lines(&divisors.chain(written).collect::<Vec<String>>());
     quote! {
         /// Base parameters of given physical parameters, eq. (16).
-        pub fn base_parameters<T: Real>(#geometry: &Geometry<T>, #parameters: &Parameters<T>) -> [T; N_BASE] {
+        ///
+        /// # Errors
+        /// [`SpecialGeometry`] where a denominator of theirs vanishes.
+        pub fn base_parameters<T: Real>(
+            #geometry: &Geometry<T>, #parameters: &Parameters<T>,
+        ) -> Result<[T; N_BASE], SpecialGeometry> {
             let n = &One::<T>::new();
             #given
             #written
-            values![#(#names),*]
+            Ok(values![#(#names),*])
         }
     }
 }

@@ -104,7 +104,7 @@ pub(super) fn self_test(derivation: &Derivation, scope: &Scope) -> TokenStream {
             let mut parameters = Parameters::<f64>::default();
             #(parameters.#fields = draw.near(parameters.#fields);)*
             let products = [#(#values),*];
-            let base = base_parameters(geometry, &parameters);
+            let base = base_parameters(geometry, &parameters)?;
             let dynamics = InverseDynamics::new(geometry, &base);
             ::modelmill_runtime::self_test::<N_PRODUCTS, N_BASE>(&products, &base, |random, reach, show| {
                 let state = State {

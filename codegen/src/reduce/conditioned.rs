@@ -1,0 +1,147 @@
+//! Retained columns that keep their digits at the model file's values.
+//!
+//! Which columns are independent is found for general constants. Near the file's own values some may all but coincide, and
+//! others are then written by them with factors that grow without bound. So the factors are looked at in floating point, at
+//! constants a little beside the file's (where special values would hide that columns coincide there), and a retained column
+//! is exchanged for the dependent one of which it makes the largest part, until all factors are of reasonable size (the
+//! exchanges of M. Gu and S. C. Eisenstat, "Efficient algorithms for computing a strong rank-revealing QR factorization",
+//! 1996, over a base that is given).
+
+use modelmill_algebra::field::Stream;
+use modelmill_spec::Mechanism;
+use nalgebra::DMatrix;
+
+use super::numeric::sample;
+use crate::expr::independent::SEED;
+use crate::expr::{ExprId, Graph};
+use crate::loops::numeric_poses::symmetric;
+use crate::regressor::projection::Projection;
+
+/// Largest factor between columns of unit length that calls for no exchange: bases that are sound stay far below, and a
+/// base within it loses three digits of sixteen.
+const MOST_GROWTH: f64 = 1e3;
+
+/// How far constants are moved, in rad or relative to their size: far enough that columns which coincide differ by more than
+/// rounding, even to second order.
+const BESIDE: f64 = 1e-5;
+
+/// What must be left of a column beside others, relative to its size, that they make it up.
+const MADE_UP: f64 = 1e-6;
+
+/// The retained columns, some exchanged for dependent ones; `None` if all can stay. Columns in `named` stay in any case.
+pub(super) fn exchanged(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    projection: &Projection,
+    columns: &[Vec<ExprId>],
+    retained: &[usize],
+    dependent: &[usize],
+    named: &[usize],
+) -> Option<Vec<usize>> {
+    if dependent.is_empty() {
+        return None;
+    }
+    let moved = beside(mechanism);
+    let n_rows = columns.len() + columns.len() / 2;
+    let mut sampled = |mechanism: &Mechanism| {
+        let w = sample(graph, mechanism, projection, columns, n_rows).ok()?;
+        Factors::new(&w, retained, dependent)
+    };
+    let mut factors = sampled(&moved).or_else(|| sampled(mechanism))?;
+    let fixed: Vec<bool> = retained.iter().map(|k| named.contains(k)).collect();
+    let mut has_changed = false;
+    if std::env::var("MM_DEBUG").is_ok() { eprintln!("growth {} {:e}", mechanism.name, factors.values.amax()); }
+    while let Some((i, j)) = factors.largest(&fixed) {
+        factors.exchange(i, j);
+        has_changed = true;
+    }
+    has_changed.then_some(factors.retained)
+}
+
+/// The mechanism with constants a little beside its own.
+fn beside(mechanism: &Mechanism) -> Mechanism {
+    let mut moved = mechanism.clone();
+    let mut stream = Stream::new(SEED);
+    for constant in &mut moved.constants {
+        let size = if constant.is_angle {
+            1.0
+        } else if constant.value == 0.0 {
+            let alike = mechanism.constants.iter();
+            let alike = alike.filter(|other| other.unit == constant.unit);
+            let largest = alike.map(|other| other.value.abs()).fold(0.0, f64::max);
+            if largest > 0.0 { largest } else { 1.0 }
+        } else {
+            constant.value.abs()
+        };
+        constant.value += BESIDE * size * symmetric(&mut stream);
+    }
+    moved
+}
+
+/// Dependent columns by retained ones, all of unit length.
+struct Factors {
+    retained: Vec<usize>,
+    dependent: Vec<usize>,
+    values: DMatrix<f64>,
+}
+
+impl Factors {
+    /// `None` where the sampled columns are no numbers, or where retained columns do not make up the others.
+    fn new(w: &DMatrix<f64>, retained: &[usize], dependent: &[usize]) -> Option<Self> {
+        let units = |columns: &[usize]| {
+            let mut picked = w.select_columns(columns);
+            for mut column in picked.column_iter_mut() {
+                let norm = column.norm();
+                if norm > 0.0 {
+                    column /= norm;
+                }
+            }
+            picked
+        };
+        let (basis, others) = (units(retained), units(dependent));
+        let qr = basis.clone().qr();
+        let mut values = others.clone();
+        qr.q_tr_mul(&mut values);
+        let values = values.rows(0, retained.len()).into_owned();
+        let values = qr.unpack_r().solve_upper_triangular(&values)?;
+        let left = others - basis * &values;
+        let is_made_up = left.column_iter().zip(values.column_iter());
+        let is_made_up = is_made_up
+            .into_iter()
+            .all(|(left, factors)| left.norm() <= MADE_UP * (1.0 + factors.amax()));
+        is_made_up.then(|| Self {
+            retained: retained.to_vec(),
+            dependent: dependent.to_vec(),
+            values,
+        })
+    }
+
+    /// Where the largest factor beyond measure stands.
+    fn largest(&self, fixed: &[bool]) -> Option<(usize, usize)> {
+        let (mut found, mut most) = (None, MOST_GROWTH);
+        for j in 0..self.values.ncols() {
+            for i in (0..self.values.nrows()).filter(|i| !fixed[*i]) {
+                if self.values[(i, j)].abs() > most {
+                    (found, most) = (Some((i, j)), self.values[(i, j)].abs());
+                }
+            }
+        }
+        found
+    }
+
+    /// Retained column `i` and dependent column `j` change places.
+    fn exchange(&mut self, i: usize, j: usize) {
+        std::mem::swap(&mut self.retained[i], &mut self.dependent[j]);
+        let pivot = self.values[(i, j)];
+        let row = self.values.row(i) / pivot;
+        let column = self.values.column(j).into_owned();
+        for (k, factor) in column.iter().enumerate().filter(|(k, _)| *k != i) {
+            for (l, share) in row.iter().enumerate() {
+                self.values[(k, l)] -= factor * share;
+            }
+            self.values[(k, j)] = -factor / pivot;
+        }
+        self.values.set_row(i, &row);
+        self.values[(i, j)] = 1.0 / pivot;
+    }
+}

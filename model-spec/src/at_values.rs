@@ -1,0 +1,247 @@
+//! A mechanism for its file's values alone: constants become numbers, so that whatever is special about them is there for
+//! all that follows: lengths that are zero or equal, axes that are parallel.
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{One, ToPrimitive, Zero};
+
+use crate::exact::{Angle, ConstantIdx, Exact, Length, Symbol};
+use crate::mechanism::{Bodies, Constant, Inertial, LumpedMass, Mechanism, Part, Step};
+
+/// How many significant digits every decimal keeps as a number of the machine; what stands behind them is rounding.
+const DIGITS: usize = 15;
+
+/// What a constant is beside the largest of the same unit where it counts as zero, and an angle beside a multiple of pi/12
+/// where it counts as that.
+const NOTHING: f64 = 1e-15;
+
+impl Mechanism {
+    /// The same mechanism for its file's values alone.
+    ///
+    /// Constants stand as the decimals that they are to 15 digits, and angles that are multiples of pi/12 as such. Other
+    /// angles keep their names, those of equal value one name, since their sines are no rational numbers.
+    #[must_use]
+    pub fn at_values(&self) -> Self {
+        let mut at = self.clone();
+        let stands = Stands::new(&self.constants);
+        at.constants = stands.kept.iter().map(|i| self.constants[*i].clone()).collect();
+        at.gravity = self.gravity.each_ref().map(|x| stands.exact(x));
+        for frame in &mut at.frames {
+            for step in &mut frame.steps {
+                *step = match step {
+                    Step::Rotate(axis, angle) => Step::Rotate(*axis, stands.angle(angle)),
+                    Step::Translate(axis, length) => Step::Translate(
+                        *axis,
+                        Length {
+                            offset: stands.exact(&length.offset),
+                            coordinates: length.coordinates.clone(),
+                        },
+                    ),
+                };
+            }
+        }
+        for point in &mut at.points {
+            point.at = point.at.each_ref().map(|x| stands.exact(x));
+        }
+        stands.bodies(&mut at.parts, &mut at.lumped_masses);
+        for effect in &mut at.effects {
+            for term in &mut effect.terms {
+                term.expression = stands.exact(&term.expression);
+            }
+            for (_, value) in &mut effect.constants {
+                *value = stands.exact(value);
+            }
+            let Bodies {
+                parts,
+                lumped_masses,
+            } = &mut effect.bodies;
+            stands.bodies(parts, lumped_masses);
+        }
+        at.is_at_values = true;
+        at
+    }
+}
+
+/// What stands for a constant.
+enum Stand {
+    Number(BigRational),
+    /// A multiple of pi.
+    Turn(BigRational),
+    /// A constant of the new mechanism.
+    Constant(ConstantIdx),
+}
+
+struct Stands {
+    of: Vec<Stand>,
+    /// Constants that keep their names.
+    kept: Vec<usize>,
+}
+
+impl Stands {
+    fn new(constants: &[Constant]) -> Self {
+        let (mut of, mut kept): (Vec<Stand>, Vec<usize>) = Default::default();
+        for constant in constants {
+            if !constant.is_angle {
+                let alike = constants.iter().filter(|c| c.unit == constant.unit);
+                let largest = alike.map(|c| c.value.abs()).fold(0.0, f64::max);
+                of.push(Stand::Number(if constant.value.abs() < NOTHING * largest {
+                    BigRational::zero()
+                } else {
+                    decimal(constant.value)
+                }));
+                continue;
+            }
+            let twelfths = constant.value * 12.0 / std::f64::consts::PI;
+            let whole = twelfths.round();
+            if (twelfths - whole).abs() <= NOTHING * 12.0 * whole.abs().max(1.0) {
+                let whole = BigInt::from(whole.to_i64().unwrap_or(0));
+                of.push(Stand::Turn(BigRational::new(whole, BigInt::from(12))));
+                continue;
+            }
+            let same = |at: &usize| decimal(constants[*at].value) == decimal(constant.value);
+            let at = kept.iter().position(same).unwrap_or(kept.len());
+            if at == kept.len() {
+                kept.push(of.len());
+            }
+            of.push(Stand::Constant(ConstantIdx(at)));
+        }
+        Self { of, kept }
+    }
+
+    fn exact(&self, exact: &Exact) -> Exact {
+        let inner = |a: &Exact| Box::new(self.exact(a));
+        let all = |operands: &[Exact]| operands.iter().map(|a| self.exact(a)).collect();
+        match exact {
+            Exact::Symbol(Symbol::Constant(i)) => match &self.of[i.0] {
+                Stand::Number(value) => Exact::Rational(value.clone()),
+                Stand::Turn(value) if value.is_zero() => Exact::Rational(value.clone()),
+                Stand::Turn(value) => {
+                    Exact::Product(vec![Exact::Rational(value.clone()), Exact::Pi])
+                }
+                Stand::Constant(i) => Exact::Symbol(Symbol::Constant(*i)),
+            },
+            Exact::Rational(_) | Exact::Pi | Exact::Symbol(_) => exact.clone(),
+            Exact::Sum(operands) => Exact::Sum(all(operands)),
+            Exact::Product(operands) => Exact::Product(all(operands)),
+            Exact::Quotient(a, b) => Exact::Quotient(inner(a), inner(b)),
+            Exact::Negative(a) => Exact::Negative(inner(a)),
+            Exact::Power(a, n) => Exact::Power(inner(a), *n),
+            Exact::Apply(function, a) => Exact::Apply(*function, inner(a)),
+        }
+    }
+
+    fn angle(&self, angle: &Angle) -> Angle {
+        let mut pi = angle.pi.clone();
+        let mut terms: Vec<(Symbol, i32)> = Vec::new();
+        for (symbol, n) in &angle.terms {
+            let symbol = match symbol {
+                Symbol::Constant(i) => match &self.of[i.0] {
+                    Stand::Turn(value) => {
+                        pi += value * BigRational::from_integer(BigInt::from(*n));
+                        continue;
+                    }
+                    Stand::Constant(i) => Symbol::Constant(*i),
+                    Stand::Number(_) => unreachable!("what stands in an angle is one"),
+                },
+                other => *other,
+            };
+            match terms.iter_mut().find(|(known, _)| *known == symbol) {
+                Some((_, sum)) => *sum += n,
+                None => terms.push((symbol, *n)),
+            }
+        }
+        terms.retain(|(_, n)| *n != 0);
+        terms.sort_unstable();
+        Angle { pi, terms }
+    }
+
+    fn bodies(&self, parts: &mut [Part], lumped_masses: &mut [LumpedMass]) {
+        for part in parts {
+            let (Inertial::AboutCentre {
+                mass,
+                centre: moment,
+                inertia,
+            }
+            | Inertial::Linear {
+                mass,
+                first_moment: moment,
+                inertia,
+            }) = &mut part.inertial;
+            for entry in std::iter::once(mass).chain(moment).chain(inertia) {
+                *entry = self.exact(entry);
+            }
+        }
+        for lump in lumped_masses {
+            let places = lump.force_at.iter_mut().chain(&mut lump.moment_at);
+            for entry in std::iter::once(&mut lump.mass).chain(places) {
+                *entry = self.exact(entry);
+            }
+        }
+    }
+}
+
+/// The decimal that a number of the machine stands for.
+fn decimal(value: f64) -> BigRational {
+    let digits = DIGITS - 1;
+    let written = format!("{value:.digits$e}");
+    let read = written.split_once('e').and_then(|(mantissa, exponent)| {
+        let mantissa: BigInt = mantissa.replace('.', "").parse().ok()?;
+        let exponent = exponent.parse::<i32>().ok()? - i32::try_from(digits).ok()?;
+        let ten = BigRational::from_integer(BigInt::from(10));
+        let scale = num_traits::pow(ten, exponent.unsigned_abs() as usize);
+        let scale = if exponent < 0 {
+            BigRational::one() / scale
+        } else {
+            scale
+        };
+        Some(BigRational::from_integer(mantissa) * scale)
+    });
+    read.expect("a finite number has a mantissa and an exponent")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn decimals_are_those_that_were_written() {
+        let ratio = |a: i64, b: i64| BigRational::new(a.into(), b.into());
+        assert_eq!(decimal(0.3), ratio(3, 10));
+        assert_eq!(decimal(0.1 + 0.2), ratio(3, 10));
+        assert_eq!(decimal(-12.5e-7), ratio(-125, 100_000_000));
+        assert_eq!(decimal(0.0), BigRational::zero());
+        assert_eq!(decimal(6.02e23), BigRational::from_integer(BigInt::from(602) * BigInt::from(10).pow(21)));
+    }
+
+    #[test]
+    fn angles_that_are_parts_of_a_turn_stand_as_such() {
+        let constant = |value: f64, unit: &str| Constant {
+            name: "x".to_owned(),
+            value,
+            unit: unit.to_owned(),
+            is_angle: unit == "rad",
+            note: None,
+        };
+        let constants = [
+            constant(std::f64::consts::FRAC_PI_2, "rad"),
+            constant(0.5, "rad"),
+            constant(6e-17, "m"),
+            constant(0.25, "m"),
+            constant(0.5, "rad"),
+            constant(0.0, "rad"),
+        ];
+        let stands = Stands::new(&constants);
+        assert_eq!(stands.kept, [1]);
+        let name = |i: usize| Symbol::Constant(ConstantIdx(i));
+        let angle = stands.angle(&Angle {
+            pi: BigRational::zero(),
+            terms: vec![(name(0), 1), (name(1), 2), (name(4), -1), (name(5), 3)],
+        });
+        assert_eq!(angle.pi, BigRational::new(1.into(), 2.into()));
+        assert_eq!(angle.terms, [(name(0), 1)]);
+        assert_eq!(
+            stands.exact(&Exact::Symbol(name(2))),
+            Exact::Rational(BigRational::zero())
+        );
+    }
+}
