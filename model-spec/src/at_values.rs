@@ -24,7 +24,11 @@ impl Mechanism {
     pub fn at_values(&self) -> Self {
         let mut at = self.clone();
         let stands = Stands::new(&self.constants);
-        at.constants = stands.kept.iter().map(|i| self.constants[*i].clone()).collect();
+        at.constants = stands
+            .kept
+            .iter()
+            .map(|i| self.constants[*i].clone())
+            .collect();
         at.gravity = self.gravity.each_ref().map(|x| stands.exact(x));
         for frame in &mut at.frames {
             for step in &mut frame.steps {
@@ -210,7 +214,10 @@ mod tests {
         assert_eq!(decimal(0.1 + 0.2), ratio(3, 10));
         assert_eq!(decimal(-12.5e-7), ratio(-125, 100_000_000));
         assert_eq!(decimal(0.0), BigRational::zero());
-        assert_eq!(decimal(6.02e23), BigRational::from_integer(BigInt::from(602) * BigInt::from(10).pow(21)));
+        assert_eq!(
+            decimal(6.02e23),
+            BigRational::from_integer(BigInt::from(602) * BigInt::from(10).pow(21))
+        );
     }
 
     #[test]

@@ -25,9 +25,13 @@ pub fn base(derivation: &Derivation, parameters: &[f64]) -> Vec<f64> {
     let products = products(derivation, parameters);
     let reduction = &derivation.reduction;
     let mut base: Vec<f64> = reduction.retained.iter().map(|k| products[*k]).collect();
-    for line in &reduction.dependencies {
-        for (k, factor) in &line.equals {
-            base[*k] += factor.value_f64(&constants) * products[line.product];
+    for (line, factors) in reduction
+        .dependencies
+        .iter()
+        .zip(reduction.factors(&constants))
+    {
+        for (k, factor) in factors {
+            base[k] += factor * products[line.product];
         }
     }
     base

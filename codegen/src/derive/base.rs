@@ -47,6 +47,13 @@ impl Derivation {
             .collect()
     }
 
+    /// Sums that base parameters refer to, with their expressions, each after those that it needs; none unless base
+    /// parameters that are written out would be too long to read.
+    pub fn base_sums(&self) -> Vec<(String, String)> {
+        let sums = base::sums(&self.mechanism, &self.reduction).into_iter();
+        sums.map(|(name, formula)| (name, formula.text())).collect()
+    }
+
     /// Eq. (6), one line per dependent product: `h[m2] = d1*h[m1*dc1] + ...`.
     pub fn dependency_texts(&self) -> Vec<String> {
         let column = |product: usize| {
@@ -56,9 +63,12 @@ impl Derivation {
             )
         };
         let lines = self.reduction.dependencies.iter().map(|line| {
-            let terms = line.equals.iter().map(|(k, factor)| {
-                let retained = Formula::name(column(self.reduction.retained[*k]));
-                Formula::product(Rational::ONE, [factor.formula(&self.mechanism), retained])
+            let retained = line.equals.iter();
+            let retained = retained.map(|(k, factor)| (self.reduction.retained[*k], factor));
+            let via = line.via.iter().map(|(product, factor)| (*product, factor));
+            let terms = retained.chain(via).map(|(product, factor)| {
+                let column = Formula::name(column(product));
+                Formula::product(Rational::ONE, [factor.formula(&self.mechanism), column])
             });
             format!("{} = {}", column(line.product), Formula::sum(terms).text())
         });
@@ -70,9 +80,13 @@ impl Derivation {
         let reduction = &self.reduction;
         let value = |product: usize| reduction.products[product].value(parameters);
         let mut base: Vec<f64> = reduction.retained.iter().map(|k| value(*k)).collect();
-        for line in &reduction.dependencies {
-            for (k, factor) in &line.equals {
-                base[*k] += factor.value_f64(constants) * value(line.product);
+        for (line, factors) in reduction
+            .dependencies
+            .iter()
+            .zip(reduction.factors(constants))
+        {
+            for (k, factor) in factors {
+                base[k] += factor * value(line.product);
             }
         }
         base
@@ -88,9 +102,11 @@ impl Derivation {
         let mut polynomials: Vec<Vec<(Monomial, BigRational)>> = retained
             .map(|k| vec![(product(*k), BigRational::one())])
             .collect();
-        for line in &reduction.dependencies {
-            for (k, factor) in &line.equals {
-                polynomials[*k].push((product(line.product), factor.value_exact(constants)));
+        let factors = reduction.factors_by(&|factor| Some(factor.value_exact(constants)));
+        let factors = factors.expect("numbers have a value for everything");
+        for (line, factors) in reduction.dependencies.iter().zip(factors) {
+            for (k, factor) in factors {
+                polynomials[k].push((product(line.product), factor));
             }
         }
         polynomials

@@ -245,11 +245,11 @@ fn culprits(derivation: &Derivation, found: &Lost) -> DeriveError {
     let lines: Vec<(usize, Vec<(usize, f64)>)> = reduction
         .dependencies
         .iter()
-        .map(|line| {
-            let terms = line.equals.iter().map(|(k, factor)| {
+        .zip(reduction.factors(&constants))
+        .map(|(line, factors)| {
+            let terms = factors.iter().map(|(k, factor)| {
                 let retained = reduction.retained[*k];
-                let term =
-                    factor.value_f64(&constants) * found.values[line.product] * norm(retained);
+                let term = factor * found.values[line.product] * norm(retained);
                 // What is no number is larger than any.
                 (
                     retained,
@@ -419,7 +419,8 @@ mod tests {
     #[test]
     fn differences_in_denominators_are_exact() {
         for exponent in [4, 6, 8] {
-            let derivation = crate::derive::derive(&pendulum(10_f64.powi(-exponent), MASSES)).unwrap();
+            let derivation =
+                crate::derive::derive(&pendulum(10_f64.powi(-exponent), MASSES)).unwrap();
             let [error, _] = errors_by_hand(&derivation);
             assert!(
                 error < 10_f64.powi(exponent - 15),
@@ -556,9 +557,9 @@ mod tests {
             let lost = lost(&derivation).unwrap().unwrap().error;
             assert!(lost < 1e-13, "{z:?}: {lost:e}");
             let lines = derivation.reduction.dependencies.iter();
-            let has_quotients = lines
-                .flat_map(|line| &line.equals)
-                .any(|(_, factor)| factor.denominator != RationalFunction::constant(Rational::ONE).denominator);
+            let has_quotients = lines.flat_map(|line| &line.equals).any(|(_, factor)| {
+                factor.denominator != RationalFunction::constant(Rational::ONE).denominator
+            });
             assert!(!has_quotients);
         }
     }

@@ -15,19 +15,66 @@ pub(crate) fn name(k: usize) -> String {
     format!("p{}_min", k + 1)
 }
 
-/// Base parameter `k` written out term by term: what a script reads.
+/// Base parameter `k` written out term by term: what a script reads. It refers to [`sums`].
 pub(crate) fn written_out(mechanism: &Mechanism, reduction: &Reduction, k: usize) -> Formula {
     let mut terms = vec![product_formula(
         mechanism,
         &reduction.products[reduction.retained[k]],
     )];
-    for line in &reduction.dependencies {
-        let factors = factors(mechanism, &reduction.products[line.product]);
+    for (at, line) in reduction.dependencies.iter().enumerate() {
         for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
+            let factors = lumped(mechanism, reduction, at);
             terms.extend(factor.expanded_times(mechanism, &factors));
         }
     }
     Formula::sum(terms)
+}
+
+/// What dependent products stand for that others go by: the product itself and theirs, as Gautier and Khalil (1990) group
+/// link by link. Each with its name, after those that it needs.
+pub(crate) fn sums(mechanism: &Mechanism, reduction: &Reduction) -> Vec<(String, Formula)> {
+    let outer_first = reduction.inner_first().into_iter().rev();
+    let sum = |line: usize| {
+        let name = sum_name(mechanism, reduction, line)?;
+        let product = reduction.dependencies[line].product;
+        let mut terms = vec![product_formula(mechanism, &reduction.products[product])];
+        for (outer, dependency) in reduction.dependencies.iter().enumerate() {
+            for (_, factor) in dependency.via.iter().filter(|(p, _)| *p == product) {
+                let factors = lumped(mechanism, reduction, outer);
+                terms.extend(factor.expanded_times(mechanism, &factors));
+            }
+        }
+        Some((name, Formula::sum(terms)))
+    };
+    outer_first.filter_map(sum).collect()
+}
+
+/// The name of the sum that a dependent product stands for, if others go by it.
+fn sum_name(mechanism: &Mechanism, reduction: &Reduction, line: usize) -> Option<String> {
+    let product = reduction.dependencies[line].product;
+    let mut via = reduction.dependencies.iter().flat_map(|line| &line.via);
+    if !via.any(|(p, _)| *p == product) {
+        return None;
+    }
+    let constants = mechanism.constants.iter().map(|c| c.name.as_str());
+    let parameters = mechanism.parameters.iter().map(|p| p.name.as_str());
+    let taken: Vec<&str> = constants.chain(parameters).collect();
+    let mut stem = "sum".to_owned();
+    while taken.iter().any(|name| name.starts_with(&stem)) {
+        stem.push('_');
+    }
+    Some(format!("{stem}{}", line + 1))
+}
+
+/// What a dependent product brings into others: its sum, or the product itself.
+pub(crate) fn lumped(mechanism: &Mechanism, reduction: &Reduction, line: usize) -> Vec<Formula> {
+    match sum_name(mechanism, reduction, line) {
+        Some(name) => vec![Formula::name(name)],
+        None => factors(
+            mechanism,
+            &reduction.products[reduction.dependencies[line].product],
+        ),
+    }
 }
 
 /// What base parameters divide by: a function of the constants that may vanish.
@@ -42,8 +89,8 @@ pub(crate) struct Denominator {
 /// Every denominator of eq. (16), powers of a constant by the constant itself.
 pub(crate) fn denominators(mechanism: &Mechanism, reduction: &Reduction) -> Vec<Denominator> {
     let mut found: BTreeSet<Polynomial> = BTreeSet::new();
-    let factors = reduction.dependencies.iter().flat_map(|line| &line.equals);
-    for (_, factor) in factors {
+    let lines = reduction.dependencies.iter();
+    for (_, factor) in lines.flat_map(|line| line.equals.iter().chain(&line.via)) {
         if factor.denominator.len() > 1 {
             found.insert(factor.denominator.clone());
             continue;
@@ -100,11 +147,20 @@ pub(crate) fn expressions(graph: &mut Graph, reduction: &Reduction) -> Vec<ExprI
         .iter()
         .map(|k| vec![product(graph, &reduction.products[*k])])
         .collect();
-    for line in &reduction.dependencies {
-        let value = product(graph, &reduction.products[line.product]);
-        for (k, factor) in &line.equals {
+    // What each dependent product is worth with those that go by it, outer ones first.
+    let lines = &reduction.dependencies;
+    let mut worth: Vec<Vec<ExprId>> = (lines.iter())
+        .map(|line| vec![product(graph, &reduction.products[line.product])])
+        .collect();
+    for i in reduction.inner_first().into_iter().rev() {
+        let value = graph.add_all(&worth[i]);
+        for (k, factor) in &lines[i].equals {
             let factor = factor.expression(graph);
             terms[*k].push(graph.mul(factor, value));
+        }
+        for (inner, factor) in &lines[i].via {
+            let factor = factor.expression(graph);
+            worth[reduction.line_of(*inner)].push(graph.mul(factor, value));
         }
     }
     terms.iter().map(|terms| graph.add_all(terms)).collect()

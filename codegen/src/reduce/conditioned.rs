@@ -7,6 +7,8 @@
 //! exchanges of M. Gu and S. C. Eisenstat, "Efficient algorithms for computing a strong rank-revealing QR factorization",
 //! 1996, over a base that is given).
 
+use std::collections::BTreeMap;
+
 use modelmill_algebra::field::Stream;
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
@@ -17,8 +19,8 @@ use crate::expr::{ExprId, Graph};
 use crate::loops::numeric_poses::symmetric;
 use crate::regressor::projection::Projection;
 
-/// Largest factor between columns of unit length that calls for no exchange: bases that are sound stay far below, and a
-/// base within it loses three digits of sixteen.
+/// Largest factor that calls for no exchange, each column measured by the longest of a parameter of its unit: bases that
+/// are sound stay far below, and a base within it loses three digits of sixteen.
 const MOST_GROWTH: f64 = 1e3;
 
 /// How far constants are moved, in rad or relative to their size: far enough that columns which coincide differ by more than
@@ -28,12 +30,20 @@ const BESIDE: f64 = 1e-5;
 /// What must be left of a column beside others, relative to its size, that they make it up.
 const MADE_UP: f64 = 1e-6;
 
+/// Columns of the regressor.
+pub(super) struct Columns<'a> {
+    /// What stands in them, drive by drive.
+    pub(super) values: &'a [Vec<ExprId>],
+    /// SI units of their products.
+    pub(super) units: &'a [String],
+}
+
 /// The retained columns, some exchanged for dependent ones; `None` if all can stay. Columns in `named` stay in any case.
 pub(super) fn exchanged(
     graph: &mut Graph,
     mechanism: &Mechanism,
     projection: &Projection,
-    columns: &[Vec<ExprId>],
+    columns: &Columns<'_>,
     retained: &[usize],
     dependent: &[usize],
     named: &[usize],
@@ -42,15 +52,14 @@ pub(super) fn exchanged(
         return None;
     }
     let moved = beside(mechanism);
-    let n_rows = columns.len() + columns.len() / 2;
+    let n_rows = columns.values.len() + columns.values.len() / 2;
     let mut sampled = |mechanism: &Mechanism| {
-        let w = sample(graph, mechanism, projection, columns, n_rows).ok()?;
-        Factors::new(&w, retained, dependent)
+        let w = sample(graph, mechanism, projection, columns.values, n_rows).ok()?;
+        Factors::new(&w, columns.units, retained, dependent)
     };
     let mut factors = sampled(&moved).or_else(|| sampled(mechanism))?;
     let fixed: Vec<bool> = retained.iter().map(|k| named.contains(k)).collect();
     let mut has_changed = false;
-    if std::env::var("MM_DEBUG").is_ok() { eprintln!("growth {} {:e}", mechanism.name, factors.values.amax()); }
     while let Some((i, j)) = factors.largest(&fixed) {
         factors.exchange(i, j);
         has_changed = true;
@@ -78,7 +87,7 @@ fn beside(mechanism: &Mechanism) -> Mechanism {
     moved
 }
 
-/// Dependent columns by retained ones, all of unit length.
+/// Dependent columns by retained ones, each measured by the longest of its unit.
 struct Factors {
     retained: Vec<usize>,
     dependent: Vec<usize>,
@@ -87,8 +96,13 @@ struct Factors {
 
 impl Factors {
     /// `None` where the sampled columns are no numbers, or where retained columns do not make up the others.
-    fn new(w: &DMatrix<f64>, retained: &[usize], dependent: &[usize]) -> Option<Self> {
-        let units = |columns: &[usize]| {
+    fn new(
+        w: &DMatrix<f64>,
+        units: &[String],
+        retained: &[usize],
+        dependent: &[usize],
+    ) -> Option<Self> {
+        let of_unit_length = |columns: &[usize]| {
             let mut picked = w.select_columns(columns);
             for mut column in picked.column_iter_mut() {
                 let norm = column.norm();
@@ -98,18 +112,33 @@ impl Factors {
             }
             picked
         };
-        let (basis, others) = (units(retained), units(dependent));
+        let (basis, others) = (of_unit_length(retained), of_unit_length(dependent));
         let qr = basis.clone().qr();
         let mut values = others.clone();
         qr.q_tr_mul(&mut values);
         let values = values.rows(0, retained.len()).into_owned();
-        let values = qr.unpack_r().solve_upper_triangular(&values)?;
+        let mut values = qr.unpack_r().solve_upper_triangular(&values)?;
         let left = others - basis * &values;
         let is_made_up = left.column_iter().zip(values.column_iter());
         let is_made_up = is_made_up
             .into_iter()
             .all(|(left, factors)| left.norm() <= MADE_UP * (1.0 + factors.amax()));
-        is_made_up.then(|| Self {
+        if !is_made_up {
+            return None;
+        }
+        // A column that all but vanishes is written by others with large factors, and others by it.
+        let mut longest: BTreeMap<&str, f64> = BTreeMap::new();
+        for (column, unit) in w.column_iter().zip(units) {
+            let most = longest.entry(unit).or_default();
+            *most = most.max(column.norm());
+        }
+        let share = |k: usize| w.column(k).norm() / longest[units[k].as_str()];
+        for (j, mut column) in values.column_iter_mut().enumerate() {
+            for (factor, k) in column.iter_mut().zip(retained) {
+                *factor *= share(dependent[j]) / share(*k);
+            }
+        }
+        Some(Self {
             retained: retained.to_vec(),
             dependent: dependent.to_vec(),
             values,

@@ -3,9 +3,8 @@
 use modelmill_algebra::field::{Element, MODULUS, PRIMES, Stream};
 use modelmill_spec::Mechanism;
 
-use super::rational_function::RationalFunction;
 use super::reduction::{Dependency, Method, Reduction};
-use super::relations::{self, ColumnRelation};
+use super::relations::{self, ColumnRelation, Written};
 use super::sample::SampledRegressor;
 use crate::DeriveError;
 use crate::tree::expressions::Monomial;
@@ -26,6 +25,8 @@ pub(super) struct Dependences {
     pub(super) wanted: Vec<(usize, usize)>,
     /// The same dependences, also between columns that are closer together.
     pub(super) relations: Vec<ColumnRelation>,
+    /// At how many points of motion everything was seen.
+    pub(super) n_points: usize,
 }
 
 impl Dependences {
@@ -36,7 +37,7 @@ impl Dependences {
     ) -> Result<Self, DeriveError> {
         let n = regressor.n_columns;
         let constants = regressor.sampler.constants::<MODULUS>(stream)?;
-        let echelon = regressor.echelon(&constants, order, None, stream)?;
+        let (echelon, n_points) = regressor.echelon(&constants, order, None, stream)?;
         let shown: Vec<usize> = (0..n).filter(|k| echelon.is_seen(*k)).collect();
         let mut pivots = echelon.pivots.clone();
         pivots.sort_unstable();
@@ -60,6 +61,7 @@ impl Dependences {
             dependent,
             wanted,
             relations,
+            n_points,
         })
     }
 
@@ -68,7 +70,7 @@ impl Dependences {
         mechanism: &Mechanism,
         candidates: &[Monomial],
         name: &dyn Fn(usize) -> Monomial,
-        factors: Vec<Option<RationalFunction>>,
+        lines: Vec<Written>,
     ) -> Result<Reduction, DeriveError> {
         let position = |k: usize| {
             self.shown
@@ -82,24 +84,23 @@ impl Dependences {
             .map(|j| Dependency {
                 product: position(*j),
                 equals: Vec::new(),
+                via: Vec::new(),
             })
             .collect();
-        for ((j, p), factor) in self.wanted.iter().zip(factors) {
-            let retained = self
-                .pivots
-                .iter()
-                .position(|x| x == p)
-                .expect("a wanted pivot is one");
-            let line = self
-                .dependent
-                .iter()
-                .position(|x| x == j)
-                .expect("a wanted column is dependent");
-            let factor = factor.ok_or_else(|| DeriveError::FactorNotRecovered {
-                product: name(*j).text(mechanism),
-                retained: name(*p).text(mechanism),
-            })?;
-            dependencies[line].equals.push((retained, factor));
+        for written in lines {
+            let j = written.column;
+            let line = (self.dependent.iter().position(|x| *x == j))
+                .expect("a written column is dependent");
+            for (p, factor) in written.by {
+                let factor = factor.ok_or_else(|| DeriveError::FactorNotRecovered {
+                    product: name(j).text(mechanism),
+                    retained: name(p).text(mechanism),
+                })?;
+                match self.pivots.iter().position(|x| *x == p) {
+                    Some(retained) => dependencies[line].equals.push((retained, factor)),
+                    None => dependencies[line].via.push((position(p), factor)),
+                }
+            }
         }
         let products: Vec<Monomial> = self.shown.iter().map(|k| name(*k)).collect();
         Ok(Reduction {
@@ -135,10 +136,12 @@ impl Reduction {
                 self.products.iter().map(|_| stream.element()).collect();
             let mut base: Vec<Element<FRESH>> =
                 self.retained.iter().map(|k| parameters[*k]).collect();
-            for line in &self.dependencies {
-                for (k, factor) in &line.equals {
-                    let factor = factor.value(&constants).ok_or(DeriveError::RankChanged)?;
-                    base[*k] = base[*k] + factor * parameters[line.product];
+            let factors = self
+                .factors_by(&|factor| factor.value(&constants))
+                .ok_or(DeriveError::RankChanged)?;
+            for (line, factors) in self.dependencies.iter().zip(factors) {
+                for (k, factor) in factors {
+                    base[k] = base[k] + factor * parameters[line.product];
                 }
             }
             for _ in 0..CONFIRMED_AT {

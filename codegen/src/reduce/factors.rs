@@ -5,9 +5,8 @@ use modelmill_algebra::field::{Element, Stream};
 
 use super::dependences::Dependences;
 use super::oracle::{Budget, Occurrence, Oracle};
-use super::rational_function::RationalFunction;
 use super::reconstruct::{self, Survey};
-use super::relations::{self, ColumnRelation, Related};
+use super::relations::{self, ColumnRelation, Related, Written};
 use super::sample::SampledRegressor;
 use crate::DeriveError;
 use crate::expr::FieldPoint;
@@ -15,10 +14,13 @@ use crate::expr::FieldPoint;
 /// Operations of the field that factors may take: a minute or so.
 pub(super) const MOST_OPERATIONS: u64 = 20_000_000_000;
 
-/// Factors of no more constants than this are found at once.
-const FEW: usize = 6;
+/// Relations to retained columns that are not longer than this are as good as near ones.
+const FEW: usize = 12;
 
-/// The wanted factors of the dependences; those that resist are `None`.
+/// Terms of all factors on retained columns beyond which nobody reads them: then columns are written by near ones.
+const MOST_TERMS: usize = 20_000;
+
+/// The dependent columns by others; factors that resist are `None`.
 pub(super) fn find(
     dependences: &Dependences,
     regressor: &SampledRegressor,
@@ -26,7 +28,7 @@ pub(super) fn find(
     roots: &[i64],
     operations: u64,
     stream: &mut Stream,
-) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
+) -> Result<Vec<Written>, DeriveError> {
     if dependences.wanted.is_empty() {
         return Ok(Vec::new());
     }
@@ -53,7 +55,26 @@ pub(super) fn find(
     }
 }
 
-/// The wanted factors by some relations, those to retained columns among them.
+/// How many factors on retained columns have lengths in a denominator.
+pub(super) fn n_quotients(
+    dependences: &Dependences,
+    regressor: &SampledRegressor,
+    variables: &[Occurrence],
+    stream: &mut Stream,
+) -> Result<usize, DeriveError> {
+    let direct = dependences.relations.iter().filter(|r| r.is_direct());
+    let direct: Vec<ColumnRelation> = direct.cloned().collect();
+    let mut oracle = FromMotion {
+        regressor,
+        dependences,
+        relations: &direct,
+        sampling: stream.clone(),
+        budget: &mut Budget::new(MOST_OPERATIONS),
+    };
+    reconstruct::n_quotients(&mut oracle, variables, stream)
+}
+
+/// The dependent columns by some relations, those to retained columns among them.
 fn by_relations(
     all: &[ColumnRelation],
     dependences: &Dependences,
@@ -62,60 +83,40 @@ fn by_relations(
     roots: &[i64],
     budget: &mut Budget,
     stream: &mut Stream,
-) -> Result<Vec<Option<RationalFunction>>, DeriveError> {
-    let mut oracle = FromMotion {
-        regressor,
-        pivots: &dependences.pivots,
-        relations: all,
-        sampling: stream.clone(),
-        budget,
-    };
-    let mut survey = Survey::new(&mut oracle, variables, roots, stream)?;
-    let starts: Vec<usize> = (all.iter())
-        .scan(0, |next, relation| {
-            let start = *next;
-            *next += relation.len();
-            Some(start)
-        })
-        .collect();
-    let factors_of = |i: usize| starts[i]..starts[i] + all[i].len();
-    // What is near is taken where its factors depend on far fewer constants.
-    let most_constants = |i: usize| {
-        factors_of(i)
-            .map(|k| survey.n_constants(k))
-            .max()
-            .unwrap_or(0)
-    };
-    let chosen: Vec<usize> = (0..all.len())
-        .filter(|i| all[*i].is_direct())
-        .map(|direct| {
-            let next = direct + 1;
-            let has_near = all.get(next).is_some_and(|near| !near.is_direct());
-            if has_near && most_constants(direct) > FEW.max(2 * most_constants(next)) {
-                next
-            } else {
-                direct
-            }
-        })
-        .collect();
-    let mut found = |chosen: &[usize], stream: &mut Stream| -> Result<Related, DeriveError> {
-        let factors = |i: &usize| {
-            let is_needed = all[*i].is_direct();
-            factors_of(*i).map(move |k| (k, is_needed))
+) -> Result<Vec<Written>, DeriveError> {
+    let mut found = |chosen: Vec<ColumnRelation>, stream: &mut Stream| {
+        let mut oracle = FromMotion {
+            regressor,
+            dependences,
+            relations: &chosen,
+            sampling: stream.clone(),
+            budget: &mut *budget,
         };
-        let wanted: Vec<(usize, bool)> = chosen.iter().flat_map(factors).collect();
+        let mut survey = Survey::new(&mut oracle, variables, roots, stream)?;
+        let wanted: Vec<(usize, bool)> = (chosen.iter())
+            .flat_map(|r| std::iter::repeat_n(r.is_direct(), r.len()))
+            .enumerate()
+            .collect();
         let factors = survey.functions(&mut oracle, &wanted, stream)?;
-        Ok(Related::new(chosen.iter().map(|i| &all[*i]), factors))
+        Ok::<_, DeriveError>(Related::new(chosen.iter(), factors))
     };
-    let mut related = found(&chosen, stream)?;
+    // Near relations come right behind those to retained columns.
+    let nearest = (0..all.len()).filter(|i| all.get(i + 1).is_none_or(ColumnRelation::is_direct));
+    let mut related = found(nearest.map(|i| all[i].clone()).collect(), stream)?;
     // What is near need not be simple: where the first joints of an arm do not feel all of a link, relations between links
     // divide by sines of twists, and those to retained columns do not.
+    let is_long = related.is_complete() && related.n_terms() > MOST_TERMS;
     let unwieldy = related.unwieldy();
-    let direct: Vec<usize> = (0..all.len())
-        .filter(|i| all[*i].is_direct() && unwieldy.contains(&all[*i].column))
+    let direct: Vec<ColumnRelation> = (all.iter())
+        .filter(|r| r.is_direct() && unwieldy.contains(&r.column))
+        .filter(|r| !is_long || r.len() <= FEW)
+        .cloned()
         .collect();
     if !direct.is_empty() && !related.is_lost() {
-        related.replace(found(&direct, stream)?);
+        related.replace(found(direct, stream)?);
+    }
+    if is_long {
+        return Ok(related.written());
     }
     let mut written = related.written_out(&dependences.wanted, roots);
     let missing: Vec<usize> = (0..written.len())
@@ -126,20 +127,25 @@ fn by_relations(
             related: &related,
             regressor,
             wanted: missing.iter().map(|k| dependences.wanted[*k]).collect(),
-            budget: &mut *oracle.budget,
+            budget,
         };
         let found = reconstruct::reconstruct(&mut rest, variables, roots, stream)?;
         for (k, function) in missing.into_iter().zip(found) {
             written[k] = function;
         }
     }
-    Ok(written)
+    let pairs = dependences.wanted.iter().zip(written);
+    let line = |((column, p), factor): (&(usize, usize), _)| Written {
+        column: *column,
+        by: vec![(*p, factor)],
+    };
+    Ok(pairs.map(line).collect())
 }
 
 /// The factors of relations, from points of motion.
 struct FromMotion<'a> {
     regressor: &'a SampledRegressor,
-    pivots: &'a [usize],
+    dependences: &'a Dependences,
     relations: &'a [ColumnRelation],
     sampling: Stream,
     budget: &'a mut Budget,
@@ -157,12 +163,23 @@ impl Oracle for FromMotion<'_> {
         &mut self,
         constants: &FieldPoint<Element<P>>,
     ) -> Result<Vec<Element<P>>, DeriveError> {
-        let rank = self.pivots.len();
-        self.spend(rank * rank * self.regressor.n_columns)?;
-        let rank = Some(rank);
-        let echelon = self
-            .regressor
-            .echelon(constants, self.pivots, rank, &mut self.sampling)?;
+        let rank = self.dependences.pivots.len();
+        let at_once = rank * rank * self.regressor.n_columns;
+        let one_by_one: usize = self.relations.iter().map(|r| (r.len() + 1).pow(3)).sum();
+        self.spend(at_once.min(one_by_one))?;
+        if one_by_one < at_once {
+            let mut rows = Vec::new();
+            for _ in 0..self.dependences.n_points {
+                rows.extend(self.regressor.point(constants, &mut self.sampling)?);
+            }
+            return relations::values_from_rows(self.relations, &rows);
+        }
+        let (echelon, _) = self.regressor.echelon(
+            constants,
+            &self.dependences.pivots,
+            Some(rank),
+            &mut self.sampling,
+        )?;
         relations::values(self.relations, &echelon)
     }
 
@@ -245,10 +262,7 @@ mod tests {
     }
 
     /// Factors by near relations where they pay, and by relations to retained columns alone.
-    fn both(
-        mechanism: &Mechanism,
-        operations: u64,
-    ) -> Result<[Vec<Option<RationalFunction>>; 2], DeriveError> {
+    fn both(mechanism: &Mechanism, operations: u64) -> Result<[Vec<Written>; 2], DeriveError> {
         let mut graph = Graph::new();
         let equations = crate::regressor::equations(&mut graph, mechanism)?;
         let columns: Vec<&Vec<ExprId>> = (equations.columns.iter())
@@ -286,7 +300,8 @@ mod tests {
     #[test]
     fn factors_put_together_from_near_ones_are_those_that_are_found_at_once() {
         let [near, direct] = both(&twisted(4), MOST_OPERATIONS).unwrap();
-        assert!(direct.iter().all(Option::is_some));
+        let all = direct.iter().flat_map(|line| &line.by);
+        assert!(all.clone().count() > 50 && all.clone().all(|(_, factor)| factor.is_some()));
         assert_eq!(near, direct);
     }
 

@@ -34,7 +34,7 @@ use crate::regressor::Equations;
 use crate::tree::expressions::Monomial;
 use constants::{occurrences, root_radicands};
 use dependences::Dependences;
-use preference::preference;
+use preference::{Preference, preference};
 use sample::sampled;
 
 /// Reduces the columns `columns[k][d]` (product by drive) to a base.
@@ -55,12 +55,17 @@ pub(crate) fn reduce(
     let effective: Vec<usize> = (0..columns.len())
         .filter(|k| columns[*k].iter().any(|x| *x != Graph::ZERO))
         .collect();
-    let (order, n_named) = preference(graph, mechanism, equations, &effective);
+    let preference = preference(graph, mechanism, equations, &effective);
     let outputs: Vec<ExprId> = (0..projection.drives.len())
         .flat_map(|d| effective.iter().map(move |k| columns[*k][d]))
         .collect();
     let exact = reduce_exactly(
-        graph, mechanism, equations, &effective, &order, n_named, &outputs,
+        graph,
+        mechanism,
+        equations,
+        &effective,
+        &preference,
+        &outputs,
     );
     let exact = exact.and_then(|found| {
         // Loops are sampled on their algebraic variety; machines live on the branch of the nominal pose.
@@ -82,7 +87,8 @@ pub(crate) fn reduce(
             | DeriveError::NotConfirmed
             | DeriveError::RankChanged),
         ) => {
-            let order: Vec<usize> = order.into_iter().map(|k| effective[k]).collect();
+            let order = preference.own_first.iter();
+            let order: Vec<usize> = order.map(|k| effective[*k]).collect();
             numeric::reduce(
                 graph, mechanism, projection, candidates, columns, &order, because,
             )
@@ -96,33 +102,48 @@ fn reduce_exactly(
     mechanism: &Mechanism,
     equations: &Equations,
     effective: &[usize],
-    order: &[usize],
-    n_named: usize,
+    preference: &Preference,
     outputs: &[ExprId],
 ) -> Result<Reduction, DeriveError> {
     let (projection, candidates) = (&equations.projection, &equations.products);
     let regressor = sampled(graph, mechanism, projection, outputs, effective.len())?;
     let mut stream = Stream::new(SEED);
+    let roots = root_radicands(graph, outputs, &projection.loops.residual);
+    let variables = occurrences(graph, outputs, &projection.loops.residual);
+    let mut order = &preference.declared;
     let mut dependences = Dependences::find(&regressor, order, &mut stream)?;
+    if preference.own_first != preference.declared {
+        let other = Dependences::find(&regressor, &preference.own_first, &mut stream)?;
+        let mut n_quotients = |dependences: &Dependences| {
+            factors::n_quotients(dependences, &regressor, &variables, &mut stream)
+        };
+        if other.pivots != dependences.pivots && n_quotients(&other)? < n_quotients(&dependences)? {
+            (order, dependences) = (&preference.own_first, other);
+        }
+    }
     let columns: Vec<Vec<ExprId>> = (effective.iter())
         .map(|k| equations.columns[*k].clone())
+        .collect();
+    let units: Vec<String> = (effective.iter())
+        .map(|k| base::unit(mechanism, &candidates[*k]))
         .collect();
     let better = conditioned::exchanged(
         graph,
         mechanism,
         projection,
-        &columns,
+        &conditioned::Columns {
+            values: &columns,
+            units: &units,
+        },
         &dependences.pivots,
         &dependences.dependent,
-        &order[..n_named],
+        &order[..preference.n_named],
     );
     if let Some(better) = better {
         let (first, rest): (Vec<usize>, Vec<usize>) =
             order.iter().partition(|k| better.contains(k));
         dependences = Dependences::find(&regressor, &[first, rest].concat(), &mut stream)?;
     }
-    let roots = root_radicands(graph, outputs, &projection.loops.residual);
-    let variables = occurrences(graph, outputs, &projection.loops.residual);
     let factors = factors::find(
         &dependences,
         &regressor,

@@ -4,9 +4,9 @@
 
 use modelmill_algebra::field::Stream;
 use modelmill_spec::Mechanism;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
-use super::rational_function::RationalFunction;
+use super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
 use super::reduction::{Dependency, Method, Reduction};
 use crate::DeriveError;
 use crate::expr::independent::SEED;
@@ -37,45 +37,41 @@ pub(super) fn reduce(
     let w = sample(graph, mechanism, projection, columns, 4 * columns.len())?;
     let norms: Vec<f64> = (0..columns.len()).map(|k| w.column(k).norm()).collect();
     let largest = norms.iter().fold(0.0, |a: f64, b| a.max(*b));
-    let mut kept: Vec<usize> = Vec::new();
+    let mut effective: Vec<usize> = (order.iter().copied())
+        .filter(|k| norms[*k] > NOTHING * largest)
+        .collect();
+    let units = DMatrix::from_fn(w.nrows(), effective.len(), |i, j| {
+        w[(i, effective[j])] / norms[effective[j]]
+    });
+    let rank = rank(&units);
+    let Chosen {
+        kept: chosen,
+        least_kept,
+        most_dropped,
+    } = Chosen::new(&units, rank);
+    let kept: Vec<usize> = chosen.iter().map(|j| effective[*j]).collect();
+    let basis = units.select_columns(&chosen);
+    let qr = basis.qr();
+    let triangle = qr.r();
     let mut lines: Vec<(usize, Vec<f64>)> = Vec::new();
-    let (mut least_kept, mut most_dropped) = (1.0_f64, 0.0_f64);
-    let mut effective = Vec::new();
-    for &k in order {
-        if norms[k] <= NOTHING * largest {
+    for (j, k) in effective.iter().enumerate() {
+        if chosen.contains(&j) {
             continue;
         }
-        effective.push(k);
-        let basis = DMatrix::from_fn(w.nrows(), kept.len(), |i, j| {
-            w[(i, kept[j])] / norms[kept[j]]
-        });
-        let column: DVector<f64> = w.column(k) / norms[k];
-        let factors = if kept.is_empty() {
-            DVector::zeros(0)
-        } else {
-            let qr = basis.clone().qr();
-            let rotated = qr.q().transpose() * &column;
-            qr.r()
-                .solve_upper_triangular(&rotated)
-                .ok_or(DeriveError::RankChanged)?
-        };
-        let left = (&column - &basis * &factors).norm();
-        if left > DEPENDENT {
-            least_kept = least_kept.min(left);
-            kept.push(k);
-        } else {
-            most_dropped = most_dropped.max(left);
-            // What contributes less than is dropped is rounding.
-            let above_rounding = |f: f64| if f.abs() > DEPENDENT { f } else { 0.0 };
-            lines.push((
-                k,
-                factors
-                    .iter()
-                    .zip(&kept)
-                    .map(|(f, j)| above_rounding(*f) * norms[k] / norms[*j])
-                    .collect(),
-            ));
-        }
+        let mut rotated = units.columns(j, 1).into_owned();
+        qr.q_tr_mul(&mut rotated);
+        let factors = triangle
+            .solve_upper_triangular(&rotated.rows(0, chosen.len()))
+            .ok_or(DeriveError::RankChanged)?;
+        // What contributes less than is dropped is rounding.
+        let above_rounding = |f: f64| if f.abs() > DEPENDENT { f } else { 0.0 };
+        let factors = factors.iter().zip(&kept);
+        lines.push((
+            *k,
+            factors
+                .map(|(f, j)| above_rounding(*f) * norms[*k] / norms[*j])
+                .collect(),
+        ));
     }
     effective.sort_unstable();
     let at = |k: usize| {
@@ -100,10 +96,11 @@ pub(super) fn reduce(
                             .iter()
                             .position(|x| x == j)
                             .expect("a kept column is kept"),
-                        decimal(*f),
+                        recognised(*f, mechanism),
                     )
                 })
                 .collect(),
+            via: Vec::new(),
         })
         .collect();
     dependencies.sort_by_key(|line| line.product);
@@ -123,6 +120,135 @@ pub(super) fn reduce(
             because: Box::new(because),
         },
     })
+}
+
+/// The rank of columns of unit length: up to the widest gap between singular values where they are small.
+fn rank(units: &DMatrix<f64>) -> usize {
+    /// Singular values above this share of the largest count.
+    const LARGE: f64 = 1e-6;
+    /// Below, all is rounding.
+    const ROUNDING: f64 = 1e-15;
+    if units.ncols() == 0 {
+        return 0;
+    }
+    let mut values: Vec<f64> = units.singular_values().iter().copied().collect();
+    values.sort_by(|a, b| b.total_cmp(a));
+    let floor = ROUNDING * values[0];
+    values.push(0.0);
+    let gap = |k: usize| values[k - 1].max(floor) / values[k].max(floor);
+    let candidates = (1..values.len()).filter(|k| values[*k] <= LARGE * values[0]);
+    // Of equal gaps the first.
+    let widest = candidates.fold(None, |best: Option<usize>, k| match best {
+        Some(best) if gap(best) >= gap(k) => Some(best),
+        _ => Some(k),
+    });
+    widest.unwrap_or(units.ncols())
+}
+
+/// Columns that are kept, as many as the rank says.
+struct Chosen {
+    kept: Vec<usize>,
+    /// What the others leave of the kept column that is nearest to being dependent, and of the dropped one that is furthest.
+    least_kept: f64,
+    most_dropped: f64,
+}
+
+impl Chosen {
+    /// The first columns of which much is left beside those before, then those of which most is left.
+    fn new(units: &DMatrix<f64>, rank: usize) -> Self {
+        const MUCH: f64 = 1e-3;
+        let mut left = units.clone();
+        let mut kept: Vec<usize> = Vec::with_capacity(rank);
+        let mut least_kept = 1.0_f64;
+        while kept.len() < rank {
+            let open = (0..units.ncols()).filter(|j| !kept.contains(j));
+            let sizes: Vec<(usize, f64)> = open.map(|j| (j, left.column(j).norm())).collect();
+            let first = sizes.iter().find(|(_, size)| *size > MUCH);
+            let most = sizes.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+            let Some(&(pivot, size)) = first.or(most).filter(|(_, size)| *size > 0.0) else {
+                break;
+            };
+            least_kept = least_kept.min(size);
+            kept.push(pivot);
+            // Twice, so that rounding leaves nothing of it.
+            for _ in 0..2 {
+                let direction = left.column(pivot).normalize();
+                for j in (0..units.ncols()).filter(|j| *j != pivot && !kept.contains(j)) {
+                    let share = direction.dot(&left.column(j));
+                    left.column_mut(j).axpy(-share, &direction, 1.0);
+                }
+            }
+        }
+        let dropped = (0..units.ncols()).filter(|j| !kept.contains(j));
+        let most_dropped = dropped.map(|j| left.column(j).norm()).fold(0.0, f64::max);
+        kept.sort_unstable();
+        Self {
+            kept,
+            least_kept,
+            most_dropped,
+        }
+    }
+}
+
+/// A factor as a small rational, or as one times constants of the file, where it is that up to rounding; else as a number.
+fn recognised(value: f64, mechanism: &Mechanism) -> RationalFunction {
+    /// Factors come from poses that are closed to about this accuracy.
+    const ROUNDING: f64 = 1e-10;
+    const LARGEST_DENOMINATOR: i64 = 24;
+    let is_near = |a: f64| (a - value).abs() <= ROUNDING * value.abs();
+    for below in 1..=LARGEST_DENOMINATOR {
+        let above = (value * below as f64).round();
+        if above.abs() < 1000.0 && is_near(above / below as f64) {
+            return RationalFunction::constant(Rational::new(above as i64, below));
+        }
+    }
+    let lengths: Vec<(usize, f64)> = (mechanism.constants.iter().enumerate())
+        .filter(|(_, c)| !c.is_angle && c.value != 0.0)
+        .map(|(i, c)| (i, c.value))
+        .collect();
+    let function = |number: Rational, above: &[usize], below: &[usize]| {
+        let powers = |of: &[usize]| {
+            let mut powers = Powers::new();
+            for i in of {
+                match powers
+                    .iter_mut()
+                    .find(|(v, _)| *v == Variable::Constant(*i))
+                {
+                    Some((_, n)) => *n += 1,
+                    None => powers.push((Variable::Constant(*i), 1)),
+                }
+            }
+            powers.sort_unstable();
+            powers
+        };
+        RationalFunction::new(
+            Polynomial::from([(powers(above), number)]),
+            Polynomial::from([(powers(below), Rational::ONE)]),
+        )
+    };
+    for number in [(1, 1), (-1, 1), (2, 1), (-2, 1), (1, 2), (-1, 2)] {
+        let k = f64::from(number.0) / f64::from(number.1);
+        let number = || Rational::new(i64::from(number.0), i64::from(number.1));
+        for (i, a) in &lengths {
+            if is_near(k * a) {
+                return function(number(), &[*i], &[]);
+            }
+            if is_near(k / a) {
+                return function(number(), &[], &[*i]);
+            }
+        }
+        for (i, a) in &lengths {
+            for (j, b) in &lengths {
+                if is_near(k * a * b) {
+                    return function(number(), &[*i, *j], &[]);
+                }
+                if i != j && is_near(k * a / b) {
+                    return function(number(), &[*i], &[*j]);
+                }
+            }
+        }
+    }
+    decimal(value)
 }
 
 /// Whether dependences that were found elsewhere fail on the model file's values around the nominal pose. Where no pose
@@ -149,16 +275,21 @@ pub(super) fn contradicts(
         w.column(at)
     };
     let largest = w.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
-    found.dependencies.iter().any(|line| {
-        let mut left = column(line.product).into_owned();
-        let mut size = left.norm();
-        for (k, factor) in &line.equals {
-            let term = column(found.retained[*k]) * factor.value_f64(&constants);
-            size += term.norm();
-            left -= term;
-        }
-        left.norm() > WRONG * size && left.norm() > NOTHING * largest
-    })
+    let factors = found.factors(&constants);
+    found
+        .dependencies
+        .iter()
+        .zip(&factors)
+        .any(|(line, factors)| {
+            let mut left = column(line.product).into_owned();
+            let mut size = left.norm();
+            for (k, factor) in factors {
+                let term = column(found.retained[*k]) * *factor;
+                size += term.norm();
+                left -= term;
+            }
+            left.norm() > WRONG * size && left.norm() > NOTHING * largest
+        })
 }
 
 /// A number with thirteen significant digits, as an exact rational, so that everything behind treats it like any other

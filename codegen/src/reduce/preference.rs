@@ -1,8 +1,9 @@
 //! In which order columns are tried as retained ones.
 //!
-//! Products that the file names come first. All others stand in the order of eq. (5), but for masses at a distance from
-//! their link's origin: their columns are sums of the link's own ones with powers of lengths, while its own ones are written
-//! by theirs with quotients. So such a product waits until its links' own products have been tried.
+//! Products that the file names come first, all others in the order of eq. (5). Masses at a distance from their link's
+//! origin are a case of their own: their columns are sums of the link's own ones with powers of lengths, while its own ones
+//! may be written by theirs with quotients only. So there is a second order in which such a product waits until its links'
+//! own products have been tried, to be taken where it saves quotients.
 
 use std::collections::BTreeMap;
 
@@ -14,13 +15,22 @@ use crate::regressor::Equations;
 use crate::tree::Tree;
 use crate::tree::expressions::Monomial;
 
-/// Positions among the effective products, most preferred first, and how many of them the file names.
+/// Positions among the effective products, most preferred first.
+pub(super) struct Preference {
+    /// In the order of eq. (5).
+    pub(super) declared: Vec<usize>,
+    /// Masses at a distance behind their links' own products.
+    pub(super) own_first: Vec<usize>,
+    /// How many of them the file names.
+    pub(super) n_named: usize,
+}
+
 pub(super) fn preference(
     graph: &Graph,
     mechanism: &Mechanism,
     equations: &Equations,
     effective: &[usize],
-) -> (Vec<usize>, usize) {
+) -> Preference {
     let product = |k: usize| &equations.products[effective[k]];
     let mut order: Vec<usize> = mechanism
         .retain
@@ -50,15 +60,18 @@ pub(super) fn preference(
     let mut others: Vec<usize> = (0..effective.len())
         .filter(|k| !named.contains(k))
         .collect();
+    let declared = [named.as_slice(), &others].concat();
     others.sort_by_key(|&k| {
         let one = &carried[k];
         let own = one.bodies.iter().filter_map(|body| last_own.get(body));
         let after = own.copied().max().filter(|_| one.is_distant).unwrap_or(0);
         (after.max(k), one.is_distant, k)
     });
-    let n_named = named.len();
-    named.extend(others);
-    (named, n_named)
+    Preference {
+        declared,
+        own_first: [named.as_slice(), &others].concat(),
+        n_named: named.len(),
+    }
 }
 
 /// On which bodies a product has inertia.

@@ -70,11 +70,6 @@ impl<O: Oracle> Survey<O> {
         })
     }
 
-    /// On how many constants a function depends.
-    pub(super) fn n_constants(&self, function: usize) -> usize {
-        self.shapes[function].degrees.len()
-    }
-
     /// Some of the functions, each with whether the others are useless without it: where such a one resists, all that come
     /// after it are `None` too.
     pub(super) fn functions(
@@ -231,7 +226,23 @@ fn probe<O: Oracle>(
     Ok(())
 }
 
-/// Degrees in all lengths together, along a random line.
+/// How many functions have lengths in their denominators; those whose degrees are beyond all reason count as such.
+pub(super) fn n_quotients<O: Oracle>(
+    oracle: &mut O,
+    constants: &[Occurrence],
+    stream: &mut Stream,
+) -> Result<usize, DeriveError> {
+    let origin = oracle.constants(stream)?;
+    let n = oracle.values(&origin)?.len();
+    let all: Vec<usize> = (0..n).collect();
+    let mut n_polynomials = 0;
+    along_a_line(oracle, &origin, constants, all, stream, |_, (_, below)| {
+        n_polynomials += usize::from(below == 0);
+    })?;
+    Ok(n - n_polynomials)
+}
+
+/// Degrees in all lengths together.
 fn total_degrees<O: Oracle>(
     oracle: &mut O,
     origin: &FieldPoint,
@@ -240,26 +251,31 @@ fn total_degrees<O: Oracle>(
     shapes: &mut [Shape],
     stream: &mut Stream,
 ) -> Result<(), DeriveError> {
-    let lengths: Vec<usize> = constants
-        .iter()
-        .filter(|(_, in_angle)| !in_angle)
-        .map(|(i, _)| *i)
-        .collect();
+    let depends_on_several = |k: &usize| {
+        let degrees = shapes[*k].degrees.keys();
+        degrees.filter(|(_, in_angle)| !in_angle).count() > 1
+    };
+    let open = functions.iter().copied().filter(depends_on_several);
+    let open = open.collect();
+    along_a_line(oracle, origin, constants, open, stream, |k, degrees| {
+        shapes[k].total = Some(degrees);
+    })
+}
+
+/// Degrees of some functions along a random line in all lengths, as far as they are found.
+fn along_a_line<O: Oracle>(
+    oracle: &mut O,
+    origin: &FieldPoint,
+    constants: &[Occurrence],
+    mut open: Vec<usize>,
+    stream: &mut Stream,
+    mut found: impl FnMut(usize, (usize, usize)),
+) -> Result<(), DeriveError> {
+    let lengths = constants.iter().filter(|(_, in_angle)| !in_angle);
+    let lengths: Vec<usize> = lengths.map(|(i, _)| *i).collect();
     let direction: Vec<Element> = lengths.iter().map(|_| stream.element()).collect();
     let mut x = Vec::new();
     let mut y: Vec<Vec<Element>> = Vec::new();
-    let mut open: Vec<usize> = functions
-        .iter()
-        .copied()
-        .filter(|k| {
-            shapes[*k]
-                .degrees
-                .keys()
-                .filter(|(_, in_angle)| !in_angle)
-                .count()
-                > 1
-        })
-        .collect();
     while !open.is_empty() && x.len() < MOST_POINTS {
         let mut point = origin.clone();
         let t = stream.element();
@@ -274,8 +290,11 @@ fn total_degrees<O: Oracle>(
         }
         open.retain(|k| {
             let values: Vec<Element> = y.iter().map(|row| row[*k]).collect();
-            shapes[*k].total = univariate::degrees(&x, &values);
-            shapes[*k].total.is_none()
+            let degrees = univariate::degrees(&x, &values);
+            if let Some(degrees) = degrees {
+                found(*k, degrees);
+            }
+            degrees.is_none()
         });
     }
     Ok(())

@@ -1,5 +1,8 @@
 //! What a reduction says: which products are retained, and how all others follow.
 
+use std::collections::BTreeMap;
+use std::ops::{Add, Mul};
+
 use super::rational_function::RationalFunction;
 use crate::DeriveError;
 use crate::tree::expressions::Monomial;
@@ -69,4 +72,83 @@ pub struct Dependency {
     pub product: usize,
     /// Positions in [`Reduction::retained`] with the factors.
     pub equals: Vec<(usize, RationalFunction)>,
+    /// Positions in [`Reduction::products`] of other dependent products with the factors: their columns stand for what they
+    /// equal in turn. None where it is no longer to write that out.
+    pub via: Vec<(usize, RationalFunction)>,
+}
+
+impl Reduction {
+    /// The factors of every dependent product on retained ones alone, by position in [`Reduction::retained`]; `None` where
+    /// `value` has none for a factor.
+    pub fn factors_by<T>(
+        &self,
+        value: &dyn Fn(&RationalFunction) -> Option<T>,
+    ) -> Option<Vec<BTreeMap<usize, T>>>
+    where
+        T: Clone + Add<Output = T> + Mul<Output = T>,
+    {
+        let mut all: Vec<BTreeMap<usize, T>> = vec![BTreeMap::new(); self.dependencies.len()];
+        for i in self.inner_first() {
+            let line = &self.dependencies[i];
+            let mut found: BTreeMap<usize, T> = BTreeMap::new();
+            let mut add = |k: usize, term: T| {
+                let sum = match found.remove(&k) {
+                    Some(before) => before + term,
+                    None => term,
+                };
+                found.insert(k, sum);
+            };
+            for (k, factor) in &line.equals {
+                add(*k, value(factor)?);
+            }
+            for (product, factor) in &line.via {
+                let factor = value(factor)?;
+                for (k, inner) in &all[self.line_of(*product)] {
+                    add(*k, factor.clone() * inner.clone());
+                }
+            }
+            all[i] = found;
+        }
+        Some(all)
+    }
+
+    /// The same in floating point, for constants in the order of the model file.
+    pub fn factors(&self, constants: &[f64]) -> Vec<BTreeMap<usize, f64>> {
+        let found = self.factors_by(&|factor| Some(factor.value_f64(constants)));
+        found.expect("floating point has a value for everything")
+    }
+
+    /// The line of a dependent product.
+    pub(crate) fn line_of(&self, product: usize) -> usize {
+        let line = self
+            .dependencies
+            .iter()
+            .position(|line| line.product == product);
+        line.expect("what a product goes by is dependent")
+    }
+
+    /// All lines, each after those that it goes by.
+    pub(crate) fn inner_first(&self) -> Vec<usize> {
+        let mut order = Vec::with_capacity(self.dependencies.len());
+        let mut is_done = vec![false; self.dependencies.len()];
+        for start in 0..self.dependencies.len() {
+            let mut open = vec![start];
+            while let Some(i) = open.last().copied() {
+                let via = self.dependencies[i].via.iter();
+                let next = via
+                    .map(|(product, _)| self.line_of(*product))
+                    .find(|l| !is_done[*l]);
+                match next {
+                    Some(next) => open.push(next),
+                    None => {
+                        open.pop();
+                        if !std::mem::replace(&mut is_done[i], true) {
+                            order.push(i);
+                        }
+                    }
+                }
+            }
+        }
+        order
+    }
 }

@@ -31,6 +31,39 @@ impl ColumnRelation {
         self.retained.len() + self.dependent.len()
     }
 
+    /// Its factors from rows of values of all columns, of which there must be enough to determine them.
+    fn values_from_rows<const P: u64>(
+        &self,
+        rows: &[Vec<Element<P>>],
+    ) -> Result<Vec<Element<P>>, DeriveError> {
+        /// Rows beyond those that determine the factors: they show that the relation holds.
+        const MORE: usize = 2;
+        let n = self.len();
+        let order: Vec<usize> = (0..=n).collect();
+        let mut echelon = Echelon::new(&order);
+        let mut more = 0;
+        for row in rows {
+            let columns = self.columns().chain([self.column]);
+            let row: Vec<Element<P>> = columns.map(|k| row[k]).collect();
+            if row.iter().all(|x| *x == Element::ZERO) {
+                continue;
+            }
+            if echelon.pivots.len() == n {
+                more += 1;
+            }
+            echelon.insert(row);
+            if more == MORE {
+                break;
+            }
+        }
+        // A pivot in the last column is a row that the others contradict.
+        if echelon.pivots.len() != n || echelon.pivots.contains(&n) {
+            return Err(DeriveError::RankChanged);
+        }
+        let factors = (0..n).map(|k| echelon.entry(k, n).ok_or(DeriveError::RankChanged));
+        factors.collect()
+    }
+
     /// Whether it needs retained columns alone.
     pub(super) fn is_direct(&self) -> bool {
         self.dependent.is_empty()
@@ -169,7 +202,7 @@ fn near<const P: u64>(echelon: &Echelon<P>, before: &[usize], column: usize) -> 
     made.into_keys().collect()
 }
 
-/// Values of the factors of all relations, one after the other.
+/// Values of the factors of all relations, one after the other, from columns that were reduced to `echelon`.
 pub(super) fn values<const P: u64>(
     relations: &[ColumnRelation],
     echelon: &Echelon<P>,
@@ -179,6 +212,26 @@ pub(super) fn values<const P: u64>(
         values.extend(relation.values(echelon)?);
     }
     Ok(values)
+}
+
+/// The same from rows of values of all columns.
+pub(super) fn values_from_rows<const P: u64>(
+    relations: &[ColumnRelation],
+    rows: &[Vec<Element<P>>],
+) -> Result<Vec<Element<P>>, DeriveError> {
+    let mut values = Vec::new();
+    for relation in relations {
+        values.extend(relation.values_from_rows(rows)?);
+    }
+    Ok(values)
+}
+
+/// A dependent column by others, with factors; `None` for those that resist.
+#[derive(Debug, PartialEq)]
+pub(super) struct Written {
+    pub(super) column: usize,
+    /// Retained columns, and dependent ones that stand for what they equal.
+    pub(super) by: Vec<(usize, Option<RationalFunction>)>,
 }
 
 /// Relations with their factors as functions of the constants.
@@ -247,6 +300,39 @@ impl Related {
         }
         let function = |j: &usize, p: &usize| expanded.get(j)?.functions.get(p).cloned();
         wanted.iter().map(|(j, p)| function(j, p)).collect()
+    }
+
+    /// How many terms the factors on retained columns have together when they are written out, at most.
+    pub(super) fn n_terms(&self) -> usize {
+        let mut counts: BTreeMap<usize, BTreeMap<usize, usize>> = BTreeMap::new();
+        for (relation, factors) in &self.0 {
+            let mut line: BTreeMap<usize, usize> = BTreeMap::new();
+            for (k, factor) in relation.columns().zip(factors) {
+                let n = factor.as_ref().map_or(1, |f| f.numerator.len());
+                match counts.get(&k) {
+                    None => *line.entry(k).or_default() += n,
+                    Some(inner) => {
+                        for (p, m) in inner {
+                            let sum = line.entry(*p).or_default();
+                            *sum = sum.saturating_add(n.saturating_mul(*m));
+                        }
+                    }
+                }
+            }
+            counts.insert(relation.column, line);
+        }
+        let all = counts.values().flat_map(BTreeMap::values);
+        all.fold(0_usize, |sum, n| sum.saturating_add(*n))
+    }
+
+    /// The relations as they are.
+    pub(super) fn written(self) -> Vec<Written> {
+        let lines = self.0.into_iter();
+        let written = |(relation, factors): (ColumnRelation, Factors)| Written {
+            column: relation.column,
+            by: relation.columns().zip(factors).collect(),
+        };
+        lines.map(written).collect()
     }
 
     /// Whether every factor is known.

@@ -160,25 +160,27 @@ impl SampledRegressor {
             .collect())
     }
 
-    /// Rows of W for one set of constants, reduced, until they show nothing new or `rank` is reached.
+    /// Rows of W for one set of constants, reduced, until they show nothing new or `rank` is reached; and from how many
+    /// points they came.
     pub(super) fn echelon<const P: u64>(
         &self,
         constants: &FieldPoint<Element<P>>,
         order: &[usize],
         rank: Option<usize>,
         stream: &mut Stream,
-    ) -> Result<Echelon<P>, DeriveError> {
+    ) -> Result<(Echelon<P>, usize), DeriveError> {
         let mut echelon = Echelon::new(order);
-        let mut idle = 0;
+        let (mut idle, mut n_points) = (0, 0);
         while self.n_columns > 0 && idle < self.idle && Some(echelon.pivots.len()) != rank {
             idle += 1;
+            n_points += 1;
             for row in self.point(constants, stream)? {
                 if echelon.insert(row) {
                     idle = 0;
                 }
             }
         }
-        Ok(echelon)
+        Ok((echelon, n_points))
     }
 }
 

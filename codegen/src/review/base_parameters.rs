@@ -9,7 +9,9 @@ use super::rank::NumericRank;
 use crate::Derivation;
 use crate::expr::Rational;
 use crate::expr::print::{Formula, Symbol};
-use crate::reduce::base::{name as base_name, product_formula as product, unit, written_out};
+use crate::reduce::base::{
+    lumped, name as base_name, product_formula as product, sums, unit, written_out,
+};
 use crate::reduce::{Method, RationalFunction};
 use crate::tree::expressions::Monomial;
 
@@ -30,8 +32,8 @@ pub fn base_grouped(derivation: &Derivation, k: usize) -> Formula {
         &reduction.products[reduction.retained[k]],
     )];
     let mut groups: Vec<(RationalFunction, Vec<(Rational, Formula)>)> = Vec::new();
-    for line in &reduction.dependencies {
-        let what = product(mechanism, &reduction.products[line.product]);
+    for (at, line) in reduction.dependencies.iter().enumerate() {
+        let what = Formula::product(Rational::ONE, lumped(mechanism, reduction, at));
         for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
             let (number, function) = factor.split_number();
             let member = (number, what.clone());
@@ -167,13 +169,15 @@ pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
         .enumerate()
         .map(|(i, line)| Equation {
             left: column(mechanism, &reduction.products[line.product]),
-            right: Formula::sum(line.equals.iter().map(|(k, factor)| {
-                let retained = &reduction.products[reduction.retained[*k]];
-                Formula::product(
-                    Rational::ONE,
-                    [factor.formula(mechanism), column(mechanism, retained)],
-                )
-            })),
+            right: {
+                let retained = line.equals.iter();
+                let retained = retained.map(|(k, factor)| (reduction.retained[*k], factor));
+                let via = line.via.iter().map(|(product, factor)| (*product, factor));
+                Formula::sum(retained.chain(via).map(|(product, factor)| {
+                    let column = column(mechanism, &reduction.products[product]);
+                    Formula::product(Rational::ONE, [factor.formula(mechanism), column])
+                }))
+            },
             tag: format!("6.{}", i + 1),
             unit: None,
         })
@@ -221,6 +225,22 @@ pub(super) fn base_parameters(
         tag: format!("16.{}", k + 1),
         unit: Some(unit(mechanism, &reduction.products[reduction.retained[k]])),
     };
+    let sums = sums(mechanism, reduction);
+    if !sums.is_empty() {
+        page.paragraph([text(
+            "Products that others go by stand with these, link by link (Gautier and Khalil 1990):",
+        )]);
+        let sums = sums
+            .into_iter()
+            .enumerate()
+            .map(|(i, (name, right))| Equation {
+                left: Formula::name(name),
+                right,
+                tag: format!("7.{}", i + 1),
+                unit: None,
+            });
+        page.equations("sums", sums.collect());
+    }
     let grouped = (0..rank)
         .map(|k| equation(k, base_grouped(derivation, k)))
         .collect();

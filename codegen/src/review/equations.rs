@@ -20,6 +20,13 @@ pub struct Equations {
     pub without_effect: Vec<String>,
     /// Eq. (6); products without effect come last, with nothing on the right.
     pub dependencies: Vec<DependencyLine>,
+    /// Sums that base parameters refer to, each after those that it needs; none unless base parameters that are written out
+    /// would be too long to read.
+    #[cfg_attr(
+        any(test, feature = "json"),
+        serde(serialize_with = "as_map", skip_serializing_if = "Vec::is_empty")
+    )]
+    pub sums: Vec<(String, String)>,
     /// Eq. (16).
     pub base: Vec<BaseLine>,
     /// How many base parameters there are.
@@ -34,7 +41,7 @@ pub struct Equations {
 pub struct DependencyLine {
     /// The product whose column it is.
     pub parameter: String,
-    /// Retained products with their factors.
+    /// Retained products with their factors, and other dependent ones that stand for what they equal in turn.
     #[cfg_attr(any(test, feature = "json"), serde(serialize_with = "as_map"))]
     pub equals: Vec<(String, String)>,
 }
@@ -140,10 +147,9 @@ impl Equations {
             equals: line
                 .equals
                 .iter()
-                .map(|(k, factor)| {
-                    let retained = product(reduction.retained[*k]);
-                    (retained, factor_text(mechanism, factor))
-                })
+                .map(|(k, factor)| (reduction.retained[*k], factor))
+                .chain(line.via.iter().map(|(product, factor)| (*product, factor)))
+                .map(|(k, factor)| (product(k), factor_text(mechanism, factor)))
                 .collect(),
         });
         let without_effect: Vec<String> = reduction
@@ -159,6 +165,7 @@ impl Equations {
             model: mechanism.name.clone(),
             parameters: (0..reduction.products.len()).map(product).collect(),
             dependencies: dependent.chain(vanishing).collect(),
+            sums: derivation.base_sums(),
             base: (0..reduction.retained.len())
                 .map(|k| BaseLine {
                     name: base_name(k),

@@ -35,8 +35,43 @@ fn changed(before: &[(String, String)], after: &[(String, String)]) -> Vec<Chang
             before: find(before, name),
             after: find(after, name),
         })
-        .filter(|change| change.before != change.after)
+        .filter(|change| match (&change.before, &change.after) {
+            (Some(before), Some(after)) => !is_same(before, after),
+            (before, after) => before != after,
+        })
         .collect()
+}
+
+/// Whether two texts are the same but for rounding in the last places of their numbers.
+fn is_same(a: &str, b: &str) -> bool {
+    /// A few roundings of a number of the machine.
+    const ROUNDING: f64 = 2e-15;
+    let (mut a, mut b) = (pieces(a), pieces(b));
+    loop {
+        match (a.next(), b.next()) {
+            (None, None) => return true,
+            (Some(a), Some(b)) if a == b => {}
+            (Some(a), Some(b)) => match (a.parse::<f64>(), b.parse::<f64>()) {
+                (Ok(a), Ok(b)) if (a - b).abs() <= ROUNDING * a.abs().max(b.abs()) => {}
+                _ => return false,
+            },
+            _ => return false,
+        }
+    }
+}
+
+/// Numbers of a text, and what stands between them.
+fn pieces(text: &str) -> impl Iterator<Item = &str> {
+    let is_of_number = |c: char| c.is_ascii_digit() || c == '.';
+    let mut rest = text;
+    std::iter::from_fn(move || {
+        let first = rest.chars().next()?;
+        let is_number = is_of_number(first);
+        let end = rest.find(|c| is_of_number(c) != is_number);
+        let (piece, after) = rest.split_at(end.unwrap_or(rest.len()));
+        rest = after;
+        Some(piece)
+    })
 }
 
 /// Everything that differs between two models.
@@ -117,4 +152,22 @@ fn dependencies(model: &Model) -> Vec<(String, String)> {
             (format!("h[{}]", line.parameter), right)
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_same;
+
+    #[test]
+    fn rounding_is_no_change() {
+        assert!(is_same(
+            "link: -2.138038093018084",
+            "link: -2.1380380930180856"
+        ));
+        assert!(!is_same("link: -2.138038093018084", "link: -2.13803809301"));
+        assert!(!is_same("a: 1", "b: 1"));
+        assert!(!is_same("a: 1", "a: -1"));
+        assert!(!is_same("a: 1", "a: 1 m"));
+        assert!(!is_same("p = d1*m2", "p = d1*m3"));
+    }
 }

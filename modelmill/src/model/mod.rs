@@ -11,7 +11,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use modelmill_codegen::review::base_expression;
-use modelmill_codegen::{BaseParameter, Derivation, Monomial};
+use modelmill_codegen::{BaseParameter, Dependency, Derivation, Monomial};
 use modelmill_identify::estimate::Belief;
 use modelmill_identify::{Note, ParameterInfo};
 use modelmill_spec::{
@@ -277,10 +277,13 @@ impl Model {
         let constants = &self.derivation.mechanism.constants;
         let constants: Vec<f64> = constants.iter().map(|c| c.value).collect();
         let mut products = vec![(&reduction.products[reduction.retained[k]], 1.0)];
-        for line in &reduction.dependencies {
-            for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
-                let factor = factor.value_f64(&constants);
-                products.push((&reduction.products[line.product], factor));
+        for (line, factors) in reduction
+            .dependencies
+            .iter()
+            .zip(reduction.factors(&constants))
+        {
+            if let Some(factor) = factors.get(&k) {
+                products.push((&reduction.products[line.product], *factor));
             }
         }
         products
@@ -440,11 +443,18 @@ impl Model {
         }
         let reduction = &self.derivation.reduction;
         let parameters = &self.derivation.mechanism.parameters;
-        let lumped = reduction
-            .dependencies
-            .iter()
-            .filter(|line| line.equals.iter().any(|(at, _)| *at == k))
-            .map(|line| line.product);
+        let is_in = |line: &&Dependency| line.equals.iter().any(|(at, _)| *at == k);
+        let mut lumped: Vec<usize> = (reduction.dependencies.iter().filter(is_in))
+            .map(|line| line.product)
+            .collect();
+        // What others bring into these is in it as well.
+        while let Some(more) = (reduction.dependencies.iter())
+            .filter(|line| line.via.iter().any(|(product, _)| lumped.contains(product)))
+            .map(|line| line.product)
+            .find(|product| !lumped.contains(product))
+        {
+            lumped.push(more);
+        }
         std::iter::once(reduction.retained[k])
             .chain(lumped)
             .any(|product| {

@@ -30,7 +30,8 @@ impl Outcome {
                 self.right += 1;
                 self.worst = self.worst.max(error);
                 if error > 1e-10 {
-                    self.poor.push(format!("{}: {error:.1e}", case.derivation.mechanism.name));
+                    self.poor
+                        .push(format!("{}: {error:.1e}", case.derivation.mechanism.name));
                 }
             }
             Err(says) => self.wrong.push(says),
@@ -45,7 +46,11 @@ fn all(trees: std::ops::Range<u64>, loops: std::ops::Range<u64>) {
         outcome.look_at(Case::new(&random::tree(seed, Matter::Special), 8, 3.0));
     }
     for seed in loops {
-        outcome.look_at(Case::new(&random::planar_loop(seed, Matter::Special), 8, 0.3));
+        outcome.look_at(Case::new(
+            &random::planar_loop(seed, Matter::Special),
+            8,
+            0.3,
+        ));
     }
     println!("{outcome:#?}");
     assert!(outcome.wrong.is_empty(), "{:#?}", outcome.wrong);

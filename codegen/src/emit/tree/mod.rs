@@ -169,6 +169,8 @@ pub(in crate::emit) fn reads_passive(derivation: &Derivation, program: &Program)
 
 /// Base parameters as eq. (16) gives them, term by term.
 pub(in crate::emit) struct BaseParameters {
+    /// Sums that they refer to, each after those that it needs.
+    pub(in crate::emit) sums: Vec<(String, Expression)>,
     pub(in crate::emit) values: Vec<Expression>,
     pub(in crate::emit) divisors: Vec<Divisor>,
     /// What values and divisors read.
@@ -203,6 +205,10 @@ pub(in crate::emit) fn base_parameters(derivation: &Derivation, scope: &Scope) -
         value
     };
     let reduction = &derivation.reduction;
+    let sums = base::sums(mechanism, reduction).into_iter();
+    let sums = sums
+        .map(|(name, formula)| (name, expression(&formula)))
+        .collect();
     let values = (0..reduction.retained.len())
         .map(|k| expression(&base::written_out(mechanism, reduction, k)))
         .collect();
@@ -215,6 +221,7 @@ pub(in crate::emit) fn base_parameters(derivation: &Derivation, scope: &Scope) -
         })
         .collect();
     BaseParameters {
+        sums,
         values,
         divisors,
         read,

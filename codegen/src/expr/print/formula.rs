@@ -2,7 +2,11 @@
 
 use num_bigint::BigInt;
 
+use super::simplify;
 use super::symbol::Symbol;
+
+/// Terms of a sum beyond which nobody looks for what they have in common.
+const MOST_COMPARED: usize = 100;
 use crate::expr::Rational;
 
 /// A function by name.
@@ -116,6 +120,9 @@ impl Formula {
                 term => flat.push(term),
             }
         }
+        if flat.len() <= MOST_COMPARED {
+            flat = simplify::gathered(flat);
+        }
         if let Some(first) = flat.iter().position(|term| !term.is_negative()) {
             flat[..=first].rotate_right(1);
         }
@@ -152,6 +159,8 @@ impl Formula {
             Self::gather(one, &mut inverse, &mut down, &mut up);
         }
         number = &number * &inverse.recip();
+        number = &number * &simplify::without_squared_roots(&mut up);
+        number = &number * &simplify::without_squared_roots(&mut down).recip();
         for one in up.iter_mut().chain(&mut down) {
             // Signs that all terms of a sum share go outside.
             if let Self::Sum(terms) = one

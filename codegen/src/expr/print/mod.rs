@@ -12,6 +12,7 @@ mod latex;
 mod mathml;
 #[cfg(test)]
 pub(crate) mod parse;
+mod simplify;
 mod symbol;
 mod text;
 

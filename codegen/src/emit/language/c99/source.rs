@@ -130,6 +130,7 @@ fn base_parameters(unit: &Unit<'_>, text: &mut String) {
     let (name, c) = (&unit.name, unit.syntax());
     let derivation = unit.source.derivation;
     let BaseParameters {
+        sums,
         values,
         divisors,
         read,
@@ -154,6 +155,9 @@ fn base_parameters(unit: &Unit<'_>, text: &mut String) {
             unit.upper,
             comment(&divisor.text)
         ));
+    }
+    for (name, value) in &sums {
+        lines.push(format!("const double {name} = {};", c.term(value)));
     }
     for (k, value) in values.iter().enumerate() {
         lines.push(format!("base[{k}] = {};", c.term(value)));

@@ -249,6 +249,7 @@ pub(super) fn nominal<'a>(
 /// Base parameters as eq. (16) gives them, term by term.
 fn base_parameters(derivation: &Derivation, scope: &Scope) -> TokenStream {
     let BaseParameters {
+        sums,
         values,
         divisors,
         read,
@@ -272,7 +273,9 @@ fn base_parameters(derivation: &Derivation, scope: &Scope) -> TokenStream {
         let [value, size] = [&divisor.value, &divisor.size].map(|x| Rust.term(x));
         format!("divisor({:?}, {value}, {size})?;", divisor.text)
     });
-    let written = lines(&divisors.chain(written).collect::<Vec<String>>());
+    let sums = sums.iter();
+    let sums = sums.flat_map(|(name, value)| sum(&format!("let {name} = "), value));
+    let written = lines(&divisors.chain(sums).chain(written).collect::<Vec<String>>());
     quote! {
         /// Base parameters of given physical parameters, eq. (16).
         ///
