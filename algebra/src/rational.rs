@@ -98,12 +98,12 @@ impl Rational {
 
     /// Whether it is 0.
     pub fn is_zero(&self) -> bool {
-        *self == Self::ZERO
+        matches!(self.0, Repr::Small(0, _))
     }
 
     /// Whether it is 1.
     pub fn is_one(&self) -> bool {
-        *self == Self::ONE
+        matches!(self.0, Repr::Small(1, 1))
     }
 
     /// Whether it is below 0.

@@ -30,34 +30,34 @@ pub trait Domain {
 /// The nodes that some roots need, in the order of evaluation.
 #[derive(Clone, Debug)]
 pub struct Tape {
-    steps: Vec<(ExprId, Node)>,
-    roots: Vec<ExprId>,
-    positions: BTreeMap<ExprId, usize>,
+    steps: Vec<Node>,
     /// Per step the index of its operands' steps, flattened.
     operands: Vec<Vec<usize>>,
+    /// The step of each root.
+    roots: Vec<usize>,
 }
 
 impl Tape {
     /// Collects what `roots` need.
     pub fn new(graph: &Graph, roots: &[ExprId]) -> Self {
-        let mut positions = BTreeMap::new();
+        const NOWHERE: usize = usize::MAX;
+        let mut positions = vec![NOWHERE; graph.len()];
         let mut steps = Vec::new();
         let mut operands = Vec::new();
         for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
             if needed {
                 let id = ExprId(u32::try_from(i).expect("graph below 4G nodes"));
                 let mut children = Vec::new();
-                graph.for_each_child(id, |child| children.push(positions[&child]));
-                positions.insert(id, steps.len());
+                graph.for_each_child(id, |child| children.push(positions[child.index()]));
+                positions[i] = steps.len();
                 operands.push(children);
-                steps.push((id, graph.node(id).clone()));
+                steps.push(graph.node(id).clone());
             }
         }
         Self {
             steps,
-            roots: roots.to_vec(),
-            positions,
             operands,
+            roots: roots.iter().map(|root| positions[root.index()]).collect(),
         }
     }
 
@@ -74,7 +74,7 @@ impl Tape {
     /// Values of the roots; `None` if any of them does not exist.
     pub fn evaluate<D: Domain>(&self, domain: &D) -> Option<Vec<D::Value>> {
         let mut values: Vec<D::Value> = Vec::with_capacity(self.steps.len());
-        for ((_, node), operands) in self.steps.iter().zip(&self.operands) {
+        for (node, operands) in self.steps.iter().zip(&self.operands) {
             let value = match node {
                 Node::Rational(value) => domain.rational(value)?,
                 Node::Atom(atom) => domain.atom(*atom)?,
@@ -116,12 +116,8 @@ impl Tape {
             };
             values.push(value);
         }
-        Some(
-            self.roots
-                .iter()
-                .map(|root| values[self.positions[root]].clone())
-                .collect(),
-        )
+        let roots = self.roots.iter();
+        Some(roots.map(|root| values[*root].clone()).collect())
     }
 }
 

@@ -13,7 +13,7 @@ use modelmill_algebra::field::Stream;
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
-use super::numeric::sample;
+use super::numeric::{REACH, sample};
 use crate::expr::independent::SEED;
 use crate::expr::{ExprId, Graph};
 use crate::loops::numeric_poses::symmetric;
@@ -54,7 +54,7 @@ pub(super) fn exchanged(
     let moved = beside(mechanism);
     let n_rows = columns.values.len() + columns.values.len() / 2;
     let mut sampled = |mechanism: &Mechanism| {
-        let w = sample(graph, mechanism, projection, columns.values, n_rows).ok()?;
+        let w = sample(graph, mechanism, projection, columns.values, n_rows, REACH).ok()?;
         Factors::new(&w, columns.units, retained, dependent)
     };
     let mut factors = sampled(&moved).or_else(|| sampled(mechanism))?;

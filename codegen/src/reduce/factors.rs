@@ -18,7 +18,7 @@ pub(super) const MOST_OPERATIONS: u64 = 20_000_000_000;
 const FEW: usize = 12;
 
 /// Terms of all factors on retained columns beyond which nobody reads them: then columns are written by near ones.
-const MOST_TERMS: usize = 20_000;
+const MOST_TERMS: usize = 5_000;
 
 /// The dependent columns by others; factors that resist are `None`.
 pub(super) fn find(
@@ -55,7 +55,7 @@ pub(super) fn find(
     }
 }
 
-/// How many factors on retained columns have lengths in a denominator.
+/// How many factors on retained columns have a sum in a denominator.
 pub(super) fn n_quotients(
     dependences: &Dependences,
     regressor: &SampledRegressor,

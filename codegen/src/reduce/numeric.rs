@@ -21,8 +21,10 @@ const DEPENDENT: f64 = 1e-9;
 const NOTHING: f64 = 1e-13;
 /// How far poses lie from the nominal one, in rad or relative to the size of the loops, and how often that is halved
 /// where most of such poses cannot be reached.
-const REACH: f64 = 0.4;
-const HALVINGS: u32 = 6;
+pub(super) const REACH: f64 = 0.4;
+/// The same where a base is looked for: columns of a mechanism with one freedom hardly differ along a short path.
+const FAR: f64 = 1.0;
+const HALVINGS: u32 = 7;
 
 /// Reduces `columns[k][d]`, trying them in the given order.
 pub(super) fn reduce(
@@ -34,7 +36,14 @@ pub(super) fn reduce(
     order: &[usize],
     because: DeriveError,
 ) -> Result<Reduction, DeriveError> {
-    let w = sample(graph, mechanism, projection, columns, 4 * columns.len())?;
+    let w = sample(
+        graph,
+        mechanism,
+        projection,
+        columns,
+        4 * columns.len(),
+        FAR,
+    )?;
     let norms: Vec<f64> = (0..columns.len()).map(|k| w.column(k).norm()).collect();
     let largest = norms.iter().fold(0.0, |a: f64, b| a.max(*b));
     let mut effective: Vec<usize> = (order.iter().copied())
@@ -263,7 +272,7 @@ pub(super) fn contradicts(
 ) -> bool {
     /// Far above rounding in poses that are followed, far below what a wrong dependence makes.
     const WRONG: f64 = 1e-6;
-    let Ok(w) = sample(graph, mechanism, projection, columns, 0) else {
+    let Ok(w) = sample(graph, mechanism, projection, columns, 0, REACH) else {
         return false;
     };
     let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
@@ -312,6 +321,7 @@ pub(super) fn sample(
     projection: &Projection,
     columns: &[Vec<ExprId>],
     wanted: usize,
+    farthest: f64,
 ) -> Result<DMatrix<f64>, DeriveError> {
     let n_drives = projection.drives.len();
     let outputs: Vec<ExprId> = (0..n_drives)
@@ -329,10 +339,10 @@ pub(super) fn sample(
     let mut rows: Vec<f64> = Vec::new();
     let wanted = wanted.div_ceil(n_drives.max(1)) + 10;
     let (mut n_points, mut tries) = (0, 0);
-    let mut reach = REACH;
+    let mut reach = farthest;
     while n_points < wanted && tries < (HALVINGS as usize + 20) * wanted {
         if tries % wanted == 0 && n_points < tries / 4 {
-            reach = (reach / 2.0).max(REACH / f64::from(1_u32 << HALVINGS));
+            reach = (reach / 2.0).max(farthest / f64::from(1_u32 << HALVINGS));
         }
         tries += 1;
         let Some(q) = loops.random(reach, &mut stream) else {

@@ -2,8 +2,8 @@
 //!
 //! Products that the file names come first, all others in the order of eq. (5). Masses at a distance from their link's
 //! origin are a case of their own: their columns are sums of the link's own ones with powers of lengths, while its own ones
-//! may be written by theirs with quotients only. So there is a second order in which such a product waits until its links'
-//! own products have been tried, to be taken where it saves quotients.
+//! may be written by theirs with quotients by sums only, which vanish where masses coincide. So there is a second order in which such a product waits until its links'
+//! own products have been tried, to be taken where it saves such quotients.
 
 use std::collections::BTreeMap;
 

@@ -226,23 +226,71 @@ fn probe<O: Oracle>(
     Ok(())
 }
 
-/// How many functions have lengths in their denominators; those whose degrees are beyond all reason count as such.
+/// How many functions have sums in their denominators, which may vanish though no length does; those whose degrees are
+/// beyond all reason count as such.
 pub(super) fn n_quotients<O: Oracle>(
     oracle: &mut O,
     constants: &[Occurrence],
     stream: &mut Stream,
 ) -> Result<usize, DeriveError> {
-    let origin = oracle.constants(stream)?;
-    let n = oracle.values(&origin)?.len();
-    let all: Vec<usize> = (0..n).collect();
-    let mut n_polynomials = 0;
-    along_a_line(oracle, &origin, constants, all, stream, |_, (_, below)| {
-        n_polynomials += usize::from(below == 0);
-    })?;
-    Ok(n - n_polynomials)
+    /// Lines that are looked at; in each, half of the lengths grow in proportion. A sum of products of lengths is a power of
+    /// that growth only if it is so by chance in all lines.
+    const LINES: usize = 4;
+    let lengths = constants.iter().filter(|(_, in_angle)| !in_angle);
+    let lengths: Vec<Atom> = lengths.map(|(i, _)| Atom::Constant(*i)).collect();
+    let mut has_sum: Vec<bool> = Vec::new();
+    for _ in 0..LINES {
+        let origin = oracle.constants(stream)?;
+        let growing: Vec<Atom> = lengths
+            .iter()
+            .copied()
+            .filter(|_| stream.bits() & 1 == 1)
+            .collect();
+        let (mut x, mut y): (Vec<Element>, Vec<Vec<Element>>) = Default::default();
+        let mut open: Vec<usize> = Vec::new();
+        while x.len() < MOST_POINTS {
+            let (t, mut point) = (stream.element(), origin.clone());
+            for atom in &growing {
+                point.values.insert(*atom, origin.values[atom] * t);
+            }
+            x.push(t);
+            y.push(oracle.values(&point)?);
+            has_sum.resize(y[0].len(), false);
+            if x.len() == 1 {
+                open = (0..has_sum.len()).filter(|k| !has_sum[*k]).collect();
+            }
+            if x.len() < 4 || x.len() % 2 == 1 {
+                continue;
+            }
+            open.retain(|k| {
+                let mut values: Vec<Element> = y.iter().map(|row| row[*k]).collect();
+                let Some((_, below)) = univariate::degrees(&x, &values) else {
+                    return true;
+                };
+                for (value, t) in values.iter_mut().zip(&x) {
+                    *value = *value * t.power(below as u64);
+                }
+                match univariate::degrees(&x, &values) {
+                    Some((_, 0)) => false,
+                    Some(_) => {
+                        has_sum[*k] = true;
+                        false
+                    }
+                    None => true,
+                }
+            });
+            if open.is_empty() {
+                break;
+            }
+        }
+        for k in open {
+            has_sum[k] = true;
+        }
+    }
+    Ok(has_sum.into_iter().filter(|x| *x).count())
 }
 
-/// Degrees in all lengths together.
+/// Degrees in all lengths together, along a random line.
 fn total_degrees<O: Oracle>(
     oracle: &mut O,
     origin: &FieldPoint,
@@ -251,31 +299,26 @@ fn total_degrees<O: Oracle>(
     shapes: &mut [Shape],
     stream: &mut Stream,
 ) -> Result<(), DeriveError> {
-    let depends_on_several = |k: &usize| {
-        let degrees = shapes[*k].degrees.keys();
-        degrees.filter(|(_, in_angle)| !in_angle).count() > 1
-    };
-    let open = functions.iter().copied().filter(depends_on_several);
-    let open = open.collect();
-    along_a_line(oracle, origin, constants, open, stream, |k, degrees| {
-        shapes[k].total = Some(degrees);
-    })
-}
-
-/// Degrees of some functions along a random line in all lengths, as far as they are found.
-fn along_a_line<O: Oracle>(
-    oracle: &mut O,
-    origin: &FieldPoint,
-    constants: &[Occurrence],
-    mut open: Vec<usize>,
-    stream: &mut Stream,
-    mut found: impl FnMut(usize, (usize, usize)),
-) -> Result<(), DeriveError> {
-    let lengths = constants.iter().filter(|(_, in_angle)| !in_angle);
-    let lengths: Vec<usize> = lengths.map(|(i, _)| *i).collect();
+    let lengths: Vec<usize> = constants
+        .iter()
+        .filter(|(_, in_angle)| !in_angle)
+        .map(|(i, _)| *i)
+        .collect();
     let direction: Vec<Element> = lengths.iter().map(|_| stream.element()).collect();
     let mut x = Vec::new();
     let mut y: Vec<Vec<Element>> = Vec::new();
+    let mut open: Vec<usize> = functions
+        .iter()
+        .copied()
+        .filter(|k| {
+            shapes[*k]
+                .degrees
+                .keys()
+                .filter(|(_, in_angle)| !in_angle)
+                .count()
+                > 1
+        })
+        .collect();
     while !open.is_empty() && x.len() < MOST_POINTS {
         let mut point = origin.clone();
         let t = stream.element();
@@ -290,11 +333,8 @@ fn along_a_line<O: Oracle>(
         }
         open.retain(|k| {
             let values: Vec<Element> = y.iter().map(|row| row[*k]).collect();
-            let degrees = univariate::degrees(&x, &values);
-            if let Some(degrees) = degrees {
-                found(*k, degrees);
-            }
-            degrees.is_none()
+            shapes[*k].total = univariate::degrees(&x, &values);
+            shapes[*k].total.is_none()
         });
     }
     Ok(())

@@ -401,3 +401,19 @@ fn poses_without_an_answer_are_errors_in_both() {
         assert_eq!((fault.sample, fault.reason), (0, reason));
     }
 }
+
+#[test]
+fn base_parameters_are_refused_where_a_denominator_of_theirs_vanishes() {
+    use modelmill_generated::four_bar::{Geometry, Parameters, base_parameters};
+    let of = |l3: f64| {
+        let geometry = Geometry {
+            L3: l3,
+            ..Geometry::default()
+        };
+        base_parameters(&geometry, &Parameters::default())
+    };
+    assert!(of(0.7).is_ok() && of(1e-12).is_ok());
+    for special in [0.0, f64::NAN] {
+        assert_eq!(of(special).unwrap_err().denominator, "L3");
+    }
+}

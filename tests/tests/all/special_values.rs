@@ -3,6 +3,7 @@
 use modelmill_codegen::Evaluator;
 use modelmill_spec::Mechanism;
 use modelmill_tests::fixtures::{derive, model};
+use modelmill_tests::laws::Case;
 use modelmill_tests::rank::rank_of_products;
 use modelmill_tests::sample::Sample;
 use modelmill_tests::stream::Stream;
@@ -22,6 +23,38 @@ fn ranks(mechanism: &Mechanism) -> (usize, usize) {
     let numeric = rank_of_products(&evaluator, &sample).expect("reachable states");
     assert!(numeric.gap > 1e6, "gap {:.1e}", numeric.gap);
     (derivation.reduction.retained.len(), numeric.rank)
+}
+
+/// Base parameters for the file's values alone.
+fn rank_at_values(mechanism: &Mechanism) -> usize {
+    derive(&mechanism.at_values()).reduction.retained.len()
+}
+
+#[test]
+fn the_exact_rank_for_the_files_values_alone_is_the_numeric_one() {
+    for (name, constant, general, special) in [
+        ("two_link", "g", 6, 4),
+        ("two_link-normal", "L", 4, 2),
+        ("five_bar", "g", 11, 7),
+    ] {
+        let mechanism = model(name);
+        assert_eq!(rank_at_values(&mechanism), general, "{name}");
+        let mechanism = with_value(mechanism, constant, 0.0);
+        assert_eq!(ranks(&mechanism), (general, special), "{name}");
+        assert_eq!(rank_at_values(&mechanism), special, "{name}");
+    }
+}
+
+/// Forces for the values alone are those of the general derivation, and no constant is left that could be changed.
+#[test]
+fn numbers_in_place_of_constants_change_no_force() {
+    for name in ["two_link", "tx40", "four_bar", "spidermill", "three_rrr"] {
+        let mechanism = model(name).at_values();
+        assert!(mechanism.constants.is_empty(), "{name}");
+        let case = Case::near_nominal(&mechanism, 20, 0.2).unwrap();
+        case.forces_satisfy_dalembert(10).unwrap();
+        case.reduction_keeps_the_forces().unwrap();
+    }
 }
 
 #[test]
