@@ -5,6 +5,7 @@
 use modelmill_algebra::field::Stream;
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
+use num_traits::ToPrimitive;
 
 use super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
 use super::reduction::{Dependency, Method, Reduction};
@@ -207,8 +208,10 @@ fn recognised(value: f64, mechanism: &Mechanism) -> RationalFunction {
     let is_near = |a: f64| (a - value).abs() <= ROUNDING * value.abs();
     for below in 1..=LARGEST_DENOMINATOR {
         let above = (value * below as f64).round();
-        if above.abs() < 1000.0 && is_near(above / below as f64) {
-            return RationalFunction::constant(Rational::new(above as i64, below));
+        if let Some(n) = above.to_i64().filter(|n| n.abs() < 1000)
+            && is_near(above / below as f64)
+        {
+            return RationalFunction::constant(Rational::new(n, below));
         }
     }
     let lengths: Vec<(usize, f64)> = (mechanism.constants.iter().enumerate())

@@ -79,3 +79,24 @@ fn arms_of_many_symbolic_twists_are_reduced_exactly() {
         check(n);
     }
 }
+
+/// Base parameters of a long arm are sums link by link, and their text does not grow with the power of the joints.
+#[test]
+fn long_arms_are_grouped_link_by_link() {
+    let case = Case::new(&twisted(18), 12, 0.5).unwrap();
+    let reduction = &case.derivation.reduction;
+    assert!(matches!(reduction.method, Method::Exact { .. }));
+    assert_eq!(reduction.retained.len(), 7 * 18 - 6);
+    let sums = case.derivation.base_sums();
+    assert!(!sums.is_empty());
+    // A sum refers to those before it only.
+    for (i, (_, text)) in sums.iter().enumerate() {
+        let names = text.split(|c: char| !c.is_alphanumeric() && c != '_');
+        let later = |name: &str| sums[i..].iter().any(|(other, _)| other == name);
+        assert!(!names.into_iter().any(later), "{text}");
+    }
+    case.reduction_keeps_the_forces().unwrap();
+    case.forces_satisfy_dalembert_to(1e-9, 4).unwrap();
+    let module = modelmill_codegen::emit(&case.derivation).module();
+    assert!(module.len() < 600_000, "{} bytes", module.len());
+}
