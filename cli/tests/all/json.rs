@@ -282,7 +282,7 @@ fn runs_says_what_changed() {
         "--json",
     ]);
     let moved = &other["moved"][0];
-    assert!(number(&moved["sigmas"]) > 4.0, "{moved}");
+    assert!(number(moved, "/sigmas") > 4.0, "{moved}");
     let change = &other["changes"][0];
     assert_eq!(
         keys(change),

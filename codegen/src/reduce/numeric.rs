@@ -23,8 +23,9 @@ const NOTHING: f64 = 1e-13;
 /// How far poses lie from the nominal one, in rad or relative to the size of the loops, and how often that is halved
 /// where most of such poses cannot be reached.
 pub(super) const REACH: f64 = 0.4;
-/// The same where a base is looked for: columns of a mechanism with one freedom hardly differ along a short path.
-const FAR: f64 = 1.0;
+/// The same where a base is looked for: columns of a mechanism with one freedom hardly differ along a short path, and a long
+/// one may lead through a singular pose into another branch, where the mechanism is another one.
+const FAR: f64 = 0.5;
 const HALVINGS: u32 = 7;
 
 /// Reduces `columns[k][d]`, trying them in the given order.

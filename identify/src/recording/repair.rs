@@ -22,11 +22,18 @@ const RARE: f64 = 0.002;
 
 impl Recording {
     /// Puts in place what stands for values that were not measured, where `is_lacking_allowed`, and for those of sensors that
-    /// failed; forces there count no more. What is done goes into the notes.
-    pub fn repair(&mut self, coordinates: &[String], drives: &[String], is_lacking_allowed: bool) {
+    /// failed; forces there count no more. `is_made` says of a drive and a sample whether the mechanism itself may make a
+    /// spike there, as close to a singular pose. What is done goes into the notes.
+    pub fn repair(
+        &mut self,
+        coordinates: &[String],
+        drives: &[String],
+        is_lacking_allowed: bool,
+        is_made: &dyn Fn(usize, usize) -> bool,
+    ) {
         let place = place_word(&self.file);
         let mut notes = Vec::new();
-        for name in drives {
+        for (drive, name) in drives.iter().enumerate() {
             let Some(column) = self.columns.get_mut(name).filter(|c| c.text.is_none()) else {
                 continue;
             };
@@ -53,7 +60,7 @@ impl Recording {
                 column.lost = lost;
                 column.join();
             }
-            if let Some((spikes, share)) = spikes(&column.values) {
+            if let Some((spikes, share)) = spikes(&column.values, &|i| is_made(drive, i)) {
                 let n = spikes.iter().filter(|spike| **spike).count();
                 let at: Vec<usize> = (0..spikes.len()).filter(|i| spikes[*i]).collect();
                 let largest = at
@@ -162,8 +169,9 @@ impl Column {
     }
 }
 
-/// Which samples of a force are spikes, and their part of the squared force; `None` if there are none.
-fn spikes(force: &[f64]) -> Option<(Vec<bool>, f64)> {
+/// Which samples of a force are spikes that the mechanism does not make, and their part of the squared force; `None` if there
+/// are none.
+fn spikes(force: &[f64], is_made: &dyn Fn(usize) -> bool) -> Option<(Vec<bool>, f64)> {
     let n = force.len();
     if n < 8 * BESIDE {
         return None;
@@ -182,6 +190,9 @@ fn spikes(force: &[f64]) -> Option<(Vec<bool>, f64)> {
             spikes[i..end].fill(false);
         }
         i = end.max(i + 1);
+    }
+    for (i, spike) in spikes.iter_mut().enumerate() {
+        *spike = *spike && !is_made(i);
     }
     let count = spikes.iter().filter(|spike| **spike).count();
     // What comes often is how this force is.
@@ -297,7 +308,8 @@ mod tests {
         };
         let read = Recording::from_reader(text.as_bytes(), "run.csv", &options);
         let mut recording = read.unwrap();
-        recording.repair(&["q".to_owned()], &["motor".to_owned()], true);
+        let (coordinates, drives) = (["q".to_owned()], ["motor".to_owned()]);
+        recording.repair(&coordinates, &drives, true, &|_, _| false);
         recording
     }
 

@@ -4,6 +4,7 @@
 mod choice;
 mod columns;
 mod contents;
+mod leverage;
 mod options;
 
 use std::path::Path;
@@ -18,6 +19,7 @@ use crate::model::Model;
 use crate::stretch::{Stretch, variances};
 
 use columns::read_options;
+use leverage::Leverage;
 
 pub use contents::{ColumnInfo, Contents, TableInfo};
 pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER};
@@ -32,7 +34,13 @@ fn read_raw(model: &Model, paths: &[&Path], reading: &Reading) -> Outcome<Raw> {
     let mut raw = model
         .host()
         .watched(&format!("reading {name}"), 0, |_| file.read(&options))??;
-    raw.repair(&model.active(), &model.drives(), reading.skip_bad_samples);
+    let leverage = Leverage::new(model, &raw);
+    raw.repair(
+        &model.active(),
+        &model.drives(),
+        reading.skip_bad_samples,
+        &|drive, sample| leverage.peaks(drive, sample),
+    );
     Ok(raw)
 }
 
