@@ -107,7 +107,7 @@ fn run(name: &str, seed: u64, made: Made) -> PathBuf {
         for (f, rate) in force.iter_mut().zip(rate) {
             match made {
                 Made::Friction(drive, dry, viscous) if drive == d => {
-                    *f += dry * rate.signum() + viscous * rate
+                    *f += dry * rate.signum() + viscous * rate;
                 }
                 Made::Scale(drive, factor) if drive == d => *f *= factor,
                 Made::Offset(drive, offset) if drive == d => *f += offset,

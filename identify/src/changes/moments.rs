@@ -74,6 +74,7 @@ impl Moments {
     }
 
     /// The same for some of the columns.
+    #[must_use]
     pub fn of(&self, columns: &[usize]) -> Self {
         Self {
             gram: DMatrix::from_fn(columns.len(), columns.len(), |i, j| {

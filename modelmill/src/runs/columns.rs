@@ -401,9 +401,12 @@ fn of_prediction(
     }
     let mut next = values.iter();
     let all: Vec<f64> = (0..model.base.len())
-        .map(|k| match model.is_known(k) {
-            true => model.nominal[k],
-            false => next.next().copied().unwrap_or(0.0),
+        .map(|k| {
+            if model.is_known(k) {
+                model.nominal[k]
+            } else {
+                next.next().copied().unwrap_or(0.0)
+            }
         })
         .collect();
     let forces = |turned: &Stretch| {
