@@ -1,6 +1,8 @@
 //! Every bundled model on its own forces with noise: `compare`, `identify` and `diagnose` go through, and say what is
 //! true of such a recording. Only the noise is missing from the model, so that nothing else may be found.
 
+mod draws;
+
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -13,6 +15,8 @@ use modelmill_codegen::{Derivation, Evaluator, States};
 use modelmill_identify::Figures;
 use modelmill_spec::Mechanism;
 
+use draws::Draws;
+
 /// Noise of each force beside its root mean square.
 const NOISE: f64 = 0.01;
 /// Samples of a recording, and the time between two, s.
@@ -20,24 +24,6 @@ const SAMPLES: usize = 600;
 const STEP: f64 = 0.02;
 /// Waves of each coordinate.
 const WAVES: usize = 4;
-
-/// Uniform and normal numbers, the same on every machine.
-struct Draws(u64);
-
-impl Draws {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^= z >> 31;
-        (z >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
-}
 
 /// Positions, rates and accelerations of the active coordinates, `[order][coordinate][sample]`.
 type Moving = [Vec<Vec<f64>>; 3];

@@ -1,6 +1,8 @@
 //! `runs` on forces of models with a further body, other friction, another scale and another clock, along motions of their own,
 //! with noise that has a memory: what changed is told as such, and nothing else.
 
+mod draws;
+
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -10,30 +12,14 @@ use modelmill::recording::{Reading, Recording};
 use modelmill::runs::{Changed, What};
 use modelmill_codegen::{Evaluator, States};
 
+use draws::Draws;
+
 const SAMPLES: usize = 2000;
 /// Time between two samples, s.
 const STEP: f64 = 0.01;
 /// Noise of each force beside its effective value, and how much of it a sample keeps of the one before.
 const NOISE: f64 = 0.01;
 const KEPT: f64 = 0.6;
-
-/// Uniform and normal numbers, the same on every machine.
-struct Draws(u64);
-
-impl Draws {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^= z >> 31;
-        (z >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
-}
 
 /// What is done to a run.
 #[derive(Clone, Copy, Debug)]

@@ -1,9 +1,9 @@
 //! In which order columns are tried as retained ones.
 //!
 //! Products that the file names come first, all others in the order of eq. (5). Masses at a distance from their link's
-//! origin are a case of their own: their columns are sums of the link's own ones with powers of lengths, while its own ones
-//! may be written by theirs with quotients by sums only, which vanish where masses coincide. So there is a second order in which such a product waits until its links'
-//! own products have been tried, to be taken where it saves such quotients.
+//! origin are a case of their own. Their columns are sums of the link's own ones with powers of lengths; written the other way
+//! round, the link's own ones take quotients by differences, which vanish where masses coincide. So there is a second order,
+//! in which such a product waits until its links' own products have been tried; it is taken where it saves such quotients.
 
 use std::collections::BTreeMap;
 

@@ -191,12 +191,14 @@ fn spikes(force: &[f64], is_made: &dyn Fn(usize) -> bool) -> Option<(Vec<bool>, 
         }
         i = end.max(i + 1);
     }
+    // What comes often is how this force is.
+    if spikes.iter().filter(|spike| **spike).count() as f64 > 0.01 * n as f64 {
+        return None;
+    }
     for (i, spike) in spikes.iter_mut().enumerate() {
         *spike = *spike && !is_made(i);
     }
-    let count = spikes.iter().filter(|spike| **spike).count();
-    // What comes often is how this force is.
-    if count == 0 || count as f64 > 0.01 * n as f64 {
+    if !spikes.contains(&true) {
         return None;
     }
     let squares = |wanted: bool| -> f64 {

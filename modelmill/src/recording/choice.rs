@@ -17,12 +17,12 @@ use crate::error::Outcome;
 use crate::model::Model;
 use crate::text::table::{percent, significant};
 
-/// And in parts of the band of the forces: noise above says nothing of them, and makes the model's forces rough.
-const FARTHEST: f64 = 8.0;
 /// Ratio of neighbouring cut-offs.
 const RATIO: f64 = 1.6;
 /// The highest cut-off, in parts of the sampling rate: beyond, differences take more than the filter leaves.
 const HIGHEST: f64 = 0.2;
+/// The same in parts of the band of the forces: noise above says nothing of them, and makes the model's forces rough.
+const FARTHEST: f64 = 8.0;
 /// The lowest cut-off, in parts of the band of the forces.
 const LOWEST: f64 = 0.15;
 /// Parts of the time, each of which is held out once.

@@ -135,7 +135,10 @@ impl Rows {
             None => rows.weighed(&(0..layout.base).collect::<Vec<usize>>())?,
         };
         for (stretch, laid) in recording.stretches.iter().zip(&mut rows.stretches) {
-            let further = of_prediction(model, stretch, laid, &rows.values)?;
+            let mut further = of_prediction(model, stretch, laid, &rows.values)?;
+            for column in &mut further {
+                leave_out(column, &laid.counts);
+            }
             laid.columns.extend(further);
         }
         Ok(rows)
@@ -288,7 +291,7 @@ impl Laid {
         self.columns.get(k)?.0.get(drive)?.as_deref()
     }
 
-    /// What a solution leaves of a drive's force, 0 where that does not count.
+    /// What a solution leaves of a drive's force.
     fn rest(&self, drive: usize, solution: Option<(&[usize], &DVector<f64>)>) -> Vec<f64> {
         let mut rest = self.forces[drive].clone();
         for (k, value) in solution
@@ -300,11 +303,6 @@ impl Laid {
                 .zip(self.column(*k, drive).unwrap_or_default())
             {
                 *r -= value * z;
-            }
-        }
-        for (r, counts) in rest.iter_mut().zip(&self.counts[drive]) {
-            if !counts {
-                *r = 0.0;
             }
         }
         rest
@@ -324,6 +322,26 @@ impl Laid {
             }
         }
         pieces
+    }
+}
+
+/// Puts 0 where a sample does not count.
+fn silence(values: &mut [f64], counts: &[bool]) {
+    for (value, _) in values
+        .iter_mut()
+        .zip(counts)
+        .filter(|(_, counts)| !**counts)
+    {
+        *value = 0.0;
+    }
+}
+
+/// A column without the samples that do not count.
+fn leave_out(column: &mut Column, counts: &[Vec<bool>]) {
+    for (values, counts) in column.0.iter_mut().zip(counts) {
+        if let Some(values) = values {
+            silence(values, counts);
+        }
     }
 }
 
@@ -368,16 +386,35 @@ fn laid(model: &Model, stretch: &Stretch, payloads: &Payloads, layout: Layout) -
     }
     let samples = forces.first().map_or(0, Vec::len);
     columns.extend((0..n).map(|drive| only(drive, vec![1.0; samples])));
-    let counts = |drive: usize| -> Vec<bool> {
-        let Some(weights) = &stretch.weights else {
-            return vec![true; samples];
+    // A kept sample has heard of all that its filter saw.
+    let every = stretch.decimation();
+    let hears_of_faults = |drive: usize, i: usize| {
+        let Some(out) = stretch.run.left_out.get(drive) else {
+            return false;
         };
-        (0..samples).map(|i| weights[i * n + drive] > 0.0).collect()
+        let around = (every * i).saturating_sub(every)..(every * (i + 1) + 1).min(out.len());
+        out[around].contains(&true)
     };
+    let counts = |drive: usize| -> Vec<bool> {
+        let weighs = |i: usize| {
+            let weights = stretch.weights.as_ref();
+            weights.is_none_or(|weights| weights[i * n + drive] > 0.0)
+        };
+        (0..samples)
+            .map(|i| weighs(i) && !hears_of_faults(drive, i))
+            .collect()
+    };
+    let counts: Vec<Vec<bool>> = (0..n).map(counts).collect();
+    for (force, counts) in forces.iter_mut().zip(&counts) {
+        silence(force, counts);
+    }
+    for column in &mut columns {
+        leave_out(column, &counts);
+    }
     Ok(Laid {
         columns,
         forces,
-        counts: (0..n).map(counts).collect(),
+        counts,
     })
 }
 
