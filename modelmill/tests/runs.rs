@@ -33,6 +33,8 @@ enum Made<'a> {
     Offset(usize, f64),
     /// The clock counts so many seconds in one.
     Clock(f64),
+    /// The force of a drive lacks between two samples.
+    Lost(usize, usize, usize),
 }
 
 /// A recording of a bundled model's positions and forces, along a motion of its own.
@@ -111,8 +113,12 @@ fn run(name: &str, seed: u64, made: Made) -> PathBuf {
     let mut text = format!("t,{},{}", active.join(","), drives.join(","));
     for k in 0..SAMPLES {
         let _ = write!(text, "\n{}", clock * STEP * k as f64);
-        for column in columns[0].iter().chain(&forces) {
+        for column in &columns[0] {
             let _ = write!(text, ",{}", column[k]);
+        }
+        for (d, force) in forces.iter().enumerate() {
+            let is_lost = matches!(made, Made::Lost(drive, from, to) if drive == d && (from..to).contains(&k));
+            let _ = write!(text, ",{}", if is_lost { f64::NAN } else { force[k] });
         }
     }
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("runs-{name}-{seed}.csv"));
@@ -274,6 +280,25 @@ fn drives_and_clocks_are_told_apart() {
         panic!("{found:#?}");
     };
     assert!((factor.value - 1.02).abs() < 0.003, "{factor:?}");
+}
+
+/// Between samples whose forces were lost stand straight lines, which say nothing of the machine.
+#[test]
+fn lost_forces_move_nothing() {
+    let model = Model::open(bundled("puma560")).expect("the model");
+    let reading = Reading {
+        skip_bad_samples: true,
+        ..Reading::default()
+    };
+    let files = [
+        run("puma560", 1000, Made::Nothing),
+        run("puma560", 1001, Made::Lost(1, 600, 1100)),
+    ];
+    let read = |file: &PathBuf| model.recording(file, &reading).expect("the recording");
+    let [before, later] = files.each_ref().map(read);
+    let found = model.runs(&[&before, &later]).expect("an answer");
+    assert!(found.runs[1].changes.is_empty(), "{:#?}", found.runs[1]);
+    assert!(found.runs[1].moved.is_empty(), "{:?}", found.runs[1].moved);
 }
 
 #[test]
