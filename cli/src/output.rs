@@ -23,17 +23,26 @@ impl Target {
         path: &Path,
         inputs: impl IntoIterator<Item = &'a Path>,
     ) -> Outcome<Self> {
-        refuse_dash(path)?;
+        Self::of("--out", path, inputs)
+    }
+
+    /// The same for a target that another flag names.
+    pub(crate) fn of<'a>(
+        flag: &str,
+        path: &Path,
+        inputs: impl IntoIterator<Item = &'a Path>,
+    ) -> Outcome<Self> {
+        refuse_dash(flag, path)?;
         if path.is_dir() {
             return Err(Failure::Usage(format!(
-                "--out {}: this is a folder; give the name of a file in it",
+                "{flag} {}: this is a folder; give the name of a file in it",
                 path.display()
             )));
         }
         for input in inputs {
             if same_file(path, input) {
                 return Err(Failure::Usage(format!(
-                    "--out {} would overwrite a file that this command reads; choose another name",
+                    "{flag} {} would overwrite a file that this command reads; choose another name",
                     path.display()
                 )));
             }
@@ -54,7 +63,7 @@ impl Target {
 
 /// Makes the folder that a command writes into.
 pub(crate) fn make_folder(folder: &Path) -> Outcome {
-    refuse_dash(folder)?;
+    refuse_dash("--out", folder)?;
     if folder.exists() && !folder.is_dir() {
         return Err(Failure::Input(format!(
             "--out {}: the folder cannot be made, since this is a file; give the name of a folder, which is made if it is not \
@@ -71,15 +80,14 @@ pub(crate) fn make_folder(folder: &Path) -> Outcome {
 }
 
 /// Many programs take `-` for standard output; here a file of that name would surprise who asks for it.
-pub(crate) fn refuse_dash(path: &Path) -> Outcome {
+pub(crate) fn refuse_dash(flag: &str, path: &Path) -> Outcome {
     if path.as_os_str() != "-" {
         return Ok(());
     }
-    Err(Failure::Usage(
-        "--out -: the name of a file is expected; what can go to standard output does so without --out (a file of this \
-         very name is `./-`)"
-            .to_owned(),
-    ))
+    Err(Failure::Usage(format!(
+        "{flag} -: the name of a file is expected; what can go to standard output does so without {flag} (a file of this very \
+         name is `./-`)"
+    )))
 }
 
 /// Writes a file as a whole, but not over one that was read; the reason and what to do if it cannot be.

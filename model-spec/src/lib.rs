@@ -59,7 +59,7 @@ pub use kinds::{
 pub use load::{Failure, Loaded, kinds_with, load, load_file, load_file_with, load_with};
 pub use mechanics::Mechanics;
 pub use mechanism::*;
-pub use motion::{Kinematics, Poses};
+pub use motion::{Kinematics, Moved, Pose, Poses};
 pub use reading::{read_named, read_text};
 pub use unit::unit_product;
 

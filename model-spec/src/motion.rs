@@ -29,12 +29,39 @@ pub struct Poses {
     frames: Vec<Pose>,
 }
 
+/// A frame at given coordinates, all in the axes of the base frame.
 #[derive(Clone, Debug)]
-struct Pose {
-    rotation: [Vec3; 3],
-    origin: Vec3,
-    /// Coordinates that move this frame against its parent: coordinate, factor, whether it turns, axis, origin.
-    moved: Vec<(usize, f64, bool, Vec3, Vec3)>,
+pub struct Pose {
+    /// Row by row; its columns are the frame's axes.
+    pub rotation: [[f64; 3]; 3],
+    /// m
+    pub origin: [f64; 3],
+    /// The joints between its parent and this frame, in the order of its steps.
+    pub moved: Vec<Moved>,
+    /// Where translations led on the way from the parent's origin, m, and how many of `moved` lay behind by then.
+    pub way: Vec<([f64; 3], usize)>,
+}
+
+/// How a coordinate moves a frame against its parent.
+#[derive(Clone, Copy, Debug)]
+pub struct Moved {
+    /// Position of the coordinate in [`Mechanism::coordinates`].
+    pub coordinate: usize,
+    /// By what the coordinate is multiplied.
+    pub factor: f64,
+    /// Whether it turns about the axis; else it slides along it.
+    pub is_rotation: bool,
+    /// Unit vector.
+    pub axis: [f64; 3],
+    /// Where the joint is reached, m.
+    pub origin: [f64; 3],
+}
+
+impl Poses {
+    /// The frames in the order of the file, the base first.
+    pub fn frames(&self) -> &[Pose] {
+        &self.frames
+    }
 }
 
 impl Kinematics {
@@ -99,27 +126,30 @@ impl Kinematics {
         assert_eq!(coordinates.len(), self.n, "one value for each coordinate");
         let mut frames: Vec<Pose> = Vec::with_capacity(self.frames.len());
         for (i, (parent, moves)) in self.frames.iter().enumerate() {
-            let mut pose = if i == 0 {
-                Pose {
-                    rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-                    origin: [0.0; 3],
-                    moved: Vec::new(),
-                }
+            let (rotation, origin) = if i == 0 {
+                let unity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+                (unity, [0.0; 3])
             } else {
-                Pose {
-                    rotation: frames[*parent].rotation,
-                    origin: frames[*parent].origin,
-                    moved: Vec::new(),
-                }
+                (frames[*parent].rotation, frames[*parent].origin)
+            };
+            let mut pose = Pose {
+                rotation,
+                origin,
+                moved: Vec::new(),
+                way: Vec::new(),
             };
             for step in moves {
                 let direction: Vec3 = std::array::from_fn(|k| pose.rotation[k][step.axis]);
                 let mut amount = step.offset;
                 for (coordinate, factor) in &step.coordinates {
                     amount += factor * coordinates[*coordinate];
-                    let is_rotation = step.is_rotation;
-                    pose.moved
-                        .push((*coordinate, *factor, is_rotation, direction, pose.origin));
+                    pose.moved.push(Moved {
+                        coordinate: *coordinate,
+                        factor: *factor,
+                        is_rotation: step.is_rotation,
+                        axis: direction,
+                        origin: pose.origin,
+                    });
                 }
                 if step.is_rotation {
                     turn(&mut pose.rotation, step.axis, amount);
@@ -127,6 +157,7 @@ impl Kinematics {
                     for k in 0..3 {
                         pose.origin[k] += amount * direction[k];
                     }
+                    pose.way.push((pose.origin, pose.moved.len()));
                 }
             }
             frames.push(pose);
@@ -167,21 +198,20 @@ impl Kinematics {
                 let at = self.position(poses, *point);
                 let mut frame = self.points[*point].0;
                 while frame != 0 {
-                    for (coordinate, factor, is_rotation, axis, origin) in
-                        &poses.frames[frame].moved
-                    {
-                        let velocity = if *is_rotation {
-                            let arm: Vec3 = std::array::from_fn(|k| at[k] - origin[k]);
+                    for moved in &poses.frames[frame].moved {
+                        let axis = moved.axis;
+                        let velocity = if moved.is_rotation {
+                            let arm: Vec3 = std::array::from_fn(|k| at[k] - moved.origin[k]);
                             [
                                 axis[1] * arm[2] - axis[2] * arm[1],
                                 axis[2] * arm[0] - axis[0] * arm[2],
                                 axis[0] * arm[1] - axis[1] * arm[0],
                             ]
                         } else {
-                            *axis
+                            axis
                         };
                         for k in 0..3 {
-                            rows[3 * l + k][*coordinate] += sign * factor * velocity[k];
+                            rows[3 * l + k][moved.coordinate] += sign * moved.factor * velocity[k];
                         }
                     }
                     frame = self.frames[frame].0;

@@ -37,6 +37,7 @@
 //! | [`model::Changes::between`] | what a variant changes |
 //! | [`Host::kinds`] | the kinds of effects that a model may have |
 //! | [`Model::with`] | the model with effects added to its file |
+//! | [`Model::picture`] | the mechanism at a pose, as SVG |
 //! | [`Model::equations`] | p_g, dependences, p_min and programs as a page |
 //! | [`Model::generate`] | code |
 //! | [`Model::evaluate`] | forces along a recording |
@@ -171,6 +172,7 @@ pub mod identify;
 pub mod import;
 pub mod interpret;
 pub mod model;
+pub mod picture;
 pub mod print;
 pub mod progress;
 pub mod recording;

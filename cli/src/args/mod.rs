@@ -1,5 +1,6 @@
 //! The command line: names, options and help of every command.
 
+pub(crate) mod drawing;
 pub(crate) mod effects;
 pub(crate) mod estimation;
 pub(crate) mod preparation;
@@ -16,6 +17,7 @@ use modelmill::{Host, Model};
 use crate::failure::Outcome;
 use crate::terminal;
 
+use drawing::DrawingArgs;
 use effects::{AddArgs, EffectsArgs};
 use estimation::{EstimatorArgs, StandstillArgs};
 use preparation::PreparationArgs;
@@ -54,12 +56,14 @@ pub(crate) enum Command {
         ratio of the last singular value that counts to the next, or to the level of rounding; below 1000 the rank is a matter \
         of opinion, and a warning says so.\n\n\
         Examples (from the project's root):\n  modelmill check model-spec/models/spidermill.toml\n  \
-        modelmill check model-spec/models/spidermill.toml --json"
+        modelmill check model-spec/models/spidermill.toml --json\n  \
+        modelmill check model-spec/models/panda.toml --picture panda.svg --at q2=0.6,q4=-1.2 --view 60,20"
     )]
     Check(CheckArgs),
     /// Say what a variant changes: entries, p_g, dependencies, p_min, operation counts
     #[command(after_help = "Examples (from the project's root):\n  \
-        modelmill diff model-spec/models/spidermill.toml model-spec/models/spidermill-paper.toml")]
+        modelmill diff model-spec/models/spidermill.toml model-spec/models/spidermill-paper.toml\n  \
+        modelmill diff model-spec/models/arm_four_bar.toml model-spec/models/arm_parallelogram.toml --picture both.svg")]
     Diff(DiffArgs),
     /// List the effects that a model may have, or explain one of them
     #[command(after_help = "Examples (from the project's root):\n  \
@@ -230,6 +234,8 @@ pub(crate) enum Command {
 pub(crate) struct CheckArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
+    #[command(flatten)]
+    pub(crate) drawing: DrawingArgs,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub(crate) json: bool,
@@ -242,6 +248,8 @@ pub(crate) struct DiffArgs {
     pub(crate) before: PathBuf,
     /// Model file as it is now
     pub(crate) after: PathBuf,
+    #[command(flatten)]
+    pub(crate) drawing: DrawingArgs,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub(crate) json: bool,

@@ -20,7 +20,11 @@ pub(crate) fn run(host: &Host, args: &CheckArgs) -> Outcome {
         }
         model => model?,
     };
+    let picture = args.drawing.target(model.files())?;
     let checked = model.check()?;
+    if let Some(target) = &picture {
+        args.drawing.draw(target, &model, None)?;
+    }
     if args.json {
         return terminal::print_json(&checked.json());
     }

@@ -11,6 +11,10 @@ use crate::{commands, terminal};
 pub(crate) fn run(host: &Host, args: &DiffArgs) -> Outcome {
     let before = commands::model(host, &args.before)?;
     let after = commands::model(host, &args.after)?;
+    let inputs = before.files().chain(after.files());
+    if let Some(target) = args.drawing.target(inputs)? {
+        args.drawing.draw(&target, &after, Some(&before))?;
+    }
     let changes = Changes::between(&before, &after);
     if args.json {
         return terminal::print_json(&changes.json(&before, &after));

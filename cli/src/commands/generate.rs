@@ -81,7 +81,7 @@ fn sources(args: &GenerateArgs, inputs: &[&Path], files: &[EmittedFile]) -> Outc
             "--out names the folder of the sources".to_owned(),
         ));
     };
-    refuse_dash(folder)?;
+    refuse_dash("--out", folder)?;
     std::fs::create_dir_all(folder).map_err(|error| {
         Failure::Input(format!(
             "folder {} cannot be made: {error}",
@@ -105,7 +105,7 @@ const OURS: &str = "# Written by modelmill.";
 
 /// Writes a crate; only over a crate of the same kind.
 fn write_crate(folder: &Path, files: &[EmittedFile]) -> Outcome {
-    refuse_dash(folder)?;
+    refuse_dash("--out", folder)?;
     let manifest = folder.join("Cargo.toml");
     let ours = Disk::default()
         .read_text(&manifest, 1 << 20)

@@ -30,6 +30,7 @@ mod hostile;
 mod interpret;
 mod json;
 mod languages;
+mod pictures;
 mod plausible;
 mod preparation;
 mod recordings;

@@ -25,6 +25,9 @@ pub use base_parameters::{base_expression, base_grouped};
 pub use equations::{BaseLine, DependencyLine, Equations, NumericMethod, Operations, Rank};
 pub use rank::NumericRank;
 
+use modelmill_draw::{Scene, Style, svg};
+use modelmill_spec::Mechanism;
+
 use crate::Derivation;
 use document::Document;
 
@@ -53,10 +56,17 @@ pub fn page(derivation: &Derivation, format: Format, numeric: Option<&NumericRan
         Format::Text => render_text::render(&document()),
         Format::Markdown => render_markdown::render(&document()),
         Format::Latex => render_latex::render(&document()),
-        Format::Html => render_html::render(&document()),
+        Format::Html => render_html::render(&document(), &picture(&derivation.mechanism)),
         #[cfg(any(test, feature = "json"))]
         Format::Json => Equations::new(derivation, numeric).json(),
     }
+}
+
+/// The mechanism at its nominal pose.
+fn picture(mechanism: &Mechanism) -> String {
+    let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
+    let scene = Scene::new(mechanism, &nominal);
+    svg(&[&scene], &scene.view(), &Style::default())
 }
 
 /// The derivation, step by step.

@@ -9,7 +9,8 @@ use crate::expr::print::Formula;
 
 const STYLE: &str = include_str!("page.css");
 
-pub(super) fn render(document: &Document) -> String {
+/// `picture` is an SVG of the mechanism.
+pub(super) fn render(document: &Document, picture: &str) -> String {
     let title = escape(&document.title);
     let mut out = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -29,7 +30,7 @@ pub(super) fn render(document: &Document) -> String {
     for text in headings {
         _ = write!(out, "<a href=\"#{}\">{}</a> ", anchor(text), escape(text));
     }
-    out.push_str("</nav>\n");
+    _ = writeln!(out, "</nav>\n<figure class=\"picture\">{picture}</figure>");
     blocks(&mut out, &document.blocks);
     out.push_str("</main>\n</body>\n</html>\n");
     out

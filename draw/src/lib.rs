@@ -1,0 +1,45 @@
+//! Pictures of mechanisms.
+//!
+//! A [`Mechanism`](modelmill_spec::Mechanism) and the values of its coordinates become a [`Scene`]: what stands where, in
+//! metres. A [`View`] looks at it, flat where all motion is in one plane, else from a direction that can be chosen, and
+//! [`svg`] draws it. Nothing here knows of dynamics.
+//!
+//! ```
+//! # let text = r#"
+//! # schema = 1
+//! # name = "pendulum"
+//! # gravity = [0, -9.81, 0]
+//! # [constants]
+//! # l = { value = 0.5, unit = "m" }
+//! # [parameters]
+//! # m = { nominal = 2.0, unit = "kg" }
+//! # [coordinates]
+//! # q = { nominal = 0.3 }
+//! # [[frame]]
+//! # name = "rod"
+//! # on = "base"
+//! # modified_dh = { theta = "q" }
+//! # [[lumped_mass]]
+//! # on = "rod"
+//! # mass = "m"
+//! # at = ["l", 0]
+//! # [[drive]]
+//! # name = "motor"
+//! # joint = "q"
+//! # "#;
+//! let mechanism = modelmill_spec::load("pendulum.toml", text, &modelmill_boundary::files::Memory::default()).expect("a model").mechanism;
+//! let scene = modelmill_draw::Scene::new(&mechanism, &[0.3]);
+//! let picture = modelmill_draw::svg(&[&scene], &scene.view(), &modelmill_draw::Style::default());
+//! assert!(picture.starts_with("<svg"));
+//! ```
+
+mod labels;
+mod paint;
+mod plane;
+mod scene;
+mod symbols;
+mod view;
+
+pub use paint::{Style, svg};
+pub use scene::{Joint, Mark, Scene, Shape, Use};
+pub use view::View;

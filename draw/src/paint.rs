@@ -1,0 +1,359 @@
+//! A scene as SVG without scripts: everything sorted from far to near, each thing with its name on demand.
+
+use std::fmt::Write as _;
+
+use modelmill_boundary::text::html as escape;
+use nalgebra::Vector3;
+
+use crate::labels::{Labels, SIZE};
+use crate::scene::{Mark, Scene, Shape};
+use crate::symbols::{self, Spot};
+use crate::view::View;
+
+/// Colours and strokes; they follow the reader's wish for light or dark.
+const STYLE: &str = include_str!("picture.css");
+/// Room around the mechanism, in units of the picture.
+const MARGIN: f64 = 46.0;
+/// How far each layer of signs stands before the one below it, in units of the picture.
+const BEFORE: f64 = 8.0;
+/// Colours of bodies in the style.
+const COLOURS: usize = 8;
+
+/// How a picture is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Style {
+    /// Width in units of the picture; it grows and shrinks with the page.
+    pub width: f64,
+    /// Height in the same.
+    pub height: f64,
+    /// Whether names always show; else under the pointer only.
+    pub names: bool,
+    /// Whether frames show their axes.
+    pub frames: bool,
+}
+
+impl Default for Style {
+    fn default() -> Self {
+        Self {
+            width: 640.0,
+            height: 480.0,
+            names: true,
+            frames: false,
+        }
+    }
+}
+
+/// Scenes over each other, seen from one place: the last one in colour, those before it as shadows.
+///
+/// The text begins with `<svg`, carries its style, and can stand in a page or a file.
+pub fn svg(scenes: &[&Scene], view: &View, style: &Style) -> String {
+    let paper = Paper::new(scenes, view, style);
+    let mut body = String::new();
+    let [shadows @ .., scene] = scenes else {
+        return body;
+    };
+    for shadow in shadows {
+        let inner = paper.paint(shadow);
+        _ = write!(body, "<g class=\"shadow\">{inner}</g>");
+    }
+    body.push_str(&paper.paint(scene));
+    body.push_str(&paper.furniture(scene));
+    body.push_str(&paper.labels(scene));
+    let names = if style.names { " named" } else { "" };
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"mechanism{names}\" role=\"img\" aria-label=\"{}\" \
+         viewBox=\"0 0 {:.0} {:.0}\">\n<style>{STYLE}</style>\n\
+         <rect class=\"paper\" width=\"100%\" height=\"100%\"/>\n{body}</svg>\n",
+        escape(&says(scene)),
+        style.width,
+        style.height
+    )
+}
+
+/// What a picture shows, for those who cannot see it.
+fn says(scene: &Scene) -> String {
+    let count = |is: fn(&Shape) -> bool| scene.marks.iter().filter(|m| is(&m.shape)).count();
+    let kinds = [
+        ("joint", count(|s| matches!(s, Shape::Joint(_)))),
+        (
+            "drive between points",
+            count(|s| matches!(s, Shape::Drive(_))),
+        ),
+        ("closed loop", count(|s| matches!(s, Shape::Closing(_)))),
+        ("lumped mass", count(|s| matches!(s, Shape::Lump(..)))),
+    ];
+    let counts = kinds.iter().filter(|(_, n)| *n > 0).map(|(what, n)| {
+        let many = match (n, what.strip_suffix("between points")) {
+            (1, _) => (*what).to_owned(),
+            (_, Some(drive)) => format!("{}s between points", drive.trim_end()),
+            _ if what.ends_with("ss") => format!("{what}es"),
+            _ => format!("{what}s"),
+        };
+        format!("{n} {many}")
+    });
+    let counts: Vec<String> = counts.collect();
+    format!("{}: {}", scene.title, counts.join(", "))
+}
+
+/// The sheet: where metres lie on it.
+struct Paper<'a> {
+    view: &'a View,
+    style: &'a Style,
+    /// Units of the picture for a metre.
+    scale: f64,
+    /// What lies in the middle, in m to the right and up.
+    middle: [f64; 2],
+    /// The largest mass, kg, beside which others are drawn.
+    heaviest: f64,
+}
+
+impl<'a> Paper<'a> {
+    fn new(scenes: &[&Scene], view: &'a View, style: &'a Style) -> Self {
+        let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        let mut heaviest = 0.0_f64;
+        for mark in scenes.iter().flat_map(|scene| &scene.marks) {
+            for at in mark.shape.places() {
+                for (range, x) in range.iter_mut().zip(view.project(&at)) {
+                    *range = [range[0].min(x), range[1].max(x)];
+                }
+            }
+            if let Shape::Lump(_, mass) | Shape::Centre(_, mass) = mark.shape {
+                heaviest = heaviest.max(mass.abs());
+            }
+        }
+        let room = [
+            style.width - 2.0 * MARGIN,
+            style.height - 2.0 * MARGIN - 16.0,
+        ];
+        let scales = [0, 1].map(|k| room[k].max(1.0) / (range[k][1] - range[k][0]).max(1e-9));
+        let smallest = scales[0].min(scales[1]);
+        let middle = range.map(|[low, high]| 0.5 * (low + high));
+        Self {
+            view,
+            style,
+            // A mechanism without extent, such as one joint alone, is drawn at 1 m.
+            scale: if smallest > 1e8 || !smallest.is_finite() {
+                room[1]
+            } else {
+                smallest
+            },
+            middle: middle.map(|m| if m.is_finite() { m } else { 0.0 }),
+            heaviest,
+        }
+    }
+
+    /// Where a place lies in the picture.
+    fn at(&self, at: &Vector3<f64>) -> [f64; 2] {
+        let [right, up] = self.view.project(at);
+        [
+            0.5 * self.style.width + self.scale * (right - self.middle[0]),
+            0.5 * self.style.height - 8.0 - self.scale * (up - self.middle[1]),
+        ]
+    }
+
+    /// How a direction points in the picture, y downwards.
+    fn direction(&self, v: &Vector3<f64>) -> [f64; 2] {
+        let [right, up] = self.view.project(v);
+        [right, -up]
+    }
+
+    /// All marks of a scene, from far to near.
+    fn paint(&self, scene: &Scene) -> String {
+        let towards = self.view.towards();
+        let mut drawn: Vec<(u8, f64, String)> = Vec::new();
+        for mark in &scene.marks {
+            let places = mark.shape.places();
+            let depth = places.iter().map(|at| at.dot(&towards)).sum::<f64>() / places.len() as f64;
+            let drawing = self.mark(scene, mark);
+            if drawing.is_empty() {
+                continue;
+            }
+            let title = escape(&mark.says);
+            let colour = colour(mark.body);
+            let group = format!("<g class=\"{colour}\"><title>{title}</title>{drawing}</g>\n");
+            // In a plane nothing hides anything, so kinds lie over each other in an order of their own; in space signs stand
+            // a little before the bars that they sit on.
+            let layer = layer(&mark.shape);
+            if scene.plane.is_some() {
+                drawn.push((layer, 0.0, group));
+            } else {
+                let before = BEFORE / self.scale * f64::from(layer);
+                drawn.push((0, depth + before, group));
+            }
+        }
+        drawn.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        drawn.into_iter().map(|(.., group)| group).collect()
+    }
+
+    fn mark(&self, scene: &Scene, mark: &Mark) -> String {
+        let spot = |at: &Vector3<f64>| Spot {
+            at: self.at(at),
+            is_flat: scene.plane.is_some(),
+        };
+        match &mark.shape {
+            Shape::Bar(ends) => self.line("bar", ends, mark.body == 0),
+            Shape::Arm(ends) => self.line("arm", ends, false),
+            Shape::Rail(at, axis) => {
+                let along = self.direction(axis);
+                symbols::rail(self.at(at), along)
+            }
+            Shape::Plate(corners) => {
+                let corners: Vec<[f64; 2]> = corners.iter().map(|at| self.at(at)).collect();
+                symbols::polygon("plate", &corners)
+            }
+            Shape::Joint(joint) => {
+                let axis = self.direction(&joint.axis);
+                let towards = joint.axis.dot(&self.view.towards());
+                symbols::joint(joint, spot(&joint.at), axis, towards)
+            }
+            Shape::Closing(at) => symbols::closing(spot(at)),
+            Shape::Drive(ends) => symbols::drive(ends.each_ref().map(|at| self.at(at))),
+            Shape::Ground(at) => {
+                let up = scene.down.map_or_else(Vector3::z, |down| -down);
+                symbols::ground(spot(at), self.direction(&up), up.dot(&self.view.towards()))
+            }
+            Shape::Point(at) => symbols::point(self.at(at)),
+            Shape::Lump(at, mass) => symbols::lump(self.at(at), self.size(*mass), *mass < 0.0),
+            Shape::Centre(at, mass) => symbols::centre(self.at(at), self.size(*mass), *mass < 0.0),
+            Shape::Frame(at, axes) if self.style.frames => {
+                let axes = axes.each_ref().map(|axis| self.direction(axis));
+                symbols::axes(self.at(at), &axes, 26.0, ["", "", ""])
+            }
+            Shape::Frame(..) => String::new(),
+        }
+    }
+
+    /// Radius of a mass: its area grows with the mass.
+    fn size(&self, mass: f64) -> f64 {
+        4.0 + 8.0 * (mass.abs() / self.heaviest).sqrt()
+    }
+
+    fn line(&self, class: &str, ends: &[Vector3<f64>; 2], is_ground: bool) -> String {
+        let [a, b] = ends.each_ref().map(|at| self.at(at));
+        if (a[0] - b[0]).hypot(a[1] - b[1]) < 0.5 {
+            return String::new();
+        }
+        let class = if is_ground { "base" } else { class };
+        symbols::line(class, a, b)
+    }
+
+    /// Gravity, the axes of the base, and a length.
+    fn furniture(&self, scene: &Scene) -> String {
+        let (width, height) = (self.style.width, self.style.height);
+        let mut out = String::from("<g class=\"furniture\">");
+        if let Some(down) = scene.down {
+            let depth = down.dot(&self.view.towards());
+            out.push_str(&symbols::gravity(
+                [width - 30.0, 22.0],
+                self.direction(&down),
+                depth,
+            ));
+        }
+        let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| self.direction(&axis));
+        out.push_str(&symbols::axes(
+            [26.0, height - 24.0],
+            &axes,
+            28.0,
+            ["x", "y", "z"],
+        ));
+        let length = round_length(0.2 * width / self.scale);
+        let (x, y) = (width - 14.0, height - 14.0);
+        _ = write!(
+            out,
+            "<path class=\"scale\" d=\"M{:.1} {:.1}v5H{x:.1}v-5\"/><text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text></g>\n",
+            x - length * self.scale,
+            y - 5.0,
+            x - length * self.scale - 6.0,
+            y,
+            metres(length)
+        );
+        out
+    }
+
+    /// Names of joints, points, loops and drives, where there is room.
+    fn labels(&self, scene: &Scene) -> String {
+        let mut labels = Labels::new(self.style.width, self.style.height);
+        for mark in &scene.marks {
+            let taken = match &mark.shape {
+                Shape::Joint(joint) => Some((&joint.at, 12.0)),
+                Shape::Lump(at, mass) => Some((at, self.size(*mass))),
+                Shape::Closing(at) | Shape::Ground(at) => Some((at, 9.0)),
+                _ => None,
+            };
+            if let Some((at, radius)) = taken {
+                labels.occupy(self.at(at), radius);
+            }
+        }
+        let mut out = String::from("<g class=\"names\">");
+        for mark in &scene.marks {
+            let (at, class) = match &mark.shape {
+                Shape::Joint(joint) => (self.at(&joint.at), "of-joint"),
+                Shape::Drive(ends) => {
+                    let [a, b] = ends.each_ref().map(|at| self.at(at));
+                    (
+                        [0.6 * a[0] + 0.4 * b[0], 0.6 * a[1] + 0.4 * b[1]],
+                        "of-drive",
+                    )
+                }
+                Shape::Point(at) => (self.at(at), "of-point"),
+                _ => continue,
+            };
+            if mark.name.is_empty() {
+                continue;
+            }
+            if let Some((x, y, anchor)) = labels.place(at, mark.name.chars().count()) {
+                _ = write!(
+                    out,
+                    "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{SIZE}\" text-anchor=\"{anchor}\">{}</text>",
+                    escape(&mark.name)
+                );
+            }
+        }
+        out.push_str("</g>\n");
+        out
+    }
+}
+
+/// The colour of a body; the ground has one of its own.
+fn colour(body: usize) -> String {
+    match body {
+        0 => "ground".to_owned(),
+        n => format!("body c{}", (n - 1) % COLOURS),
+    }
+}
+
+/// What lies over what in a plane.
+fn layer(shape: &Shape) -> u8 {
+    match shape {
+        Shape::Ground(_) => 0,
+        Shape::Plate(_) => 1,
+        Shape::Arm(_) | Shape::Rail(..) => 2,
+        Shape::Bar(_) => 3,
+        Shape::Drive(_) => 4,
+        Shape::Lump(..) | Shape::Centre(..) => 5,
+        Shape::Closing(_) | Shape::Joint(_) => 6,
+        Shape::Point(_) => 7,
+        Shape::Frame(..) => 8,
+    }
+}
+
+/// The largest of 1, 2 and 5 times a power of ten that is not above a length.
+fn round_length(most: f64) -> f64 {
+    let decade = 10_f64.powf(most.log10().floor());
+    let steps = [5.0, 2.0, 1.0].map(|step| step * decade);
+    steps
+        .into_iter()
+        .find(|step| *step <= most * 1.000_001)
+        .unwrap_or(decade)
+}
+
+/// A round length with the unit that suits it.
+fn metres(length: f64) -> String {
+    if length < 0.0095 {
+        format!("{:.0} mm", length * 1e3)
+    } else if length < 0.95 {
+        format!("{:.0} cm", length * 1e2)
+    } else {
+        format!("{length:.0} m")
+    }
+}

@@ -1,0 +1,168 @@
+//! Every bundled model has a picture: well formed, within its sheet, with lengths that are those of the model.
+
+use std::path::{Path, PathBuf};
+
+use modelmill_draw::{Scene, Shape, Style, svg};
+use modelmill_spec::Mechanism;
+
+fn bundled() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/models");
+    let entries = std::fs::read_dir(folder).expect("bundled models");
+    let mut files: Vec<PathBuf> = entries.map(|e| e.expect("an entry").path()).collect();
+    files.retain(|file| file.extension().is_some_and(|e| e == "toml"));
+    files.sort();
+    assert!(files.len() > 20);
+    files
+}
+
+fn load(name: &str) -> Mechanism {
+    let file =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../model-spec/models/{name}.toml"));
+    modelmill_spec::load_file(&file)
+        .expect("a bundled model")
+        .mechanism
+}
+
+fn nominal(mechanism: &Mechanism) -> Scene {
+    let q: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
+    Scene::new(mechanism, &q)
+}
+
+#[test]
+fn every_bundled_model_is_drawn_within_its_sheet() {
+    for file in bundled() {
+        let mechanism = modelmill_spec::load_file(&file)
+            .expect("a bundled model")
+            .mechanism;
+        let scene = nominal(&mechanism);
+        let style = Style {
+            frames: true,
+            ..Style::default()
+        };
+        let text = svg(&[&scene], &scene.view(), &style);
+        let document = roxmltree::Document::parse(&text).expect("well-formed SVG");
+        let joints = scene
+            .marks
+            .iter()
+            .filter(|m| matches!(m.shape, Shape::Joint(_)))
+            .count();
+        let drawn = document.descendants().filter(|node| {
+            let class = node.attribute("class").unwrap_or_default();
+            class.starts_with("joint") && !class.contains("cap") && node.tag_name().name() != "text"
+        });
+        assert_eq!(drawn.count(), joints, "{}", mechanism.name);
+        for node in document.descendants() {
+            for (attribute, most) in [("cx", 640.0), ("cy", 480.0), ("x", 640.0), ("y", 480.0)] {
+                let Some(value) = node.attribute(attribute) else {
+                    continue;
+                };
+                let value: f64 = value.parse().expect("a number");
+                assert!(
+                    (0.0..=most).contains(&value),
+                    "{}: {attribute} = {value}",
+                    mechanism.name
+                );
+            }
+        }
+    }
+}
+
+/// Which models move in a plane is known.
+#[test]
+fn planar_mechanisms_are_seen_flat() {
+    let planar: Vec<String> = (bundled().iter())
+        .map(|file| {
+            modelmill_spec::load_file(file)
+                .expect("a bundled model")
+                .mechanism
+        })
+        .filter(|mechanism| nominal(mechanism).plane.is_some())
+        .map(|mechanism| mechanism.name)
+        .collect();
+    let expected = [
+        "emps_directional",
+        "emps",
+        "five_bar",
+        "four_bar",
+        "parallelogram",
+        "slider_crank",
+        "spidermill_paper",
+        "spidermill",
+        "three_rpr",
+        "three_rrr",
+        "two_link",
+    ];
+    assert_eq!(planar, expected);
+}
+
+/// The cranks and couplers of the bundled robot are as long in the picture as its constants say, on one scale.
+#[test]
+fn lengths_are_those_of_the_model() {
+    let mechanism = load("spidermill");
+    let scene = nominal(&mechanism);
+    let view = scene.view();
+    let length = |name: &str| {
+        let longest = scene
+            .marks
+            .iter()
+            .filter(|m| m.says == name)
+            .filter_map(|m| match &m.shape {
+                Shape::Bar([a, b]) | Shape::Arm([a, b]) => {
+                    let [a, b] = [a, b].map(|at| view.project(at));
+                    Some((a[0] - b[0]).hypot(a[1] - b[1]))
+                }
+                _ => None,
+            });
+        longest.fold(0.0, f64::max)
+    };
+    let constant = |name: &str| {
+        let mut constants = mechanism.constants.iter();
+        constants
+            .find(|c| c.name == name)
+            .expect("a constant")
+            .value
+    };
+    for (bodies, expected) in [
+        (["S1", "S7"], constant("d1")),
+        (["S3", "S5"], constant("d3")),
+    ] {
+        for body in bodies {
+            assert!(
+                (length(body) - expected).abs() < 1e-9,
+                "{body}: {}",
+                length(body)
+            );
+        }
+    }
+    // Gravity points down in the picture.
+    let down = view.project(&scene.down.expect("gravity"));
+    assert!(
+        down[0].abs() < 1e-12 && (down[1] + 1.0).abs() < 1e-12,
+        "{down:?}"
+    );
+}
+
+/// A loop that is open is seen open, and a variant lies over what it was.
+#[test]
+fn what_is_wrong_is_seen() {
+    let mechanism = load("four_bar");
+    let mut q: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
+    let closings = |scene: &Scene| {
+        scene
+            .marks
+            .iter()
+            .filter(|m| matches!(m.shape, Shape::Closing(_)))
+            .count()
+    };
+    let closed = Scene::new(&mechanism, &q);
+    let passive = mechanism
+        .coordinates
+        .iter()
+        .position(|c| c.passive)
+        .expect("a passive one");
+    q[passive] += 0.2;
+    let open = Scene::new(&mechanism, &q);
+    assert_eq!(closings(&open), closings(&closed) + 1);
+    let text = svg(&[&closed, &open], &closed.view(), &Style::default());
+    assert_eq!(text.matches("class=\"shadow\"").count(), 1);
+}

@@ -1,0 +1,88 @@
+//! Pictures of a model: its mechanism at a pose, as SVG, or over another one.
+
+use modelmill_codegen::{Evaluator, States};
+use modelmill_draw::{Scene, View, svg};
+
+pub use modelmill_draw::Style;
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+
+/// How a model is drawn.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Drawing {
+    /// Values of active coordinates, rad or m, by their names; the others have their nominal values, and loops are closed.
+    pub at: Vec<(String, f64)>,
+    /// From where it is seen, rad: azimuth around the vertical from the base's x axis, and elevation above the horizon.
+    /// Without it planar mechanisms are seen flat, others from above and aside.
+    pub from: Option<[f64; 2]>,
+    /// Size, names and frames.
+    pub style: Style,
+}
+
+impl Model {
+    /// The mechanism at values of its active coordinates, rad or m; those that are not named are nominal.
+    ///
+    /// Fails where a name is no active coordinate, and where the loops cannot close.
+    pub fn scene(&self, at: &[(String, f64)]) -> Outcome<Scene> {
+        let mechanism = &self.derivation.mechanism;
+        let mut pose: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
+        if at.is_empty() {
+            return Ok(Scene::new(mechanism, &pose));
+        }
+        for (name, value) in at {
+            let mut coordinates = mechanism.coordinates.iter();
+            let place = coordinates.position(|c| !c.passive && c.name == *name);
+            let place = place.ok_or_else(|| {
+                let known = self.active().join(", ");
+                Error::options(format!(
+                    "`{name}` is no active coordinate of {}; these are: {known}",
+                    self.name
+                ))
+            })?;
+            pose[place] = *value;
+        }
+        let places = |passive: bool| {
+            let all = mechanism.coordinates.iter().enumerate();
+            all.filter(move |(_, c)| c.passive == passive)
+                .map(|(i, _)| i)
+        };
+        let active: Vec<f64> = places(false).map(|i| pose[i]).collect();
+        let zero = [0.0];
+        let still: Vec<&[f64]> = active.iter().map(|_| &zero[..]).collect();
+        let states = States {
+            q: active.iter().map(std::slice::from_ref).collect(),
+            qd: still.clone(),
+            qdd: still,
+            load: Vec::new(),
+        };
+        if places(true).next().is_some() {
+            let passive = Evaluator::new(&self.derivation).passive(&states);
+            let passive = passive.map_err(|_| {
+                Error::options(format!(
+                    "the loops of {} cannot close at that pose",
+                    self.name
+                ))
+            })?;
+            for (i, column) in places(true).zip(passive) {
+                pose[i] = column[0];
+            }
+        }
+        Ok(Scene::new(mechanism, &pose))
+    }
+
+    /// The model as SVG: links, joints, loops, drives and masses. `before`, if given, lies under it as a shadow, on the same
+    /// scale and at the same pose.
+    ///
+    /// Fails where a name is no active coordinate, and where the loops cannot close.
+    pub fn picture(&self, drawing: &Drawing, before: Option<&Self>) -> Outcome<String> {
+        let scene = self.scene(&drawing.at)?;
+        let view = match drawing.from {
+            Some([azimuth, elevation]) => View::from_angles(&scene, azimuth, elevation),
+            None => scene.view(),
+        };
+        let shadow = before.map(|model| model.scene(&drawing.at)).transpose()?;
+        let scenes: Vec<&Scene> = shadow.iter().chain(Some(&scene)).collect();
+        Ok(svg(&scenes, &view, &drawing.style))
+    }
+}
