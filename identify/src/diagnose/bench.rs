@@ -74,7 +74,7 @@ pub(crate) struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     pub(crate) fn new(problem: &'a Problem, supply: &'a dyn Supply) -> Self {
-        let mut pool = Pool::new(&problem.layout);
+        let mut pool = Pool::new(&problem.layout).without(&problem.left_out);
         let base = problem.base.iter().map(|c| pool.add(c.clone())).collect();
         let measured = pool.add(problem.measured.clone());
         let zero = pool.add(Column(vec![None; problem.layout.channels.len()]));
@@ -181,7 +181,7 @@ impl<'a> Bench<'a> {
                     };
                     best.map(|best| self.pick(k, best))
                 }
-                Source::Tilt(_) | Source::Delay => Some(self.changed(k, picks, &factors)),
+                Source::Tilt(_) | Source::Reading(_) => Some(self.changed(k, picks, &factors)),
                 Source::Carried => carried.get(&k).cloned(),
             };
             present.push(pick.and_then(|mut pick| {

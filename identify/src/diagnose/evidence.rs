@@ -83,7 +83,9 @@ impl Evidence {
 impl Bench<'_> {
     /// Evidence for the set `after` beside `before`; `channels` are those on which they differ.
     pub(crate) fn evidence(&self, before: &[Pick], after: &[Pick], channels: &[usize]) -> Evidence {
-        let [old, new] = [before, after].map(|picks| self.held_out(picks, channels));
+        let is_per_run = |pick: &Pick| self.candidate(pick).is_per_run;
+        let by_folds = before.iter().chain(after).any(is_per_run);
+        let [old, new] = [before, after].map(|picks| self.held_out(picks, channels, by_folds));
         let n = old.len() as f64;
         let differences: Vec<f64> = old.iter().zip(&new).map(|(a, b)| a - b).collect();
         let mean = differences.iter().sum::<f64>() / n;
@@ -128,8 +130,9 @@ impl Bench<'_> {
         }
     }
 
-    /// Weighted squared errors of some channels in blocks of time to which the set was not fitted.
-    pub(crate) fn held_out(&self, picks: &[Pick], channels: &[usize]) -> Vec<f64> {
+    /// Weighted squared errors of some channels in blocks of time to which the set was not fitted: those of the check, or
+    /// each fold of all recordings where there is none or where they have parameters of their own.
+    pub(crate) fn held_out(&self, picks: &[Pick], channels: &[usize], by_folds: bool) -> Vec<f64> {
         let layout = &self.problem.layout;
         let square = |rest: &[Vec<f64>], range: &std::ops::Range<usize>| -> f64 {
             let of = |d: &usize| {
@@ -139,7 +142,7 @@ impl Bench<'_> {
             channels.iter().map(of).sum()
         };
         let blocks = layout.blocks(BLOCKS);
-        if layout.has_check() {
+        if layout.has_check() && !by_folds {
             let (factors, _) = self.fit(picks, On::Fit);
             let rest = self.rest(picks, &factors);
             let fit = layout.fit_samples();

@@ -87,7 +87,7 @@ impl Bench<'_> {
                     })
                     .collect()
             }
-            Source::Delay => {
+            Source::Reading(reading) => {
                 let mut force = self.problem.held.clone().unwrap_or_default();
                 force.0.resize(self.weights.len(), None);
                 let own = mine.map_or(&[][..], |i| &picks[i].columns);
@@ -96,7 +96,7 @@ impl Bench<'_> {
                         force.add(*factor, self.pool.column(*k));
                     }
                 }
-                vec![self.late(&force, found.map_or(0.0, |delay| delay[0]))]
+                vec![self.misread(*reading, &force, found.map_or(0.0, |value| value[0]))]
             }
             Source::Columns(_) | Source::Carried => unreachable!("they change no model"),
         };
@@ -106,34 +106,6 @@ impl Bench<'_> {
             rank: columns.len(),
             columns: columns.into_iter().map(|c| self.pool.add(c)).collect(),
         }
-    }
-
-    /// What a force changes by when it is read later by `delay`, for each second of it; for delays below a tenth of a
-    /// sample minus its rate of change.
-    pub(crate) fn late(&self, force: &Column, delay: f64) -> Column {
-        let stretches = &self.problem.layout.stretches;
-        let changes = |values: &Vec<f64>| {
-            let mut changes = Vec::with_capacity(values.len());
-            let mut start = 0;
-            for stretch in stretches {
-                let part = &values[start..start + stretch.samples];
-                let last = part.len() - 1;
-                let samples = delay / stretch.step;
-                for i in 0..part.len() {
-                    if samples.abs() < 0.1 {
-                        let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
-                        let time = stretch.step * (after - before).max(1) as f64;
-                        changes.push((part[before] - part[after]) / time);
-                        continue;
-                    }
-                    let then = between(part, i as f64 - samples);
-                    changes.push((then - part[i]) / delay);
-                }
-                start += stretch.samples;
-            }
-            changes
-        };
-        Column(force.0.iter().map(|v| v.as_ref().map(changes)).collect())
     }
 
     /// Makes the columns of effects that depend on the fit anew.
@@ -160,18 +132,4 @@ impl Bench<'_> {
         }
         picks
     }
-}
-
-/// A series at a place between its samples.
-fn between(values: &[f64], at: f64) -> f64 {
-    let last = values.len() - 1;
-    let at = at.clamp(0.0, last as f64);
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "clamped to the places of samples"
-    )]
-    let k = at.floor() as usize;
-    let share = at - at.floor();
-    values[k] + share * (values[(k + 1).min(last)] - values[k])
 }

@@ -3,23 +3,30 @@
 //!
 //! 1. [`Problem`] - measured forces, columns of the model, candidates with the constants that are searched for.
 //! 2. `pool`, `factored`, `bench` - inner products of all columns, so that a set of effects is fitted in microseconds;
-//!    `tuning` finds constants, `following` makes columns that depend on the fit, `delays` those of late forces, `tilt`
-//!    turns gravity.
+//!    `tuning` finds constants, `following` makes columns that depend on the fit, `readings` those of forces that are read
+//!    wrongly, `tilt` turns gravity.
 //! 3. `search` - forward over sets, with exchanges; `evidence` decides on time that was not fitted; `settle` makes the last
 //!    set as small and simple as it can be.
 //! 4. `aliases` - what this recording cannot tell apart; `reproducible` - what no candidate explains and no noise is.
 //! 5. [`Diagnosis`] - the answer.
+//!
+//! What recordings have and the model does not lack is told by name too: `cleaning` takes outliers and hum off beforehand,
+//! `drifts` and `readings` are candidates among the others, and `disturbance` says what is left, and of which sort.
 
 mod aliases;
 mod bench;
+mod cleaning;
 mod column;
-mod delays;
+mod disturbance;
+mod drifts;
+mod estimates;
 mod evidence;
 mod factored;
 mod following;
 mod noise;
 mod pool;
 mod problem;
+mod readings;
 mod reproducible;
 mod search;
 mod settle;
@@ -28,13 +35,17 @@ mod tuning;
 
 use serde::Serialize;
 
+pub use cleaning::step_of_values;
 pub use column::Column;
+pub use disturbance::{Budget, Disturbance, Quantity};
+pub use drifts::drifts;
 pub use evidence::Evidence;
 pub use noise::{effective_samples, white_noise};
 pub use problem::{
-    Candidate, Choice, Effect, EffectParameter, Layout, NoSupply, Problem, Sign, Source, Stretch,
-    Supply,
+    Candidate, Choice, Effect, EffectParameter, Fault, Layout, Nature, NoSupply, Problem, Reading,
+    Sign, Source, Stretch, Supply,
 };
+pub use readings::readings;
 pub use tilt::{Sensitivity, Tilt};
 
 use bench::{Bench, Pick};
@@ -45,11 +56,6 @@ use reproducible::reproducible;
 const UNEXPLAINED: f64 = 0.1;
 /// The same, in squares of the channel's white noise.
 const ABOVE_NOISE: f64 = 0.05;
-
-/// How many times the squares of the white noise a rest must have that does not come again with the state.
-const MUCH: f64 = 2.0;
-/// How few independent samples it is worth then, relative to all.
-const RESEMBLE: f64 = 0.3;
 
 /// The answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -89,6 +95,10 @@ pub struct FoundEffect {
     pub constants: Vec<(String, f64)>,
     /// Estimates of the parameters, from the recordings of the fit.
     pub estimates: Vec<f64>,
+    /// Their standard deviations, where they are known.
+    pub deviations: Vec<Option<f64>>,
+    /// How likely it is that it is there.
+    pub probability: f64,
     /// What cannot be told from it.
     pub indistinguishable_from: Vec<Effect>,
 }
@@ -111,8 +121,12 @@ pub struct Considered {
 pub struct Diagnosis {
     /// The answer.
     pub verdict: Verdict,
-    /// White noise of all channels relative to the measured forces.
+    /// Noise of all channels relative to the measured forces, white or coloured.
     pub noise_floor: f64,
+    /// What is left of each channel, by where it comes from.
+    pub budgets: Vec<Budget>,
+    /// What the recordings have and the model does not lack.
+    pub disturbances: Vec<Disturbance>,
     /// The ladder, from the model as it is.
     pub ladder: Vec<Rung>,
     /// Effects that are missing.
@@ -127,8 +141,14 @@ pub struct Diagnosis {
     pub unexplained: Vec<usize>,
 }
 
-/// Finds what is missing. `supply` makes columns that are not known from the start.
-pub fn diagnose(problem: &Problem, supply: &dyn Supply) -> Diagnosis {
+/// Finds what is missing. `supply` makes columns that are not known from the start. Outliers and hum are taken off the measured
+/// forces of the problem, and what is to be left out becomes zero.
+pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
+    problem.removed.resize(problem.layout.channels.len(), 0.0);
+    let mut disturbances = problem.disturbances.clone();
+    problem.leave_out();
+    disturbances.extend(cleaning::clean(problem));
+    let problem = &*problem;
     let mut bench = Bench::new(problem, supply);
     bench.look(&[]);
     let alone = bench.explained_alone();
@@ -148,28 +168,39 @@ pub fn diagnose(problem: &Problem, supply: &dyn Supply) -> Diagnosis {
     let unexplained: Vec<usize> = (0..rest.len())
         .filter(|d| bench.is_unexplained(*d, &rest[*d], again[*d]))
         .collect();
-    let verdict = match (unexplained.is_empty(), picks.is_empty()) {
+    let (budgets, coloured) = bench.budgets(&picks, &rest, &again);
+    disturbances.extend(bench.disturbances(&picks));
+    disturbances.extend(coloured);
+    let estimates = bench.estimates(&picks, On::Fit);
+    let mut effects = Vec::new();
+    for (i, (pick, aliases)) in picks.iter().zip(aliases).enumerate() {
+        let candidate = bench.candidate(pick);
+        if candidate.nature == Nature::Disturbance {
+            continue;
+        }
+        let rivals: Vec<f64> = aliases.iter().map(|alias| alias.worse).collect();
+        let (values, deviations) = estimates[i].iter().copied().unzip();
+        effects.push(FoundEffect {
+            effect: candidate.effect.clone(),
+            candidate: pick.candidate,
+            constants: pick.constants.clone(),
+            estimates: values,
+            deviations,
+            probability: bench.probability(&picks, i, &rivals),
+            indistinguishable_from: aliases.into_iter().map(|alias| alias.effect).collect(),
+        });
+    }
+    let verdict = match (unexplained.is_empty(), effects.is_empty()) {
         (false, _) => Verdict::Unexplained,
         (true, true) => Verdict::Adequate,
         (true, false) => Verdict::MissingEffect,
     };
-    let (on_fit, _) = bench.fit(&picks, On::Fit);
-    let mut at = problem.base.len();
-    let mut effects = Vec::new();
-    for (pick, aliases) in picks.iter().zip(aliases) {
-        effects.push(FoundEffect {
-            effect: bench.candidate(pick).effect.clone(),
-            candidate: pick.candidate,
-            constants: pick.constants.clone(),
-            estimates: on_fit.as_slice()[at..at + pick.columns.len()].to_vec(),
-            indistinguishable_from: aliases.into_iter().map(|alias| alias.effect).collect(),
-        });
-        at += pick.columns.len();
-    }
     let candidates = bench.considered(&picks, &found, &alone);
     Diagnosis {
         verdict,
-        noise_floor: noise_floor(problem),
+        noise_floor: noise_floor(&budgets),
+        budgets,
+        disturbances,
         ladder,
         effects,
         candidates,
@@ -179,39 +210,23 @@ pub fn diagnose(problem: &Problem, supply: &dyn Supply) -> Diagnosis {
     }
 }
 
-/// White noise of all channels relative to the measured forces.
-fn noise_floor(problem: &Problem) -> f64 {
-    let samples = problem.layout.samples() as f64;
-    let noise: f64 = problem.noise.iter().map(|n| n * n * samples).sum();
-    let size = total_force(problem);
-    if size > 0.0 {
-        (noise / size).sqrt()
+/// Noise of all channels relative to the measured forces.
+fn noise_floor(budgets: &[Budget]) -> f64 {
+    let sum = |of: &dyn Fn(&Budget) -> f64| budgets.iter().map(|b| of(b).powi(2)).sum::<f64>();
+    let force = sum(&|budget| budget.force);
+    if force > 0.0 {
+        (sum(&|budget| budget.noise) / force).sqrt()
     } else {
         0.0
     }
 }
 
-/// Squares of the measured forces, those of held parameters included.
-fn total_force(problem: &Problem) -> f64 {
-    let mut force = problem.measured.clone();
-    if let Some(held) = &problem.held {
-        force.add(1.0, held);
-    }
-    force.0.iter().flatten().map(|v| dot(v, v)).sum()
-}
-
 impl Bench<'_> {
-    /// Whether what is left of a channel is more than noise: it comes again with the state, or it is well above the white
-    /// noise and its neighbours resemble each other.
+    /// Whether what is left of a channel is more than noise: it comes again with the state.
     fn is_unexplained(&self, channel: usize, rest: &[f64], again: f64) -> bool {
         let squares = dot(rest, rest) / rest.len().max(1) as f64;
         let noise = self.problem.noise[channel].powi(2);
-        if squares <= noise {
-            return false;
-        }
-        let worth = effective_samples(rest) / rest.len().max(1) as f64;
-        let comes_again = again > UNEXPLAINED && again * squares > ABOVE_NOISE * noise;
-        comes_again || squares > MUCH * noise && worth < RESEMBLE
+        squares > noise && again > UNEXPLAINED && again * squares > ABOVE_NOISE * noise
     }
 
     /// Share of the squared error of the model as it is that each candidate explains alone.
@@ -250,13 +265,10 @@ impl Bench<'_> {
         let split = layout.fit_samples();
         let (factors, _) = self.fit(picks, On::Fit);
         let rest = self.rest(picks, &factors);
-        let mut force = self.problem.measured.clone();
-        if let Some(held) = &self.problem.held {
-            force.add(1.0, held);
-        }
+        let forces: Vec<Vec<f64>> = (0..rest.len()).map(|d| self.problem.force(d)).collect();
         let norm = |part: &[f64]| dot(part, part);
         let size = |range: std::ops::Range<usize>| -> f64 {
-            let channels = force.0.iter().flatten();
+            let channels = forces.iter();
             channels.map(|values| norm(&values[range.clone()])).sum()
         };
         let fit: f64 = rest.iter().map(|r| norm(&r[..split])).sum();
@@ -268,7 +280,7 @@ impl Bench<'_> {
             let all = 0..rest.len();
             // Weights differ by channel, figures do not.
             let error: f64 = all
-                .map(|d| self.held_out(picks, &[d]).iter().sum::<f64>() / self.weights[d])
+                .map(|d| self.held_out(picks, &[d], true).iter().sum::<f64>() / self.weights[d])
                 .sum();
             error / size(0..split).max(f64::MIN_POSITIVE)
         };

@@ -1,77 +1,92 @@
 //! Inner products of columns, channel by channel and apart for fit and check, so that any set of columns is fitted in
 //! microseconds.
 
+use std::cell::RefCell;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::cleaning::silence;
 use super::column::Column;
 use super::problem::Layout;
 
-/// Columns with their inner products.
+/// Columns with their inner products, each of which is computed when it is asked for first.
 pub(crate) struct Pool {
     columns: Vec<Column>,
     fit: Range<usize>,
     check: Range<usize>,
-    /// `products[part][channel][i][j]` for `j <= i`; part 0 is the fit, part 1 the check.
-    products: [Vec<Vec<Vec<f64>>>; 2],
+    /// `products[i][j]` for `j <= i`: by part (0 is the fit, 1 the check) and channel, the parts one after the other.
+    products: RefCell<Vec<Vec<Option<Box<[f64]>>>>>,
+    /// Samples that are left out of every column.
+    left_out: Vec<bool>,
 }
 
 impl Pool {
     pub(crate) fn new(layout: &Layout) -> Self {
-        let channels = layout.channels.len();
         let fit = layout.fit_samples();
         Self {
             columns: Vec::new(),
             fit: 0..fit,
             check: fit..layout.samples(),
-            products: [vec![Vec::new(); channels], vec![Vec::new(); channels]],
+            products: RefCell::default(),
+            left_out: Vec::new(),
         }
     }
 
+    /// Leaves samples out of all columns that come.
+    pub(crate) fn without(mut self, left_out: &[bool]) -> Self {
+        left_out.clone_into(&mut self.left_out);
+        self
+    }
+
     /// Adds a column; its place.
-    pub(crate) fn add(&mut self, column: Column) -> usize {
+    pub(crate) fn add(&mut self, mut column: Column) -> usize {
+        silence(&mut column, &self.left_out);
         self.columns.push(column);
-        let new = self.columns.len() - 1;
-        let parts = [self.fit.clone(), self.check.clone()];
-        for (range, channels) in parts.into_iter().zip(&mut self.products) {
-            for (d, rows) in channels.iter_mut().enumerate() {
-                let row = match &self.columns[new].0[d] {
-                    None => Vec::new(),
-                    Some(own) => (self.columns.iter())
-                        .map(|other| match &other.0[d] {
-                            Some(other) => dot(&own[range.clone()], &other[range.clone()]),
-                            None => 0.0,
-                        })
-                        .collect(),
-                };
-                rows.push(row);
-            }
-        }
-        new
+        self.products.get_mut().push(Vec::new());
+        self.columns.len() - 1
     }
 
     pub(crate) fn column(&self, k: usize) -> &Column {
         &self.columns[k]
     }
 
+    /// Inner products of two columns by part and channel.
+    fn products_of(&self, a: usize, b: usize) -> Box<[f64]> {
+        let parts = [&self.fit, &self.check].into_iter();
+        let of_part = |range: &Range<usize>| -> Vec<f64> {
+            let pairs = self.columns[a].0.iter().zip(&self.columns[b].0);
+            pairs
+                .map(|pair| match pair {
+                    (Some(a), Some(b)) => dot(&a[range.clone()], &b[range.clone()]),
+                    _ => 0.0,
+                })
+                .collect()
+        };
+        parts.flat_map(of_part).collect()
+    }
+
     /// Weighted inner products of some columns on fit, check or both.
     pub(crate) fn gram(&self, which: &[usize], weights: &[f64], on: On) -> DMatrix<f64> {
         let parts = match on {
-            On::Fit => 0..1,
-            On::All => 0..2,
+            On::Fit => 1,
+            On::All => 2,
         };
         let n = which.len();
         let mut gram = DMatrix::zeros(n, n);
+        let mut products = self.products.borrow_mut();
         for i in 0..n {
             for j in 0..=i {
                 let (a, b) = (which[i].max(which[j]), which[i].min(which[j]));
-                let mut sum = 0.0;
-                for part in &self.products[parts.clone()] {
-                    for (rows, weight) in part.iter().zip(weights) {
-                        sum += weight * rows[a].get(b).copied().unwrap_or(0.0);
-                    }
+                let row = &mut products[a];
+                if row.len() <= b {
+                    row.resize(b + 1, None);
                 }
+                let known = row[b].get_or_insert_with(|| self.products_of(a, b));
+                let by_channel = known.chunks(weights.len().max(1)).take(parts);
+                let sum = by_channel
+                    .map(|part| part.iter().zip(weights).map(|(p, w)| p * w).sum::<f64>())
+                    .sum();
                 gram[(i, j)] = sum;
                 gram[(j, i)] = sum;
             }

@@ -1,6 +1,7 @@
 //! What a diagnosis starts from: measured forces, the columns that the model has, and those that effects would add.
 
 use super::column::Column;
+use super::disturbance::Disturbance;
 use super::tilt::Tilt;
 
 /// A stretch of samples that follow each other in time.
@@ -114,10 +115,39 @@ pub enum Source {
     Columns(Vec<Choice>),
     /// The base does not stand level; the parameters are angles, rad.
     Tilt(Tilt),
-    /// All forces come later than the motion; the parameter is the delay, s.
-    Delay,
+    /// Forces are not read as they act.
+    Reading(Reading),
     /// They depend on what the drives carry, which the fit says: see [`Supply::carried`].
     Carried,
+}
+
+/// A way in which forces are read wrongly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// Later than they act; the parameter is the delay, s.
+    Late,
+    /// Through a low-pass of first order; the parameter is its time constant, s.
+    Lagging,
+    /// Larger than they are; the parameter is the part by which they are.
+    Scaled,
+}
+
+/// What reads forces wrongly, and where.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reading {
+    /// How.
+    pub fault: Fault,
+    /// The channel; `None` for all of them alike.
+    pub channel: Option<usize>,
+}
+
+/// What it means for the model that a candidate is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Nature {
+    /// The model lacks it.
+    Effect,
+    /// The recordings have it, and the model lacks nothing by that.
+    Disturbance,
 }
 
 /// Columns that are made while the search goes on.
@@ -155,6 +185,10 @@ pub struct Candidate {
     pub is_part_of_load: bool,
     /// A simpler kind that it holds as a special case and that comes before it.
     pub refines: Option<String>,
+    /// Whether the model lacks it or the recordings have it.
+    pub nature: Nature,
+    /// Whether each recording has parameters of its own, so that one cannot speak for another.
+    pub is_per_run: bool,
     /// Its columns.
     pub source: Source,
 }
@@ -180,6 +214,12 @@ pub struct Problem {
     pub variables: Vec<(String, Vec<f64>)>,
     /// White noise of each channel's force.
     pub noise: Vec<f64>,
+    /// Samples that say nothing of the model, as those of a push; empty where all count.
+    pub left_out: Vec<bool>,
+    /// Squares per sample that were taken off each channel before, since they do not repeat with the state.
+    pub removed: Vec<f64>,
+    /// What is known to be wrong with the recordings.
+    pub disturbances: Vec<Disturbance>,
 }
 
 #[cfg(test)]

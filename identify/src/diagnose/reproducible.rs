@@ -16,6 +16,11 @@ const MOST: usize = 6000;
 /// Strengths of the ridge, relative to a function's own squares.
 const RIDGES: [f64; 5] = [1e-6, 1e-4, 1e-2, 1e-1, 1.0];
 
+/// Quantiles of a position beyond which stops may begin, percent from either end.
+const BEYOND: [usize; 4] = [3, 8, 15, 30];
+/// Lengths over which friction may remember, in units of a position's spread.
+const MEMORIES: [f64; 3] = [0.02, 0.08, 0.3];
+
 /// How much of each channel's squared residual comes again where it was not fitted, between 0 and 1.
 pub(crate) fn reproducible(
     layout: &Layout,
@@ -109,7 +114,7 @@ pub(crate) fn reproducible(
 /// Functions of the variables at some samples, each of unit size.
 fn features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec<f64>> {
     let mut scaled: Vec<Vec<f64>> = Vec::new();
-    let mut features: Vec<Vec<f64>> = Vec::new();
+    let (mut signs, mut shapes): (Vec<Vec<f64>>, Vec<Vec<f64>>) = Default::default();
     for (name, values) in variables {
         let values: Vec<f64> = picked.iter().map(|i| values[*i]).collect();
         let n = values.len() as f64;
@@ -126,14 +131,20 @@ fn features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec<f64>>
                     .map(|x| (x / (share * spread)).tanh())
                     .collect()
             };
-            features.push(sign(0.02));
-            features.push(sign(0.2));
+            signs.push(sign(0.02));
+            signs.push(sign(0.2));
+        }
+        // Of positions also what only begins beyond a place, as stops do, and friction that remembers where it reversed.
+        if !name.ends_with("_d") && !name.ends_with("_dd") {
+            shapes.extend(hinges(&values, spread));
+            let memories = MEMORIES.iter().map(|share| memory(&values, share * spread));
+            shapes.extend(memories);
         }
         scaled.push(values.iter().map(|x| (x - mean) / (2.0 * spread)).collect());
     }
     let product =
         |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(x, y)| x * y).collect() };
-    let signs = features.clone();
+    let mut features: Vec<Vec<f64>> = signs.iter().cloned().chain(shapes).collect();
     features.push(vec![1.0; picked.len()]);
     features.extend(scaled.iter().cloned());
     let degree = if scaled.len() <= 6 { 3 } else { 2 };
@@ -152,6 +163,41 @@ fn features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec<f64>>
         }
     }
     features
+}
+
+/// How far a position is beyond some of its own quantiles, at both ends, in units of its spread.
+fn hinges(values: &[f64], spread: f64) -> Vec<Vec<f64>> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let last = sorted.len() - 1;
+    let beyond = |at: usize, sign: f64| -> Vec<f64> {
+        let place = sorted[at];
+        let over = values
+            .iter()
+            .map(|x| (sign * (x - place)).max(0.0) / spread);
+        over.collect()
+    };
+    let places = BEYOND.iter().flat_map(|share| {
+        let at = last * share / 100;
+        [beyond(at, -1.0), beyond(last - at, 1.0)]
+    });
+    places.collect()
+}
+
+/// Dahl's state of dry friction along a position: it reaches its bound over a length after each reversal
+/// (P. R. Dahl, AIAA Journal 14, 1976).
+fn memory(values: &[f64], length: f64) -> Vec<f64> {
+    let mut state = 0.0_f64;
+    let mut before = values[0];
+    let step = |x: &f64| {
+        let moved = x - before;
+        before = *x;
+        // Exact for a straight way between samples.
+        let bound = moved.signum();
+        state = bound + (state - bound) * (-moved.abs() / length).exp();
+        state
+    };
+    values.iter().map(step).collect()
 }
 
 #[cfg(test)]

@@ -59,7 +59,6 @@ impl Bench<'_> {
         loop {
             self.weigh(&accepted);
             self.look(&accepted);
-            self.leave_out_slight_delays(&accepted);
             let trials = self.grow(&accepted, &beam);
             let (grown, exchanged): (Vec<&Trial>, Vec<&Trial>) =
                 trials.iter().partition(|t| self.is_addition(&accepted, t));
@@ -148,17 +147,18 @@ impl Bench<'_> {
 
     /// The first of some sets that evidence speaks for; why single effects were refused goes into a list.
     fn first_that_holds(
-        &self,
+        &mut self,
         accepted: &[Pick],
         trials: &mut dyn Iterator<Item = &Trial>,
         refused: &mut Vec<Refused>,
     ) -> Option<(Trial, Evidence)> {
         for trial in trials.take(TESTED) {
+            let trial = self.settled(trial);
             let news: Vec<Pick> = difference(&trial.picks, accepted);
             let evidence = self.evidence(accepted, &trial.picks, &self.acted_on(&news));
             let wrong_sign = !trial.wrong_sign.is_empty();
             if evidence.holds() && !wrong_sign {
-                return Some((trial.clone(), evidence));
+                return Some((trial, evidence));
             }
             if let [pick] = news.as_slice() {
                 refused.push(Refused {
@@ -255,12 +255,6 @@ impl Bench<'_> {
         trials.sort_by(|a, b| a.score.total_cmp(&b.score));
         trials.truncate(40);
         trials
-            .into_iter()
-            .filter_map(|trial| {
-                let trial = self.settled(&trial);
-                (!self.is_slight_delay(&trial)).then_some(trial)
-            })
-            .collect()
     }
 
     /// Tries members of a set against candidates that come close, each with constants that are searched finely: on their
@@ -329,7 +323,9 @@ impl Bench<'_> {
             .present
             .iter()
             .flatten()
-            .filter(|p| self.freedoms(p) == 1 && !matches!(self.candidate(p).source, Source::Delay))
+            .filter(|p| {
+                self.freedoms(p) == 1 && !matches!(self.candidate(p).source, Source::Reading(_))
+            })
             .collect();
         let mut set = accepted.to_vec();
         let mut first = None;

@@ -2,7 +2,6 @@
 
 use super::bench::{Bench, Pick, n_columns};
 use super::pool::On;
-use super::problem::Source;
 use super::search::criterion;
 
 /// By how much the criterion must fall for an exchange of members.
@@ -45,10 +44,6 @@ impl Bench<'_> {
     pub(crate) fn prune(&mut self, picks: Vec<Pick>) -> Vec<Pick> {
         self.weigh(&picks);
         let mut picks = self.simplify(picks);
-        let trial = self.trial(picks.clone());
-        if self.is_slight_delay(&trial) {
-            picks.retain(|p| !matches!(self.candidate(p).source, Source::Delay));
-        }
         loop {
             let without = |i: usize| {
                 let mut rest = picks.clone();
@@ -126,8 +121,7 @@ impl Bench<'_> {
                 set[i] = rival.clone();
                 let trial = self.try_in(&table, set);
                 let score = criterion(self.problem, &trial, worth);
-                if trial.freedoms <= now.freedoms && score < best.0 && !self.is_slight_delay(&trial)
-                {
+                if trial.freedoms <= now.freedoms && score < best.0 {
                     best = (score, Some(trial));
                 }
             }

@@ -4,8 +4,8 @@
 use std::f64::consts::TAU;
 
 use modelmill_identify::diagnose::{
-    Candidate, Choice, Column, Diagnosis, Effect, EffectParameter, Layout, NoSupply, Problem, Sign,
-    Source, Stretch, Verdict, diagnose, white_noise,
+    Candidate, Choice, Column, Diagnosis, Effect, EffectParameter, Layout, Nature, NoSupply,
+    Problem, Sign, Source, Stretch, Verdict, diagnose, white_noise,
 };
 
 /// Samples of the fit, and as many of the check.
@@ -90,6 +90,8 @@ fn candidate(kind: &str, columns: &[&[f64]], sign: Sign) -> Candidate {
         searched: 0,
         is_part_of_load: false,
         refines: None,
+        nature: Nature::Effect,
+        is_per_run: false,
         source: Source::Columns(vec![Choice {
             constants: Vec::new(),
             columns: columns.iter().map(|values| column(values)).collect(),
@@ -151,7 +153,7 @@ fn deviation(values: &[f64]) -> f64 {
 }
 
 fn answer(problem: &Problem) -> Diagnosis {
-    diagnose(problem, &NoSupply)
+    diagnose(&mut problem.clone(), &NoSupply)
 }
 
 /// Kinds that were found, in the order of their names.

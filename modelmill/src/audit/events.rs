@@ -6,6 +6,7 @@
 //! and stands far above all that the rest of the run leaves.
 
 use modelmill_identify::Note;
+use modelmill_identify::diagnose::{Disturbance, Quantity};
 use nalgebra::{DMatrix, DVector};
 
 use super::with_friction;
@@ -72,6 +73,19 @@ pub(super) fn found(model: &Model, data: &mut Stretch, leave_out: bool) -> Vec<N
                 "Option `leave_out_events` leaves them out of fits and figures."
             }
         )));
+    }
+    for event in &events {
+        let drives = event.drives.iter();
+        data.faults.push(Disturbance {
+            kind: "contact_event".to_owned(),
+            at: drives.clone().map(|(d, _, _)| names[*d].clone()).collect(),
+            estimates: drives
+                .map(|(d, largest, _)| Quantity::new("largest", *largest, model.force_unit(*d)))
+                .collect(),
+            recordings: vec![data.run.file.clone()],
+            interval: Some([event.from, event.to]),
+            says: None,
+        });
     }
     if leave_out && !events.is_empty() {
         let run = &mut data.run;

@@ -255,7 +255,7 @@ impl Chosen {
                 };
                 only(tilt.directions(&level).into_iter().map(sum).collect())
             }
-            Source::Delay => Vec::new(),
+            Source::Reading(_) => Vec::new(),
         };
         Ok(Some((candidate, choices)))
     }

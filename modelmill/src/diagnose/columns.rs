@@ -2,7 +2,7 @@
 
 use modelmill_codegen::Evaluator;
 use modelmill_identify::diagnose::{
-    Candidate, Choice, Column, Effect, EffectParameter, Sign, Source,
+    Candidate, Choice, Column, Effect, EffectParameter, Fault, Nature, Reading, Sign, Source,
 };
 use modelmill_spec::{ActsOn, EffectKind, Mechanics, Search};
 use rayon::prelude::*;
@@ -98,7 +98,15 @@ pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) ->
             unit: "s".to_owned(),
             sign: Sign::Any,
         };
-        made.push(changed(candidates, change, vec![parameter], Source::Delay));
+        made.push(changed(
+            candidates,
+            change,
+            vec![parameter],
+            Source::Reading(Reading {
+                fault: Fault::Late,
+                channel: None,
+            }),
+        ));
         origins.push(None);
     }
     Ok(Made {
@@ -174,6 +182,8 @@ fn changed(
         searched: 0,
         is_part_of_load: is_part_of_load(&candidates.kinds[change.kind]),
         refines: None,
+        nature: Nature::Effect,
+        is_per_run: false,
         source,
     }
 }
@@ -265,6 +275,8 @@ fn candidate(
             searched: 0,
             is_part_of_load,
             refines: kind.refines.clone(),
+            nature: Nature::Effect,
+            is_per_run: false,
             source: Source::Carried,
         };
         return Some((candidate, felt));
@@ -331,6 +343,8 @@ fn candidate(
         searched: usize::from(searched.is_some()),
         is_part_of_load,
         refines: kind.refines.clone(),
+        nature: Nature::Effect,
+        is_per_run: false,
         source: Source::Columns(choices),
     };
     Some((candidate, felt))

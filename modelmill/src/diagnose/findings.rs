@@ -1,7 +1,7 @@
 //! What a diagnosis found, as values: the verdict, what is missing with estimates and doubles, the model with what was
 //! found beside the model as it is, and where errors live. Text, JSON and the page print them.
 
-use modelmill_identify::diagnose::{Diagnosis, Effect, FoundEffect, Verdict};
+use modelmill_identify::diagnose::{Diagnosis, Effect, EffectParameter, FoundEffect, Verdict};
 use modelmill_identify::{FitParameter, Note, Region, Status};
 use modelmill_spec::Mechanics;
 use modelmill_spec::edit::NewEffect;
@@ -11,10 +11,12 @@ use crate::compare::{self, Places};
 use crate::error::Outcome;
 use crate::model::Model;
 use crate::recording::{self, Recording};
+use crate::runs::Difference;
 use crate::stretch::Stretch;
 
 use super::added::{self, Added};
 use super::chosen::Named;
+use super::faults;
 use super::problem::{self, Answer, Held};
 use super::versions::Version;
 use super::words::Judged;
@@ -83,6 +85,8 @@ pub struct Missing {
     pub effect: Effect,
     /// Its parameters and constants.
     pub estimates: Vec<Estimate>,
+    /// How likely it is that it is there, between 0 and 1.
+    pub probability: f64,
     /// What the recordings cannot tell it from.
     pub indistinguishable_from: Vec<Effect>,
     /// Which experiment tells it from these, as the library says.
@@ -149,7 +153,12 @@ impl Model {
     ) -> Outcome<Findings> {
         let [fit_data, check_data] = recording::stretches(self, fit, check);
         let held = question.held;
-        let answer = problem::find(self, &fit_data, &check_data, held)?;
+        let recordings: Vec<&Recording> = fit.iter().chain(check).copied().collect();
+        let between =
+            (self.host()).watched("holding the recordings against each other", 0, |_| {
+                faults::between_runs(self, &recordings)
+            })?;
+        let answer = problem::find(self, &fit_data, &check_data, held, &between)?;
         let judged = if check_data.is_empty() {
             Judged::CrossValidation
         } else {
@@ -194,7 +203,7 @@ impl Model {
         findings.off_nominal = off_nominal(findings.last());
         findings.regions = regions(&findings);
         if question.again_with_nominal && held != Held::All && !findings.off_nominal.is_empty() {
-            findings.with_nominal = Some(with_nominal(&findings)?);
+            findings.with_nominal = Some(with_nominal(&findings, &between)?);
         }
         Ok(findings)
     }
@@ -240,26 +249,17 @@ fn with_effects(
 }
 
 /// The same question with all parameters held at their nominal values.
-fn with_nominal(findings: &Findings) -> Outcome<WithNominal> {
+fn with_nominal(findings: &Findings, between: &[Difference]) -> Outcome<WithNominal> {
     let version = &findings.before;
     let of = |is_check: bool| -> Vec<Stretch> {
         let runs = version.data.iter().zip(&version.runs);
         let wanted = runs.filter(|(_, run)| run.is_check == is_check);
         wanted.map(|(data, _)| data.clone()).collect()
     };
-    let answer = problem::find(&version.model, &of(false), &of(true), Held::All)?;
+    let answer = problem::find(&version.model, &of(false), &of(true), Held::All, between)?;
     let missing = answer.diagnosis.effects.iter().map(|found| {
         let parameters = &answer.problem.candidates[found.candidate].parameters;
-        let estimates = parameters
-            .iter()
-            .zip(&found.estimates)
-            .map(|(p, value)| Estimate {
-                name: p.symbol.clone(),
-                value: *value,
-                std: None,
-                unit: p.unit.clone(),
-            });
-        (found.effect.clone(), estimates.collect())
+        (found.effect.clone(), of_search(parameters, found))
     });
     Ok(WithNominal {
         missing: missing.collect(),
@@ -273,6 +273,7 @@ fn missing(findings: &Findings) -> Vec<Missing> {
         .map(|found| Missing {
             effect: found.effect.clone(),
             estimates: estimates(findings, found),
+            probability: found.probability,
             indistinguishable_from: found.indistinguishable_from.clone(),
             separate_by: separate_by(findings, found),
             separation: separation(findings, found),
@@ -294,20 +295,23 @@ fn unit_of_constant(findings: &Findings, found: &FoundEffect, name: &str) -> Str
     units.map_or_else(String::new, |(_, unit)| unit.clone())
 }
 
+/// Estimates as the search has them.
+fn of_search(parameters: &[EffectParameter], found: &FoundEffect) -> Vec<Estimate> {
+    let values = found.estimates.iter().zip(&found.deviations);
+    let of = |(p, (value, std)): (&EffectParameter, (&f64, &Option<f64>))| Estimate {
+        name: p.symbol.clone(),
+        value: *value,
+        std: *std,
+        unit: p.unit.clone(),
+    };
+    parameters.iter().zip(values).map(of).collect()
+}
+
 /// Estimates of an effect with their deviations, from identification with everything that was found; where the model with
 /// the effects cannot say them apart, those of the search.
 fn estimates(findings: &Findings, found: &FoundEffect) -> Vec<Estimate> {
     let parameters = &findings.answer.problem.candidates[found.candidate].parameters;
-    let of_search = parameters
-        .iter()
-        .zip(&found.estimates)
-        .map(|(p, value)| Estimate {
-            name: p.symbol.clone(),
-            value: *value,
-            std: None,
-            unit: p.unit.clone(),
-        });
-    let mut all: Vec<Estimate> = of_search.collect();
+    let mut all = of_search(parameters, found);
     all.extend(found.constants.iter().map(|(name, value)| Estimate {
         name: name.clone(),
         value: *value,
@@ -384,7 +388,9 @@ fn separation(findings: &Findings, found: &FoundEffect) -> Option<Separation> {
     let is_force = |effect: &&Effect| {
         let kinds = findings.answer.candidates.kinds.iter();
         let mut kind = kinds.filter(|kind| kind.name == effect.kind);
-        kind.all(|kind| kind.mechanics != Some(Mechanics::Delay))
+        // What no library holds has no columns along another motion.
+        kind.next()
+            .is_some_and(|kind| kind.mechanics != Some(Mechanics::Delay))
     };
     let rivals = found.indistinguishable_from.iter().filter(is_force);
     let rivals: Vec<Effect> = rivals.cloned().collect();

@@ -2,6 +2,7 @@
 //! own derivation, and a search over sets of them decides.
 //!
 //! `places` -> `candidates` (what `add` would add) -> `columns` (numbers along the recordings) -> `problem` (posed and solved)
+//! with `faults` (of recordings, taken off), `encoders` and `memory` (candidates that no entry of a model file says)
 //! -> `added` (the model file with what was found) -> `versions` (both models identified, along all recordings) -> `findings`.
 //! `chosen` does the same for effects that the user names; `words` puts verdicts into sentences.
 
@@ -9,7 +10,10 @@ pub(crate) mod added;
 mod candidates;
 mod chosen;
 mod columns;
+mod encoders;
+mod faults;
 mod findings;
+mod memory;
 pub(crate) mod numbers;
 mod places;
 mod problem;
@@ -21,7 +25,9 @@ pub(crate) use candidates::sign;
 pub use chosen::Named;
 pub(crate) use chosen::{Chosen, Constants, base, choose};
 pub use findings::{Estimate, Findings, Missing, OffNominal, Question, Separation, WithNominal};
-pub use modelmill_identify::diagnose::{Diagnosis, Effect, Rung, Verdict};
+pub use modelmill_identify::diagnose::{
+    Budget, Diagnosis, Disturbance, Effect, Quantity, Rung, Verdict,
+};
 pub use problem::Held;
 pub(crate) use problem::ROUNDING;
 pub use versions::{Along, Version};

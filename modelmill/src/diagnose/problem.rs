@@ -2,19 +2,25 @@
 
 use modelmill_codegen::Evaluator;
 use modelmill_identify::diagnose::{
-    Column, Considered, Diagnosis, Effect, Problem, Source, Supply, diagnose, white_noise,
+    Column, Considered, Diagnosis, Disturbance, Effect, Problem, Source, Supply, diagnose, drifts,
+    readings, white_noise,
 };
 
 use crate::along::drive_rates;
 use crate::error::{Error, Outcome};
 use crate::identify::regression::nothing_measured;
 use crate::model::Model;
+use crate::runs::Difference;
 use crate::stretch::Stretch;
 use crate::text::table::count;
 
 use super::candidates::{Candidates, candidates};
 use super::columns::{Origin, carried, columns, finer};
+use super::encoders::encoders;
+use super::faults::take_off;
+use super::memory::memories;
 use super::numbers::{Runs, layout, regressor, stack, variables};
+use super::words;
 
 /// Errors below this share of a force are rounding, of the recording or of whatever simulated it.
 pub(crate) const ROUNDING: f64 = 3e-6;
@@ -44,6 +50,7 @@ pub(crate) fn find(
     fit: &[Stretch],
     check: &[Stretch],
     held: Held,
+    between: &[Difference],
 ) -> Outcome<Answer> {
     let candidates = model
         .host()
@@ -51,13 +58,24 @@ pub(crate) fn find(
     let all: Vec<(&Stretch, bool)> = (fit.iter().map(|one| (one, false)))
         .chain(check.iter().map(|one| (one, true)))
         .collect();
-    let (mut problem, origins, undefined) =
+    let (mut problem, mut origins, undefined) =
         model
             .host()
             .watched("computing what each would add", 0, |_| {
                 problem(&candidates, model, &all)
             })??;
     hold(&mut problem, model, held);
+    take_off(&mut problem, model, &all, between)?;
+    let units: Vec<String> = (0..model.drives().len())
+        .map(|d| model.force_unit(d).to_owned())
+        .collect();
+    let mut further = readings(&problem.layout);
+    further.extend(drifts(&problem, &units));
+    further.extend(memories(model, &all)?);
+    further.extend(encoders(model, &all, &problem, held)?);
+    problem.candidates.extend(further);
+    // None of these is an entry of a model file.
+    origins.resize(problem.candidates.len(), None);
     let supply = Made {
         candidates: &candidates,
         origins: &origins,
@@ -67,8 +85,11 @@ pub(crate) fn find(
     let mut diagnosis = model
         .host()
         .watched("looking for what is missing", 0, |_| {
-            diagnose(&problem, &supply)
+            diagnose(&mut problem, &supply)
         })?;
+    for one in &mut diagnosis.disturbances {
+        tell(one, model);
+    }
     diagnosis
         .candidates
         .extend(undefined.into_iter().map(|effect| Considered {
@@ -82,6 +103,21 @@ pub(crate) fn find(
         diagnosis,
         candidates,
     })
+}
+
+/// Gives a disturbance the units of its place, and words.
+fn tell(one: &mut Disturbance, model: &Model) {
+    let drives = model.drives();
+    let place = one.at.first();
+    let drive = drives.iter().position(|drive| Some(drive) == place);
+    if let Some(d) = drive {
+        for value in one.estimates.iter_mut().filter(|v| v.unit.is_empty()) {
+            model.force_unit(d).clone_into(&mut value.unit);
+        }
+    }
+    if one.says.is_none() {
+        one.says = Some(words::disturbance(one));
+    }
 }
 
 /// Columns that are made while the search goes on.
@@ -149,6 +185,7 @@ fn problem(
         friction: friction(model, all)?,
         variables: variables(model, all),
         held: None,
+        ..Problem::default()
     };
     Ok((problem, made.origins, made.undefined))
 }

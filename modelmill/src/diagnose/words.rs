@@ -1,9 +1,9 @@
 //! What was found, in sentences.
 
-use modelmill_identify::diagnose::{Diagnosis, Effect, Rung, Verdict};
+use modelmill_identify::diagnose::{Diagnosis, Disturbance, Effect, Rung, Verdict};
 
 use crate::diagnose::ROUNDING;
-use crate::text::table::percent;
+use crate::text::table::{number, percent, significant};
 
 /// Where errors are judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -135,6 +135,79 @@ pub fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged) -> St
                 sits.join(" and ")
             )
         }
+    }
+}
+
+/// What a disturbance is, in a sentence.
+pub fn disturbance(one: &Disturbance) -> String {
+    let at = one.at.join(", ");
+    let value = |name: &str| {
+        let found = one.estimates.iter().find(|value| value.name == name);
+        found.map_or_else(String::new, |q| {
+            format!("{} {}", significant(q.value, 3), q.unit)
+                .trim_end()
+                .to_owned()
+        })
+    };
+    let all: Vec<String> = (one.estimates.iter())
+        .map(|q| {
+            let deviation = q.deviation;
+            let deviation =
+                deviation.map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
+            let said = format!("{} {}{deviation} {}", q.name, number(q.value), q.unit);
+            said.trim_end().to_owned()
+        })
+        .collect();
+    let all = all.join(", ");
+    match one.kind.as_str() {
+        "coloured_noise" => format!(
+            "the noise of {at} is {} and coloured, mostly below about {}; it does not come again with the state",
+            value("noise"),
+            value("corner")
+        ),
+        "quantised_force" => format!("the force of {at} is read in steps of {}", value("step")),
+        "outliers" => {
+            let share = one.estimates.iter().find(|value| value.name == "share");
+            format!(
+                "outliers in {at}: {} of the samples, off by {} in the mean square; they count no more",
+                percent(share.map(|share| share.value)),
+                value("size")
+            )
+        }
+        "periodic_in_time" => {
+            let frequencies = one
+                .estimates
+                .iter()
+                .filter(|value| value.name == "frequency");
+            let frequencies: Vec<String> = frequencies
+                .map(|value| format!("{} Hz", significant(value.value, 4)))
+                .collect();
+            format!(
+                "a hum of {} on {at} at {}: periodic in time, not in the state",
+                value("amplitude"),
+                frequencies.join(" and ")
+            )
+        }
+        "offset_drift" => format!("the zero of the force of {at} drifts in time: {all}"),
+        "friction_drift" => {
+            format!(
+                "the friction of {at} changes in the course of a recording, as it does in time when it warms up: {all}"
+            )
+        }
+        "encoder_eccentricity" => format!(
+            "the encoder of {at} errs as an eccentric one does, {} times per turn: {all}",
+            value("times_per_turn")
+        ),
+        "contact_event" => {
+            let [from, to] = one.interval.unwrap_or_default();
+            format!(
+                "a contact or push from {} to {} s of {}, on {at}: {all}; this time is left out",
+                significant(from, 4),
+                significant(to, 4),
+                one.recordings.join(", ")
+            )
+        }
+        other => format!("{} ({at}): {all}", kind(other)),
     }
 }
 

@@ -447,6 +447,7 @@ fn recording(plant: &ModelPlant<'_>, motion: &Motion) -> Option<Stretch> {
         variance: None,
         weights: None,
         maps_from_degrees: String::new(),
+        faults: Vec::new(),
         load: None,
     })
 }

@@ -1,7 +1,7 @@
 //! What a diagnosis found as JSON and for people.
 
 use modelmill_identify::diagnose::{Rung, Verdict};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use crate::diagnose::{Estimate, Findings, words};
 use crate::print::Spelling;
@@ -24,6 +24,7 @@ impl Findings {
                     "kind": missing.effect.kind,
                     "at": missing.effect.at,
                     "estimates": estimates(&missing.estimates),
+                    "probability": missing.probability,
                     "indistinguishable_from": missing.indistinguishable_from,
                     "separate_by": missing.separate_by,
                     "separate_command": separation.and_then(|asked| spelling.separate(model, asked)),
@@ -41,6 +42,39 @@ impl Findings {
                 json!({"name": p.name, "expression": p.expression, "nominal": off.nominal, "value": p.value, "sigmas": off.sigmas, "unit": p.unit})
             })
             .collect();
+        let budget: Map<String, Value> = (channels.iter().zip(&diagnosis.budgets).enumerate())
+            .map(|(d, (channel, budget))| {
+                let part = |x: f64| {
+                    if budget.force > 0.0 {
+                        x / budget.force
+                    } else {
+                        0.0
+                    }
+                };
+                let value = json!({
+                    "noise": part(budget.noise),
+                    "not_repeating": part(budget.not_repeating),
+                    "model": part(budget.model),
+                    "unit": model.force_unit(d),
+                    "rms": budget.force,
+                });
+                (channel.clone(), value)
+            })
+            .collect();
+        let disturbances: Vec<Value> = (diagnosis.disturbances.iter())
+            .map(|one| {
+                json!({
+                    "kind": one.kind,
+                    "at": one.at,
+                    "says": one.says,
+                    "estimates": one.estimates.iter().map(|q| {
+                        json!({"name": q.name, "value": q.value, "std": q.deviation, "unit": q.unit})
+                    }).collect::<Vec<_>>(),
+                    "recordings": one.recordings,
+                    "interval": one.interval,
+                })
+            })
+            .collect();
         let unexplained: Vec<Value> = (diagnosis.unexplained.iter())
             .map(|d| json!({"channel": channels[*d], "reproducible": diagnosis.reproducible[*d]}))
             .collect();
@@ -48,6 +82,8 @@ impl Findings {
             "model": model.name,
             "verdict": diagnosis.verdict,
             "noise_floor": diagnosis.noise_floor,
+            "budget": budget,
+            "disturbances": disturbances,
             "steps": steps(&diagnosis.ladder),
             "effects": effects,
             "candidates": candidates,
@@ -97,6 +133,7 @@ impl Findings {
         ));
         lines.push(format!("  {}", words::floor(diagnosis)));
         self.missing_text(style, spelling, &mut lines);
+        self.disturbances_text(style, &mut lines);
         lines.push(String::new());
         lines.push(style.bold(if diagnosis.verdict == Verdict::Unexplained {
             "where what is left sits"
@@ -125,6 +162,44 @@ impl Findings {
             ));
         }
         lines
+    }
+
+    /// What the recordings have besides, and where the error that is left comes from.
+    fn disturbances_text(&self, style: Style, lines: &mut Vec<String>) {
+        let diagnosis = &self.diagnosis;
+        if !diagnosis.disturbances.is_empty() {
+            lines.push(String::new());
+            lines.push(style.bold("what the recordings have besides, and the model does not lack"));
+            for one in &diagnosis.disturbances {
+                let says = format!("{}.", one.says.as_deref().unwrap_or_default());
+                let told = words::lines(&says, 98);
+                lines.extend(told.iter().map(|line| format!("  {line}")));
+            }
+        }
+        lines.push(String::new());
+        lines.push(style.bold("what is left of each drive, as a part of its force"));
+        let part = |x: f64, force: f64| percent((force > 0.0).then(|| x / force));
+        let rows: Vec<Vec<String>> = (self.channels().iter().zip(&diagnosis.budgets))
+            .map(|(channel, budget)| {
+                let of = |x: f64| part(x, budget.force);
+                vec![
+                    channel.clone(),
+                    of(budget.noise),
+                    of(budget.not_repeating),
+                    of(budget.model),
+                ]
+            })
+            .collect();
+        lines.extend(table(
+            2,
+            &[
+                ("drive", Align::Left),
+                ("noise", Align::Right),
+                ("not repeating", Align::Right),
+                ("model", Align::Right),
+            ],
+            &rows,
+        ));
     }
 
     /// What was found, with values and doubles.

@@ -156,6 +156,7 @@ fn prepare(model: &Model, recording: &Raw, args: &Reading, delay: f64) -> Outcom
             weights: None,
             load: None,
             maps_from_degrees: maps_from_degrees.clone(),
+            faults: Vec::new(),
         })
     });
     with_variance.collect()

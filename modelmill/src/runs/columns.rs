@@ -218,6 +218,24 @@ impl Rows {
         (0..self.layout.drives).map(of_drive).fold(0.0, f64::max)
     }
 
+    /// The force of some columns along all stretches, one after the other.
+    pub(crate) fn force(&self, columns: &[usize], values: &DVector<f64>) -> Column {
+        let of_drive = |drive: usize| {
+            let of_stretch = |laid: &Laid| {
+                let mut force = vec![0.0; laid.samples()];
+                for (k, value) in columns.iter().zip(values.iter()) {
+                    let column = laid.column(*k, drive).unwrap_or_default();
+                    for (f, z) in force.iter_mut().zip(column) {
+                        *f += value * z;
+                    }
+                }
+                force
+            };
+            self.stretches.iter().flat_map(of_stretch).collect()
+        };
+        Column::new((0..self.layout.drives).map(of_drive).collect())
+    }
+
     /// The rows with the memory of each drive's noise taken out, as sums.
     pub(crate) fn white(&self) -> Outcome<White> {
         let n = self.layout.total();

@@ -10,12 +10,14 @@ mod columns;
 mod payload;
 
 use modelmill_identify::changes::{Change, Moments, Runs, Search, search};
+use modelmill_identify::diagnose::Column;
 use modelmill_identify::{Note, ParameterInfo};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::Recording;
 
+use changes::Possible;
 pub use changes::{Changed, Estimate, What};
 use columns::{Rows, White};
 use payload::Payloads;
@@ -171,8 +173,15 @@ fn changes(
     run: &White,
 ) -> Vec<Changed> {
     let possible = changes::possible(model, payloads, run.layout);
+    let found = found(&possible, rows, before, run);
+    let told = found.iter();
+    told.map(|one| changes::told(model, &possible, one, &rows.values))
+        .collect()
+}
+
+fn found(possible: &[Possible], rows: &Rows, before: &White, run: &White) -> Vec<Change> {
     let columns = possible.iter().map(|one| one.columns.clone()).collect();
-    let found = search(
+    let mut found = search(
         &Runs {
             reference: before.blocks.clone(),
             later: run.blocks.clone(),
@@ -182,8 +191,57 @@ fn changes(
             changes: columns,
         },
     );
-    let moves = |one: &&Change| rows.part(&possible[one.which].columns, &one.values) > LEAST;
-    let told = found.iter().filter(moves);
-    told.map(|one| changes::told(model, &possible, one, &rows.values))
-        .collect()
+    found.retain(|one| rows.part(&possible[one.which].columns, &one.values) > LEAST);
+    found
+}
+
+/// A change between two recordings, with the force that it is.
+pub(crate) struct Difference {
+    /// The recording before.
+    pub(crate) first: String,
+    /// The later one.
+    pub(crate) later: String,
+    /// What changed.
+    pub(crate) changed: Changed,
+    /// What the forces of the later one have besides, along all recordings.
+    pub(crate) force: Column,
+}
+
+/// What later recordings do not share with the first, with the forces that that makes.
+pub(crate) fn differences(model: &Model, recordings: &[&Recording]) -> Outcome<Vec<Difference>> {
+    let [first, later @ ..] = recordings else {
+        return Ok(Vec::new());
+    };
+    let payloads = Payloads::new(model)?;
+    let reference = Rows::new(model, first, &payloads, None)?;
+    let before = reference.white()?;
+    let samples =
+        |one: &Recording| -> usize { one.stretches.iter().map(|one| one.time().len()).sum() };
+    let total: usize = recordings.iter().map(|one| samples(one)).sum();
+    let mut start = samples(first);
+    let mut differences = Vec::new();
+    for recording in later {
+        let rows = Rows::new(model, recording, &payloads, Some(&reference.values))?;
+        let run = rows.white()?;
+        let possible = changes::possible(model, &payloads, run.layout);
+        let end = start + samples(recording);
+        for one in found(&possible, &rows, &before, &run) {
+            let own = rows.force(&possible[one.which].columns, &one.values);
+            let along_all = |values: Vec<f64>| {
+                let mut all = vec![0.0; total];
+                if values.len() == end - start {
+                    all[start..end].copy_from_slice(&values);
+                }
+                all
+            };
+            differences.push(Difference {
+                first: first.file().to_owned(),
+                later: recording.file().to_owned(),
+                changed: changes::told(model, &possible, &one, &rows.values),
+                force: Column(own.0.into_iter().map(|v| v.map(along_all)).collect()),
+            });
+        }
+        start = end;
+    }
+    Ok(differences)
 }

@@ -5,6 +5,7 @@ pub mod variances;
 
 use modelmill_codegen::{PoseFault, PoseReason, States};
 use modelmill_identify::decimate_time;
+use modelmill_identify::diagnose::Disturbance;
 use modelmill_identify::{Note, Run, place_word};
 
 use crate::error::{Error, Outcome};
@@ -27,6 +28,8 @@ pub struct Stretch {
     pub load: Option<Vec<Vec<f64>>>,
     /// The options that would read all angles in degrees; empty where no file stands behind.
     pub maps_from_degrees: String,
+    /// What is wrong with the recording, as far as it was seen.
+    pub faults: Vec<Disturbance>,
 }
 
 impl From<Run> for Stretch {
@@ -38,6 +41,7 @@ impl From<Run> for Stretch {
             weights: None,
             load: None,
             maps_from_degrees: String::new(),
+            faults: Vec::new(),
         }
     }
 }

@@ -1,0 +1,93 @@
+//! What changes in the course of a recording: the zero of a force's sensor, and friction that warms up. Each recording has
+//! numbers of its own.
+
+use super::column::Column;
+use super::problem::{Candidate, Choice, Effect, EffectParameter, Nature, Problem, Sign, Source};
+
+/// A drift of the offset and of the friction of every channel; `units` are those of the forces.
+pub fn drifts(problem: &Problem, units: &[String]) -> Vec<Candidate> {
+    let layout = &problem.layout;
+    let mut recordings: Vec<&str> = layout.stretches.iter().map(|s| s.name.as_str()).collect();
+    recordings.dedup();
+    let ramps: Vec<Vec<f64>> = recordings.iter().map(|name| ramp(problem, name)).collect();
+    let mut candidates = Vec::new();
+    for (d, channel) in layout.channels.iter().enumerate() {
+        let product = |ramp: &[f64], column: &Column| -> Column {
+            let mut only = Column(vec![None; layout.channels.len()]);
+            let values = column.0[d].iter().flatten();
+            only.0[d] = Some(values.zip(ramp).map(|(x, r)| x * r).collect());
+            only
+        };
+        // Rate, sign of the rate, and a constant.
+        let Some([rate, sign, one]) = problem.friction.get(3 * d..3 * d + 3) else {
+            continue;
+        };
+        for (kind, shapes) in [
+            ("offset_drift", &[("F0", one)][..]),
+            ("friction_drift", &[("Fc", sign), ("Fv", rate)]),
+        ] {
+            let mut parameters = Vec::new();
+            let mut columns = Vec::new();
+            for (ramp, name) in ramps.iter().zip(&recordings) {
+                for (symbol, shape) in shapes {
+                    let column = product(ramp, shape);
+                    if column.0[d].iter().flatten().all(|x| *x == 0.0) {
+                        continue;
+                    }
+                    let unit = match *symbol {
+                        "Fv" if units[d] == "N" => "N s/m",
+                        "Fv" => "N m s/rad",
+                        _ => units[d].as_str(),
+                    };
+                    parameters.push(EffectParameter {
+                        symbol: format!("change of {symbol} in {name}"),
+                        unit: unit.to_owned(),
+                        sign: Sign::Any,
+                    });
+                    columns.push(column);
+                }
+            }
+            if columns.is_empty() {
+                continue;
+            }
+            candidates.push(Candidate {
+                effect: Effect {
+                    kind: kind.to_owned(),
+                    at: vec![channel.clone()],
+                },
+                parameters,
+                searched: 0,
+                is_part_of_load: false,
+                refines: None,
+                nature: Nature::Disturbance,
+                is_per_run: true,
+                source: Source::Columns(vec![Choice {
+                    constants: Vec::new(),
+                    columns,
+                }]),
+            });
+        }
+    }
+    candidates
+}
+
+/// From minus to plus a half along one recording, zero along the others.
+fn ramp(problem: &Problem, recording: &str) -> Vec<f64> {
+    let stretches = &problem.layout.stretches;
+    let of = stretches.iter().filter(|s| s.name == recording);
+    let samples: usize = of.map(|s| s.samples).sum();
+    let last = samples.saturating_sub(1).max(1) as f64;
+    let mut at = 0.0;
+    let mut ramp = Vec::with_capacity(problem.layout.samples());
+    for stretch in stretches {
+        for _ in 0..stretch.samples {
+            if stretch.name == recording {
+                ramp.push(at / last - 0.5);
+                at += 1.0;
+            } else {
+                ramp.push(0.0);
+            }
+        }
+    }
+    ramp
+}

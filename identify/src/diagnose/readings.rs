@@ -1,0 +1,163 @@
+//! Forces that are not read as they act: late, through a low-pass, or on another scale. Their columns follow from the forces
+//! that a fit says.
+
+use super::bench::{Bench, Trial};
+use super::column::Column;
+use super::problem::{
+    Candidate, Effect, EffectParameter, Fault, Layout, Nature, Reading, Sign, Source,
+};
+
+/// Below this part of a sample a derivative says what a delay does.
+const SLIGHT: f64 = 0.1;
+
+impl Fault {
+    /// The kind of effect, the symbol of its parameter, and the unit and sign of that.
+    fn words(self) -> (&'static str, &'static str, &'static str, Sign) {
+        match self {
+            Self::Late => ("time_delay", "T", "s", Sign::Any),
+            Self::Lagging => ("force_lag", "tau", "s", Sign::Positive),
+            Self::Scaled => ("drive_gain", "gain", "1", Sign::Any),
+        }
+    }
+}
+
+/// What may be wrong with the reading of each force by itself, and of all by a low-pass alike. A delay of all forces is an
+/// effect of the library, and another scale of all would be other parameters.
+pub fn readings(layout: &Layout) -> Vec<Candidate> {
+    let channels = layout.channels.len();
+    let each = (0..channels).flat_map(|d| {
+        let late = (channels > 1).then_some((Fault::Late, Some(d)));
+        let lagging = (channels > 1).then_some((Fault::Lagging, Some(d)));
+        [late, lagging, Some((Fault::Scaled, Some(d)))]
+    });
+    let all = [Some((Fault::Lagging, None))];
+    let readings = all.into_iter().chain(each).flatten();
+    readings
+        .map(|(fault, channel)| {
+            let (kind, symbol, unit, sign) = fault.words();
+            let place = channel.map_or("force", |d: usize| layout.channels[d].as_str());
+            Candidate {
+                effect: Effect {
+                    kind: kind.to_owned(),
+                    at: vec![place.to_owned()],
+                },
+                parameters: vec![EffectParameter {
+                    symbol: symbol.to_owned(),
+                    unit: unit.to_owned(),
+                    sign,
+                }],
+                searched: 0,
+                is_part_of_load: false,
+                refines: None,
+                nature: Nature::Effect,
+                is_per_run: false,
+                source: Source::Reading(Reading { fault, channel }),
+            }
+        })
+        .collect()
+}
+
+impl Bench<'_> {
+    /// What forces change by when they are read wrongly, for each unit of the parameter, between none and its value.
+    pub(crate) fn misread(&self, reading: Reading, force: &Column, value: f64) -> Column {
+        let channels = force.0.iter().enumerate();
+        let of = |(d, values): (usize, &Option<Vec<f64>>)| {
+            let values = values.as_ref()?;
+            if reading.channel.is_some_and(|channel| channel != d) {
+                return None;
+            }
+            if reading.fault == Fault::Scaled {
+                return Some(values.clone());
+            }
+            let mut changes = Vec::with_capacity(values.len());
+            let mut start = 0;
+            for stretch in &self.problem.layout.stretches {
+                let part = &values[start..start + stretch.samples];
+                let samples = value / stretch.step;
+                if samples.abs() < SLIGHT {
+                    changes.extend(slopes(part).map(|slope| -slope / stretch.step));
+                } else if reading.fault == Fault::Late {
+                    let late = (0..part.len()).map(|i| between(part, i as f64 - samples));
+                    changes.extend(late.zip(part).map(|(then, now)| (then - now) / value));
+                } else {
+                    let filtered = lagging(part, samples.abs()).into_iter().zip(part);
+                    changes.extend(filtered.map(|(late, now)| (late - now) / value.abs()));
+                }
+                start += stretch.samples;
+            }
+            Some(changes)
+        };
+        Column(channels.map(of).collect())
+    }
+
+    /// A set whose columns that depend on the fit have been made anew by it.
+    pub(crate) fn settled(&mut self, trial: &Trial) -> Trial {
+        let is_curved = |source: &Source| matches!(source, Source::Reading(reading) if reading.fault != Fault::Scaled);
+        if !(trial.picks.iter()).any(|p| is_curved(&self.candidate(p).source)) {
+            return trial.clone();
+        }
+        let score = trial.score;
+        let picks = self.refresh(trial.picks.clone());
+        Trial {
+            score,
+            ..self.trial(picks)
+        }
+    }
+}
+
+/// Changes from sample to sample, by central differences.
+fn slopes(values: &[f64]) -> impl Iterator<Item = f64> {
+    let last = values.len() - 1;
+    (0..values.len()).map(move |i| {
+        let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
+        (values[after] - values[before]) / (after - before).max(1) as f64
+    })
+}
+
+/// A series through a low-pass of first order whose time constant is so many samples, exact for one that is straight between
+/// its samples.
+fn lagging(values: &[f64], constant: f64) -> Vec<f64> {
+    let keeps = (-constant.recip()).exp();
+    let mut state = values[0];
+    let mut before = values[0];
+    let follow = |now: &f64| {
+        let slope = now - before;
+        // A ramp is followed at a distance of the time constant.
+        state = now - slope * constant + (state - before + slope * constant) * keeps;
+        before = *now;
+        state
+    };
+    values.iter().map(follow).collect()
+}
+
+/// A series at a place between its samples.
+fn between(values: &[f64], at: f64) -> f64 {
+    let last = values.len() - 1;
+    let at = at.clamp(0.0, last as f64);
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to the places of samples"
+    )]
+    let k = at.floor() as usize;
+    let share = at - at.floor();
+    values[k] + share * (values[(k + 1).min(last)] - values[k])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A low-pass of first order answers a step by an exponential and follows a ramp at the distance of its time constant.
+    #[test]
+    fn a_low_pass_answers_ramps_and_steps_as_its_equation_says() {
+        let constant = 2.5;
+        let ramp: Vec<f64> = (0..60).map(f64::from).collect();
+        let late = lagging(&ramp, constant);
+        for (i, x) in late.iter().enumerate() {
+            let t = i as f64;
+            let expected = t - constant + constant * (-t / constant).exp();
+            assert!((x - expected).abs() < 1e-12, "{i}: {x} {expected}");
+        }
+    }
+}

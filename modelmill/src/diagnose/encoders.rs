@@ -1,0 +1,187 @@
+//! Encoders that err as they turn: an eccentric disc reads the position too large and too small once or several times a turn,
+//! and the model takes that for motion. What forces change by with each reading, its rate and its acceleration is had by
+//! central differences of the fitted model, so that any error along the motion is a sum of three products.
+
+use modelmill_identify::changes::Moments;
+use modelmill_identify::diagnose::{
+    Candidate, Choice, Column, Effect, EffectParameter, Nature, Problem, Sign, Source,
+};
+
+use crate::along;
+use crate::error::Outcome;
+use crate::model::Model;
+use crate::stretch::Stretch;
+
+use super::numbers::{Runs, stack};
+use super::problem::Held;
+
+/// How often an error may come again in a turn, or along the travel of a coordinate that slides.
+const TIMES: [u32; 16] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 48, 60];
+/// Steps of the differences, as parts of the largest value.
+const STEP: f64 = 1e-5;
+/// Samples that an error must take at least for each of its waves.
+const SAMPLES_PER_WAVE: f64 = 12.0;
+/// Beyond so many times its middle size a difference has met a sign that jumped.
+const JUMPED: f64 = 100.0;
+
+/// An error of each encoder with sine and cosine of its angle, for each number of waves that may be.
+pub(crate) fn encoders(
+    model: &Model,
+    all: &Runs<'_>,
+    problem: &Problem,
+    held: Held,
+) -> Outcome<Vec<Candidate>> {
+    let values = values(model, problem, held);
+    let motions = model.motions();
+    let mut candidates = Vec::new();
+    for (i, (name, is_angle)) in motions.iter().enumerate() {
+        let of = |order: usize| -> Vec<f64> {
+            let mut all_values = Vec::new();
+            for (one, _) in all {
+                let run = &one.run;
+                let values = [&run.q, &run.qd, &run.qdd][order];
+                all_values.extend(values[i].iter().copied().step_by(one.decimation()));
+            }
+            all_values
+        };
+        let [q, qd, qdd] = [0, 1, 2].map(of);
+        let low = q.iter().copied().fold(f64::INFINITY, f64::min);
+        let travel = q.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
+        let fastest = qd.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        if travel.is_nan() || travel <= 0.0 || fastest <= 0.0 {
+            continue;
+        }
+        let Some(slopes) = sensitivities(model, all, &values, i)? else {
+            continue;
+        };
+        let step = problem.layout.stretches.iter().map(|s| s.step);
+        let step = step.fold(f64::MIN_POSITIVE, f64::max);
+        let turn = if *is_angle {
+            std::f64::consts::TAU
+        } else {
+            travel
+        };
+        let choice = |times: u32| {
+            let k = std::f64::consts::TAU * f64::from(times) / turn;
+            if k * fastest * step > std::f64::consts::TAU / SAMPLES_PER_WAVE {
+                return None;
+            }
+            let wave = |phase: f64| {
+                let error = |j: usize| {
+                    let (sin, cos) = (k * q[j] + phase).sin_cos();
+                    let rate = k * cos * qd[j];
+                    [sin, rate, k * cos * qdd[j] - k * k * sin * qd[j] * qd[j]]
+                };
+                let mut column = Column(vec![None; model.drives().len()]);
+                for (order, slope) in slopes.iter().enumerate() {
+                    let mut part = slope.clone();
+                    for values in part.0.iter_mut().flatten() {
+                        for (j, x) in values.iter_mut().enumerate() {
+                            *x *= error(j)[order];
+                        }
+                    }
+                    // Forces are those of the true motion.
+                    column.add(-1.0, &part);
+                }
+                column
+            };
+            Some(Choice {
+                constants: vec![("times_per_turn".to_owned(), f64::from(times))],
+                columns: vec![wave(0.0), wave(0.5 * std::f64::consts::PI)],
+            })
+        };
+        let choices: Vec<Choice> = TIMES.into_iter().filter_map(choice).collect();
+        if choices.is_empty() {
+            continue;
+        }
+        let parameter = |symbol: &str| EffectParameter {
+            symbol: symbol.to_owned(),
+            unit: if *is_angle { "rad" } else { "m" }.to_owned(),
+            sign: Sign::Any,
+        };
+        candidates.push(Candidate {
+            effect: Effect {
+                kind: "encoder_eccentricity".to_owned(),
+                at: vec![name.clone()],
+            },
+            parameters: vec![parameter("sine"), parameter("cosine")],
+            searched: 1,
+            is_part_of_load: false,
+            refines: None,
+            nature: Nature::Disturbance,
+            is_per_run: false,
+            source: Source::Columns(choices),
+        });
+    }
+    Ok(candidates)
+}
+
+/// Base parameters by least squares, drives weighed alike; those that are held keep their nominal values.
+fn values(model: &Model, problem: &Problem, held: Held) -> Vec<f64> {
+    let mut all = Moments::new(problem.base.len());
+    for (d, measured) in problem.measured.0.iter().enumerate() {
+        let Some(measured) = measured else { continue };
+        let mut one = Moments::new(problem.base.len());
+        let columns: Vec<Option<&[f64]>> = problem.base.iter().map(|c| c.0[d].as_deref()).collect();
+        one.add_rows(&columns, measured);
+        let weight = one.total.max(f64::MIN_POSITIVE).recip();
+        one.gram *= weight;
+        one.rhs *= weight;
+        all.merge(&one);
+    }
+    let solved = all.solve().values;
+    let mut next = solved.iter();
+    (0..model.base.len())
+        .map(|k| {
+            if held == Held::All || model.is_known(k) {
+                model.nominal[k]
+            } else {
+                next.next().copied().unwrap_or(0.0)
+            }
+        })
+        .collect()
+}
+
+/// What forces change by with a position, its rate and its acceleration, decimated; `None` where the model does not hold
+/// beside the recording.
+fn sensitivities(
+    model: &Model,
+    all: &Runs<'_>,
+    values: &[f64],
+    coordinate: usize,
+) -> Outcome<Option<[Column; 3]>> {
+    let mut slopes = Vec::new();
+    for order in 0..3 {
+        let along = |sign: f64| {
+            stack(all, |one| {
+                let mut turned: Stretch = one.clone();
+                let run = &mut turned.run;
+                let column = &mut [&mut run.q, &mut run.qd, &mut run.qdd][order][coordinate];
+                let largest = column.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+                let step = sign * STEP * largest.max(f64::MIN_POSITIVE);
+                column.iter_mut().for_each(|x| *x += step);
+                let mut forces = along::forces(model, &turned, values)?;
+                for x in forces.iter_mut().flatten() {
+                    *x /= 2.0 * step.abs();
+                }
+                Ok(forces)
+            })
+        };
+        let [Ok(back), Ok(ahead)] = [along(-1.0), along(1.0)] else {
+            return Ok(None);
+        };
+        let pairs = ahead.into_iter().zip(back);
+        let slope = pairs.map(|(ahead, back)| {
+            let mut slope: Vec<f64> = ahead.iter().zip(&back).map(|(a, b)| a - b).collect();
+            let mut sizes: Vec<f64> = slope.iter().map(|x| x.abs()).collect();
+            sizes.sort_by(f64::total_cmp);
+            let bound = JUMPED * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+            for x in slope.iter_mut().filter(|x| x.abs() > bound) {
+                *x = 0.0;
+            }
+            slope
+        });
+        slopes.push(Column::new(slope.collect()));
+    }
+    Ok(<[Column; 3]>::try_from(slopes).ok())
+}

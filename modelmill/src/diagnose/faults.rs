@@ -1,0 +1,199 @@
+//! What is known to be wrong with recordings before anything is looked for: pushes, coarse readings, and what another recording
+//! of the machine does not share. All of it is told, and none of it is left to be taken for an effect.
+
+use modelmill_identify::diagnose::{Disturbance, Problem, Quantity, step_of_values};
+
+use crate::error::Outcome;
+use crate::model::Model;
+use crate::recording::Recording;
+use crate::runs::{Difference, What, differences};
+
+use super::numbers::Runs;
+
+/// About a push so long is left out on either side, s.
+const MARGIN: f64 = 0.15;
+/// A push that lasts less is none, s.
+const SHORTEST: f64 = 0.18;
+/// Pushes closer together are one, s.
+const TOGETHER: f64 = 0.3;
+/// What a place explains holds this part of all samples beyond the place.
+const BEYOND: f64 = 0.5;
+
+/// What later recordings do not share with the first one; nothing where that cannot be said.
+pub(crate) fn between_runs(model: &Model, recordings: &[&Recording]) -> Vec<Difference> {
+    if recordings.len() < 2 {
+        return Vec::new();
+    }
+    differences(model, recordings).unwrap_or_default()
+}
+
+/// Takes what is known off a problem, and tells it there.
+pub(crate) fn take_off(
+    problem: &mut Problem,
+    model: &Model,
+    all: &Runs<'_>,
+    between: &[Difference],
+) -> Outcome<()> {
+    problem.removed.resize(model.drives().len(), 0.0);
+    let samples = problem.layout.samples().max(1) as f64;
+    for one in between {
+        for (d, force) in one.force.0.iter().enumerate() {
+            let (Some(force), Some(measured)) = (force, &mut problem.measured.0[d]) else {
+                continue;
+            };
+            if force.len() != measured.len() {
+                continue;
+            }
+            for (y, f) in measured.iter_mut().zip(force) {
+                *y -= f;
+            }
+            problem.removed[d] += force.iter().map(|f| f * f).sum::<f64>() / samples;
+        }
+        problem.disturbances.push(told(one));
+    }
+    coarse(problem, model, all)?;
+    pushes(problem, all);
+    for one in all.iter().flat_map(|(one, _)| &one.faults) {
+        if one.kind != "contact_event" {
+            problem.disturbances.push(one.clone());
+        }
+    }
+    Ok(())
+}
+
+/// A difference of two recordings by name.
+fn told(one: &Difference) -> Disturbance {
+    let (_, at, values) = one.changed.what.parts(one.changed.unit);
+    let kind = match one.changed.what {
+        What::Payload { .. } => "payload_change",
+        What::Clock { .. } => "time_base",
+        _ => "different_runs",
+    };
+    let estimates = values.into_iter().map(|(name, value, unit)| Quantity {
+        name: name.to_owned(),
+        value: value.value,
+        deviation: Some(value.deviation),
+        unit: unit.to_owned(),
+    });
+    Disturbance {
+        kind: kind.to_owned(),
+        at: vec![at.to_owned()],
+        estimates: estimates.collect(),
+        recordings: vec![one.first.clone(), one.later.clone()],
+        interval: None,
+        says: Some(format!(
+            "{} differs between the recordings: in {} beside {}, {}",
+            match one.changed.what {
+                What::Payload { .. } => "the payload",
+                What::Friction { .. } => "the friction",
+                What::Offset { .. } => "a constant force",
+                What::Scale { .. } => "the scale of a force",
+                What::Clock { .. } => "the clock",
+                What::EncoderZero { .. } => "the zero of an encoder",
+            },
+            one.later,
+            one.first,
+            one.changed.says
+        )),
+    }
+}
+
+/// Forces that are read in steps coarser than their noise: half a step either way is their noise.
+fn coarse(problem: &mut Problem, model: &Model, all: &Runs<'_>) -> Outcome<()> {
+    for (d, drive) in model.drives().iter().enumerate() {
+        let mut recorded = Vec::new();
+        for (one, _) in all {
+            recorded.extend_from_slice(&one.run.measured()?[d]);
+        }
+        let is_decimated = all.iter().any(|(one, _)| one.decimation() > 1);
+        let Some(step) = step_of_values(&recorded, problem.noise[d]).filter(|_| !is_decimated)
+        else {
+            continue;
+        };
+        problem.noise[d] = problem.noise[d].max(step / 12.0_f64.sqrt());
+        problem.disturbances.push(Disturbance {
+            kind: "quantised_force".to_owned(),
+            at: vec![drive.clone()],
+            estimates: vec![Quantity::new("step", step, model.force_unit(d))],
+            recordings: Vec::new(),
+            interval: None,
+            says: None,
+        });
+    }
+    Ok(())
+}
+
+/// Leaves out pushes: events that no place of a coordinate explains.
+fn pushes(problem: &mut Problem, all: &Runs<'_>) {
+    let events: Vec<Disturbance> = merged(all);
+    if events.is_empty() {
+        return;
+    }
+    let (mut inside, mut about, mut positions) = (Vec::new(), Vec::new(), Vec::new());
+    for (one, _) in all {
+        let is_in = |event: &Disturbance, time: f64, margin: f64| {
+            let [from, to] = event.interval.unwrap_or_default();
+            event.recordings.contains(&one.run.file) && time >= from - margin && time <= to + margin
+        };
+        for (i, time) in one.time().into_iter().enumerate() {
+            inside.push(events.iter().any(|event| is_in(event, time, 0.0)));
+            about.push(events.iter().any(|event| is_in(event, time, MARGIN)));
+            let at = i * one.decimation();
+            positions.push(one.run.q.iter().map(|q| q[at]).collect::<Vec<f64>>());
+        }
+    }
+    let coordinates = positions.first().map_or(0, Vec::len);
+    let explains = |i: usize, sign: f64| {
+        let mut of_event: Vec<f64> = positions
+            .iter()
+            .zip(&inside)
+            .filter(|(_, inside)| **inside)
+            .map(|(q, _)| sign * q[i])
+            .collect();
+        of_event.sort_by(f64::total_cmp);
+        let Some(place) = of_event.get(of_event.len() / 10) else {
+            return false;
+        };
+        let beyond = positions.iter().zip(&inside);
+        let beyond: Vec<bool> = beyond
+            .filter(|(q, _)| sign * q[i] >= *place)
+            .map(|(_, inside)| *inside)
+            .collect();
+        let events = beyond.iter().filter(|inside| **inside).count() as f64;
+        events > BEYOND * beyond.len() as f64
+    };
+    if (0..coordinates).any(|i| explains(i, 1.0) || explains(i, -1.0)) {
+        return;
+    }
+    problem.left_out = about;
+    problem.disturbances.extend(events);
+}
+
+/// Events of all recordings, those that are close together as one, without the short ones.
+fn merged(all: &Runs<'_>) -> Vec<Disturbance> {
+    let mut events: Vec<Disturbance> = Vec::new();
+    let faults = all.iter().flat_map(|(one, _)| &one.faults);
+    for event in faults.filter(|one| one.kind == "contact_event") {
+        let [from, to] = event.interval.unwrap_or_default();
+        if let Some(last) = events.last_mut()
+            && last.recordings == event.recordings
+            && let Some(before) = &mut last.interval
+            && from - before[1] < TOGETHER
+        {
+            before[1] = to;
+            for place in &event.at {
+                if !last.at.contains(place) {
+                    last.at.push(place.clone());
+                }
+            }
+            continue;
+        }
+        events.push(event.clone());
+    }
+    events.retain(|event| {
+        event
+            .interval
+            .is_some_and(|[from, to]| to - from >= SHORTEST)
+    });
+    events
+}

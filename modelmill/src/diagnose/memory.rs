@@ -1,0 +1,91 @@
+//! Friction that remembers where it reversed (P. R. Dahl, AIAA Journal 14, 1976): over a length after each reversal it grows to
+//! its bound, as bristles that bend before they slip. It depends on the way that was gone, so no term of a model file says it.
+
+use modelmill_codegen::Evaluator;
+use modelmill_identify::diagnose::{
+    Candidate, Choice, Column, Effect, EffectParameter, Nature, Sign, Source,
+};
+
+use crate::along;
+use crate::error::Outcome;
+use crate::model::Model;
+use crate::stretch::Stretch;
+
+use super::numbers::{Runs, stack};
+
+/// Lengths that are tried, as parts of the travel.
+const LENGTHS: [f64; 12] = [
+    0.001, 0.002, 0.004, 0.007, 0.012, 0.02, 0.035, 0.06, 0.1, 0.17, 0.3, 0.5,
+];
+
+/// Dahl friction of every drive.
+pub(crate) fn memories(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Candidate>> {
+    let evaluator = Evaluator::new(&model.derivation);
+    let drives = model.drives();
+    let mut candidates = Vec::new();
+    let positions = |one: &Stretch| -> Outcome<Vec<Vec<f64>>> {
+        let mut columns = along::columns(model, one, |states| evaluator.drives(states))?;
+        columns.truncate(drives.len());
+        Ok(columns)
+    };
+    let mut travels = vec![[f64::INFINITY, f64::NEG_INFINITY]; drives.len()];
+    for (one, _) in all {
+        for (travel, values) in travels.iter_mut().zip(positions(one)?) {
+            for x in values {
+                *travel = [travel[0].min(x), travel[1].max(x)];
+            }
+        }
+    }
+    for (d, drive) in drives.iter().enumerate() {
+        let travel = travels[d][1] - travels[d][0];
+        if travel.is_nan() || travel <= 0.0 {
+            continue;
+        }
+        let lengths = LENGTHS.map(|part| part * travel);
+        let of_lengths = stack(all, |one| {
+            let position = &positions(one)?[d];
+            Ok(lengths.map(|length| states(position, length)).to_vec())
+        })?;
+        let choice = |(length, states): (f64, Vec<f64>)| {
+            let mut column = Column(vec![None; drives.len()]);
+            column.0[d] = Some(states);
+            Choice {
+                constants: vec![("length".to_owned(), length)],
+                columns: vec![column],
+            }
+        };
+        let choices = lengths.into_iter().zip(of_lengths).map(choice).collect();
+        candidates.push(Candidate {
+            effect: Effect {
+                kind: "dahl_friction".to_owned(),
+                at: vec![drive.clone()],
+            },
+            parameters: vec![EffectParameter {
+                symbol: "Fc".to_owned(),
+                unit: model.force_unit(d).to_owned(),
+                sign: Sign::Positive,
+            }],
+            searched: 1,
+            is_part_of_load: false,
+            refines: Some("coulomb_friction".to_owned()),
+            nature: Nature::Effect,
+            is_per_run: false,
+            source: Source::Columns(choices),
+        });
+    }
+    Ok(candidates)
+}
+
+/// The state of the bristles along a position, between minus and plus one: `dz/dx = (sign - z) / length`.
+fn states(position: &[f64], length: f64) -> Vec<f64> {
+    let mut state = 0.0_f64;
+    let mut before = position.first().copied().unwrap_or(0.0);
+    let step = |x: &f64| {
+        let moved = x - before;
+        before = *x;
+        let bound = if moved < 0.0 { -1.0 } else { 1.0 };
+        state = bound + (state - bound) * (-moved.abs() / length).exp();
+        state
+    };
+    position.iter().map(step).collect()
+}
