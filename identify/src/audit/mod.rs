@@ -4,6 +4,8 @@
 mod clock;
 mod columns;
 mod delay_and_exchange;
+mod positions;
 mod signals;
 
 pub use delay_and_exchange::{ForceAudit, ForceDelay, Suspect};
+pub use positions::PositionFault;

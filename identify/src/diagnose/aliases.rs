@@ -6,7 +6,7 @@ use super::problem::Effect;
 
 /// How much worse (twice the logarithm of the likelihood, with the samples that the residual is worth) a set may be and
 /// still not be told from the best.
-const APART: f64 = 9.0;
+pub(crate) const APART: f64 = 9.0;
 /// What stands in for an effect must take off this share of the squared error that the effect takes off.
 const STANDS_IN: f64 = 0.8;
 /// A column of which others leave less than this share of squares lies in their span.

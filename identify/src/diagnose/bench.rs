@@ -263,11 +263,12 @@ impl<'a> Bench<'a> {
                     known.resize(*k + 1, None);
                 }
                 let by_channel = known[*k].get_or_insert_with(|| {
-                    let pairs = column.0.iter().zip(&self.pool.column(*k).0);
+                    let pairs = column.0.iter().zip(&self.pool.column(*k).0).enumerate();
                     pairs
-                        .filter_map(|(a, b)| {
+                        .filter_map(|(d, (a, b))| {
                             let a = a.as_ref()?;
-                            Some(b.as_ref().map_or(0.0, |b| dot(a, b)))
+                            let all = self.pool.all();
+                            Some(b.as_ref().map_or(0.0, |b| self.pool.inner(d, a, b, all)))
                         })
                         .collect()
                 });
@@ -280,10 +281,10 @@ impl<'a> Bench<'a> {
     }
 
     fn product(&self, a: &Column, b: &Column) -> f64 {
-        let pairs = a.0.iter().zip(&b.0).zip(&self.weights);
+        let pairs = a.0.iter().zip(&b.0).zip(&self.weights).enumerate();
         pairs
-            .map(|((a, b), weight)| match (a, b) {
-                (Some(a), Some(b)) => weight * dot(a, b),
+            .map(|(d, ((a, b), weight))| match (a, b) {
+                (Some(a), Some(b)) => weight * self.pool.inner(d, a, b, self.pool.all()),
                 _ => 0.0,
             })
             .sum()

@@ -21,6 +21,9 @@ const OUT: f64 = 7.0;
 const RARE: f64 = 0.05;
 /// Samples about a reversal that are left alone.
 const REVERSAL: usize = 4;
+/// Samples on either side of a reversal that count no more, and the part of all that they may be.
+const JUMP: usize = 2;
+const MOST_JUMPS: f64 = 0.1;
 /// How many times the middle of the spectrum about it a line must reach.
 const ABOVE: f64 = 60.0;
 /// Half the width of what counts as about it, and of the line itself, in steps of the spectrum.
@@ -51,7 +54,7 @@ pub(crate) fn clean(problem: &mut Problem) -> Vec<Disturbance> {
 
 /// What base parameters and friction leave, channels weighed alike.
 fn rest(problem: &Problem) -> Vec<Vec<f64>> {
-    let mut pool = Pool::new(&problem.layout);
+    let mut pool = Pool::new(&problem.layout).without(&problem.left_out);
     let columns = problem.base.iter().chain(&problem.friction);
     let mut which: Vec<usize> = columns.map(|c| pool.add(c.clone())).collect();
     let measured = pool.add(problem.measured.clone());
@@ -84,7 +87,7 @@ fn outliers(problem: &mut Problem) -> Vec<Disturbance> {
         let rest = rest(problem);
         let mut more = false;
         for (d, rest) in rest.iter().enumerate() {
-            let reverses = reversals(problem, d);
+            let reverses = reversals(problem, d, REVERSAL);
             let apart = from_neighbours(problem, rest);
             let spread = 1.4826 * median(apart.iter().map(|x| x.abs()).collect());
             let bound = OUT * spread.max(problem.noise[d]);
@@ -127,7 +130,7 @@ fn outliers(problem: &mut Problem) -> Vec<Disturbance> {
 }
 
 /// Samples about which a channel's drive reverses, where friction jumps.
-fn reversals(problem: &Problem, channel: usize) -> Vec<bool> {
+fn reversals(problem: &Problem, channel: usize, samples: usize) -> Vec<bool> {
     let n = problem.layout.samples();
     let mut about = vec![false; n];
     let sign = problem.friction.get(3 * channel + 1);
@@ -136,8 +139,8 @@ fn reversals(problem: &Problem, channel: usize) -> Vec<bool> {
     };
     for i in 1..n {
         if sign[i] * sign[i - 1] <= 0.0 {
-            let end = (i + REVERSAL).min(n);
-            about[i.saturating_sub(REVERSAL)..end].fill(true);
+            let end = (i + samples).min(n);
+            about[i.saturating_sub(samples)..end].fill(true);
         }
     }
     about
@@ -310,32 +313,24 @@ pub fn step_of_values(values: &[f64], noise: f64) -> Option<f64> {
 }
 
 impl Problem {
-    /// Leaves samples out of everything that is known from the start; what is made later leaves them out by itself.
-    pub(crate) fn leave_out(&mut self) {
-        let out = std::mem::take(&mut self.left_out);
-        let silence = |column: &mut Column| silence(column, &out);
-        silence(&mut self.measured);
-        self.base.iter_mut().for_each(silence);
-        self.friction.iter_mut().for_each(silence);
-        for candidate in &mut self.candidates {
-            if let super::problem::Source::Columns(choices) = &mut candidate.source {
-                let columns = choices.iter_mut().flat_map(|choice| &mut choice.columns);
-                columns.for_each(silence);
+    /// Leaves out samples next to a reversal of their drive too, unless these are many: friction jumps there, and on which side
+    /// of the jump a sample lies no derivative of positions tells.
+    pub(crate) fn leave_out_jumps(&mut self) {
+        let mut out = std::mem::take(&mut self.left_out);
+        out.resize(
+            self.layout.channels.len(),
+            vec![false; self.layout.samples()],
+        );
+        for (d, out) in out.iter_mut().enumerate() {
+            let jumps = reversals(self, d, JUMP);
+            let count = jumps.iter().filter(|jumps| **jumps).count() as f64;
+            if count < MOST_JUMPS * jumps.len() as f64 {
+                for (out, jumps) in out.iter_mut().zip(jumps) {
+                    *out |= jumps;
+                }
             }
         }
         self.left_out = out;
-    }
-}
-
-/// A column without some samples.
-pub(crate) fn silence(column: &mut Column, out: &[bool]) {
-    if out.is_empty() {
-        return;
-    }
-    for values in column.0.iter_mut().flatten() {
-        for (x, _) in values.iter_mut().zip(out).filter(|(_, out)| **out) {
-            *x = 0.0;
-        }
     }
 }
 

@@ -1,5 +1,5 @@
 //! What changes in the course of a recording: the zero of a force's sensor, and friction that warms up. Each recording has
-//! numbers of its own.
+//! numbers of its own, and a zero that drifts has a level besides, since nobody knows when it was right.
 
 use super::column::Column;
 use super::problem::{Candidate, Choice, Effect, EffectParameter, Nature, Problem, Sign, Source};
@@ -9,7 +9,7 @@ pub fn drifts(problem: &Problem, units: &[String]) -> Vec<Candidate> {
     let layout = &problem.layout;
     let mut recordings: Vec<&str> = layout.stretches.iter().map(|s| s.name.as_str()).collect();
     recordings.dedup();
-    let ramps: Vec<Vec<f64>> = recordings.iter().map(|name| ramp(problem, name)).collect();
+    let ramps: Vec<[Vec<f64>; 2]> = recordings.iter().map(|name| ramp(problem, name)).collect();
     let mut candidates = Vec::new();
     for (d, channel) in layout.channels.iter().enumerate() {
         let product = |ramp: &[f64], column: &Column| -> Column {
@@ -28,8 +28,13 @@ pub fn drifts(problem: &Problem, units: &[String]) -> Vec<Candidate> {
         ] {
             let mut parameters = Vec::new();
             let mut columns = Vec::new();
-            for (ramp, name) in ramps.iter().zip(&recordings) {
-                for (symbol, shape) in shapes {
+            let has_level = kind == "offset_drift";
+            for ([level, ramp], name) in ramps.iter().zip(&recordings) {
+                let changes = shapes.iter().map(|shape| ("change of ", ramp, shape));
+                let levels = shapes.iter().map(|shape| ("", level, shape));
+                for (lead, ramp, (symbol, shape)) in
+                    changes.chain(levels.take(if has_level { shapes.len() } else { 0 }))
+                {
                     let column = product(ramp, shape);
                     if column.0[d].iter().flatten().all(|x| *x == 0.0) {
                         continue;
@@ -40,7 +45,7 @@ pub fn drifts(problem: &Problem, units: &[String]) -> Vec<Candidate> {
                         _ => units[d].as_str(),
                     };
                     parameters.push(EffectParameter {
-                        symbol: format!("change of {symbol} in {name}"),
+                        symbol: format!("{lead}{symbol} in {name}"),
                         unit: unit.to_owned(),
                         sign: Sign::Any,
                     });
@@ -71,23 +76,21 @@ pub fn drifts(problem: &Problem, units: &[String]) -> Vec<Candidate> {
     candidates
 }
 
-/// From minus to plus a half along one recording, zero along the others.
-fn ramp(problem: &Problem, recording: &str) -> Vec<f64> {
+/// One along one recording and zero along the others, and the same from minus to plus a half.
+fn ramp(problem: &Problem, recording: &str) -> [Vec<f64>; 2] {
     let stretches = &problem.layout.stretches;
     let of = stretches.iter().filter(|s| s.name == recording);
     let samples: usize = of.map(|s| s.samples).sum();
     let last = samples.saturating_sub(1).max(1) as f64;
     let mut at = 0.0;
-    let mut ramp = Vec::with_capacity(problem.layout.samples());
+    let [mut level, mut ramp] = [(); 2].map(|()| Vec::with_capacity(problem.layout.samples()));
     for stretch in stretches {
         for _ in 0..stretch.samples {
-            if stretch.name == recording {
-                ramp.push(at / last - 0.5);
-                at += 1.0;
-            } else {
-                ramp.push(0.0);
-            }
+            let is_in = stretch.name == recording;
+            level.push(f64::from(u8::from(is_in)));
+            ramp.push(if is_in { at / last - 0.5 } else { 0.0 });
+            at += f64::from(u8::from(is_in));
         }
     }
-    ramp
+    [level, ramp]
 }

@@ -24,7 +24,7 @@ const BELOW_NOISE: f64 = 0.8;
 /// How many of its own deviations over the blocks the gain must be above zero.
 const LEAST_T: f64 = 2.5;
 /// A gain from which on it is enough that blocks gain by shares of their own, and how sure that must be.
-const LARGE_GAIN: f64 = 0.5;
+const LARGE_GAIN: f64 = 0.15;
 const LEAST_SHARES_T: f64 = 4.0;
 
 /// What speaks for one set of effects beside another.
@@ -39,10 +39,9 @@ pub struct Evidence {
     /// By how much the extended information criterion falls, with the effective number of samples and the number of
     /// candidates that there were to choose from.
     pub bic: f64,
-    /// How many independent equations the residual before is worth.
+    /// How many independent equations the residual after is worth.
     pub effective_samples: f64,
-    /// The squared error before, relative to the variances by which channels are weighted: the larger of error and noise.
-    /// So it is about 1, and less only where there is nothing but rounding.
+    /// The squared error before, relative to the white noise of the channels: less than 1 only where there is nothing but rounding.
     pub above_noise: f64,
 }
 
@@ -114,7 +113,7 @@ impl Bench<'_> {
             let freedoms = picks.iter().map(|p| self.freedoms(p));
             freedoms.sum::<usize>() as f64
         };
-        let worth = self.worth(&old_rest, channels);
+        let worth = self.worth(&new_rest, channels);
         // The best of so many fits chance better than any one of them.
         let choices = (self.problem.candidates.len().max(1) as f64).ln();
         let price = |picks: &[Pick]| count(picks) * worth.ln() + 2.0 * picks.len() as f64 * choices;
@@ -125,9 +124,17 @@ impl Bench<'_> {
             bic: worth * (old_squares / new_squares.max(f64::MIN_POSITIVE)).ln()
                 - (price(after) - price(before)),
             effective_samples: worth,
-            above_noise: old_squares
-                / (channels.len() * self.problem.layout.samples()).max(1) as f64,
+            above_noise: self.above_noise(&old_rest, channels),
         }
+    }
+
+    /// Squares of a residual relative to those of the white noise, over some channels.
+    fn above_noise(&self, rest: &[Vec<f64>], channels: &[usize]) -> f64 {
+        let of = |d: &usize| {
+            let noise = self.problem.noise[*d].powi(2).max(f64::MIN_POSITIVE);
+            dot(&rest[*d], &rest[*d]) / rest[*d].len().max(1) as f64 / noise
+        };
+        channels.iter().map(of).sum::<f64>() / channels.len().max(1) as f64
     }
 
     /// Weighted squared errors of some channels in blocks of time to which the set was not fitted: those of the check, or
@@ -158,10 +165,10 @@ impl Bench<'_> {
             for i in 0..which.len() {
                 for j in 0..=i {
                     let (a, b) = (self.pool.column(which[i]), self.pool.column(which[j]));
-                    let pairs = a.0.iter().zip(&b.0).zip(&self.weights);
+                    let pairs = a.0.iter().zip(&b.0).zip(&self.weights).enumerate();
                     let own: f64 = pairs
-                        .map(|((a, b), weight)| match (a, b) {
-                            (Some(a), Some(b)) => weight * dot(&a[fold.clone()], &b[fold.clone()]),
+                        .map(|(d, ((a, b), weight))| match (a, b) {
+                            (Some(a), Some(b)) => weight * self.pool.inner(d, a, b, fold.clone()),
                             _ => 0.0,
                         })
                         .sum();
@@ -183,6 +190,12 @@ impl Bench<'_> {
                         for (r, x) in rest.iter_mut().zip(&values[fold.clone()]) {
                             *r -= factor * x;
                         }
+                    }
+                }
+                let out = self.problem.left_out.get(*d);
+                for (i, r) in fold.clone().zip(rest.iter_mut()) {
+                    if out.is_some_and(|out| out[i]) {
+                        *r = 0.0;
                     }
                 }
                 error += self.weights[*d] * dot(&rest, &rest);

@@ -57,6 +57,9 @@ const UNEXPLAINED: f64 = 0.1;
 /// The same, in squares of the channel's white noise.
 const ABOVE_NOISE: f64 = 0.05;
 
+/// Kinds of friction of which a drift is a change.
+const FRICTION: [&str; 2] = ["viscous_friction", "coulomb_friction"];
+
 /// The answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -146,7 +149,7 @@ pub struct Diagnosis {
 pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
     problem.removed.resize(problem.layout.channels.len(), 0.0);
     let mut disturbances = problem.disturbances.clone();
-    problem.leave_out();
+    problem.leave_out_jumps();
     disturbances.extend(cleaning::clean(problem));
     let problem = &*problem;
     let mut bench = Bench::new(problem, supply);
@@ -190,6 +193,8 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
             indistinguishable_from: aliases.into_iter().map(|alias| alias.effect).collect(),
         });
     }
+    let mut disturbances = disturbances;
+    friction_in_time(&mut effects, &mut disturbances);
     let verdict = match (unexplained.is_empty(), effects.is_empty()) {
         (false, _) => Verdict::Unexplained,
         (true, true) => Verdict::Adequate,
@@ -208,6 +213,27 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
         reproducible: again,
         unexplained,
     }
+}
+
+/// Friction that the model lacks and that drifts besides is one effect: friction that changes with time.
+fn friction_in_time(effects: &mut Vec<FoundEffect>, disturbances: &mut Vec<Disturbance>) {
+    disturbances.retain(|drift| {
+        let is_its = |found: &FoundEffect| {
+            found.effect.at == drift.at && FRICTION.contains(&found.effect.kind.as_str())
+        };
+        let Some(at) = effects.iter().position(is_its) else {
+            return true;
+        };
+        if drift.kind != "friction_drift" {
+            return true;
+        }
+        let mut merged = effects[at].clone();
+        effects.retain(|found| !is_its(found));
+        drift.kind.clone_into(&mut merged.effect.kind);
+        effects.insert(at.min(effects.len()), merged);
+        // What it changes by is told besides.
+        true
+    });
 }
 
 /// Noise of all channels relative to the measured forces.

@@ -6,7 +6,6 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::cleaning::silence;
 use super::column::Column;
 use super::problem::Layout;
 
@@ -17,8 +16,8 @@ pub(crate) struct Pool {
     check: Range<usize>,
     /// `products[i][j]` for `j <= i`: by part (0 is the fit, 1 the check) and channel, the parts one after the other.
     products: RefCell<Vec<Vec<Option<Box<[f64]>>>>>,
-    /// Samples that are left out of every column.
-    left_out: Vec<bool>,
+    /// Samples that are left out of every product, by channel and in order.
+    left_out: Vec<Vec<usize>>,
 }
 
 impl Pool {
@@ -33,15 +32,39 @@ impl Pool {
         }
     }
 
-    /// Leaves samples out of all columns that come.
-    pub(crate) fn without(mut self, left_out: &[bool]) -> Self {
-        left_out.clone_into(&mut self.left_out);
+    /// Leaves samples out of all products and of what is left.
+    pub(crate) fn without(mut self, left_out: &[Vec<bool>]) -> Self {
+        let places = |out: &Vec<bool>| {
+            let samples = out.iter().enumerate();
+            samples.filter_map(|(i, out)| out.then_some(i)).collect()
+        };
+        self.left_out = left_out.iter().map(places).collect();
         self
     }
 
+    /// Inner product of two columns' values on a channel over some samples, without those that are left out.
+    pub(crate) fn inner(&self, channel: usize, a: &[f64], b: &[f64], range: Range<usize>) -> f64 {
+        let out = self.left_out.get(channel).map_or(&[][..], Vec::as_slice);
+        let from = out.partition_point(|i| *i < range.start);
+        let to = out.partition_point(|i| *i < range.end);
+        let less: f64 = out[from..to].iter().map(|i| a[*i] * b[*i]).sum();
+        dot(&a[range.clone()], &b[range]) - less
+    }
+
+    /// All samples.
+    pub(crate) fn all(&self) -> Range<usize> {
+        0..self.check.end
+    }
+
+    /// Makes a series zero where samples are left out.
+    pub(crate) fn silence(&self, channel: usize, values: &mut [f64]) {
+        for i in self.left_out.get(channel).into_iter().flatten() {
+            values[*i] = 0.0;
+        }
+    }
+
     /// Adds a column; its place.
-    pub(crate) fn add(&mut self, mut column: Column) -> usize {
-        silence(&mut column, &self.left_out);
+    pub(crate) fn add(&mut self, column: Column) -> usize {
         self.columns.push(column);
         self.products.get_mut().push(Vec::new());
         self.columns.len() - 1
@@ -55,10 +78,10 @@ impl Pool {
     fn products_of(&self, a: usize, b: usize) -> Box<[f64]> {
         let parts = [&self.fit, &self.check].into_iter();
         let of_part = |range: &Range<usize>| -> Vec<f64> {
-            let pairs = self.columns[a].0.iter().zip(&self.columns[b].0);
+            let pairs = self.columns[a].0.iter().zip(&self.columns[b].0).enumerate();
             pairs
-                .map(|pair| match pair {
-                    (Some(a), Some(b)) => dot(&a[range.clone()], &b[range.clone()]),
+                .map(|(d, pair)| match pair {
+                    (Some(a), Some(b)) => self.inner(d, a, b, range.clone()),
                     _ => 0.0,
                 })
                 .collect()
@@ -108,6 +131,9 @@ impl Pool {
                     }
                 }
             }
+        }
+        for (d, rest) in rest.iter_mut().enumerate() {
+            self.silence(d, rest);
         }
         rest
     }

@@ -214,8 +214,8 @@ pub struct Problem {
     pub variables: Vec<(String, Vec<f64>)>,
     /// White noise of each channel's force.
     pub noise: Vec<f64>,
-    /// Samples that say nothing of the model, as those of a push; empty where all count.
-    pub left_out: Vec<bool>,
+    /// Samples that say nothing of the model, as those of a push, `[channel][sample]`; empty where all count.
+    pub left_out: Vec<Vec<bool>>,
     /// Squares per sample that were taken off each channel before, since they do not repeat with the state.
     pub removed: Vec<f64>,
     /// What is known to be wrong with the recordings.

@@ -1,8 +1,10 @@
 //! Forces that are not read as they act: late, through a low-pass, or on another scale. Their columns follow from the forces
 //! that a fit says.
 
-use super::bench::{Bench, Trial};
+use super::aliases::APART;
+use super::bench::{Bench, Pick, Trial};
 use super::column::Column;
+use super::pool::On;
 use super::problem::{
     Candidate, Effect, EffectParameter, Fault, Layout, Nature, Reading, Sign, Source,
 };
@@ -90,17 +92,51 @@ impl Bench<'_> {
         Column(channels.map(of).collect())
     }
 
-    /// A set whose columns that depend on the fit have been made anew by it.
+    /// A set whose columns that depend on the fit have been made anew by it. A delay and a low-pass are the same where both are
+    /// slight: the low-pass is taken where it leaves clearly less.
     pub(crate) fn settled(&mut self, trial: &Trial) -> Trial {
-        let is_curved = |source: &Source| matches!(source, Source::Reading(reading) if reading.fault != Fault::Scaled);
-        if !(trial.picks.iter()).any(|p| is_curved(&self.candidate(p).source)) {
+        let curved = |bench: &Self, pick: &Pick| match bench.candidate(pick).source {
+            Source::Reading(reading) if reading.fault != Fault::Scaled => Some(reading),
+            _ => None,
+        };
+        let is_curved = |(i, pick): (usize, &Pick)| Some((i, curved(self, pick)?));
+        let Some((at, reading)) = trial.picks.iter().enumerate().find_map(is_curved) else {
             return trial.clone();
+        };
+        let is_other = |pick: &&Pick| {
+            let other = curved(self, pick);
+            other.is_some_and(|o| o.channel == reading.channel && o.fault != reading.fault)
+                && trial.picks.iter().all(|p| p.candidate != pick.candidate)
+        };
+        let mut sets = vec![trial.picks.clone()];
+        if let Some(other) = self.present.iter().flatten().find(is_other) {
+            let mut set = trial.picks.clone();
+            set[at] = other.clone();
+            sets.push(set);
         }
-        let score = trial.score;
-        let picks = self.refresh(trial.picks.clone());
+        let mut tried: Vec<Trial> = Vec::new();
+        for set in sets {
+            let refreshed = self.refresh(set);
+            tried.push(self.trial(refreshed));
+        }
+        tried.sort_by_key(|trial| {
+            let fault = trial.picks.get(at).and_then(|pick| curved(self, pick));
+            fault.is_some_and(|reading| reading.fault == Fault::Lagging)
+        });
+        let mut best = tried.remove(0);
+        if let Some(other) = tried.pop() {
+            let (factors, _) = self.fit(&other.picks, On::All);
+            let rest = self.rest(&other.picks, &factors);
+            let channels: Vec<usize> = (0..rest.len()).collect();
+            let better = self.worth(&rest, &channels) * (best.squares / other.squares).ln();
+            let has_signs = other.wrong_sign.is_empty();
+            if !best.wrong_sign.is_empty() || has_signs && better > APART {
+                best = other;
+            }
+        }
         Trial {
-            score,
-            ..self.trial(picks)
+            score: trial.score,
+            ..best
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The search for the smallest set of effects that explains what the model cannot say: forward over sets, with every
 //! member tried against every other candidate, back again, and simpler ones preferred.
 
-use super::bench::{Bench, Pick, Trial};
+use super::bench::{Bench, Pick, Table, Trial};
 use super::evidence::Evidence;
 use super::pool::On;
 use super::problem::{Problem, Source};
@@ -22,6 +22,10 @@ const MOST_OF: f64 = 0.7;
 const MUCH_BETTER: f64 = 20.0;
 /// Which share of the squared error on its channels it must take off beside that.
 const LARGE_CHANGE: f64 = 0.1;
+/// Candidates of which all pairs are tried whole, those that explain most beside one other.
+const PAIRED: usize = 140;
+/// Pairs that go on.
+const BEST_PAIRS: usize = 12;
 /// Most effects that are looked for.
 const MOST: usize = 40;
 
@@ -80,6 +84,40 @@ impl Bench<'_> {
                     evidence.holds() && evidence.gain > LARGE_CHANGE
                 })
             });
+            if std::env::var("MM_DEBUG").is_ok() {
+                let name = |p: &Pick| {
+                    format!(
+                        "{}@{}",
+                        self.candidate(p).effect.kind,
+                        self.candidate(p).effect.at.join("+")
+                    )
+                };
+                for t in trials.iter().take(14) {
+                    let news = difference(&t.picks, &accepted);
+                    let e = self.evidence(&accepted, &t.picks, &self.acted_on(&news));
+                    eprintln!(
+                        "DBG {:.1} sq {:.3} wrong {:?} [{}] gain {:.2} t {:.1} st {:.1} bic {:.0} add {}",
+                        t.score,
+                        t.squares,
+                        t.wrong_sign,
+                        t.picks.iter().map(name).collect::<Vec<_>>().join(" "),
+                        e.gain,
+                        e.blocks_t,
+                        e.shares_t,
+                        e.bic,
+                        self.is_addition(&accepted, t)
+                    );
+                }
+                eprintln!(
+                    "DBG chosen {:?} other {:?}",
+                    chosen
+                        .as_ref()
+                        .map(|c| c.0.picks.iter().map(name).collect::<Vec<_>>()),
+                    other
+                        .as_ref()
+                        .map(|c| c.0.picks.iter().map(name).collect::<Vec<_>>())
+                );
+            }
             let Some((trial, evidence)) = other.or(chosen) else {
                 break;
             };
@@ -205,7 +243,23 @@ impl Bench<'_> {
                 }
             }
         }
+        let pairs = self.pairs(accepted, &table, &score);
+        trials.extend(
+            (pairs.into_iter())
+                .filter(|pair| beam.iter().all(|set| !same(set, &pair.picks)))
+                .collect::<Vec<Trial>>(),
+        );
+        // The best set says what is noise: beside what it explains, neighbours resemble each other less.
+        let best = trials.iter().filter(|trial| trial.wrong_sign.is_empty());
+        let worth = best
+            .min_by(|a, b| a.squares.total_cmp(&b.squares))
+            .map_or(worth, |best| {
+                let (factors, _) = self.fit(&best.picks, On::All);
+                worth.max(self.worth(&self.rest(&best.picks, &factors), &channels))
+            });
+        let score = |trial: &Trial| criterion(problem, trial, worth);
         trials.sort_by(|a, b| score(a).total_cmp(&score(b)));
+        trials.dedup_by(|a, b| same(&a.picks, &b.picks));
         trials.truncate(40);
         // Constants that suited other sets may suit these less.
         for k in 0..trials.len().min(BEAM) {
@@ -255,6 +309,45 @@ impl Bench<'_> {
         trials.sort_by(|a, b| a.score.total_cmp(&b.score));
         trials.truncate(40);
         trials
+    }
+
+    /// The best of all pairs of further effects beside the accepted ones, and in place of any of these: a pair may explain all
+    /// where neither does much alone, and where what is shared by two places comes first.
+    fn pairs(&self, accepted: &[Pick], table: &Table, score: &dyn Fn(&Trial) -> f64) -> Vec<Trial> {
+        let is_new = |pick: &&Pick| accepted.iter().all(|p| p.candidate != pick.candidate);
+        let alone = |pick: &Pick| {
+            let mut set = accepted.to_vec();
+            set.push(pick.clone());
+            self.try_in(table, set).squares
+        };
+        let simple = self.present.iter().flatten().filter(is_new);
+        let simple = simple.filter(|pick| self.freedoms(pick) <= 2);
+        let mut further: Vec<(f64, &Pick)> = simple.map(|pick| (alone(pick), pick)).collect();
+        further.sort_by(|a, b| a.0.total_cmp(&b.0));
+        further.truncate(PAIRED);
+        let mut kept: Vec<Vec<Pick>> = vec![accepted.to_vec()];
+        kept.extend((0..accepted.len()).map(|i| {
+            let mut fewer = accepted.to_vec();
+            fewer.remove(i);
+            fewer
+        }));
+        let mut best: Vec<(f64, Trial)> = Vec::new();
+        for set in kept {
+            for (i, (_, one)) in further.iter().enumerate() {
+                for (_, two) in &further[i + 1..] {
+                    let mut picks = set.clone();
+                    picks.extend([(*one).clone(), (*two).clone()]);
+                    let trial = self.try_in(table, picks);
+                    let own = score(&trial);
+                    if best.len() < BEST_PAIRS || best.last().is_some_and(|(last, _)| own < *last) {
+                        let at = best.partition_point(|(other, _)| *other < own);
+                        best.insert(at, (own, trial));
+                        best.truncate(BEST_PAIRS);
+                    }
+                }
+            }
+        }
+        best.into_iter().map(|(_, trial)| trial).collect()
     }
 
     /// Tries members of a set against candidates that come close, each with constants that are searched finely: on their

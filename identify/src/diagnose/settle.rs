@@ -50,17 +50,20 @@ impl Bench<'_> {
                 rest.remove(i);
                 rest
             };
-            let tests = (0..picks.len()).map(|i| {
-                let rest = without(i);
+            let mut tests = Vec::new();
+            for i in 0..picks.len() {
+                // What follows from the fit follows without the member too.
+                let rest = self.refresh(without(i));
                 let channels = self.acted_on(std::slice::from_ref(&picks[i]));
-                (i, self.evidence(&rest, &picks, &channels))
-            });
+                tests.push((i, self.evidence(&rest, &picks, &channels)));
+            }
             let weakest = tests
+                .into_iter()
                 .filter(|(_, evidence)| !evidence.holds())
                 .min_by(|a, b| a.1.gain.total_cmp(&b.1.gain));
             match weakest {
                 Some((i, _)) => {
-                    let fewer = without(i);
+                    let fewer = self.refresh(without(i));
                     picks = self.simplify(fewer);
                 }
                 None => break,

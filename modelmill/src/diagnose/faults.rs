@@ -165,7 +165,7 @@ fn pushes(problem: &mut Problem, all: &Runs<'_>) {
     if (0..coordinates).any(|i| explains(i, 1.0) || explains(i, -1.0)) {
         return;
     }
-    problem.left_out = about;
+    problem.left_out = vec![about; problem.layout.channels.len()];
     problem.disturbances.extend(events);
 }
 

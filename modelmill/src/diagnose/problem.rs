@@ -44,6 +44,17 @@ pub(crate) struct Answer {
     pub candidates: Candidates,
 }
 
+impl Answer {
+    /// What is left of all forces in the mean square, each drive relative to its own.
+    pub(crate) fn left(&self) -> f64 {
+        let parts = self.diagnosis.budgets.iter().map(|budget| {
+            let squares = budget.noise.powi(2) + budget.model.powi(2);
+            squares / budget.force.powi(2).max(f64::MIN_POSITIVE)
+        });
+        parts.sum()
+    }
+}
+
 /// Finds what a model lacks.
 pub(crate) fn find(
     model: &Model,

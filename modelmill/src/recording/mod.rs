@@ -10,13 +10,15 @@ mod options;
 use std::path::Path;
 use std::sync::Arc;
 
-use modelmill_identify::{Note, Recording as Raw, RecordingFiles, Run};
+use modelmill_identify::diagnose::{Disturbance, Quantity};
+use modelmill_identify::{Note, PositionFault, Recording as Raw, RecordingFiles, Run};
 
 use crate::audit;
 use crate::error::{Error, Outcome};
 use crate::host::kinds_of_files;
 use crate::model::Model;
 use crate::stretch::{Stretch, variances};
+use crate::text::table::significant;
 
 use columns::read_options;
 use leverage::Leverage;
@@ -148,6 +150,9 @@ fn prepare(model: &Model, recording: &Raw, args: &Reading, delay: f64) -> Outcom
         run.notes.extend(idle);
         pair(run, delay)?;
     }
+    let faults: Vec<Disturbance> = (recording.position_faults(&model.active()).into_iter())
+        .map(|fault| position_fault(model, recording.file(), &fault))
+        .collect();
     let with_variance = runs.into_iter().map(|run| {
         let variance = variances::recorded(recording, &run, &model.drives())?;
         Ok(Stretch {
@@ -156,10 +161,55 @@ fn prepare(model: &Model, recording: &Raw, args: &Reading, delay: f64) -> Outcom
             weights: None,
             load: None,
             maps_from_degrees: maps_from_degrees.clone(),
-            faults: Vec::new(),
+            faults: faults.clone(),
         })
     });
     with_variance.collect()
+}
+
+/// A fault of positions as a diagnosis tells it.
+fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturbance {
+    let (kind, at, name, value, unit, says) = match fault {
+        PositionFault::Jitter { time } => (
+            "time_jitter",
+            "t",
+            "jitter",
+            *time,
+            "s",
+            format!(
+                "the time stamps of {file} jitter: positions err in proportion to the rate, all coordinates by the same time, \
+                 {} ms in the mean square",
+                significant(1e3 * time, 2)
+            ),
+        ),
+        PositionFault::Play { coordinate, width } => {
+            let is_angle = |(name, is): &(String, bool)| name == coordinate && *is;
+            let unit = if model.motions().iter().any(is_angle) {
+                "rad"
+            } else {
+                "m"
+            };
+            (
+                "backlash",
+                coordinate.as_str(),
+                "width",
+                *width,
+                unit,
+                format!(
+                    "backlash between the encoder of {coordinate} and its load: in {file} the reading jumps to and fro by {} {unit}",
+                    significant(*width, 2)
+                ),
+            )
+        }
+    };
+    Disturbance {
+        kind: kind.to_owned(),
+        at: vec![at.to_owned()],
+        estimates: vec![Quantity::new(name, value, unit)],
+        recordings: vec![file.to_owned()],
+        interval: None,
+        says: Some(says),
+    }
 }
 
 /// Says that options of the filter do nothing where all derivatives are recorded.

@@ -1,0 +1,254 @@
+//! Faults of positions that no smoothing takes away: time stamps that are not when samples were taken, and play between encoder
+//! and load. A position goes in as it was recorded; both are seen beside the cubic that joins a sample's neighbours.
+//!
+//! Where stamps are wrong by a time, positions are wrong by that time and their rate: in proportion to the rate, and for all
+//! coordinates by the same time. Where there is play, the reading jumps each time the load changes sides, by one length to and fro.
+
+use crate::recording::Recording;
+use crate::signal::median;
+
+/// Neighbours on either side of a sample.
+const SIDE: usize = 5;
+/// Parts of the largest rate below which a coordinate stands and above which it runs.
+const SLOW: f64 = 0.1;
+const FAST: f64 = 0.4;
+/// How many times as large errors must be where a coordinate runs.
+const GROWS: f64 = 3.0;
+/// How much alike the times must be that two coordinates tell.
+const ALIKE: f64 = 0.7;
+/// Samples on either side of a place from which a jump there is told.
+const ABOUT: usize = 10;
+/// Jumps that must tell of play, and by how many deviations each must stand out.
+const JUMPS: usize = 3;
+const OUT: f64 = 8.0;
+/// How much jumps may differ.
+const SPREAD: f64 = 0.35;
+/// Samples that are looked at.
+const LOOKED_AT: usize = 20_000;
+
+/// A fault of the positions of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PositionFault {
+    /// Samples were taken so many seconds before or after their stamps, in the mean square of neighbours.
+    Jitter {
+        /// Seconds.
+        time: f64,
+    },
+    /// A coordinate's reading jumps to and fro by so many rad or m.
+    Play {
+        /// The coordinate.
+        coordinate: String,
+        /// The jump, rad or m.
+        width: f64,
+    },
+}
+
+impl Recording {
+    /// Faults of positions; columns that cannot be used are passed over.
+    pub fn position_faults(&self, coordinates: &[String]) -> Vec<PositionFault> {
+        let Ok(time) = self.column("t") else {
+            return Vec::new();
+        };
+        let n = time.len().min(LOOKED_AT);
+        if n < 20 * ABOUT {
+            return Vec::new();
+        }
+        let time = &time[..n];
+        let position = |name: &String| {
+            let q = self.column(name).ok()?.get(..n)?;
+            let moves = q.iter().any(|x| x.total_cmp(&q[0]).is_ne());
+            (moves && q.iter().all(|x| x.is_finite())).then_some(q)
+        };
+        let beside: Vec<Beside> = (coordinates.iter())
+            .filter_map(|name| Some(Beside::new(time, position(name)?)))
+            .collect();
+        let jitter = jitter(&beside).map(|time| PositionFault::Jitter { time });
+        let mut faults: Vec<PositionFault> = jitter.into_iter().collect();
+        if faults.is_empty() {
+            for name in coordinates {
+                let width = position(name).and_then(|q| play(time, q));
+                faults.extend(width.map(|width| PositionFault::Play {
+                    coordinate: name.clone(),
+                    width,
+                }));
+            }
+        }
+        faults
+    }
+}
+
+/// What a sample is beside the cubic through its neighbours, and the rate there.
+struct Beside {
+    errors: Vec<f64>,
+    rates: Vec<f64>,
+}
+
+impl Beside {
+    fn new(time: &[f64], q: &[f64]) -> Self {
+        let (mut errors, mut rates) = (Vec::new(), Vec::new());
+        for i in SIDE..q.len() - SIDE {
+            let about = (i - SIDE..=i + SIDE).filter(|k| *k != i);
+            let points = about.map(|k| (time[k] - time[i], q[k] - q[i]));
+            let [value, rate] = cubic(points, 0.0);
+            errors.push(-value);
+            rates.push(rate);
+        }
+        Self { errors, rates }
+    }
+}
+
+/// Value and slope at zero of the cubic nearest to some points, with a step of `step` for each unit of the time's sign: the
+/// value becomes the step where that is not zero.
+fn cubic(points: impl Iterator<Item = (f64, f64)>, step: f64) -> [f64; 2] {
+    let points: Vec<(f64, f64)> = points.collect();
+    let scale = points
+        .iter()
+        .fold(f64::MIN_POSITIVE, |m, (t, _)| m.max(t.abs()));
+    let n = if step == 0.0 { 4 } else { 5 };
+    let mut gram = nalgebra::DMatrix::<f64>::zeros(n, n);
+    let mut right = nalgebra::DVector::<f64>::zeros(n);
+    for (t, x) in points {
+        let s = t / scale;
+        let row = [1.0, s, s * s, s * s * s, step * s.signum()];
+        for i in 0..n {
+            for j in 0..n {
+                gram[(i, j)] += row[i] * row[j];
+            }
+            right[i] += row[i] * x;
+        }
+    }
+    let Some(factor) = gram.cholesky() else {
+        return [0.0; 2];
+    };
+    let found = factor.solve(&right);
+    [
+        if step == 0.0 { found[0] } else { found[4] },
+        found[1] / scale,
+    ]
+}
+
+/// The time by which stamps are wrong, s, if errors of all coordinates grow with the rate and tell of the same times.
+fn jitter(all: &[Beside]) -> Option<f64> {
+    if all.len() < 2 {
+        return None;
+    }
+    let mut told: Vec<Vec<Option<f64>>> = Vec::new();
+    for one in all {
+        let fastest = one.rates.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let pairs = one.errors.iter().zip(&one.rates);
+        let size = |wanted: &dyn Fn(f64) -> bool| {
+            let sizes = pairs.clone().filter(|(_, v)| wanted(v.abs() / fastest));
+            median(sizes.map(|(e, _)| e.abs()).collect())
+        };
+        let [slow, fast] = [size(&|v| v < SLOW), size(&|v| v > FAST)];
+        if fastest <= 0.0 || fast <= GROWS * slow {
+            return None;
+        }
+        told.push(
+            pairs
+                .map(|(e, v)| (v.abs() > FAST * fastest).then(|| e / v))
+                .collect(),
+        );
+    }
+    let mut times = Vec::new();
+    for (k, one) in told.iter().enumerate() {
+        for other in &told[k + 1..] {
+            let both: Vec<(f64, f64)> = one
+                .iter()
+                .zip(other)
+                .filter_map(|(a, b)| Some(((*a)?, (*b)?)))
+                .collect();
+            let sum = |of: &dyn Fn(&(f64, f64)) -> f64| both.iter().map(of).sum::<f64>();
+            let alike = sum(&|(a, b)| a * b) / (sum(&|(a, _)| a * a) * sum(&|(_, b)| b * b)).sqrt();
+            if both.len() < 30 || alike.is_nan() || alike < ALIKE {
+                return None;
+            }
+            times.extend(both.iter().map(|(a, _)| a * a));
+        }
+    }
+    let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
+    (mean > 0.0).then(|| mean.sqrt())
+}
+
+/// The length by which a reading jumps to and fro, if all jumps are of one length and alternate.
+fn play(time: &[f64], q: &[f64]) -> Option<f64> {
+    let jump = |i: usize| {
+        let about = (i - ABOUT..=i + ABOUT).filter(|k| *k != i);
+        2.0 * cubic(about.map(|k| (time[k] - time[i], q[k] - q[i])), 1.0)[0]
+    };
+    let jumps: Vec<f64> = (ABOUT..q.len() - ABOUT).map(jump).collect();
+    let noise = 1.4826 * median(jumps.iter().map(|x| x.abs()).collect());
+    let mut found: Vec<f64> = Vec::new();
+    for (i, own) in jumps.iter().enumerate() {
+        let near = i.saturating_sub(ABOUT)..(i + ABOUT + 1).min(jumps.len());
+        let is_largest = jumps[near].iter().all(|x| x.abs() <= own.abs());
+        if is_largest && own.abs() > OUT * noise {
+            found.push(*own);
+        }
+    }
+    let middle = median(found.iter().map(|x| x.abs()).collect());
+    let is_alike = |x: &&f64| (x.abs() - middle).abs() < SPREAD * middle;
+    let alternate = found
+        .windows(2)
+        .filter(|pair| pair[0] * pair[1] < 0.0)
+        .count();
+    let is_play = found.len() >= JUMPS
+        && 5 * found.iter().filter(is_alike).count() >= 4 * found.len()
+        && 5 * alternate >= 4 * (found.len() - 1);
+    is_play.then_some(middle)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_noise::Noise;
+
+    const N: usize = 1800;
+
+    fn time() -> Vec<f64> {
+        (0..N).map(|i| 0.004 * i as f64).collect()
+    }
+
+    fn motion(t: f64, k: usize) -> f64 {
+        let k = k as f64;
+        0.4 * ((1.0 + 0.3 * k) * t).sin() + 0.2 * ((2.3 + 0.2 * k) * t + k).cos()
+    }
+
+    #[test]
+    fn a_sound_recording_has_no_fault() {
+        for seed in 0..20 {
+            let mut noise = Noise::new(seed);
+            let read = |noise: &mut Noise, k| -> Vec<f64> {
+                let all = time().into_iter();
+                all.map(|t| motion(t, k) + 5e-6 * noise.normal()).collect()
+            };
+            let both = [0, 1].map(|k| Beside::new(&time(), &read(&mut noise, k)));
+            assert_eq!(jitter(&both), None);
+            assert_eq!(play(&time(), &read(&mut noise, 0)), None);
+        }
+    }
+
+    #[test]
+    fn wrong_stamps_are_told_by_all_coordinates() {
+        let mut noise = Noise::new(3);
+        let late: Vec<f64> = time().iter().map(|t| t + 1e-4 * noise.normal()).collect();
+        let both = [0, 1].map(|k| {
+            let read: Vec<f64> = (late.iter())
+                .map(|t| motion(*t, k) + 5e-6 * noise.normal())
+                .collect();
+            Beside::new(&time(), &read)
+        });
+        let found = jitter(&both).unwrap();
+        assert!((0.7e-4..1.4e-4).contains(&found), "{found}");
+    }
+
+    #[test]
+    fn play_is_seen_by_jumps_to_and_fro() {
+        let mut noise = Noise::new(8);
+        let read: Vec<f64> = (time().iter())
+            .map(|t| motion(*t, 0) + 2e-4 * (1.9 * t + 0.3).sin().signum() + 5e-6 * noise.normal())
+            .collect();
+        let found = play(&time(), &read).unwrap();
+        assert!((3e-4..5e-4).contains(&found), "{found}");
+    }
+}
