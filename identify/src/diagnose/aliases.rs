@@ -2,13 +2,15 @@
 
 use super::bench::{Bench, Pick, Trial, n_columns};
 use super::pool::solve;
-use super::problem::Effect;
+use super::problem::{Effect, Source};
 
 /// How much worse (twice the logarithm of the likelihood, with the samples that the residual is worth) a set may be and
 /// still not be told from the best.
 pub(crate) const APART: f64 = 9.0;
 /// What stands in for an effect must take off this share of the squared error that the effect takes off.
 const STANDS_IN: f64 = 0.8;
+/// A wrong reading that leaves less than this factor is looked at with a column of its own size.
+const CLOSE: f64 = 3.0;
 /// A column of which others leave less than this share of squares lies in their span.
 const WITHIN: f64 = 1e-6;
 
@@ -44,7 +46,7 @@ impl Bench<'_> {
                 (worse < APART && stands_in && trial.wrong_sign.is_empty()).then_some(worse)
             };
             let mut found: Vec<Alias> = Vec::new();
-            for candidate in self.present.iter().flatten() {
+            for candidate in self.present.clone().iter().flatten() {
                 if picks.iter().any(|p| p.candidate == candidate.candidate) {
                     continue;
                 }
@@ -66,7 +68,13 @@ impl Bench<'_> {
                 }
                 let mut set = others.clone();
                 set.push(candidate.clone());
-                let trial = self.try_in(&table, set);
+                let mut trial = self.try_in(&table, set);
+                if matches!(self.candidate(candidate).source, Source::Reading(_))
+                    && trial.squares < CLOSE * squares
+                {
+                    let refreshed = self.refresh(trial.picks);
+                    trial = self.trial(refreshed);
+                }
                 if let Some(worse) = in_place(self, &others, &trial) {
                     found.push(Alias {
                         effect: self.candidate(candidate).effect.clone(),

@@ -7,7 +7,6 @@
 
 use std::f64::consts::TAU;
 
-use super::column::Column;
 use super::disturbance::{Disturbance, Quantity};
 use super::pool::{On, Pool, dot, solve};
 use super::problem::Problem;
@@ -337,6 +336,7 @@ impl Problem {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::column::Column;
     use crate::diagnose::problem::{Layout, Stretch};
     use crate::test_noise::Noise;
 

@@ -84,40 +84,6 @@ impl Bench<'_> {
                     evidence.holds() && evidence.gain > LARGE_CHANGE
                 })
             });
-            if std::env::var("MM_DEBUG").is_ok() {
-                let name = |p: &Pick| {
-                    format!(
-                        "{}@{}",
-                        self.candidate(p).effect.kind,
-                        self.candidate(p).effect.at.join("+")
-                    )
-                };
-                for t in trials.iter().take(14) {
-                    let news = difference(&t.picks, &accepted);
-                    let e = self.evidence(&accepted, &t.picks, &self.acted_on(&news));
-                    eprintln!(
-                        "DBG {:.1} sq {:.3} wrong {:?} [{}] gain {:.2} t {:.1} st {:.1} bic {:.0} add {}",
-                        t.score,
-                        t.squares,
-                        t.wrong_sign,
-                        t.picks.iter().map(name).collect::<Vec<_>>().join(" "),
-                        e.gain,
-                        e.blocks_t,
-                        e.shares_t,
-                        e.bic,
-                        self.is_addition(&accepted, t)
-                    );
-                }
-                eprintln!(
-                    "DBG chosen {:?} other {:?}",
-                    chosen
-                        .as_ref()
-                        .map(|c| c.0.picks.iter().map(name).collect::<Vec<_>>()),
-                    other
-                        .as_ref()
-                        .map(|c| c.0.picks.iter().map(name).collect::<Vec<_>>())
-                );
-            }
             let Some((trial, evidence)) = other.or(chosen) else {
                 break;
             };
@@ -532,7 +498,11 @@ pub(crate) fn criterion(problem: &Problem, trial: &Trial, worth: f64) -> f64 {
         + wrong
 }
 
-/// A little against sets in which one kind acts twice at a place, which say what others say more plainly.
+/// What another place costs, where nothing else decides between sets that say the same.
+const PLACE: f64 = 0.01;
+
+/// A little against sets in which one kind acts twice at a place, which say what others say more plainly; and against many
+/// places.
 fn overlap(problem: &Problem, picks: &[Pick]) -> f64 {
     let effect = |pick: &Pick| &problem.candidates[pick.candidate].effect;
     let twice = |(i, one): (usize, &Pick)| {
@@ -545,7 +515,8 @@ fn overlap(problem: &Problem, picks: &[Pick]) -> f64 {
         });
         others.count() as f64
     };
-    picks.iter().enumerate().map(twice).sum()
+    let places: usize = picks.iter().map(|pick| effect(pick).at.len()).sum();
+    picks.iter().enumerate().map(twice).sum::<f64>() + PLACE * places as f64
 }
 
 /// Picks of a set whose candidate is not in another.

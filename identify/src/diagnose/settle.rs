@@ -115,7 +115,8 @@ impl Bench<'_> {
             self.look(&others);
             let table = self.table(&picks);
             let now = self.trial(picks.clone());
-            let mut best = (criterion(self.problem, &now, worth) - EXCHANGED, None);
+            let bound = criterion(self.problem, &now, worth) - EXCHANGED;
+            let mut best = (bound, None);
             for rival in self.present.iter().flatten() {
                 if picks.iter().any(|p| p.candidate == rival.candidate) {
                     continue;
@@ -128,9 +129,14 @@ impl Bench<'_> {
                     best = (score, Some(trial));
                 }
             }
-            if let (_, Some(trial)) = best {
-                let refined = self.refine(trial.picks);
-                picks = self.refresh(refined);
+            if let (score, Some(trial)) = best {
+                let settled = self.settled(&trial);
+                let changes = settled.picks != trial.picks;
+                // A column that is made anew may no longer say what it promised.
+                if !changes || criterion(self.problem, &settled, worth) < score.max(bound) {
+                    let refined = self.refine(settled.picks);
+                    picks = self.refresh(refined);
+                }
             }
         }
         picks
