@@ -73,7 +73,7 @@ pub fn floor(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// The verdict in one or two sentences with figures.
+/// The verdict with figures, success first: what was found, what is left and of which kind, what the recordings have besides.
 pub fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged) -> String {
     let ladder = &diagnosis.ladder;
     let (Some(first), Some(last)) = (ladder.first(), ladder.last()) else {
@@ -87,55 +87,79 @@ pub fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged) -> St
         percent(Some(first.check)),
         percent(Some(last.check))
     );
-    match diagnosis.verdict {
+    let them = if found.len() == 1 { "it" } else { "them" };
+    let says = match diagnosis.verdict {
         Verdict::Adequate => format!(
             "The model is adequate: it misses the forces by {} {}; {noise}. No effect of the library would lower that where it \
              was not fitted.",
-            percent(Some(first.check)),
+            percent(Some(last.check)),
             judged.words()
         ),
         Verdict::MissingEffect => format!(
-            "The model lacks {}. With {} {falls}; {noise}.",
-            effects(&found),
-            if found.len() == 1 { "it" } else { "them" },
+            "The model lacks {}. With {them} {falls}; {noise}.",
+            effects(&found)
         ),
         Verdict::Unexplained => {
             let of = |d: &usize| 100.0 * diagnosis.reproducible[*d];
-            let unexplained = diagnosis.unexplained.iter();
-            let (again, noisy): (Vec<&usize>, Vec<&usize>) =
-                unexplained.partition(|d| of(d) >= 1.0);
-            let mut sits: Vec<String> = again
-                .iter()
+            let sits: Vec<String> = (diagnosis.unexplained.iter())
                 .map(|d| {
                     format!(
                         "{} ({:.0} % of what is left there comes again with the state)",
-                        channels[**d],
+                        channels[*d],
                         of(d)
                     )
                 })
                 .collect();
-            let names: Vec<&str> = noisy.iter().map(|d| channels[**d].as_str()).collect();
-            if !names.is_empty() {
-                sits.push(format!(
-                    "{} (above the noise there, and neighbouring samples resemble each other)",
-                    names.join(", ")
-                ));
-            }
-            let besides = if found.is_empty() {
+            let sits = sits.join(" and ");
+            if found.is_empty() {
                 format!(
-                    "The model misses the forces by {} {}; {noise}.",
+                    "Something is missing that no effect of the library explains, in {sits}. The model misses the forces by {} \
+                     {}; {noise}.",
                     percent(Some(last.check)),
                     judged.words()
                 )
             } else {
-                format!("With {} {falls}; {noise}.", effects(&found))
-            };
-            format!(
-                "Something is missing that no effect of the library explains, in {}. {besides}",
-                sits.join(" and ")
-            )
+                format!(
+                    "The model lacks {}: with {them} {falls}; {noise}. Something is left that no effect of the library \
+                     explains, in {sits}.",
+                    effects(&found)
+                )
+            }
+        }
+    };
+    match besides(diagnosis) {
+        Some(besides) => format!("{says} {besides}"),
+        None => says,
+    }
+}
+
+/// What the recordings have besides, by name.
+fn besides(diagnosis: &Diagnosis) -> Option<String> {
+    let mut kinds: Vec<(&str, Vec<&str>)> = Vec::new();
+    for one in &diagnosis.disturbances {
+        let places = one.at.iter().map(String::as_str);
+        match kinds.iter_mut().find(|(kind, _)| *kind == one.kind) {
+            Some((_, at)) => at.extend(places.filter(|p| *p != "t")),
+            None => kinds.push((&one.kind, places.filter(|p| *p != "t").collect())),
         }
     }
+    let named: Vec<String> = kinds
+        .into_iter()
+        .map(|(name, mut at)| {
+            at.dedup();
+            match at.as_slice() {
+                [] => kind(name),
+                at => format!("{} ({})", kind(name), at.join(", ")),
+            }
+        })
+        .collect();
+    let is_none = named.is_empty();
+    (!is_none).then(|| {
+        format!(
+            "The recordings have besides, and the model does not lack: {}.",
+            named.join(", ")
+        )
+    })
 }
 
 /// What a disturbance is, in a sentence.
