@@ -13,6 +13,8 @@ pub(crate) struct Answer {
     pub(crate) steps: Vec<Step>,
     /// What the program would add.
     pub(crate) effects: Vec<Claim>,
+    /// Kinds of what it says that recordings have besides.
+    pub(crate) disturbances: Vec<String>,
     /// The drive in which it says most of the error sits.
     pub(crate) channel: Option<String>,
 }
@@ -70,7 +72,11 @@ impl Answer {
                 aliases,
             })
         });
+        let disturbances = value["disturbances"].as_array().into_iter().flatten();
         Ok(Self {
+            disturbances: disturbances
+                .filter_map(|one| one["kind"].as_str().map(str::to_owned))
+                .collect(),
             verdict: verdict.to_owned(),
             steps: steps.collect::<Result<_, String>>()?,
             effects: effects.collect::<Result<_, String>>()?,

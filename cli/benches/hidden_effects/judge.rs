@@ -103,10 +103,12 @@ impl Mark {
 }
 
 /// Marks an answer. `excess` gives the squared error, in units of the noise's variance, that a set of claimed effects
-/// leaves of the true forces without noise; infinite for kinds that it does not know.
+/// leaves of the true forces without noise; infinite for kinds that it does not know. `disturbance` is what something outside
+/// the library is called among the disturbances of recordings: named so, the model lacks nothing.
 pub(crate) fn judge(
     class: Class,
     hidden: &[Placed],
+    disturbance: Option<&str>,
     answer: &Answer,
     excess: &mut dyn FnMut(&[Placed]) -> f64,
 ) -> Mark {
@@ -120,6 +122,12 @@ pub(crate) fn judge(
         }
         Class::Outside => match answer.verdict.as_str() {
             "unexplained" => Mark::Right,
+            "adequate"
+                if disturbance
+                    .is_some_and(|kind| answer.disturbances.iter().any(|one| one == kind)) =>
+            {
+                Mark::Right
+            }
             "adequate" => Mark::Overlooked,
             _ => Mark::Guess,
         },

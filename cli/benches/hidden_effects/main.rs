@@ -247,7 +247,9 @@ fn one(options: &Options, plant: &Plant, folder: &Path, number: u64) -> Result<D
         Ok(answer) => {
             let mut excess =
                 |claims: &[placed::Placed]| case.excess(plant, claims).unwrap_or(f64::INFINITY);
-            let mark = judge(case.class, &case.placed(), &answer, &mut excess);
+            let law = case.outside.as_ref().map(|outside| outside.law);
+            let named = law.and_then(outside::Law::disturbance);
+            let mark = judge(case.class, &case.placed(), named, &answer, &mut excess);
             let aliases = judge::aliases(&answer, &mut excess);
             (Some(answer), mark, aliases)
         }

@@ -66,6 +66,15 @@ impl Law {
             Self::Hum => "hum in time",
         }
     }
+
+    /// What it is called among the disturbances of recordings, if it is one.
+    pub(crate) fn disturbance(self) -> Option<&'static str> {
+        match self {
+            Self::Drift => Some("offset_drift"),
+            Self::Hum => Some("periodic_in_time"),
+            _ => None,
+        }
+    }
 }
 
 impl std::fmt::Display for Outside {

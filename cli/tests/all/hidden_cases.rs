@@ -131,7 +131,7 @@ fn hidden_effects_are_found() {
             let left = case.excess(&plant, claims);
             left.unwrap_or(f64::INFINITY)
         };
-        let mark = judge(case.class, &case.placed(), &answer, &mut excess);
+        let mark = judge(case.class, &case.placed(), None, &answer, &mut excess);
         assert!(
             mark.is_right(),
             "{}: {}; {answer:?}",

@@ -39,7 +39,7 @@ fn said(verdict: &str, effects: &[(&str, &[&str], &[Placed])]) -> Value {
 fn mark(class: Class, hidden: &[(&str, &[&str])], answer: &Value, excess: f64) -> Mark {
     let hidden: Vec<Placed> = hidden.iter().map(|(k, at)| Placed::new(k, at)).collect();
     let answer = Answer::read(&answer.to_string()).expect("the form of cli.md");
-    judge(class, &hidden, &answer, &mut |_| excess)
+    judge(class, &hidden, None, &answer, &mut |_| excess)
 }
 
 /// The mark where anything else than the truth is told apart with ease.

@@ -28,8 +28,11 @@ const ABOVE: f64 = 60.0;
 /// Half the width of what counts as about it, and of the line itself, in steps of the spectrum.
 const ABOUT: usize = 48;
 const LINE: usize = 6;
-/// Lines below this frequency, Hz, may be those of the motion; so may those of which there are many.
-const LOWEST: f64 = 8.0;
+/// Lines below this frequency, Hz, may be those of the motion; so may those of which there are many. Below the second they
+/// must be most of what is left of a channel.
+const LOWEST: f64 = 3.0;
+const LOW: f64 = 8.0;
+const MOST_OF: f64 = 0.6;
 const MOST_LINES: usize = 6;
 /// The part of a channel's squared rest that all of its lines must be.
 const LEAST: f64 = 0.02;
@@ -167,18 +170,28 @@ fn lines(problem: &mut Problem) -> Vec<Disturbance> {
     let channels = rest.len();
     let mut left = rest.clone();
     let mut frequencies: Vec<f64> = Vec::new();
+    let mut lowest = LOWEST;
     while frequencies.len() <= MOST_LINES {
         let Some(frequency) = (0..channels)
-            .filter_map(|d| line(problem, &left[d]))
+            .filter_map(|d| line(problem, &left[d], lowest))
             .max_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(_, frequency)| frequency)
         else {
             break;
         };
         let frequency = finest(problem, &left, frequency);
-        for left in &mut left {
+        let mut without = left.clone();
+        for left in &mut without {
             take_off(problem, left, frequency);
         }
+        let is_most = |(before, after): (&Vec<f64>, &Vec<f64>)| {
+            dot(after, after) < (1.0 - MOST_OF) * dot(before, before)
+        };
+        if frequency < LOW && !left.iter().zip(&without).any(is_most) {
+            lowest = LOW;
+            continue;
+        }
+        left = without;
         frequencies.push(frequency);
     }
     if frequencies.is_empty() || frequencies.len() > MOST_LINES {
@@ -215,7 +228,7 @@ fn lines(problem: &mut Problem) -> Vec<Disturbance> {
 }
 
 /// The line that stands out most from the spectrum about it: by how much, and its frequency, Hz.
-fn line(problem: &Problem, rest: &[f64]) -> Option<(f64, f64)> {
+fn line(problem: &Problem, rest: &[f64], lowest: f64) -> Option<(f64, f64)> {
     let mut best: Option<(f64, f64)> = None;
     let mut start = 0;
     for stretch in &problem.layout.stretches {
@@ -229,7 +242,7 @@ fn line(problem: &Problem, rest: &[f64]) -> Option<(f64, f64)> {
             let frequency = k as f64 * per_step;
             // A line is the highest of its neighbours.
             let near = &power[k - LINE..(k + LINE + 1).min(power.len())];
-            if frequency < LOWEST || near.iter().any(|p| *p > power[k]) {
+            if frequency < lowest || near.iter().any(|p| *p > power[k]) {
                 continue;
             }
             let about = (k.saturating_sub(ABOUT)..(k + ABOUT + 1).min(power.len()))

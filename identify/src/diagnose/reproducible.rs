@@ -21,6 +21,9 @@ const BEYOND: [usize; 4] = [3, 8, 15, 30];
 /// Lengths over which friction may remember, in units of a position's spread.
 const MEMORIES: [f64; 3] = [0.02, 0.08, 0.3];
 
+/// Half widths of what is dragged along a position, in units of its spread.
+const STOPS: [f64; 4] = [0.05, 0.15, 0.4, 1.0];
+
 /// How much of each channel's squared residual comes again where it was not fitted, between 0 and 1.
 pub(crate) fn reproducible(
     layout: &Layout,
@@ -139,6 +142,8 @@ fn features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec<f64>>
             shapes.extend(hinges(&values, spread));
             let memories = MEMORIES.iter().map(|share| memory(&values, share * spread));
             shapes.extend(memories);
+            let stops = STOPS.iter().map(|share| stop(&values, share * spread));
+            shapes.extend(stops);
         }
         scaled.push(values.iter().map(|x| (x - mean) / (2.0 * spread)).collect());
     }
@@ -196,6 +201,17 @@ fn memory(values: &[f64], length: f64) -> Vec<f64> {
         let bound = moved.signum();
         state = bound + (state - bound) * (-moved.abs() / length).exp();
         state
+    };
+    values.iter().map(step).collect()
+}
+
+/// The stretch of a spring that drags a block along a position, relative to the largest: the operator of which hysteresis that
+/// does not depend on the rate is made (L. Prandtl 1928, A. Ishlinskii 1944).
+fn stop(values: &[f64], width: f64) -> Vec<f64> {
+    let mut block = values[0];
+    let step = |x: &f64| {
+        block = block.clamp(x - width, x + width);
+        (x - block) / width
     };
     values.iter().map(step).collect()
 }

@@ -140,6 +140,7 @@ fn problem(random: &mut Random, hidden: &[f64], candidates: Vec<Candidate>) -> P
             ("q".into(), random.smooth()),
             ("q_d".into(), random.smooth()),
         ],
+        ..Problem::default()
     }
 }
 
