@@ -12,6 +12,7 @@ mod cloos;
 mod common;
 mod damaged_recordings;
 mod diagnose;
+mod diagnose_harsh;
 mod diagnose_made;
 mod effects;
 mod emps;

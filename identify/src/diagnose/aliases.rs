@@ -68,13 +68,8 @@ impl Bench<'_> {
                 }
                 let mut set = others.clone();
                 set.push(candidate.clone());
-                let mut trial = self.try_in(&table, set);
-                if matches!(self.candidate(candidate).source, Source::Reading(_))
-                    && trial.squares < CLOSE * squares
-                {
-                    let refreshed = self.refresh(trial.picks);
-                    trial = self.trial(refreshed);
-                }
+                let tried = self.try_in(&table, set);
+                let trial = self.of_its_size(candidate, tried, squares);
                 if let Some(worse) = in_place(self, &others, &trial) {
                     found.push(Alias {
                         effect: self.candidate(candidate).effect.clone(),
@@ -135,6 +130,16 @@ impl Bench<'_> {
             all.push(found);
         }
         all
+    }
+
+    /// A set with a wrong reading that comes near to what is found, by a column of the reading's own size.
+    fn of_its_size(&mut self, candidate: &Pick, tried: Trial, squares: f64) -> Trial {
+        let is_reading = matches!(self.candidate(candidate).source, Source::Reading(_));
+        if !is_reading || tried.squares > CLOSE * squares {
+            return tried;
+        }
+        let refreshed = self.refresh(tried.picks);
+        self.trial(refreshed)
     }
 
     /// Whether all columns of one effect lie in the span of the base, some effects and another one.

@@ -193,7 +193,6 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
             indistinguishable_from: aliases.into_iter().map(|alias| alias.effect).collect(),
         });
     }
-    let mut disturbances = disturbances;
     friction_in_time(&mut effects, &mut disturbances);
     let verdict = match (unexplained.is_empty(), effects.is_empty()) {
         (false, _) => Verdict::Unexplained,

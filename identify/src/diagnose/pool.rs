@@ -9,13 +9,16 @@ use nalgebra::{DMatrix, DVector};
 use super::column::Column;
 use super::problem::Layout;
 
+/// Inner products of two columns by part and channel, where they were asked for.
+type Products = Option<Box<[f64]>>;
+
 /// Columns with their inner products, each of which is computed when it is asked for first.
 pub(crate) struct Pool {
     columns: Vec<Column>,
     fit: Range<usize>,
     check: Range<usize>,
     /// `products[i][j]` for `j <= i`: by part (0 is the fit, 1 the check) and channel, the parts one after the other.
-    products: RefCell<Vec<Vec<Option<Box<[f64]>>>>>,
+    products: RefCell<Vec<Vec<Products>>>,
     /// Samples that are left out of every product, by channel and in order.
     left_out: Vec<Vec<usize>>,
 }

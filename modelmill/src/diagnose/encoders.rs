@@ -8,7 +8,6 @@ use modelmill_identify::diagnose::{
 };
 
 use crate::along;
-use crate::error::Outcome;
 use crate::model::Model;
 use crate::stretch::Stretch;
 
@@ -30,7 +29,7 @@ pub(crate) fn encoders(
     all: &Runs<'_>,
     problem: &Problem,
     held: Held,
-) -> Outcome<Vec<Candidate>> {
+) -> Vec<Candidate> {
     let values = values(model, problem, held);
     let motions = model.motions();
     let mut candidates = Vec::new();
@@ -51,7 +50,7 @@ pub(crate) fn encoders(
         if travel.is_nan() || travel <= 0.0 || fastest <= 0.0 {
             continue;
         }
-        let Some(slopes) = sensitivities(model, all, &values, i)? else {
+        let Some(slopes) = sensitivities(model, all, &values, i) else {
             continue;
         };
         let step = problem.layout.stretches.iter().map(|s| s.step);
@@ -113,7 +112,7 @@ pub(crate) fn encoders(
             source: Source::Columns(choices),
         });
     }
-    Ok(candidates)
+    candidates
 }
 
 /// Base parameters by least squares, drives weighed alike; those that are held keep their nominal values.
@@ -149,7 +148,7 @@ fn sensitivities(
     all: &Runs<'_>,
     values: &[f64],
     coordinate: usize,
-) -> Outcome<Option<[Column; 3]>> {
+) -> Option<[Column; 3]> {
     let mut slopes = Vec::new();
     for order in 0..3 {
         let along = |sign: f64| {
@@ -159,7 +158,9 @@ fn sensitivities(
                 let column = &mut [&mut run.q, &mut run.qd, &mut run.qdd][order][coordinate];
                 let largest = column.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
                 let step = sign * STEP * largest.max(f64::MIN_POSITIVE);
-                column.iter_mut().for_each(|x| *x += step);
+                for x in column.iter_mut() {
+                    *x += step;
+                }
                 let mut forces = along::forces(model, &turned, values)?;
                 for x in forces.iter_mut().flatten() {
                     *x /= 2.0 * step.abs();
@@ -168,7 +169,7 @@ fn sensitivities(
             })
         };
         let [Ok(back), Ok(ahead)] = [along(-1.0), along(1.0)] else {
-            return Ok(None);
+            return None;
         };
         let pairs = ahead.into_iter().zip(back);
         let slope = pairs.map(|(ahead, back)| {
@@ -183,5 +184,5 @@ fn sensitivities(
         });
         slopes.push(Column::new(slope.collect()));
     }
-    Ok(<[Column; 3]>::try_from(slopes).ok())
+    <[Column; 3]>::try_from(slopes).ok()
 }

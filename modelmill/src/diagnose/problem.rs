@@ -83,7 +83,7 @@ pub(crate) fn find(
     let mut further = readings(&problem.layout);
     further.extend(drifts(&problem, &units));
     further.extend(memories(model, &all)?);
-    further.extend(encoders(model, &all, &problem, held)?);
+    further.extend(encoders(model, &all, &problem, held));
     problem.candidates.extend(further);
     // None of these is an entry of a model file.
     origins.resize(problem.candidates.len(), None);
