@@ -21,6 +21,10 @@ const ABOUT: usize = 10;
 /// Jumps that must tell of play, and by how many deviations each must stand out.
 const JUMPS: usize = 3;
 const OUT: f64 = 8.0;
+/// An encoder's own steps are no play: jumps must be so many of them.
+const STEPS: f64 = 8.0;
+/// Nor is what is less than this part of the travel.
+const LEAST: f64 = 5e-5;
 /// How much jumps may differ.
 const SPREAD: f64 = 0.35;
 /// Samples that are looked at.
@@ -187,6 +191,11 @@ fn play(time: &[f64], q: &[f64]) -> Option<f64> {
         }
     }
     let middle = median(found.iter().map(|x| x.abs()).collect());
+    let low = q.iter().copied().fold(f64::INFINITY, f64::min);
+    let travel = q.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
+    if middle < STEPS * resolution(q) || middle < LEAST * travel {
+        return None;
+    }
     let is_alike = |x: &&f64| (x.abs() - middle).abs() < SPREAD * middle;
     let alternate = found
         .windows(2)
@@ -196,6 +205,16 @@ fn play(time: &[f64], q: &[f64]) -> Option<f64> {
         && 5 * found.iter().filter(is_alike).count() >= 4 * found.len()
         && 5 * alternate >= 4 * (found.len() - 1);
     is_play.then_some(middle)
+}
+
+/// The smallest change of a reading from sample to sample, which for an encoder is its step.
+fn resolution(q: &[f64]) -> f64 {
+    let changes = q.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let largest = changes.clone().fold(0.0, f64::max);
+    let least = changes
+        .filter(|change| *change > 1e-9 * largest)
+        .fold(f64::INFINITY, f64::min);
+    if least.is_finite() { least } else { 0.0 }
 }
 
 #[cfg(test)]

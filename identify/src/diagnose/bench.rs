@@ -74,7 +74,7 @@ pub(crate) struct Bench<'a> {
 
 impl<'a> Bench<'a> {
     pub(crate) fn new(problem: &'a Problem, supply: &'a dyn Supply) -> Self {
-        let mut pool = Pool::new(&problem.layout).without(&problem.left_out);
+        let mut pool = Pool::new(&problem.layout).without(&problem.undecided());
         let base = problem.base.iter().map(|c| pool.add(c.clone())).collect();
         let measured = pool.add(problem.measured.clone());
         let zero = pool.add(Column(vec![None; problem.layout.channels.len()]));

@@ -21,7 +21,7 @@ const RARE: f64 = 0.05;
 /// Samples about a reversal that are left alone.
 const REVERSAL: usize = 4;
 /// Samples on either side of a reversal that count no more, and the part of all that they may be.
-const JUMP: usize = 2;
+const JUMP: usize = 1;
 const MOST_JUMPS: f64 = 0.1;
 /// How many times the middle of the spectrum about it a line must reach.
 const ABOVE: f64 = 60.0;
@@ -56,7 +56,7 @@ pub(crate) fn clean(problem: &mut Problem) -> Vec<Disturbance> {
 
 /// What base parameters and friction leave, channels weighed alike.
 fn rest(problem: &Problem) -> Vec<Vec<f64>> {
-    let mut pool = Pool::new(&problem.layout).without(&problem.left_out);
+    let mut pool = Pool::new(&problem.layout).without(&problem.undecided());
     let columns = problem.base.iter().chain(&problem.friction);
     let mut which: Vec<usize> = columns.map(|c| pool.add(c.clone())).collect();
     let measured = pool.add(problem.measured.clone());
@@ -325,24 +325,36 @@ pub fn step_of_values(values: &[f64], noise: f64) -> Option<f64> {
 }
 
 impl Problem {
-    /// Leaves out samples next to a reversal of their drive too, unless these are many: friction jumps there, and on which side
-    /// of the jump a sample lies no derivative of positions tells.
-    pub(crate) fn leave_out_jumps(&mut self) {
-        let mut out = std::mem::take(&mut self.left_out);
-        out.resize(
-            self.layout.channels.len(),
-            vec![false; self.layout.samples()],
-        );
-        for (d, out) in out.iter_mut().enumerate() {
+    /// Finds the samples next to a reversal of their drive, unless these are many: friction jumps there, and on which side of the
+    /// jump a sample lies no derivative of positions tells.
+    pub(crate) fn find_jumps(&mut self) {
+        let of = |d: usize| {
             let jumps = reversals(self, d, JUMP);
             let count = jumps.iter().filter(|jumps| **jumps).count() as f64;
             if count < MOST_JUMPS * jumps.len() as f64 {
-                for (out, jumps) in out.iter_mut().zip(jumps) {
-                    *out |= jumps;
-                }
+                jumps
+            } else {
+                Vec::new()
             }
-        }
-        self.left_out = out;
+        };
+        self.jumps = (0..self.layout.channels.len()).map(of).collect();
+    }
+
+    /// Samples that decide nothing, by channel.
+    pub(crate) fn undecided(&self) -> Vec<Vec<bool>> {
+        let of = |d: usize| {
+            let out = |all: &[Vec<bool>], i: usize| {
+                all.get(d)
+                    .and_then(|out| out.get(i))
+                    .copied()
+                    .unwrap_or(false)
+            };
+            let samples = 0..self.layout.samples();
+            samples
+                .map(|i| out(&self.left_out, i) || out(&self.jumps, i))
+                .collect()
+        };
+        (0..self.layout.channels.len()).map(of).collect()
     }
 }
 

@@ -192,12 +192,7 @@ impl Bench<'_> {
                         }
                     }
                 }
-                let out = self.problem.left_out.get(*d);
-                for (i, r) in fold.clone().zip(rest.iter_mut()) {
-                    if out.is_some_and(|out| out[i]) {
-                        *r = 0.0;
-                    }
-                }
+                self.pool.silence(*d, fold.start, &mut rest);
                 error += self.weights[*d] * dot(&rest, &rest);
             }
             error

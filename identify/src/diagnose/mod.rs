@@ -149,7 +149,7 @@ pub struct Diagnosis {
 pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
     problem.removed.resize(problem.layout.channels.len(), 0.0);
     let mut disturbances = problem.disturbances.clone();
-    problem.leave_out_jumps();
+    problem.find_jumps();
     disturbances.extend(cleaning::clean(problem));
     let problem = &*problem;
     let mut bench = Bench::new(problem, supply);
@@ -289,7 +289,14 @@ impl Bench<'_> {
         let layout = &self.problem.layout;
         let split = layout.fit_samples();
         let (factors, _) = self.fit(picks, On::Fit);
-        let rest = self.rest(picks, &factors);
+        // What decides nothing counts in figures, but for what is left out altogether.
+        let columns = self.columns(picks);
+        let mut rest = (self.pool).whole_rest(self.measured, &columns, factors.as_slice());
+        for (rest, out) in rest.iter_mut().zip(&self.problem.left_out) {
+            for (r, _) in rest.iter_mut().zip(out).filter(|(_, out)| **out) {
+                *r = 0.0;
+            }
+        }
         let forces: Vec<Vec<f64>> = (0..rest.len()).map(|d| self.problem.force(d)).collect();
         let norm = |part: &[f64]| dot(part, part);
         let size = |range: std::ops::Range<usize>| -> f64 {

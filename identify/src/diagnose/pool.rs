@@ -59,10 +59,13 @@ impl Pool {
         0..self.check.end
     }
 
-    /// Makes a series zero where samples are left out.
-    pub(crate) fn silence(&self, channel: usize, values: &mut [f64]) {
-        for i in self.left_out.get(channel).into_iter().flatten() {
-            values[*i] = 0.0;
+    /// Makes a series that begins at a sample zero where samples are left out.
+    pub(crate) fn silence(&self, channel: usize, start: usize, values: &mut [f64]) {
+        let out = self.left_out.get(channel).map_or(&[][..], Vec::as_slice);
+        let from = out.partition_point(|i| *i < start);
+        let to = out.partition_point(|i| *i < start + values.len());
+        for i in &out[from..to] {
+            values[i - start] = 0.0;
         }
     }
 
@@ -120,8 +123,17 @@ impl Pool {
         gram
     }
 
-    /// What is left of the column `of` when others are taken off with some factors.
+    /// What is left of the column `of` when others are taken off with some factors; zero where samples are left out.
     pub(crate) fn rest(&self, of: usize, others: &[usize], factors: &[f64]) -> Vec<Vec<f64>> {
+        let mut rest = self.whole_rest(of, others, factors);
+        for (d, rest) in rest.iter_mut().enumerate() {
+            self.silence(d, 0, rest);
+        }
+        rest
+    }
+
+    /// The same of all samples.
+    pub(crate) fn whole_rest(&self, of: usize, others: &[usize], factors: &[f64]) -> Vec<Vec<f64>> {
         let samples = self.check.end;
         let mut rest: Vec<Vec<f64>> = (self.columns[of].0.iter())
             .map(|values| values.clone().unwrap_or_else(|| vec![0.0; samples]))
@@ -134,9 +146,6 @@ impl Pool {
                     }
                 }
             }
-        }
-        for (d, rest) in rest.iter_mut().enumerate() {
-            self.silence(d, rest);
         }
         rest
     }

@@ -216,6 +216,8 @@ pub struct Problem {
     pub noise: Vec<f64>,
     /// Samples that say nothing of the model, as those of a push, `[channel][sample]`; empty where all count.
     pub left_out: Vec<Vec<bool>>,
+    /// Samples next to reversals, which do not decide but count in figures, `[channel][sample]`; a diagnosis finds them.
+    pub jumps: Vec<Vec<bool>>,
     /// Squares per sample that were taken off each channel before, since they do not repeat with the state.
     pub removed: Vec<f64>,
     /// What is known to be wrong with the recordings.
