@@ -16,6 +16,8 @@ use crate::signal::{hann_power, median};
 const NEIGHBOURS: usize = 9;
 /// By how many robust deviations.
 const OUT: f64 = 7.0;
+/// What is less than this part of the force is rounding.
+const SLIGHT: f64 = 1e-3;
 /// What happens more often is how the force is.
 const RARE: f64 = 0.05;
 /// Samples about a reversal that are left alone.
@@ -92,7 +94,9 @@ fn outliers(problem: &mut Problem) -> Vec<Disturbance> {
             let reverses = reversals(problem, d, REVERSAL);
             let apart = from_neighbours(problem, rest);
             let spread = 1.4826 * median(apart.iter().map(|x| x.abs()).collect());
-            let bound = OUT * spread.max(problem.noise[d]);
+            let force = problem.force(d);
+            let size = (dot(&force, &force) / force.len().max(1) as f64).sqrt();
+            let bound = (OUT * spread.max(problem.noise[d])).max(SLIGHT * size);
             let new: Vec<usize> = (0..rest.len())
                 .filter(|i| apart[*i].abs() > bound && !reverses[*i])
                 .collect();

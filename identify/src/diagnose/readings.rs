@@ -16,7 +16,8 @@ impl Fault {
     /// The kind of effect, the symbol of its parameter, and the unit and sign of that.
     fn words(self) -> (&'static str, &'static str, &'static str, Sign) {
         match self {
-            Self::Late => ("time_delay", "T", "s", Sign::Any),
+            // What is read before it acts is the motion, late.
+            Self::Late => ("time_delay", "T", "s", Sign::Positive),
             Self::Lagging => ("force_lag", "tau", "s", Sign::Positive),
             Self::Scaled => ("drive_gain", "gain", "1", Sign::Any),
         }

@@ -96,7 +96,7 @@ pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) ->
         let parameter = EffectParameter {
             symbol: "T".to_owned(),
             unit: "s".to_owned(),
-            sign: Sign::Any,
+            sign: Sign::Positive,
         };
         made.push(changed(
             candidates,
