@@ -1,17 +1,24 @@
 //! Where points are at given coordinates, and how loops move with them: a mechanism goes in once, and is asked many
 //! times, as limits of planned motion need it.
 
-use crate::exact::Symbol;
-use crate::kinematics::Vec3;
-use crate::mechanism::{Axis, Mechanism, PointIdx, Step};
+use crate::exact::{CoordinateIdx, Symbol};
+use crate::kinematics::{Vec3, turned_by};
+use crate::mechanism::{Axis, FreeBody, Mechanism, PointIdx, Step};
 
 /// The geometry of a mechanism with the file's constants.
 #[derive(Clone, Debug)]
 pub struct Kinematics {
     n: usize,
-    frames: Vec<(usize, Vec<Move>)>,
+    frames: Vec<(usize, Vec<Motion>)>,
     points: Vec<(usize, Vec3)>,
     loops: Vec<[usize; 2]>,
+}
+
+/// One step on the way to a frame.
+#[derive(Clone, Debug)]
+enum Motion {
+    One(Move),
+    Free(FreeBody),
 }
 
 /// One elementary motion: `offset + sum of factor * coordinate` about or along an axis.
@@ -77,7 +84,8 @@ impl Kinematics {
             Axis::Z => 2,
         };
         let moves = |step: &Step| match step {
-            Step::Rotate(about, angle) => Move {
+            Step::Free(body) => Motion::Free(*body),
+            Step::Rotate(about, angle) => Motion::One(Move {
                 axis: axis(about),
                 is_rotation: true,
                 offset: angle.evaluate(&value),
@@ -89,8 +97,8 @@ impl Kinematics {
                         _ => None,
                     })
                     .collect(),
-            },
-            Step::Translate(along, length) => Move {
+            }),
+            Step::Translate(along, length) => Motion::One(Move {
                 axis: axis(along),
                 is_rotation: false,
                 offset: length.evaluate(&value),
@@ -99,7 +107,7 @@ impl Kinematics {
                     .iter()
                     .map(|(i, factor)| (i.0, crate::print::to_f64(factor)))
                     .collect(),
-            },
+            }),
         };
         Self {
             n: mechanism.coordinates.len(),
@@ -139,6 +147,15 @@ impl Kinematics {
                 way: Vec::new(),
             };
             for step in moves {
+                let step = match step {
+                    Motion::One(step) => step,
+                    Motion::Free(body) => {
+                        let of = |i: CoordinateIdx| coordinates[i.0];
+                        pose.origin = body.position.map(of);
+                        pose.rotation = turned_by(body.quaternion.map(of));
+                        continue;
+                    }
+                };
                 let direction: Vec3 = std::array::from_fn(|k| pose.rotation[k][step.axis]);
                 let mut amount = step.offset;
                 for (coordinate, factor) in &step.coordinates {

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::build::Places;
 use crate::build::bodies::check_unique;
-use crate::build::frames::{Points, twice};
+use crate::build::frames::{Points, Tree, twice};
+use crate::build::free;
 use crate::build::symbols::Symbols;
 use crate::column;
 use crate::diagnostic::{Diagnostic, Log, Span};
@@ -76,10 +77,12 @@ pub(super) fn loops(
     loops
 }
 
-/// Reads the drives; there must be one per active coordinate.
+/// Reads the drives; there must be one per degree of freedom that is driven. What is not has a row of its own, called after
+/// its coordinate: those of free bodies come first, those of joints last.
 pub(super) fn drives(
     model: &ModelEntry,
     symbols: &Symbols,
+    tree: &Tree,
     points: &Points,
     places: &mut Places,
     log: &mut Log,
@@ -144,9 +147,12 @@ pub(super) fn drives(
         drives.push(Drive {
             name: name.text.clone(),
             kind: kind.unwrap_or(DriveKind::Joint(CoordinateIdx(0))),
+            is_driven: true,
         });
     }
+    free::add_rows(model, symbols, tree, points, places, &mut drives, log);
     if log.n_errors() == before && !log.syntax_broken {
+        free::check_apart(tree, &drives, points, places, log);
         check_number(model, symbols, &drives, places, log);
     }
     drives
@@ -162,7 +168,7 @@ fn check_number(
     let n_active = symbols
         .coordinates
         .iter()
-        .filter(|coordinate| !coordinate.passive)
+        .filter(|coordinate| !coordinate.passive && coordinate.motion.has_rate())
         .count();
     let n_declared = model
         .coordinates
@@ -182,6 +188,7 @@ fn check_number(
             .enumerate()
             .find(|(i, coordinate)| {
                 !coordinate.passive
+                    && coordinate.motion.has_rate()
                     && !drives
                         .iter()
                         .any(|drive| drive.kind == DriveKind::Joint(CoordinateIdx(*i)))
@@ -200,14 +207,14 @@ fn check_number(
         } else {
             "no drive is left for this coordinate"
         })
-        .help("each coordinate that is not `passive` is a degree of freedom and needs one drive")
+        .help("each coordinate that is not `passive` is a degree of freedom and needs one drive, or `driven = false`")
         .help(if n_active == 0 {
             "every coordinate is `passive`, so that nothing is driven: take `passive = true` off the one that the drive moves; if \
              the loops tie too many coordinates then, a joint is missing or a loop is too many"
         } else if drives.len() > n_active {
             "delete a drive, or make another coordinate active"
         } else {
-            "add a `[[drive]]`; if the loops settle this coordinate, mark it `passive = true`"
+            "add a `[[drive]]`; if the loops settle this coordinate, mark it `passive = true`, and if it moves freely, `driven = false`"
         }),
     );
 }
@@ -330,6 +337,10 @@ pub(super) fn recording(
     let mut known = vec!["t".to_owned()];
     for coordinate in &symbols.coordinates {
         let name = &coordinate.name;
+        if !coordinate.motion.has_rate() {
+            known.push(name.clone());
+            continue;
+        }
         known.extend([name.clone(), format!("{name}_d"), format!("{name}_dd")]);
     }
     for drive in drives {

@@ -8,6 +8,7 @@ mod bodies;
 pub(crate) mod effect_places;
 mod effects;
 mod frames;
+mod free;
 mod identified;
 mod joints;
 mod limits;
@@ -56,7 +57,8 @@ pub(crate) fn build(
     let parts = bodies::parts(model, &symbols, &tree, log);
     let lumped_masses = bodies::lumped_masses(model, &symbols, &tree, &points, log);
     let loops = actuation::loops(model, &points, &mut places, log);
-    let drives = actuation::drives(model, &symbols, &points, &mut places, log);
+    free::check_loops(&tree, &loops, &points, &places, log);
+    let drives = actuation::drives(model, &symbols, &tree, &points, &mut places, log);
     let own_kinds = model.effect_kind.iter().flat_map(|list| &list.entries);
     let own_kinds: Vec<&EffectKindEntry> = libraries.iter().chain(own_kinds).collect();
     let scene = Scene {

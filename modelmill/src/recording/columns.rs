@@ -187,7 +187,7 @@ fn quantity_of(known: &[(String, Quantity)], ours: &str) -> Option<Quantity> {
 /// Derivatives, forces and variances may be missing: they are prepared, or asked for where they are needed.
 fn can_lack(ours: &str, quantity: Quantity) -> bool {
     match quantity {
-        Quantity::Time => false,
+        Quantity::Time | Quantity::Number => false,
         Quantity::Angle(order) | Quantity::Length(order) => order > 0 && ours.contains("_d"),
         _ => true,
     }

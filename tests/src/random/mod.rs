@@ -374,7 +374,11 @@ impl Draft {
                 DriveKind::Joint(*coordinate)
             };
             let name = format!("drive{}", self.mechanism.drives.len());
-            self.mechanism.drives.push(Drive { name, kind });
+            self.mechanism.drives.push(Drive {
+                name,
+                kind,
+                is_driven: true,
+            });
         }
     }
 
