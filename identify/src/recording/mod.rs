@@ -152,6 +152,13 @@ impl Recording {
         }))
     }
 
+    /// Puts numbers in the place of a column, or adds one; one for each sample (asserted).
+    pub fn put(&mut self, name: &str, values: Vec<f64>) {
+        assert_eq!(values.len(), self.samples(), "one number for each sample");
+        let column = self.columns.entry(name.to_owned()).or_default();
+        column.values = values;
+    }
+
     /// The samples from `start` to before `end` as a recording of its own, without the notes.
     pub(crate) fn stretch(&self, file: String, start: usize, end: usize) -> Self {
         let columns = self.columns.iter().map(|(name, column)| {

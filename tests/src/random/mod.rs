@@ -1,8 +1,10 @@
 //! Random mechanisms, built as values without a model file; the same seed makes the same mechanism.
 
+mod free;
 mod planar_loop;
 mod tree;
 
+pub use free::hung_free;
 pub use planar_loop::{planar_loop, regularity_at};
 pub use tree::tree;
 
