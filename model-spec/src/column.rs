@@ -142,7 +142,7 @@ impl Mechanism {
                 columns.push((format!("{}{suffix}", coordinate.name), quantity));
             }
         }
-        for drive in &self.drives {
+        for drive in self.drives.iter().chain(&self.shared_drives) {
             let (force, variance) = match drive.kind.carries(&self.coordinates) {
                 Carries::Torque => (Quantity::Torque, Quantity::TorqueVariance),
                 _ => (Quantity::Force, Quantity::ForceVariance),

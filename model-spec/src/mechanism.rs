@@ -48,6 +48,9 @@ pub struct Mechanism {
     pub loops: Vec<Loop>,
     /// Drives, one per degree of freedom; what nothing drives has its row here too.
     pub drives: Vec<Drive>,
+    /// Drives of a mechanism that has more of them than degrees of freedom, such as cables; then none of [`Self::drives`] is
+    /// driven, and these act on all of them by their transposed Jacobian, `J' f`.
+    pub shared_drives: Vec<Drive>,
     /// Friction, drive inertia and the like.
     pub effects: Vec<Effect>,
     /// How much later than they act the forces of recordings are read, s; zero unless an effect says otherwise.

@@ -3,7 +3,7 @@
 
 use crate::exact::{CoordinateIdx, Symbol};
 use crate::kinematics::{Vec3, turned_by};
-use crate::mechanism::{Axis, FreeBody, Mechanism, PointIdx, Step};
+use crate::mechanism::{Axis, DriveKind, FreeBody, Mechanism, PointIdx, Step};
 
 /// The geometry of a mechanism with the file's constants.
 #[derive(Clone, Debug)]
@@ -212,30 +212,57 @@ impl Kinematics {
         let mut rows = vec![vec![0.0; self.n]; 3 * self.loops.len()];
         for (l, ends) in self.loops.iter().enumerate() {
             for (point, sign) in ends.iter().zip([1.0, -1.0]) {
-                let at = self.position(poses, *point);
-                let mut frame = self.points[*point].0;
-                while frame != 0 {
-                    for moved in &poses.frames[frame].moved {
-                        let axis = moved.axis;
-                        let velocity = if moved.is_rotation {
-                            let arm: Vec3 = std::array::from_fn(|k| at[k] - moved.origin[k]);
-                            [
-                                axis[1] * arm[2] - axis[2] * arm[1],
-                                axis[2] * arm[0] - axis[0] * arm[2],
-                                axis[0] * arm[1] - axis[1] * arm[0],
-                            ]
-                        } else {
-                            axis
-                        };
-                        for k in 0..3 {
-                            rows[3 * l + k][moved.coordinate] += sign * moved.factor * velocity[k];
-                        }
+                self.moves(poses, *point, &mut |coordinate, velocity| {
+                    for k in 0..3 {
+                        rows[3 * l + k][coordinate] += sign * velocity[k];
                     }
-                    frame = self.frames[frame].0;
-                }
+                });
             }
         }
         rows
+    }
+
+    /// Shows each coordinate that moves a point, with the point's velocity for a rate of one, joint by joint.
+    fn moves(&self, poses: &Poses, point: usize, show: &mut dyn FnMut(usize, Vec3)) {
+        let at = self.position(poses, point);
+        let mut frame = self.points[point].0;
+        while frame != 0 {
+            for moved in &poses.frames[frame].moved {
+                let axis = moved.axis;
+                let velocity = if moved.is_rotation {
+                    let arm: Vec3 = std::array::from_fn(|k| at[k] - moved.origin[k]);
+                    [
+                        axis[1] * arm[2] - axis[2] * arm[1],
+                        axis[2] * arm[0] - axis[0] * arm[2],
+                        axis[0] * arm[1] - axis[1] * arm[0],
+                    ]
+                } else {
+                    axis
+                };
+                show(moved.coordinate, velocity.map(|x| moved.factor * x));
+            }
+            frame = self.frames[frame].0;
+        }
+    }
+
+    /// Derivative of a drive's angle or length by all coordinates: a row of J. No loop may tie the coordinates.
+    pub fn drive_slopes(&self, poses: &Poses, kind: DriveKind) -> Vec<f64> {
+        let mut row = vec![0.0; self.n];
+        match kind {
+            DriveKind::Joint(i) => row[i.0] = 1.0,
+            DriveKind::Linear { from, to } => {
+                let ends = [from, to].map(|point| self.position(poses, point.0));
+                let along: Vec3 = std::array::from_fn(|k| ends[1][k] - ends[0][k]);
+                let length = along.iter().map(|x| x * x).sum::<f64>().sqrt();
+                for (point, sign) in [(from, -1.0), (to, 1.0)] {
+                    self.moves(poses, point.0, &mut |coordinate, velocity| {
+                        let slope: f64 = along.iter().zip(velocity).map(|(a, v)| a * v).sum();
+                        row[coordinate] += sign * slope / length;
+                    });
+                }
+            }
+        }
+        row
     }
 }
 

@@ -371,3 +371,154 @@ fn an_arm_on_a_free_body_is_identified_in_any_axes() {
         check(name, &free_arm(order, coordinates, twist), 1.0, 2e-2);
     }
 }
+
+const CABLES: &str = r#"
+schema = 1
+name = "cables"
+gravity = [0, "-g", 0]
+[constants]
+w = { value = 2.0, unit = "m" }
+h = { value = 1.5, unit = "m" }
+b = { value = 0.1, unit = "m" }
+g = { value = 9.81, unit = "m/s^2" }
+[coordinates]
+x = { nominal = 1.0 }
+y = { nominal = 0.7 }
+a = { nominal = 0.0 }
+[[frame]]
+name = "carriage"
+on = "base"
+joint = { prismatic = "x", axis = "x" }
+[[frame]]
+name = "slider"
+on = "carriage"
+joint = { prismatic = "y", axis = "y" }
+[[frame]]
+name = "platform"
+on = "slider"
+joint = { revolute = "a", axis = "z" }
+[[part]]
+on = "platform"
+linear = { planar = "", nominal = { ZZ = 0.02, MX = 0.03, MY = -0.02, M = 1.3 } }
+[[point]]
+name = "A1"
+on = "base"
+at = [0, 0, 0]
+[[point]]
+name = "A2"
+on = "base"
+at = ["w", 0, 0]
+[[point]]
+name = "A3"
+on = "base"
+at = ["w", "h", 0]
+[[point]]
+name = "A4"
+on = "base"
+at = [0, "h", 0]
+[[point]]
+name = "B1"
+on = "platform"
+at = ["b", "-b", 0]
+[[point]]
+name = "B2"
+on = "platform"
+at = ["-b", "b", 0]
+[[drive]]
+name = "cable1"
+linear = { from = "A1", to = "B1" }
+[[drive]]
+name = "cable2"
+linear = { from = "A2", to = "B1" }
+[[drive]]
+name = "cable3"
+linear = { from = "A3", to = "B2" }
+[[drive]]
+name = "cable4"
+linear = { from = "A4", to = "B2" }
+"#;
+
+/// Four cables hold three freedoms: the rows are those of the coordinates, and any tensions that make up the forces there will
+/// do.
+#[test]
+fn cables_are_more_than_freedoms() {
+    let model = Model::from_text("cables", CABLES).expect("the model");
+    assert_eq!(model.drives(), ["on_x", "on_y", "on_a"]);
+    let (samples, step) = (1500, 0.004);
+    let motion = |k: usize, order: usize| -> [f64; 3] {
+        let t = step * k as f64;
+        [(1.0, 0.4, 2.3), (0.7, 0.25, 3.1), (0.0, 0.5, 4.7)].map(
+            |(at, size, rate): (f64, f64, f64)| {
+                let (sin, cos) = (rate * t).sin_cos();
+                match order {
+                    0 => at + size * sin,
+                    1 => size * rate * cos,
+                    _ => -size * rate * rate * sin,
+                }
+            },
+        )
+    };
+    let column = |order: usize, i: usize| -> Vec<f64> {
+        (0..samples).map(|k| motion(k, order)[i]).collect()
+    };
+    let columns: Vec<Vec<Vec<f64>>> = (0..3)
+        .map(|o| (0..3).map(|i| column(o, i)).collect())
+        .collect();
+    let slices = |o: usize| -> Vec<&[f64]> { columns[o].iter().map(Vec::as_slice).collect() };
+    let states = States {
+        q: slices(0),
+        qd: slices(1),
+        qdd: slices(2),
+        load: Vec::new(),
+    };
+    let forces = Evaluator::new(&model.derivation)
+        .inverse_dynamics(&states, &model.nominal)
+        .expect("forces");
+    let mut text = "t,x,y,a,cable1,cable2,cable3,cable4".to_owned();
+    for k in 0..samples {
+        let [x, y, a] = motion(k, 0);
+        let (s, c) = f64::sin_cos(a);
+        let turned = |u: f64, v: f64| [u * c - v * s, u * s + v * c];
+        let jacobian = nalgebra::DMatrix::from_fn(4, 3, |cable, i| {
+            let anchor = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.5], [0.0, 1.5]][cable];
+            let arm = if cable < 2 {
+                turned(0.1, -0.1)
+            } else {
+                turned(-0.1, 0.1)
+            };
+            let along = [x + arm[0] - anchor[0], y + arm[1] - anchor[1]];
+            let length = along[0].hypot(along[1]);
+            match i {
+                0 | 1 => along[i] / length,
+                _ => (arm[0] * along[1] - arm[1] * along[0]) / length,
+            }
+        });
+        let wanted = nalgebra::DVector::from_fn(3, |i, _| forces[i][k]);
+        // The least tensions, and an inner one that changes nothing.
+        let transposed = jacobian.transpose();
+        let least = transposed
+            .clone()
+            .svd(true, true)
+            .solve(&wanted, 1e-12)
+            .expect("tensions");
+        let full = transposed.clone().insert_rows(3, 1, 0.0).svd(true, true);
+        let inner = full.v_t.expect("asked for").row(3).transpose() * 5.0;
+        let tensions = least + inner;
+        let _ = write!(text, "\n{},{x},{y},{a}", step * k as f64);
+        for tension in tensions.iter() {
+            let _ = write!(text, ",{tension}");
+        }
+    }
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("undriven-cables.csv");
+    std::fs::write(&file, text + "\n").expect("a recording");
+    let recording = model
+        .recording(&file, &Reading::default())
+        .expect("a recording");
+    let found = model
+        .identify(&[&recording], &[], &Estimation::default())
+        .expect("a fit");
+    for (parameter, truth) in found.fit.parameters.iter().zip(&model.nominal) {
+        let error = (parameter.value - truth).abs() / 0.05;
+        assert!(error < 1e-2, "{} instead of {truth}", parameter.value);
+    }
+}

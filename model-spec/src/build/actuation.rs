@@ -77,7 +77,13 @@ pub(super) fn loops(
     loops
 }
 
-/// Reads the drives; there must be one per degree of freedom that is driven. What is not has a row of its own, called after
+/// Rows of the equation of motion, and drives that have none of their own because there are more of them.
+pub(super) struct Drives {
+    pub(super) rows: Vec<Drive>,
+    pub(super) shared: Vec<Drive>,
+}
+
+/// Reads the drives; there must be one per degree of freedom that is driven, or more than there are freedoms in a tree. What is not has a row of its own, called after
 /// its coordinate: those of free bodies come first, those of joints last.
 pub(super) fn drives(
     model: &ModelEntry,
@@ -86,7 +92,7 @@ pub(super) fn drives(
     points: &Points,
     places: &mut Places,
     log: &mut Log,
-) -> Vec<Drive> {
+) -> Drives {
     let entries = model
         .drive
         .as_ref()
@@ -150,12 +156,29 @@ pub(super) fn drives(
             is_driven: true,
         });
     }
-    free::add_rows(model, symbols, tree, points, places, &mut drives, log);
+    let shared = free::take_shared(model, symbols, &mut drives);
+    free::check_apart(tree, &shared, points, &places.drives, log);
+    if !shared.is_empty() {
+        places.drives.clear();
+    }
+    free::add_rows(
+        model,
+        symbols,
+        tree,
+        points,
+        places,
+        &shared,
+        &mut drives,
+        log,
+    );
     if log.n_errors() == before && !log.syntax_broken {
-        free::check_apart(tree, &drives, points, places, log);
+        free::check_apart(tree, &drives, points, &places.drives, log);
         check_number(model, symbols, &drives, places, log);
     }
-    drives
+    Drives {
+        rows: drives,
+        shared,
+    }
 }
 
 fn check_number(
@@ -212,7 +235,7 @@ fn check_number(
             "every coordinate is `passive`, so that nothing is driven: take `passive = true` off the one that the drive moves; if \
              the loops tie too many coordinates then, a joint is missing or a loop is too many"
         } else if drives.len() > n_active {
-            "delete a drive, or make another coordinate active"
+            "delete a drive, or make another coordinate active; more drives than degrees of freedom are possible without loops only"
         } else {
             "add a `[[drive]]`; if the loops settle this coordinate, mark it `passive = true`, and if it moves freely, `driven = false`"
         }),
@@ -284,7 +307,8 @@ pub(super) fn check_place_names(model: &ModelEntry, log: &mut Log) {
 }
 
 /// Reads what columns of drives measure: by what they are multiplied to be what acts at the joint.
-pub(super) fn torque(model: &ModelEntry, drives: &[Drive], log: &mut Log) -> Vec<(String, f64)> {
+pub(super) fn torque(model: &ModelEntry, drives: &Drives, log: &mut Log) -> Vec<(String, f64)> {
+    let drives: Vec<&Drive> = drives.rows.iter().chain(&drives.shared).collect();
     let recording = model.recording.as_ref();
     let torque = recording.and_then(|entry| entry.torque.as_ref());
     let mut factors = Vec::new();
@@ -324,7 +348,7 @@ pub(super) fn torque(model: &ModelEntry, drives: &[Drive], log: &mut Log) -> Vec
 pub(super) fn recording(
     model: &ModelEntry,
     symbols: &Symbols,
-    drives: &[Drive],
+    drives: &Drives,
     log: &mut Log,
 ) -> Vec<(String, String)> {
     let Some(columns) = model
@@ -343,7 +367,7 @@ pub(super) fn recording(
         }
         known.extend([name.clone(), format!("{name}_d"), format!("{name}_dd")]);
     }
-    for drive in drives {
+    for drive in drives.rows.iter().chain(&drives.shared) {
         known.extend([drive.name.clone(), format!("{}_var", drive.name)]);
     }
     let mut pairs: Vec<(String, String)> = Vec::new();

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use crate::build::Places;
 use crate::build::frames::{Points, Tree};
 use crate::build::symbols::Symbols;
-use crate::diagnostic::{Diagnostic, Log};
+use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::exact::{CoordinateIdx, Symbol};
 use crate::mechanism::{Drive, DriveKind, FrameIdx, FreeBody, Loop, PointIdx, Step};
 use crate::schema::ModelEntry;
@@ -23,13 +23,35 @@ fn free_bodies(tree: &Tree) -> impl Iterator<Item = (usize, &FreeBody)> {
     })
 }
 
-/// Adds a row for every degree of freedom that nothing drives.
+/// Takes the drives out of a tree that has more of them than degrees of freedom: they share its rows.
+pub(super) fn take_shared(
+    model: &ModelEntry,
+    symbols: &Symbols,
+    drives: &mut Vec<Drive>,
+) -> Vec<Drive> {
+    let coordinates = symbols.coordinates.iter();
+    let freedoms = coordinates
+        .filter(|c| !c.passive && c.motion.has_rate())
+        .count();
+    let has_loops = model
+        .loops
+        .as_ref()
+        .is_some_and(|list| !list.entries.is_empty());
+    let has_passive = symbols.coordinates.iter().any(|c| c.passive);
+    if drives.len() <= freedoms || freedoms == 0 || has_loops || has_passive {
+        return Vec::new();
+    }
+    std::mem::take(drives)
+}
+
+/// Adds a row for every degree of freedom that nothing drives, or that drives share.
 pub(super) fn add_rows(
     model: &ModelEntry,
     symbols: &Symbols,
     tree: &Tree,
     points: &Points,
     places: &mut Places,
+    shared: &[Drive],
     drives: &mut Vec<Drive>,
     log: &mut Log,
 ) {
@@ -40,7 +62,13 @@ pub(super) fn add_rows(
         of_bodies.extend(body.position);
         of_bodies.extend([qx, qy, qz]);
     }
-    let undriven = undriven(model, symbols, places, drives, log);
+    let mut undriven = undriven(model, symbols, places, drives, log);
+    if !shared.is_empty() {
+        let all = (0..symbols.coordinates.len()).map(CoordinateIdx);
+        undriven = all
+            .filter(|i| symbols.coordinates[i.0].motion.has_rate() && !of_bodies.contains(i))
+            .collect();
+    }
     let driven: Vec<CoordinateIdx> = drives
         .iter()
         .filter_map(|drive| match drive.kind {
@@ -57,7 +85,10 @@ pub(super) fn add_rows(
     of_bodies.retain(|i| !driven.contains(i));
     for (i, row) in of_bodies.iter().chain(&undriven).map(|i| (i, row(*i))) {
         let is_taken = symbols.coordinates.iter().any(|c| c.name == row.name)
-            || drives.iter().any(|drive| drive.name == row.name)
+            || drives
+                .iter()
+                .chain(shared)
+                .any(|drive| drive.name == row.name)
             || points.get(&row.name).is_some();
         if is_taken {
             log.push(
@@ -222,11 +253,11 @@ pub(super) fn check_apart(
     tree: &Tree,
     drives: &[Drive],
     points: &Points,
-    places: &Places,
+    spans: &[Span],
     log: &mut Log,
 ) {
     let root = roots(tree);
-    for (drive, span) in drives.iter().zip(&places.drives) {
+    for (drive, span) in drives.iter().zip(spans) {
         if let DriveKind::Linear { from, to } = drive.kind
             && root(points, from) != root(points, to)
         {
@@ -252,7 +283,7 @@ pub(super) fn check_loops(
     }
 }
 
-fn across(span: crate::Span, what: &str) -> Diagnostic {
+fn across(span: Span, what: &str) -> Diagnostic {
     Diagnostic::error(
         span,
         format!("{what} cannot reach across a free body with a quaternion"),

@@ -74,7 +74,7 @@ impl Summary {
             let wanted = m.coordinates.iter().filter(|c| c.passive == passive);
             wanted.map(|c| c.name.clone()).collect()
         };
-        let drives = |is_driven: bool| {
+        let drives = |is_driven: bool| -> Vec<String> {
             let wanted = m.drives.iter().filter(|d| d.is_driven == is_driven);
             wanted.map(|d| d.name.clone()).collect()
         };
@@ -84,7 +84,10 @@ impl Summary {
             active: coordinates(false),
             passive: coordinates(true),
             loops: m.loops.iter().map(|l| l.name.clone()).collect(),
-            drives: drives(true),
+            drives: {
+                let shared = m.shared_drives.iter().map(|d| d.name.clone());
+                drives(true).into_iter().chain(shared).collect()
+            },
             undriven: drives(false),
             effects: m.effects.iter().map(|e| e.kind.clone()).collect(),
             parameters: m.parameters.iter().map(|p| p.name.clone()).collect(),

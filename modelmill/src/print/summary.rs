@@ -223,8 +223,10 @@ fn joint(motion: Motion, name: &str, passive: bool) -> String {
 }
 
 fn drives(m: &Mechanism, is_driven: bool) -> Vec<String> {
+    let shared = m.shared_drives.iter();
     m.drives
         .iter()
+        .chain(shared)
         .filter(|drive| drive.is_driven == is_driven)
         .map(|drive| match drive.kind {
             DriveKind::Joint(i) => format!("{} (on {})", drive.name, m.coordinates[i.0].name),

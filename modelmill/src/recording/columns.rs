@@ -89,10 +89,19 @@ pub(crate) fn read_options(
             NotFinite::Refuse
         },
         wanted: Some(known.into_iter().map(|(name, _)| name).collect()),
-        may_lack: model.drives(),
+        may_lack: may_lack(model),
         between: args.between,
         ..ReadOptions::default()
     })
+}
+
+/// Forces of which samples may be missing. Those of drives that share rows are looked at before they are repaired.
+fn may_lack(model: &Model) -> Vec<String> {
+    if model.derivation.mechanism.shared_drives.is_empty() {
+        model.drives()
+    } else {
+        Vec::new()
+    }
 }
 
 /// Several faults as one, each on a line of its own; wrong options weigh more than what the recording lacks.

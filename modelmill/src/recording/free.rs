@@ -2,7 +2,7 @@
 //! twists that are recorded or follow from the pose, and forces that are zero because nothing acts.
 
 use modelmill_identify::{Note, Preparation, Recording as Raw, Run};
-use modelmill_spec::{FreeBody, Mechanism, Step, TwistAxes};
+use modelmill_spec::{DriveKind, FreeBody, Kinematics, Mechanism, Step, TwistAxes};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -33,9 +33,10 @@ pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<Note>> {
         }
         check_twist(mechanism, body, raw)?;
     }
+    share(mechanism, raw)?;
     let mut zero = Vec::new();
     for drive in mechanism.drives.iter().filter(|drive| !drive.is_driven) {
-        if !raw.has(&drive.name) {
+        if !raw.has(&drive.name) && mechanism.shared_drives.is_empty() {
             raw.put(&drive.name, vec![0.0; raw.samples()]);
             zero.push(format!("`{}`", drive.name));
         }
@@ -48,6 +49,53 @@ pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<Note>> {
         raw.file(),
         zero.join(", ")
     ))])
+}
+
+/// Adds what drives that share the rows do on each of them, `J' f`, to what is recorded there.
+fn share(mechanism: &Mechanism, raw: &mut Raw) -> Outcome {
+    let shared = &mechanism.shared_drives;
+    let has = |name: &str| raw.has(name);
+    if !shared.iter().any(|drive| has(&drive.name))
+        || !mechanism.coordinates.iter().all(|c| has(&c.name))
+    {
+        // No forces were measured, or poses are missing, which is said where states are made.
+        return Ok(());
+    }
+    let column = |name: &str| raw.column(name).map(<[f64]>::to_vec);
+    let forces: Vec<Vec<f64>> = shared
+        .iter()
+        .map(|d| column(&d.name))
+        .collect::<Result<_, _>>()?;
+    let q: Vec<Vec<f64>> = mechanism
+        .coordinates
+        .iter()
+        .map(|c| column(&c.name))
+        .collect::<Result<_, _>>()?;
+    let kinematics = Kinematics::new(mechanism);
+    let mut rows: Vec<Vec<f64>> = Vec::new();
+    for row in &mechanism.drives {
+        rows.push(if has(&row.name) {
+            column(&row.name)?
+        } else {
+            vec![0.0; raw.samples()]
+        });
+    }
+    for sample in 0..raw.samples() {
+        let here: Vec<f64> = q.iter().map(|q| q[sample]).collect();
+        let poses = kinematics.poses(&here);
+        for (drive, force) in shared.iter().zip(&forces) {
+            let slopes = kinematics.drive_slopes(&poses, drive.kind);
+            for (row, total) in mechanism.drives.iter().zip(&mut rows) {
+                if let DriveKind::Joint(i) = row.kind {
+                    total[sample] += slopes[i.0] * force[sample];
+                }
+            }
+        }
+    }
+    for (row, total) in mechanism.drives.iter().zip(rows) {
+        raw.put(&row.name, total);
+    }
+    Ok(())
 }
 
 /// Scales quaternions to unit length, and turns the sign of those that lie on the other side of the one before.
