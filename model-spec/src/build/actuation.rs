@@ -161,24 +161,16 @@ pub(super) fn drives(
     if !shared.is_empty() {
         places.drives.clear();
     }
-    free::add_rows(
-        model,
-        symbols,
-        tree,
-        points,
-        places,
-        &shared,
-        &mut drives,
-        log,
-    );
-    if log.n_errors() == before && !log.syntax_broken {
-        free::check_apart(tree, &drives, points, &places.drives, log);
-        check_number(model, symbols, &drives, places, log);
-    }
-    Drives {
+    let mut drives = Drives {
         rows: drives,
         shared,
+    };
+    free::add_rows(model, symbols, tree, points, places, &mut drives, log);
+    if log.n_errors() == before && !log.syntax_broken {
+        free::check_apart(tree, &drives.rows, points, &places.drives, log);
+        check_number(model, symbols, &drives.rows, places, log);
     }
+    drives
 }
 
 fn check_number(

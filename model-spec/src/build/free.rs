@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use crate::build::Places;
+use crate::build::actuation::Drives;
 use crate::build::frames::{Points, Tree};
 use crate::build::symbols::Symbols;
 use crate::diagnostic::{Diagnostic, Log, Span};
@@ -51,10 +52,13 @@ pub(super) fn add_rows(
     tree: &Tree,
     points: &Points,
     places: &mut Places,
-    shared: &[Drive],
-    drives: &mut Vec<Drive>,
+    drives: &mut Drives,
     log: &mut Log,
 ) {
+    let Drives {
+        rows: drives,
+        shared,
+    } = drives;
     let mut of_bodies = Vec::new();
     for (frame, body) in free_bodies(tree) {
         check_body(symbols, tree, frame, body, places, log);
@@ -87,7 +91,7 @@ pub(super) fn add_rows(
         let is_taken = symbols.coordinates.iter().any(|c| c.name == row.name)
             || drives
                 .iter()
-                .chain(shared)
+                .chain(&*shared)
                 .any(|drive| drive.name == row.name)
             || points.get(&row.name).is_some();
         if is_taken {
@@ -204,7 +208,7 @@ fn check_body(
         .iter()
         .map(|i| symbols.coordinates[i.0].nominal.powi(2))
         .sum();
-    if !(size > 1e-12) {
+    if size.is_nan() || size <= 1e-12 {
         log.push(
             Diagnostic::error(
                 places.coordinates[body.quaternion[0].0],

@@ -78,6 +78,7 @@ impl Draft {
                 lumped_masses: Vec::new(),
                 loops: Vec::new(),
                 drives: Vec::new(),
+                shared_drives: Vec::new(),
                 effects: Vec::new(),
                 force_delay: 0.0,
                 identified_base: Vec::new(),
