@@ -59,6 +59,7 @@ pub use motion::{
 };
 pub use recording::{
     ColumnInfo, Computed, Fault, NotFinite, Note, ReadOptions, Recording, RecordingError,
-    RecordingFile, RecordingFiles, Severity, TableInfo, name_of_bytes, place_word,
+    RecordingFile, RecordingFiles, Severity, TableInfo, has_ending_of_a_recording, name_of_bytes,
+    place_word,
 };
 pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER};

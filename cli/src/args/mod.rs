@@ -4,6 +4,7 @@ pub(crate) mod drawing;
 pub(crate) mod effects;
 pub(crate) mod estimation;
 pub(crate) mod preparation;
+pub(crate) mod runs;
 pub(crate) mod separate;
 
 use std::path::PathBuf;
@@ -21,6 +22,7 @@ use drawing::DrawingArgs;
 use effects::{AddArgs, EffectsArgs};
 use estimation::{EstimatorArgs, StandstillArgs};
 use preparation::PreparationArgs;
+use runs::RunsArgs;
 use separate::SeparateArgs;
 
 /// From a model file to base parameters, equations, fast Rust, and parameters from measurements.
@@ -183,14 +185,8 @@ pub(crate) enum Command {
         modelmill check robot.toml"
     )]
     Import(ImportArgs),
-    /// Say what changed between runs of one machine: load, friction, offset, scale of a force, clock
-    #[command(
-        after_help = "The first run is how things were; every other one is held against it. Runs may move differently.\n\n\
-        Examples:\n  \
-        modelmill runs arm.toml --data monday.csv --data tuesday.csv\n  \
-        modelmill runs model-spec/models/spidermill.toml \\\n      \
-        --data recordings/spidermill-mbs/plain-fit.csv recordings/spidermill-mbs/with-rods-fit.csv --json"
-    )]
+    /// Say what changed between runs of one machine: load, friction, offset, scale of a force, clock, encoders, pushes
+    #[command(after_help = runs::HELP)]
     Runs(RunsArgs),
     /// Solve identified base parameters for physical ones, as in Table 1 of the paper: all real solutions
     #[command(after_help = "Examples (from the project's root):\n  \
@@ -471,21 +467,6 @@ pub(crate) struct CompareArgs {
     /// Values of the base parameters: `nominal`, or a file that `identify` wrote
     #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
     pub(crate) parameters: ParameterSource,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    pub(crate) json: bool,
-    #[command(flatten)]
-    pub(crate) preparation: PreparationArgs,
-}
-
-/// `runs`.
-#[derive(Debug, Args)]
-pub(crate) struct RunsArgs {
-    /// Model file (TOML)
-    pub(crate) model: PathBuf,
-    /// Recordings (CSV, Parquet, MATLAB 5), two or more; the first is the one that the others are held against
-    #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
-    pub(crate) data: Vec<PathBuf>,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub(crate) json: bool,

@@ -25,7 +25,7 @@ pub use error::{Fault, RecordingError};
 pub use file::RecordingFile;
 pub use notes::{Note, Severity};
 pub use options::{Computed, NotFinite, ReadOptions};
-pub use read::{name_of_bytes, place_word};
+pub use read::{has_ending_of_a_recording, name_of_bytes, place_word};
 pub use tables::{ColumnInfo, TableInfo};
 pub use together::RecordingFiles;
 

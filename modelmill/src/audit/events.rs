@@ -35,10 +35,13 @@ const BOUND: f64 = 1.345;
 const ROUNDS: usize = 4;
 
 /// An interval in which forces act that no parameters explain.
-struct Event {
-    from: f64,
-    to: f64,
-    drives: Vec<(usize, f64, f64)>,
+#[derive(Clone, Debug)]
+pub(crate) struct Event {
+    /// When it begins and ends, s.
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+    /// The drives on which it shows, each with the largest force that is not explained and with what is usual.
+    pub(crate) drives: Vec<(usize, f64, f64)>,
 }
 
 /// Remarks on the events of a stretch; their forces count no more where they are to be left out.
@@ -73,23 +76,32 @@ pub(super) fn found(model: &Model, data: &mut Stretch, leave_out: bool) -> Vec<N
             }
         )));
     }
-    if leave_out && !events.is_empty() {
-        let run = &mut data.run;
-        let n = run.time.len();
-        if run.left_out.is_empty() {
-            run.left_out = vec![vec![false; n]; names.len()];
-        }
-        for (i, time) in run.time.iter().enumerate() {
-            let is_in = |event: &Event| (event.from..=event.to).contains(time);
-            if events.iter().any(is_in) {
-                run.left_out.iter_mut().for_each(|out| out[i] = true);
-            }
-        }
+    if leave_out {
+        leave_out_events(data, &events);
     }
     notes
 }
 
-fn events(model: &Model, data: &Stretch) -> Option<Vec<Event>> {
+/// Forces within events count no more.
+pub(crate) fn leave_out_events(data: &mut Stretch, events: &[Event]) {
+    if events.is_empty() {
+        return;
+    }
+    let run = &mut data.run;
+    if run.left_out.is_empty() {
+        let drives = run.force.as_ref().map_or(0, Vec::len);
+        run.left_out = vec![vec![false; run.time.len()]; drives];
+    }
+    for (i, time) in run.time.iter().enumerate() {
+        let is_in = |event: &Event| (event.from..=event.to).contains(time);
+        if events.iter().any(is_in) {
+            run.left_out.iter_mut().for_each(|out| out[i] = true);
+        }
+    }
+}
+
+/// The events of a stretch; `None` where too little is there to tell.
+pub(crate) fn events(model: &Model, data: &Stretch) -> Option<Vec<Event>> {
     let run = &data.run;
     let forces = run.force.as_deref()?;
     let n = run.time.len();

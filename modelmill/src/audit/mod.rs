@@ -1,7 +1,7 @@
 //! What a model says of a recording before anything is believed: delays between force and motion, columns that are
 //! exchanged or turned round, angles in degrees. Everything goes into the notes.
 
-mod events;
+pub(crate) mod events;
 mod nominal_forces;
 
 use modelmill_codegen::{Evaluator, States};

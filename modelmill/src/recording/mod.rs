@@ -23,7 +23,7 @@ use columns::read_options;
 use leverage::Leverage;
 
 pub use contents::{ColumnInfo, Contents, TableInfo};
-pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER};
+pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER, has_ending_of_a_recording};
 pub use modelmill_identify::{Preparation, Smoothing};
 pub use options::Reading;
 

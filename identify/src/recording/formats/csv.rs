@@ -25,6 +25,10 @@ const LONGEST_RECORD: usize = 64 << 20;
 pub(crate) struct Csv;
 
 impl Format for Csv {
+    fn extensions(&self) -> &'static [&'static str] {
+        &["csv", "tsv"]
+    }
+
     fn is_table(&self) -> bool {
         false
     }
