@@ -486,14 +486,14 @@ fn a_known_load_tells_the_scales_of_all_forces() {
 /// Friction that rises at one run and stays is told from that run on; a run that is different by itself is no lasting change.
 #[test]
 fn what_changed_and_stayed_is_told_with_its_run() {
-    let model = Model::open(bundled("two_link")).expect("the model");
+    let model = Model::open(bundled("emps")).expect("the model");
     let made = |k: u64| match k {
         4 => Made::Scale(0, 1.1),
-        7.. => Made::Friction(1, 0.5, 0.2),
+        7.. => Made::Friction(0, 5.0, 30.0),
         _ => Made::Nothing,
     };
     let recordings = (0..12).map(|k| {
-        let file = run("two_link", 1500 + k, made(k));
+        let file = run("emps", 1500 + k, made(k));
         Ok(model
             .recording(file, &Reading::default())
             .expect("the recording"))
@@ -514,8 +514,8 @@ fn what_changed_and_stayed_is_told_with_its_run() {
     else {
         panic!("{:#?}", point.changes);
     };
-    assert_eq!(*drive, model.drives()[1]);
-    is_near(dry, 0.5, 0.1);
+    assert_eq!(*drive, model.drives()[0]);
+    is_near(dry, 5.0, 0.2);
     let page = modelmill::report::runs_page(&model, &found).expect("a page");
     assert!(
         page.contains("From run 8 on") && page.contains("friction of"),

@@ -23,6 +23,7 @@ use crate::audit::events::{self, Event};
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::Recording;
+use crate::stretch::Stretch;
 
 pub use changes::{Changed, Estimate, What};
 use changes::{Possible, centre};
@@ -242,12 +243,31 @@ pub(crate) struct LookedAt {
     sizes: Sizes,
 }
 
+/// Whether most forces of a drive between two times were measured: what stands in the place of others is no push.
+fn was_measured(stretch: &Stretch, drive: usize, from: f64, to: f64) -> bool {
+    let Some(out) = stretch.run.left_out.get(drive) else {
+        return true;
+    };
+    let all = stretch.run.time.iter().zip(out);
+    let within = all.filter(|(time, _)| (from..=to).contains(*time));
+    let [mut lost, mut n] = [0, 0];
+    for (_, out) in within {
+        lost += usize::from(*out);
+        n += 1;
+    }
+    2 * lost < n
+}
+
 impl Bench<'_> {
     fn looked_at(&self, recording: &Recording, values: Option<&DVector<f64>>) -> Outcome<LookedAt> {
         let mut stretches = recording.stretches.clone();
         let mut told = Vec::new();
         for stretch in &mut stretches {
-            let found = events::events(self.model, stretch).unwrap_or_default();
+            let mut found = events::events(self.model, stretch).unwrap_or_default();
+            found.retain_mut(|event| {
+                event.drives.retain(|(d, ..)| was_measured(stretch, *d, event.from, event.to));
+                !event.drives.is_empty()
+            });
             // The beginning and the end of a push hardly rise above what is usual.
             let wide = found.iter().map(|event| {
                 let room = AROUND * (event.to - event.from);
