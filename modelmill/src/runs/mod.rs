@@ -265,7 +265,9 @@ impl Bench<'_> {
         for stretch in &mut stretches {
             let mut found = events::events(self.model, stretch).unwrap_or_default();
             found.retain_mut(|event| {
-                event.drives.retain(|(d, ..)| was_measured(stretch, *d, event.from, event.to));
+                event
+                    .drives
+                    .retain(|(d, ..)| was_measured(stretch, *d, event.from, event.to));
                 !event.drives.is_empty()
             });
             // The beginning and the end of a push hardly rise above what is usual.
