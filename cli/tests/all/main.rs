@@ -36,6 +36,7 @@ mod preparation;
 mod recordings;
 mod reduce;
 mod report;
+mod runs;
 mod separate;
 mod simulate;
 mod sound;

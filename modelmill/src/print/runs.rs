@@ -260,16 +260,24 @@ impl Compared {
                 .map(str::to_owned)
                 .to_vec()
             };
-            let rows: Vec<Vec<String>> = values.iter().map(row).collect();
+            let told = values.iter().filter(|one| one.value.deviation.is_some());
+            let rows: Vec<Vec<String>> = told.map(row).collect();
             let columns = [
                 ("of", Align::Left),
-                ("value", Align::Left),
-                ("", Align::Right),
+                ("", Align::Left),
+                ("value", Align::Right),
                 ("+-", Align::Right),
                 ("unit", Align::Left),
                 ("", Align::Left),
             ];
             lines.extend(table(4, &columns, &rows));
+            let not_told = values.iter().filter(|one| one.value.deviation.is_none());
+            let not_told: Vec<String> = not_told
+                .map(|one| format!("{} of {}", one.name, one.of))
+                .collect();
+            if !not_told.is_empty() {
+                lines.push(format!("    not told: {}", not_told.join(", ")));
+            }
         }
     }
 

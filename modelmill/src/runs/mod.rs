@@ -39,6 +39,9 @@ const MOVED: f64 = 4.0;
 /// A change must move one of the drives by this part of its effective force: less is within what no model knows.
 const LEAST: f64 = 4e-3;
 
+/// What is shorter, in s, is left out but not told as a push: the error of a model rises for so long as well.
+const SHORTEST_PUSH: f64 = 0.25;
+
 /// Before and after an event so much of its length is left out as well.
 const AROUND: f64 = 0.2;
 
@@ -243,6 +246,33 @@ pub(crate) struct LookedAt {
     sizes: Sizes,
 }
 
+/// Events of forces that were measured; those that follow each other at once are one.
+fn pushes(events: Vec<Event>, stretch: &Stretch) -> Vec<Event> {
+    let mut all: Vec<Event> = Vec::new();
+    for mut event in events {
+        let (from, to) = (event.from, event.to);
+        event
+            .drives
+            .retain(|(d, ..)| was_measured(stretch, *d, from, to));
+        if event.drives.is_empty() {
+            continue;
+        }
+        match all.last_mut() {
+            Some(last) if from - last.to < SHORTEST_PUSH => {
+                last.to = to;
+                for (d, largest, usual) in event.drives {
+                    match last.drives.iter_mut().find(|(other, ..)| *other == d) {
+                        Some((_, most, _)) => *most = most.max(largest),
+                        None => last.drives.push((d, largest, usual)),
+                    }
+                }
+            }
+            _ => all.push(event),
+        }
+    }
+    all
+}
+
 /// Whether most forces of a drive between two times were measured: what stands in the place of others is no push.
 fn was_measured(stretch: &Stretch, drive: usize, from: f64, to: f64) -> bool {
     let Some(out) = stretch.run.left_out.get(drive) else {
@@ -263,13 +293,8 @@ impl Bench<'_> {
         let mut stretches = recording.stretches.clone();
         let mut told = Vec::new();
         for stretch in &mut stretches {
-            let mut found = events::events(self.model, stretch).unwrap_or_default();
-            found.retain_mut(|event| {
-                event
-                    .drives
-                    .retain(|(d, ..)| was_measured(stretch, *d, event.from, event.to));
-                !event.drives.is_empty()
-            });
+            let found = events::events(self.model, stretch).unwrap_or_default();
+            let found = pushes(found, stretch);
             // The beginning and the end of a push hardly rise above what is usual.
             let wide = found.iter().map(|event| {
                 let room = AROUND * (event.to - event.from);
@@ -280,7 +305,10 @@ impl Bench<'_> {
                 }
             });
             events::leave_out_events(stretch, &wide.collect::<Vec<_>>());
-            told.extend(found.iter().map(|event| changes::event(self.model, event)));
+            let lasting = found
+                .iter()
+                .filter(|event| event.to - event.from >= SHORTEST_PUSH);
+            told.extend(lasting.map(|event| changes::event(self.model, event)));
         }
         let rows = Rows::new(self.model, &stretches, self.payloads, values)?;
         let white = rows.white()?;
