@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use modelmill::{Host, Model};
 
-use crate::args::estimation::EstimatorArgs;
-use crate::args::estimation::StandstillArgs;
+use crate::args::estimation::{EstimatorArgs, StandstillArgs};
 use crate::args::preparation::PreparationArgs;
 use crate::failure::Outcome;
 use crate::terminal;
@@ -22,7 +21,7 @@ pub(crate) enum ParameterSource {
 
 impl ParameterSource {
     /// Reads the argument of `--parameters`.
-    fn parse(text: &str) -> Result<Self, String> {
+    pub(crate) fn parse(text: &str) -> Result<Self, String> {
         match text {
             "" => Err("expected `nominal` or the path of a fit".to_owned()),
             "nominal" => Ok(Self::Nominal),

@@ -15,6 +15,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+use drawing::DrawingArgs;
 use effects::{AddArgs, EffectsArgs};
 use runs::RunsArgs;
 
