@@ -4,8 +4,9 @@ use crate::signal::median;
 
 /// The fewest values of a segment: a single one that lies apart did not stay.
 const SHORTEST: usize = 2;
-/// A value that lies apart from both of its neighbours by so many deviations is single.
-const APART: f64 = 5.0;
+/// A value that lies apart from both of its neighbours by so many deviations is single; one that is nearer cannot pay for a
+/// segment with a neighbour.
+const APART: f64 = 3.5;
 /// How many times the logarithm of the number of values a change must gain.
 const STRICTER: f64 = 3.0;
 /// The median of the square of a number from the normal distribution.
