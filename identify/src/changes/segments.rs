@@ -34,7 +34,7 @@ pub fn segments(values: &[Option<Told>], among: usize) -> Vec<usize> {
     };
     let scatter = median(known.windows(2).map(square).collect()) / MEDIAN_OF_SQUARE;
     let scatter = scatter.max(1.0);
-    let known = without_single(known, APART * scatter.sqrt());
+    let known = without_single(&known, APART * scatter.sqrt());
     let n = known.len();
     if n < 2 * SHORTEST {
         return Vec::new();
@@ -71,7 +71,7 @@ pub fn segments(values: &[Option<Told>], among: usize) -> Vec<usize> {
 }
 
 /// The values without those that lie apart, by so many deviations, from both of their neighbours.
-fn without_single(known: Vec<(usize, Told)>, apart: f64) -> Vec<(usize, Told)> {
+fn without_single(known: &[(usize, Told)], apart: f64) -> Vec<(usize, Told)> {
     let is_near = |a: usize, b: usize| {
         let ((_, (a, da)), (_, (b, db))) = (known[a], known[b]);
         (a - b).abs() < apart * da.hypot(db)

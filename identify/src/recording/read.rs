@@ -94,7 +94,7 @@ pub fn name_of_bytes(name: &str, bytes: &[u8]) -> String {
 
 /// Whether a file's name ends as names of recordings do.
 pub fn has_ending_of_a_recording(path: &Path) -> bool {
-    let mut endings = FORMATS.into_iter().flat_map(|format| format.extensions());
+    let mut endings = FORMATS.into_iter().flat_map(<dyn Format>::extensions);
     path.extension()
         .is_some_and(|extension| endings.any(|ending| extension.eq_ignore_ascii_case(ending)))
 }

@@ -130,7 +130,7 @@ impl Compared {
             self.say_points(&mut lines, style);
         }
         if let Some(shared) = &self.shared {
-            self.say_shared(shared, &mut lines, style);
+            say_shared(shared, &mut lines, style);
         }
         if !first.changes.is_empty() {
             lines.push(String::new());
@@ -216,71 +216,6 @@ impl Compared {
         }
     }
 
-    /// Values of the fit in which some are each run's own.
-    fn say_shared(&self, fit: &SharedFit, lines: &mut Vec<String>, style: Style) {
-        lines.push(String::new());
-        let n = fit.shared.iter().flatten().count();
-        lines.push(style.bold(&format!(
-            "One fit of all runs, with {} shared",
-            count(n, "base parameter", "base parameters")
-        )));
-        let text = |value: Fitted| match value.deviation {
-            Some(deviation) => with_deviation(value.value, deviation),
-            None => ["not told".to_owned(), String::new()],
-        };
-        if !fit.gains.is_empty() {
-            lines.push("  True forces are the measured ones times".to_owned());
-            let rows: Vec<Vec<String>> = (fit.gains.iter())
-                .map(|(drive, gain)| [vec![drive.clone()], text(*gain).to_vec()].concat())
-                .collect();
-            let columns = [
-                ("drive", Align::Left),
-                ("factor", Align::Right),
-                ("+-", Align::Right),
-            ];
-            lines.extend(table(4, &columns, &rows));
-        }
-        for (file, values) in fit.runs.iter().filter(|(_, values)| !values.is_empty()) {
-            lines.push(format!("  {file}"));
-            let row = |one: &Valued| {
-                let [value, deviation] = text(one.value);
-                let against = if one.is_against_first {
-                    "against the first run"
-                } else {
-                    ""
-                };
-                [
-                    one.of.as_str(),
-                    &one.name,
-                    &value,
-                    &deviation,
-                    &one.unit,
-                    against,
-                ]
-                .map(str::to_owned)
-                .to_vec()
-            };
-            let told = values.iter().filter(|one| one.value.deviation.is_some());
-            let rows: Vec<Vec<String>> = told.map(row).collect();
-            let columns = [
-                ("of", Align::Left),
-                ("", Align::Left),
-                ("value", Align::Right),
-                ("+-", Align::Right),
-                ("unit", Align::Left),
-                ("", Align::Left),
-            ];
-            lines.extend(table(4, &columns, &rows));
-            let not_told = values.iter().filter(|one| one.value.deviation.is_none());
-            let not_told: Vec<String> = not_told
-                .map(|one| format!("{} of {}", one.name, one.of))
-                .collect();
-            if !not_told.is_empty() {
-                lines.push(format!("    not told: {}", not_told.join(", ")));
-            }
-        }
-    }
-
     fn moved(&self, first: &OneRun, run: &OneRun, k: usize) -> Vec<String> {
         let (before, now) = (first.alone[k], run.alone[k]);
         let info = &self.parameters[k];
@@ -344,4 +279,69 @@ fn change_json(between: [usize; 2], change: &Changed) -> Value {
         "indistinguishable_from": change.rivals,
         "says": change.says,
     })
+}
+
+/// Values of the fit in which some are each run's own.
+fn say_shared(fit: &SharedFit, lines: &mut Vec<String>, style: Style) {
+    lines.push(String::new());
+    let n = fit.shared.iter().flatten().count();
+    lines.push(style.bold(&format!(
+        "One fit of all runs, with {} shared",
+        count(n, "base parameter", "base parameters")
+    )));
+    let text = |value: Fitted| match value.deviation {
+        Some(deviation) => with_deviation(value.value, deviation),
+        None => ["not told".to_owned(), String::new()],
+    };
+    if !fit.gains.is_empty() {
+        lines.push("  True forces are the measured ones times".to_owned());
+        let rows: Vec<Vec<String>> = (fit.gains.iter())
+            .map(|(drive, gain)| [vec![drive.clone()], text(*gain).to_vec()].concat())
+            .collect();
+        let columns = [
+            ("drive", Align::Left),
+            ("factor", Align::Right),
+            ("+-", Align::Right),
+        ];
+        lines.extend(table(4, &columns, &rows));
+    }
+    for (file, values) in fit.runs.iter().filter(|(_, values)| !values.is_empty()) {
+        lines.push(format!("  {file}"));
+        let row = |one: &Valued| {
+            let [value, deviation] = text(one.value);
+            let against = if one.is_against_first {
+                "against the first run"
+            } else {
+                ""
+            };
+            [
+                one.of.as_str(),
+                &one.name,
+                &value,
+                &deviation,
+                &one.unit,
+                against,
+            ]
+            .map(str::to_owned)
+            .to_vec()
+        };
+        let told = values.iter().filter(|one| one.value.deviation.is_some());
+        let rows: Vec<Vec<String>> = told.map(row).collect();
+        let columns = [
+            ("of", Align::Left),
+            ("", Align::Left),
+            ("value", Align::Right),
+            ("+-", Align::Right),
+            ("unit", Align::Left),
+            ("", Align::Left),
+        ];
+        lines.extend(table(4, &columns, &rows));
+        let not_told = values.iter().filter(|one| one.value.deviation.is_none());
+        let not_told: Vec<String> = not_told
+            .map(|one| format!("{} of {}", one.name, one.of))
+            .collect();
+        if !not_told.is_empty() {
+            lines.push(format!("    not told: {}", not_told.join(", ")));
+        }
+    }
 }

@@ -91,16 +91,12 @@ pub enum What {
     },
 }
 
+/// A value with its name and unit.
+pub type Named = (&'static str, Estimate, &'static str);
+
 impl What {
     /// What scripts call it, where it is, and its values with their names and units; `unit` is that of the force or coordinate.
-    pub fn parts(
-        &self,
-        unit: &'static str,
-    ) -> (
-        &'static str,
-        Vec<&str>,
-        Vec<(&'static str, Estimate, &'static str)>,
-    ) {
+    pub fn parts(&self, unit: &'static str) -> (&'static str, Vec<&str>, Vec<Named>) {
         let (kind, at, estimates) = match self {
             Self::ContactEvent { drives, interval } => {
                 let names = drives.iter().map(|(name, _)| name.as_str()).collect();

@@ -25,7 +25,7 @@ use crate::model::Model;
 use crate::recording::Recording;
 use crate::stretch::Stretch;
 
-pub use changes::{Changed, Estimate, What};
+pub use changes::{Changed, Estimate, Named, What};
 use changes::{Possible, centre};
 use layout::Layout;
 use payload::Payloads;

@@ -480,25 +480,34 @@ fn owned(
                 origin: 0.0,
             })
             .collect(),
-        name => {
-            let mut unknown = (0..model.base.len()).filter(|k| !model.is_known(*k));
-            let Some(column) = unknown.position(|k| infos[k].name == name) else {
-                return Err(Error::options(format!(
-                    "`{name}` is neither a base parameter whose value is unknown nor a kind; kinds are {}, as in `payload@{}`, \
-                     `friction` or `gain@{}`",
-                    KINDS.join(", "),
-                    payloads.frames.last().map_or("body", String::as_str),
-                    drives.first().map_or("drive", String::as_str)
-                )));
-            };
-            let info = infos.iter().find(|info| info.name == name);
-            vec![Own {
-                of: name.to_owned(),
-                columns: vec![column],
-                names: named(&[(name, info.map_or("", |info| info.unit.as_str()))]),
-                is_against_first: false,
-                origin: 0.0,
-            }]
-        }
+        name => vec![base_parameter(model, payloads, infos, name)?],
+    })
+}
+
+/// A base parameter by its name.
+fn base_parameter(
+    model: &Model,
+    payloads: &Payloads,
+    infos: &[ParameterInfo],
+    name: &str,
+) -> Outcome<Own> {
+    let unknown: Vec<usize> = (0..model.base.len())
+        .filter(|k| !model.is_known(*k))
+        .collect();
+    let Some(column) = unknown.iter().position(|k| infos[*k].name == name) else {
+        return Err(Error::options(format!(
+            "`{name}` is neither a base parameter whose value is unknown nor a kind; kinds are {}, as in `payload@{}`, \
+             `friction` or `gain@{}`",
+            KINDS.join(", "),
+            payloads.frames.last().map_or("body", String::as_str),
+            model.drives().first().map_or("drive", String::as_str)
+        )));
+    };
+    Ok(Own {
+        of: name.to_owned(),
+        columns: vec![column],
+        names: vec![(name.to_owned(), infos[unknown[column]].unit.clone())],
+        is_against_first: false,
+        origin: 0.0,
     })
 }
