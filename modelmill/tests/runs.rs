@@ -522,5 +522,4 @@ fn what_changed_and_stayed_is_told_with_its_run() {
         "{}",
         page.len()
     );
-    assert!(!page.contains("http"), "the page needs another file");
 }
