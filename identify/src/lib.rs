@@ -43,7 +43,7 @@ mod signal;
 mod test_noise;
 mod words;
 
-pub use audit::{ForceAudit, ForceDelay, Suspect};
+pub use audit::{Delay, DelayAudit, Delays, ForceAudit, RobustFit, Suspect, robust_fit};
 pub use estimate::{
     Deviations, Direction, LeastSquares, LeastSquaresError, RANK_TOLERANCE, Solution, Triangle,
 };

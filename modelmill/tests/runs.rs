@@ -2,152 +2,15 @@
 //! with noise that has a memory: what changed is told as such, and nothing else.
 
 mod draws;
+mod made;
 
-use std::f64::consts::TAU;
-use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use modelmill::Model;
 use modelmill::recording::{Reading, Recording};
 use modelmill::runs::{Asked, Changed, Compared, Estimate, KnownLoad, PerRun, Unread, What};
-use modelmill_codegen::{Evaluator, States};
 
-use draws::Draws;
-
-const SAMPLES: usize = 2000;
-/// Time between two samples, s.
-const STEP: f64 = 0.01;
-/// Noise of each force beside its effective value, and how much of it a sample keeps of the one before.
-const NOISE: f64 = 0.01;
-const KEPT: f64 = 0.6;
-
-/// What is done to a run.
-#[derive(Clone, Copy, Debug)]
-enum Made<'a> {
-    Nothing,
-    /// A further part, as its entry in the model file.
-    Body(&'a str),
-    /// Dry and viscous friction on a drive.
-    Friction(usize, f64, f64),
-    Scale(usize, f64),
-    Offset(usize, f64),
-    /// The clock counts so many seconds in one.
-    Clock(f64),
-    /// The force of a drive lacks between two samples.
-    Lost(usize, usize, usize),
-    /// Between two samples a force pushes some drives, by so many times their effective force.
-    Push(&'a [usize], usize, usize, f64),
-    /// Friction of a drive comes on top of a further part, as for [`Made::Body`].
-    BodyAndFriction(&'a str, usize, f64, f64),
-    /// Measured forces of all drives are scaled, and there may be a further part.
-    BodyAndScales(&'a str, &'a [f64]),
-}
-
-/// A recording of a bundled model's positions and forces, along a motion of its own.
-fn run(name: &str, seed: u64, made: Made) -> PathBuf {
-    let mut text = std::fs::read_to_string(bundled(name)).expect("a model");
-    if let Made::Body(part) | Made::BodyAndFriction(part, ..) | Made::BodyAndScales(part, _) = made
-    {
-        text.push_str(part);
-    }
-    let model = Model::from_text(name, &text).expect("the model");
-    let mut draws = Draws(seed);
-    let active = model.active();
-    let mut columns = [(); 3].map(|()| vec![vec![0.0; SAMPLES]; active.len()]);
-    let coordinates = &model.derivation.mechanism.coordinates;
-    for (i, coordinate) in coordinates.iter().filter(|c| !c.passive).enumerate() {
-        columns[0][i].fill(coordinate.nominal);
-        // Loops leave less room.
-        let wide = if model.derivation.mechanism.loops.is_empty() {
-            1.0
-        } else {
-            0.3
-        };
-        let reach = wide
-            * if coordinate.motion.is_angle() {
-                0.35
-            } else {
-                0.1
-            };
-        for _ in 0..4 {
-            let rate = TAU * (0.1 + 0.9 * draws.uniform());
-            let phase = TAU * draws.uniform();
-            let amplitude = reach * (0.3 + draws.uniform()) / 2.0;
-            for k in 0..SAMPLES {
-                let (sin, cos) = (rate * STEP * k as f64 + phase).sin_cos();
-                columns[0][i][k] += amplitude * sin;
-                columns[1][i][k] += amplitude * rate * cos;
-                columns[2][i][k] -= amplitude * rate * rate * sin;
-            }
-        }
-    }
-    let [q, qd, qdd] = columns
-        .each_ref()
-        .map(|all| all.iter().map(Vec::as_slice).collect());
-    let states = States {
-        q,
-        qd,
-        qdd,
-        load: Vec::new(),
-    };
-    let evaluator = Evaluator::new(&model.derivation);
-    let mut forces = evaluator
-        .inverse_dynamics(&states, &model.nominal)
-        .expect("forces");
-    let motion = evaluator.drives(&states).expect("drives");
-    let drives = model.drives();
-    let mut clock = 1.0;
-    for (d, force) in forces.iter_mut().enumerate() {
-        let rate = &motion[drives.len() + d];
-        for (f, rate) in force.iter_mut().zip(rate) {
-            match made {
-                Made::Friction(drive, dry, viscous)
-                | Made::BodyAndFriction(_, drive, dry, viscous)
-                    if drive == d =>
-                {
-                    *f += dry * rate.signum() + viscous * rate;
-                }
-                Made::Scale(drive, factor) if drive == d => *f *= factor,
-                Made::BodyAndScales(_, factors) => *f *= factors[d],
-                Made::Offset(drive, offset) if drive == d => *f += offset,
-                Made::Clock(factor) => clock = factor,
-                _ => {}
-            }
-        }
-        let size = (force.iter().map(|f| f * f).sum::<f64>() / SAMPLES as f64).sqrt();
-        if let Made::Push(drives, from, to, by) = made
-            && drives.contains(&d)
-        {
-            for (k, f) in force[from..to].iter_mut().enumerate() {
-                *f += by * size * (0.5 * TAU * k as f64 / (to - from) as f64).sin();
-            }
-        }
-        let mut noise = 0.0;
-        for f in force {
-            noise = KEPT * noise + (1.0 - KEPT * KEPT).sqrt() * draws.normal();
-            *f += NOISE * size * noise;
-        }
-    }
-    let mut text = format!("t,{},{}", active.join(","), drives.join(","));
-    for k in 0..SAMPLES {
-        let _ = write!(text, "\n{}", clock * STEP * k as f64);
-        for column in &columns[0] {
-            let _ = write!(text, ",{}", column[k]);
-        }
-        for (d, force) in forces.iter().enumerate() {
-            let is_lost = matches!(made, Made::Lost(drive, from, to) if drive == d && (from..to).contains(&k));
-            let _ = write!(text, ",{}", if is_lost { f64::NAN } else { force[k] });
-        }
-    }
-    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("runs-{name}-{seed}.csv"));
-    std::fs::write(&file, text + "\n").expect("a recording");
-    file
-}
-
-fn bundled(name: &str) -> PathBuf {
-    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/models");
-    models.join(format!("{name}.toml"))
-}
+use made::{Made, STEP, bundled, run};
 
 /// What is told of a run against one to which nothing was done.
 fn told(name: &str, seed: u64, made: Made) -> Vec<Changed> {
@@ -354,7 +217,7 @@ const TOOL: &str = "\n[[part]]\nname = \"tool\"\non = \"link6\"\nmass = 2.8\ncen
 /// A push is an interval of time on some drives, and no load.
 #[test]
 fn a_push_is_told_with_its_times() {
-    let found = told("puma560", 1200, Made::Push(&[1, 2], 900, 1000, 0.8));
+    let found = told("puma560", 1200, Made::Bump(&[1, 2], 900, 1000, 0.8));
     let [
         Changed {
             what:

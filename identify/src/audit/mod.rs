@@ -3,7 +3,11 @@
 
 mod clock;
 mod columns;
-mod delay_and_exchange;
+mod delay;
+mod exchange;
+mod robust;
 mod signals;
 
-pub use delay_and_exchange::{ForceAudit, ForceDelay, Suspect};
+pub use delay::{Delay, DelayAudit, Delays};
+pub use exchange::{ForceAudit, Suspect};
+pub use robust::{RobustFit, robust_fit};
