@@ -2,6 +2,7 @@
 //! with noise that has a memory: what changed is told as such, and nothing else.
 
 mod draws;
+#[allow(dead_code, reason = "other tests do more to runs")]
 mod made;
 
 use std::path::PathBuf;
@@ -10,7 +11,7 @@ use modelmill::Model;
 use modelmill::recording::{Reading, Recording};
 use modelmill::runs::{Asked, Changed, Compared, Estimate, KnownLoad, PerRun, Unread, What};
 
-use made::{Made, STEP, bundled, run};
+use made::{Made, bundled, run};
 
 /// What is told of a run against one to which nothing was done.
 fn told(name: &str, seed: u64, made: Made) -> Vec<Changed> {

@@ -189,6 +189,8 @@ impl Search<'_> {
     fn runs(&self, cutoff: f64) -> Option<Vec<Run>> {
         let mut preparation = self.reading.preparation.clone();
         preparation.cutoff_hz = Some(cutoff);
+        // What the band is was found already, and costs spectra of all positions.
+        preparation.band_hz = Some(self.open.band_hz);
         let mut runs = free::runs(self.model, self.raw, &preparation).ok()?;
         let delay = self.model.derivation.mechanism.force_delay;
         if delay != 0.0 {

@@ -17,7 +17,7 @@ const NOISE: f64 = 0.01;
 const KEPT: f64 = 0.6;
 
 /// What is done to a run.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) enum Made<'a> {
     Nothing,
     /// A further part, as its entry in the model file.
@@ -34,20 +34,31 @@ pub(crate) enum Made<'a> {
     BodyAndFriction(&'a str, usize, f64, f64),
     /// Measured forces of all drives are scaled, and there may be a further part.
     BodyAndScales(&'a str, &'a [f64]),
-    /// The weight of a further part, as its entry in the model file, between two samples: a push.
-    Push(&'a str, usize, usize),
+    /// So many times what a model weighs more, between two samples: a push.
+    Push(&'a Model, f64, usize, usize),
     /// The force of a drive lacks between two samples.
     Lost(usize, usize, usize),
 }
 
 /// A recording of a bundled model's positions and forces, along a motion of its own.
 pub(crate) fn run(name: &str, seed: u64, made: Made) -> PathBuf {
-    let mut text = std::fs::read_to_string(bundled(name)).expect("a model");
-    if let Made::Body(part) | Made::BodyAndFriction(part, ..) | Made::BodyAndScales(part, _) = made
-    {
-        text.push_str(part);
-    }
-    let model = Model::from_text(name, &text).expect("the model");
+    let model = match made {
+        Made::Body(part) | Made::BodyAndFriction(part, ..) | Made::BodyAndScales(part, _) => {
+            with_part(name, part)
+        }
+        _ => Model::open(bundled(name)).expect("the model"),
+    };
+    run_of(&model, name, seed, made)
+}
+
+/// A bundled model with a further part, given as its entry in the model file.
+pub(crate) fn with_part(name: &str, part: &str) -> Model {
+    let text = std::fs::read_to_string(bundled(name)).expect("a model");
+    Model::from_text(name, &format!("{text}{part}")).expect("the model")
+}
+
+/// A recording of a model that is derived already.
+pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBuf {
     let mut draws = Draws(seed);
     let active = model.active();
     let mut columns = [(); 3].map(|()| vec![vec![0.0; SAMPLES]; active.len()]);
@@ -97,17 +108,16 @@ pub(crate) fn run(name: &str, seed: u64, made: Made) -> PathBuf {
     let mut forces = evaluator
         .inverse_dynamics(&states, &model.nominal)
         .expect("forces");
-    if let Made::Push(part, from, to) = made {
-        let pushed = Model::from_text(name, &format!("{text}{part}")).expect("the model");
+    if let Made::Push(pushed, times, from, to) = made {
         let weight = |model: &Model| {
             let evaluator = Evaluator::new(&model.derivation);
             let forces = evaluator.inverse_dynamics(&at_rest, &model.nominal);
             forces.expect("forces")
         };
-        let [with, without] = [weight(&pushed), weight(&model)];
+        let [with, without] = [weight(pushed), weight(model)];
         for (d, force) in forces.iter_mut().enumerate() {
             for k in from..to {
-                force[k] += with[d][k] - without[d][k];
+                force[k] += times * (with[d][k] - without[d][k]);
             }
         }
     }
