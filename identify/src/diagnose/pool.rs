@@ -1,6 +1,7 @@
 //! Inner products of columns, channel by channel and apart for fit and check, so that any set of columns is fitted in
 //! microseconds.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
@@ -13,6 +14,8 @@ pub(crate) struct Pool {
     columns: Vec<Column>,
     fit: Range<usize>,
     check: Range<usize>,
+    /// Samples without a say, channel by channel; empty if all have one.
+    left_out: Vec<Vec<bool>>,
     /// `products[part][channel][i][j]` for `j <= i`; part 0 is the fit, part 1 the check.
     products: [Vec<Vec<Vec<f64>>>; 2],
 }
@@ -25,6 +28,7 @@ impl Pool {
             columns: Vec::new(),
             fit: 0..fit,
             check: fit..layout.samples(),
+            left_out: layout.left_out.clone(),
             products: [vec![Vec::new(); channels], vec![Vec::new(); channels]],
         }
     }
@@ -38,12 +42,15 @@ impl Pool {
             for (d, rows) in channels.iter_mut().enumerate() {
                 let row = match &self.columns[new].0[d] {
                     None => Vec::new(),
-                    Some(own) => (self.columns.iter())
-                        .map(|other| match &other.0[d] {
-                            Some(other) => dot(&own[range.clone()], &other[range.clone()]),
-                            None => 0.0,
-                        })
-                        .collect(),
+                    Some(own) => {
+                        let own = counted(own, self.left_out.get(d));
+                        (self.columns.iter())
+                            .map(|other| match &other.0[d] {
+                                Some(other) => dot(&own[range.clone()], &other[range.clone()]),
+                                None => 0.0,
+                            })
+                            .collect()
+                    }
                 };
                 rows.push(row);
             }
@@ -94,7 +101,28 @@ impl Pool {
                 }
             }
         }
+        for (rest, out) in rest.iter_mut().zip(&self.left_out) {
+            silence(rest, out);
+        }
         rest
+    }
+}
+
+/// Values with zeros where they have no say.
+fn counted<'a>(values: &'a [f64], out: Option<&Vec<bool>>) -> Cow<'a, [f64]> {
+    match out {
+        Some(out) if out.contains(&true) => {
+            let mut values = values.to_vec();
+            silence(&mut values, out);
+            Cow::Owned(values)
+        }
+        _ => Cow::Borrowed(values),
+    }
+}
+
+fn silence(values: &mut [f64], out: &[bool]) {
+    for (value, _) in values.iter_mut().zip(out).filter(|(_, out)| **out) {
+        *value = 0.0;
     }
 }
 
@@ -199,6 +227,7 @@ mod tests {
                 sampled: 0.1,
                 is_check: false,
             }],
+            left_out: Vec::new(),
         };
         let wave = |k: f64| -> Vec<f64> { (0..50).map(|i| (k * f64::from(i)).sin()).collect() };
         let mut pool = Pool::new(&layout);
@@ -228,5 +257,35 @@ mod tests {
         let residual = pool.rest(y, &[one, two], &[factors[0], factors[1]]);
         let weighed = dot(&residual[0], &residual[0]) + 4.0 * dot(&residual[1], &residual[1]);
         assert!((weighed - rest).abs() < 1e-9 * rest);
+    }
+    /// What stands in the place of a force that was not measured moves nothing.
+    #[test]
+    fn forces_that_lack_have_no_say() {
+        let wave = |k: f64| -> Vec<f64> { (0..50).map(|i| (k * f64::from(i)).sin()).collect() };
+        let mut layout = Layout {
+            channels: vec!["a".into()],
+            stretches: vec![Stretch {
+                name: String::new(),
+                samples: 50,
+                step: 0.1,
+                sampled: 0.1,
+                is_check: false,
+            }],
+            left_out: Vec::new(),
+        };
+        let found = |layout: &Layout| {
+            let mut pool = Pool::new(layout);
+            let one = pool.add(Column(vec![Some(wave(0.3))]));
+            let mut forces: Vec<f64> = wave(0.3).iter().map(|x| 2.0 * x).collect();
+            forces[17] = 100.0;
+            let y = pool.add(Column(vec![Some(forces)]));
+            let (factors, squares) = solve(&pool.gram(&[one, y], &[1.0], On::All));
+            let rest = pool.rest(y, &[one], &[factors[0]]);
+            (factors[0], squares, rest[0][17])
+        };
+        assert!((found(&layout).0 - 2.0).abs() > 0.1);
+        layout.left_out = vec![(0..50).map(|i| i == 17).collect()];
+        let (factor, squares, rest) = found(&layout);
+        assert!((factor - 2.0).abs() < 1e-12 && squares < 1e-12 && rest.abs() < 1e-12);
     }
 }

@@ -91,6 +91,20 @@ impl Stretch {
         (0..n).map(piece).collect()
     }
 
+    /// Whether a kept sample has heard, through the filter before it, of a force of a drive that does not count.
+    pub(crate) fn hears_of_faults(&self, drive: usize, kept: usize) -> bool {
+        let every = self.decimation();
+        self.run.left_out.get(drive).is_some_and(|out| {
+            let to = if every == 1 {
+                kept + 1
+            } else {
+                every * (kept + 1) + 1
+            };
+            let around = (every * kept).saturating_sub(every - 1)..to.min(out.len());
+            out[around].contains(&true)
+        })
+    }
+
     /// Times of the samples that are kept.
     pub fn time(&self) -> Vec<f64> {
         decimate_time(&self.run.time, self.decimation())
