@@ -351,24 +351,13 @@ fn less_than_a_sample_is_told() {
         println!("Small delays are not tested: there is no ../shared/data beside the workspace.");
         return;
     }
-    for name in ["model-friction.toml", "spidermill.toml"] {
-        let from = if name == "spidermill.toml" {
-            model(name).into()
-        } else {
-            harsh.join(name)
-        };
-        std::fs::copy(from, scratch(name)).expect("writable");
-    }
+    let [with_friction, base] = ["model-friction.toml", "spidermill.toml"].map(scratch);
+    std::fs::copy(harsh.join("model-friction.toml"), &with_friction).expect("writable");
+    std::fs::copy(spidermill(), base).expect("writable");
     let notes = |case: &str| -> String {
         let path = harsh.join(case).join("check.csv");
         let path = path.to_str().expect("plain text");
-        let found = json(&[
-            "identify",
-            &scratch("model-friction.toml"),
-            "--data",
-            path,
-            "--json",
-        ]);
+        let found = json(&["identify", &with_friction, "--data", path, "--json"]);
         let notes = found["data"].as_array().expect("notes").iter();
         notes
             .map(|note| note["says"].as_str().unwrap_or_default())
