@@ -277,7 +277,9 @@ fn read_header(stream: &mut impl BufRead) -> Result<(String, Vec<u8>), Fault> {
         line if line.trim_ascii().contains(&b'\r') => {
             Some("text with lone carriage returns as line ends")
         }
-        _ if bytes.len() as u64 == LONGEST_HEADER => Some("a file without lines"),
+        _ if bytes.len() as u64 == LONGEST_HEADER => {
+            Some("a file whose first line is longer than 1 MB")
+        }
         _ => None,
     };
     if let Some(looks_like) = looks_like {
