@@ -286,9 +286,8 @@ fn late(table: &mut Table, column: usize, samples: f64) {
     let before: Vec<f64> = table.rows.iter().map(|row| row[column]).collect();
     for (k, row) in table.rows.iter_mut().enumerate() {
         let at = (k as f64 - samples).max(0.0);
-        let first = (at.floor() as usize)
-            .saturating_sub(1)
-            .min(before.len() - 4);
+        let below = (0..before.len()).take_while(|i| *i as f64 <= at).count();
+        let first = below.saturating_sub(2).min(before.len() - 4);
         let x = at - first as f64;
         row[column] = (0..4)
             .map(|i| {

@@ -118,7 +118,7 @@ pub(crate) fn events(model: &Model, data: &Stretch) -> Option<Vec<Event>> {
     if samples.len() < 40 * MOST_TOGETHER {
         return None;
     }
-    let rest = Rest::of(model, data, forces, &samples)?;
+    let rest = Unexplained::of(model, data, forces, &samples)?;
     let levels: Vec<Level> = (0..forces.len()).map(|d| rest.level(d, together)).collect();
     let flagged: Vec<bool> = (0..samples.len())
         .map(|i| levels.iter().any(|level| level.values[i] > level.bound))
@@ -169,7 +169,7 @@ pub(crate) fn events(model: &Model, data: &Stretch) -> Option<Vec<Event>> {
 }
 
 /// What no parameters explain of the forces.
-struct Rest {
+struct Unexplained {
     drives: usize,
     rest: DVector<f64>,
     measured: DVector<f64>,
@@ -185,7 +185,7 @@ struct Level {
     bound: f64,
 }
 
-impl Rest {
+impl Unexplained {
     fn of(model: &Model, data: &Stretch, forces: &[Vec<f64>], samples: &[usize]) -> Option<Self> {
         let drives = forces.len();
         let rows = Rows::new(model, data, samples)?;
