@@ -59,6 +59,9 @@ pub fn robust_fit(
                 weights[i] = within / (scale * scale);
             }
         }
+        if weights.iter().all(|weight| *weight == 0.0) {
+            return None;
+        }
         let mut weighted = regressor.clone();
         for mut column in weighted.column_iter_mut() {
             column.component_mul_assign(&weights);
