@@ -117,13 +117,6 @@ impl Laid {
 fn counts(stretch: &Stretch, forces: &[Vec<f64>]) -> Vec<Vec<bool>> {
     let every = stretch.decimation();
     let n = forces.len();
-    let hears_of_faults = |drive: usize, i: usize| {
-        let Some(out) = stretch.run.left_out.get(drive) else {
-            return false;
-        };
-        let around = (every * i).saturating_sub(every)..(every * (i + 1) + 1).min(out.len());
-        out[around].contains(&true)
-    };
     let weighs = |drive: usize, i: usize| {
         let weights = stretch.weights.as_ref();
         weights.is_none_or(|weights| weights[i * n + drive] > 0.0)
@@ -131,7 +124,7 @@ fn counts(stretch: &Stretch, forces: &[Vec<f64>]) -> Vec<Vec<bool>> {
     let of_drive = |(drive, force): (usize, &Vec<f64>)| {
         let samples = 0..force.len();
         samples
-            .map(|i| weighs(drive, i) && !hears_of_faults(drive, i))
+            .map(|i| weighs(drive, i) && !stretch.hears_of_faults(drive, i))
             .collect()
     };
     forces.iter().enumerate().map(of_drive).collect()
