@@ -115,7 +115,6 @@ impl Laid {
 
 /// Which forces count, `[drive][sample]`. A kept sample has heard of all that its filter saw.
 fn counts(stretch: &Stretch, forces: &[Vec<f64>]) -> Vec<Vec<bool>> {
-    let every = stretch.decimation();
     let n = forces.len();
     let weighs = |drive: usize, i: usize| {
         let weights = stretch.weights.as_ref();
