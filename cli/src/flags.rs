@@ -113,10 +113,11 @@ impl Spelling for Flags {
 }
 
 /// Fields of the library's options whose flags are called otherwise.
-const FLAGS: [(&str, &str); 4] = [
+const FLAGS: [(&str, &str); 5] = [
     ("band_hz", "band"),
     ("columns", "map"),
     ("cutoff_hz", "cutoff"),
+    ("loads", "load"),
     ("source", "derivatives"),
 ];
 

@@ -107,6 +107,10 @@ pub(crate) fn replace(path: &Path, text: &str) -> Outcome {
 fn not_written(error: &FileError) -> Failure {
     let path = error.path.display();
     Failure::Input(match &error.fault {
+        // Some systems have folders in which no file can be made.
+        FileFault::Missing if error.path.parent().is_some_and(Path::is_dir) => format!(
+            "{path} cannot be written: its folder takes no such file; choose another folder"
+        ),
         FileFault::Missing => format!(
             "{path} cannot be written: there is no such folder; check that the folder exists and may be written to"
         ),

@@ -2,7 +2,7 @@
 
 use modelmill_spec::{
     CoordinateIdx, DriveKind, Exact, FrameIdx, Inertial, Kinematics, LumpedMass, Mechanism, Part,
-    PointIdx, Pose, Poses, Symbol,
+    PointIdx, Pose, Poses, Step, Symbol,
 };
 use nalgebra::Vector3;
 
@@ -196,6 +196,13 @@ impl Builder<'_> {
         let pose = self.pose(frame).clone();
         let mut body = self.bodies[own.parent.0];
         let mut from = Vector3::from(self.pose(own.parent.0).origin);
+        if own.steps.iter().any(|step| matches!(step, Step::Free(_))) {
+            // Nothing holds it, so no bar leads there.
+            body = self.n_bodies;
+            self.n_bodies += 1;
+            from = Vector3::from(pose.origin);
+            self.anchors.push(vec![from]);
+        }
         let mut next = 0;
         let mut way = pose.way.iter().peekable();
         loop {
@@ -246,7 +253,9 @@ impl Builder<'_> {
         let drives = &self.mechanism.drives;
         let driven_by = |c: usize| {
             let kind = DriveKind::Joint(CoordinateIdx(c));
-            drives.iter().find(|drive| drive.kind == kind)
+            drives
+                .iter()
+                .find(|drive| drive.is_driven && drive.kind == kind)
         };
         let drive = together
             .iter()
@@ -302,6 +311,7 @@ impl Builder<'_> {
                 || mechanism
                     .drives
                     .iter()
+                    .chain(&mechanism.shared_drives)
                     .any(|d| ends(d.kind).contains(&PointIdx(point)))
         };
         for (i, point) in mechanism.points.iter().enumerate() {
@@ -345,7 +355,8 @@ impl Builder<'_> {
 
     /// Drives between points.
     fn drives(&mut self) {
-        for drive in &self.mechanism.drives {
+        let mechanism = self.mechanism;
+        for drive in mechanism.drives.iter().chain(&mechanism.shared_drives) {
             let ends = ends(drive.kind);
             let [from, to] = ends[..] else { continue };
             let shape = Shape::Drive([self.point(from), self.point(to)]);

@@ -43,7 +43,9 @@ mod signal;
 mod test_noise;
 mod words;
 
-pub use audit::{ForceAudit, ForceDelay, PositionFault, Suspect};
+pub use audit::{
+    Delay, DelayAudit, Delays, ForceAudit, PositionFault, RobustFit, Suspect, robust_fit,
+};
 pub use estimate::{
     Deviations, Direction, LeastSquares, LeastSquaresError, RANK_TOLERANCE, Solution, Triangle,
 };
@@ -59,6 +61,7 @@ pub use motion::{
 };
 pub use recording::{
     ColumnInfo, Computed, Fault, NotFinite, Note, ReadOptions, Recording, RecordingError,
-    RecordingFile, RecordingFiles, Severity, TableInfo, name_of_bytes, place_word,
+    RecordingFile, RecordingFiles, Severity, TableInfo, has_ending_of_a_recording, name_of_bytes,
+    place_word,
 };
 pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER};

@@ -41,6 +41,7 @@ impl Mechanism {
                             coordinates: length.coordinates.clone(),
                         },
                     ),
+                    Step::Free(body) => Step::Free(*body),
                 };
             }
         }

@@ -11,6 +11,7 @@ use num_traits::ToPrimitive;
 use crate::diagnostic::{Log, Span};
 use crate::exact::Function;
 use crate::formula::{Ast, AstKind};
+use crate::joint_motion::Motion;
 use crate::kinds::Carries;
 use crate::mechanism::Mechanism;
 use crate::parser::parse;
@@ -25,6 +26,8 @@ pub enum Quantity {
     Angle(u8),
     /// A length or its first or second derivative, m, m/s, m/s^2.
     Length(u8),
+    /// A number without a unit.
+    Number,
     /// A force, N.
     Force,
     /// A torque, N m.
@@ -86,6 +89,7 @@ const TURN: f64 = std::f64::consts::TAU;
 fn units(quantity: Quantity) -> &'static [(&'static str, f64)] {
     match quantity {
         Quantity::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("min", 60.0)],
+        Quantity::Number => &[("1", 1.0)],
         Quantity::Angle(0) => &[("rad", 1.0), ("deg", DEGREE), ("mrad", 1e-3), ("rev", TURN)],
         Quantity::Angle(1) => &[
             ("rad/s", 1.0),
@@ -127,15 +131,18 @@ impl Mechanism {
         let mut columns = vec![("t".to_owned(), Quantity::Time)];
         for coordinate in self.coordinates.iter().filter(|c| !c.passive) {
             for (order, suffix) in (0..).zip(["", "_d", "_dd"]) {
-                let quantity = if coordinate.motion.is_angle() {
-                    Quantity::Angle(order)
-                } else {
-                    Quantity::Length(order)
+                let quantity = match coordinate.motion {
+                    Motion::Revolute => Quantity::Angle(order),
+                    Motion::Prismatic => Quantity::Length(order),
+                    // Rates of the vector part are angular velocities; the scalar part has none.
+                    Motion::Quaternion if order > 0 => Quantity::Angle(order),
+                    Motion::QuaternionScalar if order > 0 => continue,
+                    Motion::Quaternion | Motion::QuaternionScalar => Quantity::Number,
                 };
                 columns.push((format!("{}{suffix}", coordinate.name), quantity));
             }
         }
-        for drive in &self.drives {
+        for drive in self.drives.iter().chain(&self.shared_drives) {
             let (force, variance) = match drive.kind.carries(&self.coordinates) {
                 Carries::Torque => (Quantity::Torque, Quantity::TorqueVariance),
                 _ => (Quantity::Force, Quantity::ForceVariance),

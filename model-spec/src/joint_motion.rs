@@ -11,6 +11,11 @@ pub enum Motion {
     Revolute,
     /// Length in m.
     Prismatic,
+    /// Component of the vector part of a free body's unit quaternion. Its rate is the body's angular velocity about the same
+    /// axis, in rad/s, and not the component's own derivative.
+    Quaternion,
+    /// The scalar part, which has no rate of its own.
+    QuaternionScalar,
 }
 
 impl Motion {
@@ -18,8 +23,23 @@ impl Motion {
     pub fn is_angle(self) -> bool {
         match self {
             Self::Revolute => true,
-            Self::Prismatic => false,
+            Self::Prismatic | Self::Quaternion | Self::QuaternionScalar => false,
         }
+    }
+
+    /// Whether the coordinate is a length in m.
+    pub fn is_length(self) -> bool {
+        self == Self::Prismatic
+    }
+
+    /// Whether it is a component of a quaternion.
+    pub fn is_quaternion(self) -> bool {
+        matches!(self, Self::Quaternion | Self::QuaternionScalar)
+    }
+
+    /// Whether a rate belongs to the coordinate; else its place among the rates and accelerations is not read.
+    pub fn has_rate(self) -> bool {
+        self != Self::QuaternionScalar
     }
 
     /// The field's word for the joint.
@@ -27,29 +47,35 @@ impl Motion {
         match self {
             Self::Revolute => "revolute",
             Self::Prismatic => "prismatic",
+            Self::Quaternion => "quaternion, vector part",
+            Self::QuaternionScalar => "quaternion, scalar part",
         }
     }
 
     /// The unit of the coordinate.
     pub fn unit(self) -> &'static str {
-        if self.is_angle() { "rad" } else { "m" }
+        match self {
+            Self::Revolute => "rad",
+            Self::Prismatic => "m",
+            Self::Quaternion | Self::QuaternionScalar => "1",
+        }
     }
 
     /// What acts on the coordinate.
     pub fn carries(self) -> Carries {
-        if self.is_angle() {
-            Carries::Torque
-        } else {
+        if self.is_length() {
             Carries::Force
+        } else {
+            Carries::Torque
         }
     }
 
     /// The dimension of the coordinate.
     pub(crate) fn dimension(self) -> Dimension {
-        if self.is_angle() {
-            Dimension::ONE
-        } else {
+        if self.is_length() {
             Dimension::LENGTH
+        } else {
+            Dimension::ONE
         }
     }
 }

@@ -70,6 +70,12 @@ pub(crate) fn frame_poses(mechanism: &Mechanism) -> Vec<FramePose> {
                         origin[k] += distance * direction[k];
                     }
                 }
+                // What loops and drives reach does not move with the body as a whole, so no derivative is asked for.
+                Step::Free(body) => {
+                    let of = |i: CoordinateIdx| mechanism.coordinates[i.0].nominal;
+                    origin = body.position.map(of);
+                    rotation = turned_by(body.quaternion.map(of));
+                }
             }
         }
         poses.push(FramePose {
@@ -79,6 +85,28 @@ pub(crate) fn frame_poses(mechanism: &Mechanism) -> Vec<FramePose> {
         });
     }
     poses
+}
+
+/// The rotation of a quaternion w, x, y, z of any length, by rows.
+pub(crate) fn turned_by([w, x, y, z]: [f64; 4]) -> [Vec3; 3] {
+    let per = 2.0 / (w * w + x * x + y * y + z * z);
+    [
+        [
+            1.0 - per * (y * y + z * z),
+            per * (x * y - w * z),
+            per * (x * z + w * y),
+        ],
+        [
+            per * (x * y + w * z),
+            1.0 - per * (x * x + z * z),
+            per * (y * z - w * x),
+        ],
+        [
+            per * (x * z - w * y),
+            per * (y * z + w * x),
+            1.0 - per * (x * x + y * y),
+        ],
+    ]
 }
 
 fn column(rotation: &[Vec3; 3], axis: Axis) -> Vec3 {

@@ -46,8 +46,11 @@ pub struct Mechanism {
     pub lumped_masses: Vec<LumpedMass>,
     /// Loops closed by coincident points.
     pub loops: Vec<Loop>,
-    /// Drives, one per degree of freedom.
+    /// Drives, one per degree of freedom; what nothing drives has its row here too.
     pub drives: Vec<Drive>,
+    /// Drives of a mechanism that has more of them than degrees of freedom, such as cables; then none of [`Self::drives`] is
+    /// driven, and these act on all of them by their transposed Jacobian, `J' f`.
+    pub shared_drives: Vec<Drive>,
     /// Friction, drive inertia and the like.
     pub effects: Vec<Effect>,
     /// How much later than they act the forces of recordings are read, s; zero unless an effect says otherwise.
@@ -124,6 +127,34 @@ pub enum Step {
     Rotate(Axis, Angle),
     /// Translation along an axis.
     Translate(Axis, Length),
+    /// Any motion at all; the only step of a frame that hangs on the base.
+    Free(FreeBody),
+}
+
+/// How a body moves that hangs on nothing: by its position, a unit quaternion, and its twist.
+///
+/// The rates of `position` are the velocity of the frame's origin, those of the quaternion's vector part the angular velocity,
+/// and accelerations are the time derivatives of these components; forces on the coordinates are the components of the
+/// wrench about the frame's origin in the same axes. So they are dual to each other, whichever axes are chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FreeBody {
+    /// Of the origin in the base frame, m.
+    pub position: [CoordinateIdx; 3],
+    /// w, x, y, z: it turns components in the body's axes into those in the base's. Its length does not matter.
+    pub quaternion: [CoordinateIdx; 4],
+    /// In which axes velocity and force are given.
+    pub linear: TwistAxes,
+    /// In which axes angular velocity and moment are given.
+    pub angular: TwistAxes,
+}
+
+/// Axes of the components of a twist or wrench.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TwistAxes {
+    /// Those of the body.
+    Body,
+    /// Those of the base frame.
+    World,
 }
 
 /// A frame in the tree.
@@ -228,6 +259,9 @@ pub struct Drive {
     pub name: String,
     /// How it acts.
     pub kind: DriveKind,
+    /// False where nothing drives the coordinate: the row of the equation of motion is there all the same, and its force is
+    /// zero unless a recording has one under this name.
+    pub is_driven: bool,
 }
 
 /// How a drive acts.

@@ -1,17 +1,24 @@
 //! Where points are at given coordinates, and how loops move with them: a mechanism goes in once, and is asked many
 //! times, as limits of planned motion need it.
 
-use crate::exact::Symbol;
-use crate::kinematics::Vec3;
-use crate::mechanism::{Axis, Mechanism, PointIdx, Step};
+use crate::exact::{CoordinateIdx, Symbol};
+use crate::kinematics::{Vec3, turned_by};
+use crate::mechanism::{Axis, DriveKind, FreeBody, Mechanism, PointIdx, Step};
 
 /// The geometry of a mechanism with the file's constants.
 #[derive(Clone, Debug)]
 pub struct Kinematics {
     n: usize,
-    frames: Vec<(usize, Vec<Move>)>,
+    frames: Vec<(usize, Vec<Motion>)>,
     points: Vec<(usize, Vec3)>,
     loops: Vec<[usize; 2]>,
+}
+
+/// One step on the way to a frame.
+#[derive(Clone, Debug)]
+enum Motion {
+    One(Move),
+    Free(FreeBody),
 }
 
 /// One elementary motion: `offset + sum of factor * coordinate` about or along an axis.
@@ -77,7 +84,8 @@ impl Kinematics {
             Axis::Z => 2,
         };
         let moves = |step: &Step| match step {
-            Step::Rotate(about, angle) => Move {
+            Step::Free(body) => Motion::Free(*body),
+            Step::Rotate(about, angle) => Motion::One(Move {
                 axis: axis(about),
                 is_rotation: true,
                 offset: angle.evaluate(&value),
@@ -89,8 +97,8 @@ impl Kinematics {
                         _ => None,
                     })
                     .collect(),
-            },
-            Step::Translate(along, length) => Move {
+            }),
+            Step::Translate(along, length) => Motion::One(Move {
                 axis: axis(along),
                 is_rotation: false,
                 offset: length.evaluate(&value),
@@ -99,7 +107,7 @@ impl Kinematics {
                     .iter()
                     .map(|(i, factor)| (i.0, crate::print::to_f64(factor)))
                     .collect(),
-            },
+            }),
         };
         Self {
             n: mechanism.coordinates.len(),
@@ -139,6 +147,15 @@ impl Kinematics {
                 way: Vec::new(),
             };
             for step in moves {
+                let step = match step {
+                    Motion::One(step) => step,
+                    Motion::Free(body) => {
+                        let of = |i: CoordinateIdx| coordinates[i.0];
+                        pose.origin = body.position.map(of);
+                        pose.rotation = turned_by(body.quaternion.map(of));
+                        continue;
+                    }
+                };
                 let direction: Vec3 = std::array::from_fn(|k| pose.rotation[k][step.axis]);
                 let mut amount = step.offset;
                 for (coordinate, factor) in &step.coordinates {
@@ -195,30 +212,57 @@ impl Kinematics {
         let mut rows = vec![vec![0.0; self.n]; 3 * self.loops.len()];
         for (l, ends) in self.loops.iter().enumerate() {
             for (point, sign) in ends.iter().zip([1.0, -1.0]) {
-                let at = self.position(poses, *point);
-                let mut frame = self.points[*point].0;
-                while frame != 0 {
-                    for moved in &poses.frames[frame].moved {
-                        let axis = moved.axis;
-                        let velocity = if moved.is_rotation {
-                            let arm: Vec3 = std::array::from_fn(|k| at[k] - moved.origin[k]);
-                            [
-                                axis[1] * arm[2] - axis[2] * arm[1],
-                                axis[2] * arm[0] - axis[0] * arm[2],
-                                axis[0] * arm[1] - axis[1] * arm[0],
-                            ]
-                        } else {
-                            axis
-                        };
-                        for k in 0..3 {
-                            rows[3 * l + k][moved.coordinate] += sign * moved.factor * velocity[k];
-                        }
+                self.moves(poses, *point, &mut |coordinate, velocity| {
+                    for k in 0..3 {
+                        rows[3 * l + k][coordinate] += sign * velocity[k];
                     }
-                    frame = self.frames[frame].0;
-                }
+                });
             }
         }
         rows
+    }
+
+    /// Shows each coordinate that moves a point, with the point's velocity for a rate of one, joint by joint.
+    fn moves(&self, poses: &Poses, point: usize, show: &mut dyn FnMut(usize, Vec3)) {
+        let at = self.position(poses, point);
+        let mut frame = self.points[point].0;
+        while frame != 0 {
+            for moved in &poses.frames[frame].moved {
+                let axis = moved.axis;
+                let velocity = if moved.is_rotation {
+                    let arm: Vec3 = std::array::from_fn(|k| at[k] - moved.origin[k]);
+                    [
+                        axis[1] * arm[2] - axis[2] * arm[1],
+                        axis[2] * arm[0] - axis[0] * arm[2],
+                        axis[0] * arm[1] - axis[1] * arm[0],
+                    ]
+                } else {
+                    axis
+                };
+                show(moved.coordinate, velocity.map(|x| moved.factor * x));
+            }
+            frame = self.frames[frame].0;
+        }
+    }
+
+    /// Derivative of a drive's angle or length by all coordinates: a row of J. No loop may tie the coordinates.
+    pub fn drive_slopes(&self, poses: &Poses, kind: DriveKind) -> Vec<f64> {
+        let mut row = vec![0.0; self.n];
+        match kind {
+            DriveKind::Joint(i) => row[i.0] = 1.0,
+            DriveKind::Linear { from, to } => {
+                let ends = [from, to].map(|point| self.position(poses, point.0));
+                let along: Vec3 = std::array::from_fn(|k| ends[1][k] - ends[0][k]);
+                let length = along.iter().map(|x| x * x).sum::<f64>().sqrt();
+                for (point, sign) in [(from, -1.0), (to, 1.0)] {
+                    self.moves(poses, point.0, &mut |coordinate, velocity| {
+                        let slope: f64 = along.iter().zip(velocity).map(|(a, v)| a * v).sum();
+                        row[coordinate] += sign * slope / length;
+                    });
+                }
+            }
+        }
+        row
     }
 }
 

@@ -100,6 +100,8 @@ fn check_finite(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
         let finite = frame.steps.iter().all(|step| match step {
             Step::Rotate(_, angle) => angle.evaluate(&value).is_finite(),
             Step::Translate(_, length) => length.evaluate(&value).abs() < 1e100,
+            // Checked where its coordinates are read.
+            Step::Free(_) => true,
         });
         if !finite {
             report(
@@ -439,6 +441,11 @@ fn check_drives(mechanism: &Mechanism, places: &Places, log: &mut Log) {
     let direct = columns(mechanism, &rates, false);
     let through = columns(mechanism, &rates, true);
     let n_active = direct.first().map_or(0, Vec::len);
+    let rated = mechanism
+        .coordinates
+        .iter()
+        .filter(|c| !c.passive && c.motion.has_rate());
+    let n_freedoms = rated.count();
     let mut total = direct;
     for j in 0..n_active {
         if dependent.first().is_none_or(Vec::is_empty) {
@@ -466,7 +473,7 @@ fn check_drives(mechanism: &Mechanism, places: &Places, log: &mut Log) {
         }
     }
     let held = rank(&total, 1e-7);
-    if held < n_active {
+    if held < n_freedoms {
         let weakest = total
             .iter()
             .position(|row| norm(row) == 0.0)
@@ -475,7 +482,7 @@ fn check_drives(mechanism: &Mechanism, places: &Places, log: &mut Log) {
             log.push(
                 Diagnostic::error(
                     *span,
-                    format!("the drives hold only {held} of {n_active} degrees of freedom at the nominal pose"),
+                    format!("the drives hold only {held} of {n_freedoms} degrees of freedom at the nominal pose"),
                 )
                 .label("moving this one changes nothing that the other drives do not hold already")
                 .help("choose a nominal pose away from this singularity, or drive another coordinate"),

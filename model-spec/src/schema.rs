@@ -7,7 +7,8 @@ use crate::range::Range;
 use crate::record::{List, Named, OneOrMany, record};
 use crate::unit::Unit;
 use crate::values::{
-    AxisName, Flag, Name, Number, Search, Spot, Suffix, Text, UnitByPlace, Vector, Version,
+    AxisName, Flag, Name, Number, QuaternionOrder, Search, Spot, Suffix, Text, TwistName,
+    UnitByPlace, Vector, Version,
 };
 
 record! {
@@ -94,6 +95,9 @@ record! {
         "nominal" nominal: optional Number,
         /// True if the coordinate follows from the loops; no drive holds it.
         "passive" passive: optional Flag,
+        /// False if nothing drives the coordinate: its row of the equation of motion, with a force of zero, takes part in
+        /// identification.
+        "driven" driven: optional Flag,
         /// Remark.
         "note" note: optional Text,
     }
@@ -157,8 +161,14 @@ record! {
         /// Three angles of a spherical joint, about its `axes` one after the other, each turned by those before.
         "spherical" spherical: optional List<Formula>,
         /// Six coordinates of a free body: its position along x, y and z, then three angles as those of a spherical
-        /// joint.
+        /// joint; or seven, its position and a unit quaternion, of a body that hangs on nothing and needs no drives.
         "free" free: optional List<Formula>,
+        /// Order of the quaternion of a free body with seven coordinates: `xyzw` or `wxyz`. It turns the body's axes into those
+        /// of the base.
+        "quaternion" quaternion: optional QuaternionOrder,
+        /// Axes of its velocity, angular velocity, force and moment: `body`, `world`, or `mixed` for velocity and force in
+        /// those of the base, angular velocity and moment in those of the body.
+        "twist" twist: optional TwistName,
         /// Axis of a revolute, prismatic or cylindrical joint; z if left away.
         "axis" axis: optional AxisName,
         /// Axes of a universal, spherical or free joint, such as `yz` or `zyx`; `xy` or `zyx` if left away.

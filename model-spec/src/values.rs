@@ -489,6 +489,18 @@ words! {
     "x" => X, "y" => Y, "z" => Z, "-x" => MinusX, "-y" => MinusY, "-z" => MinusZ
 }
 
+words! {
+    /// The order in which a quaternion is written.
+    pub(crate) QuaternionOrder: "the order of a quaternion",
+    "xyzw" => Xyzw, "wxyz" => Wxyz
+}
+
+words! {
+    /// The axes of the twist of a free body.
+    pub(crate) TwistName: "the axes of a twist",
+    "body" => Body, "world" => World, "mixed" => Mixed
+}
+
 /// How a constant's value is found where it is not known.
 #[derive(Clone, Debug)]
 pub(crate) enum Search {

@@ -55,6 +55,28 @@ fn motion(mechanism: &Mechanism, reach: f64) -> Moving {
             all.push(column);
         }
     }
+    // Quaternions have a length of one, and their scalar parts no rates.
+    let active = || {
+        mechanism
+            .coordinates
+            .iter()
+            .filter(|c| !c.passive)
+            .enumerate()
+    };
+    let quaternion: Vec<usize> = active()
+        .filter(|(_, c)| c.motion.is_quaternion())
+        .map(|(i, _)| i)
+        .collect();
+    for k in 0..SAMPLES {
+        let square: f64 = quaternion.iter().map(|i| moving[0][*i][k].powi(2)).sum();
+        for i in &quaternion {
+            moving[0][*i][k] /= square.sqrt();
+        }
+    }
+    for (i, _) in active().filter(|(_, c)| !c.motion.has_rate()) {
+        moving[1][i].fill(0.0);
+        moving[2][i].fill(0.0);
+    }
     moving
 }
 
@@ -249,6 +271,8 @@ every! {
     delta_tied "delta_tied";
     emps "emps";
     emps_directional "emps-directional";
+    drone "drone";
+    humanoid "humanoid";
     five_bar "five_bar";
     four_bar "four_bar";
     gough_stewart "gough_stewart";
@@ -257,6 +281,7 @@ every! {
     parallelogram "parallelogram";
     puma560 "puma560";
     rx90 "rx90";
+    quadruped "quadruped";
     scara "scara";
     slider_crank "slider_crank";
     spidermill "spidermill";

@@ -2,134 +2,16 @@
 //! with noise that has a memory: what changed is told as such, and nothing else.
 
 mod draws;
+#[allow(dead_code, reason = "other tests do more to runs")]
+mod made;
 
-use std::f64::consts::TAU;
-use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use modelmill::Model;
 use modelmill::recording::{Reading, Recording};
-use modelmill::runs::{Changed, What};
-use modelmill_codegen::{Evaluator, States};
+use modelmill::runs::{Asked, Changed, Compared, Estimate, KnownLoad, PerRun, Unread, What};
 
-use draws::Draws;
-
-const SAMPLES: usize = 2000;
-/// Time between two samples, s.
-const STEP: f64 = 0.01;
-/// Noise of each force beside its effective value, and how much of it a sample keeps of the one before.
-const NOISE: f64 = 0.01;
-const KEPT: f64 = 0.6;
-
-/// What is done to a run.
-#[derive(Clone, Copy, Debug)]
-enum Made<'a> {
-    Nothing,
-    /// A further part, as its entry in the model file.
-    Body(&'a str),
-    /// Dry and viscous friction on a drive.
-    Friction(usize, f64, f64),
-    Scale(usize, f64),
-    Offset(usize, f64),
-    /// The clock counts so many seconds in one.
-    Clock(f64),
-    /// The force of a drive lacks between two samples.
-    Lost(usize, usize, usize),
-}
-
-/// A recording of a bundled model's positions and forces, along a motion of its own.
-fn run(name: &str, seed: u64, made: Made) -> PathBuf {
-    let mut text = std::fs::read_to_string(bundled(name)).expect("a model");
-    if let Made::Body(part) = made {
-        text.push_str(part);
-    }
-    let model = Model::from_text(name, &text).expect("the model");
-    let mut draws = Draws(seed);
-    let active = model.active();
-    let mut columns = [(); 3].map(|()| vec![vec![0.0; SAMPLES]; active.len()]);
-    let coordinates = &model.derivation.mechanism.coordinates;
-    for (i, coordinate) in coordinates.iter().filter(|c| !c.passive).enumerate() {
-        columns[0][i].fill(coordinate.nominal);
-        // Loops leave less room.
-        let wide = if model.derivation.mechanism.loops.is_empty() {
-            1.0
-        } else {
-            0.3
-        };
-        let reach = wide
-            * if coordinate.motion.is_angle() {
-                0.35
-            } else {
-                0.1
-            };
-        for _ in 0..4 {
-            let rate = TAU * (0.1 + 0.9 * draws.uniform());
-            let phase = TAU * draws.uniform();
-            let amplitude = reach * (0.3 + draws.uniform()) / 2.0;
-            for k in 0..SAMPLES {
-                let (sin, cos) = (rate * STEP * k as f64 + phase).sin_cos();
-                columns[0][i][k] += amplitude * sin;
-                columns[1][i][k] += amplitude * rate * cos;
-                columns[2][i][k] -= amplitude * rate * rate * sin;
-            }
-        }
-    }
-    let [q, qd, qdd] = columns
-        .each_ref()
-        .map(|all| all.iter().map(Vec::as_slice).collect());
-    let states = States {
-        q,
-        qd,
-        qdd,
-        load: Vec::new(),
-    };
-    let evaluator = Evaluator::new(&model.derivation);
-    let mut forces = evaluator
-        .inverse_dynamics(&states, &model.nominal)
-        .expect("forces");
-    let motion = evaluator.drives(&states).expect("drives");
-    let drives = model.drives();
-    let mut clock = 1.0;
-    for (d, force) in forces.iter_mut().enumerate() {
-        let rate = &motion[drives.len() + d];
-        for (f, rate) in force.iter_mut().zip(rate) {
-            match made {
-                Made::Friction(drive, dry, viscous) if drive == d => {
-                    *f += dry * rate.signum() + viscous * rate;
-                }
-                Made::Scale(drive, factor) if drive == d => *f *= factor,
-                Made::Offset(drive, offset) if drive == d => *f += offset,
-                Made::Clock(factor) => clock = factor,
-                _ => {}
-            }
-        }
-        let size = (force.iter().map(|f| f * f).sum::<f64>() / SAMPLES as f64).sqrt();
-        let mut noise = 0.0;
-        for f in force {
-            noise = KEPT * noise + (1.0 - KEPT * KEPT).sqrt() * draws.normal();
-            *f += NOISE * size * noise;
-        }
-    }
-    let mut text = format!("t,{},{}", active.join(","), drives.join(","));
-    for k in 0..SAMPLES {
-        let _ = write!(text, "\n{}", clock * STEP * k as f64);
-        for column in &columns[0] {
-            let _ = write!(text, ",{}", column[k]);
-        }
-        for (d, force) in forces.iter().enumerate() {
-            let is_lost = matches!(made, Made::Lost(drive, from, to) if drive == d && (from..to).contains(&k));
-            let _ = write!(text, ",{}", if is_lost { f64::NAN } else { force[k] });
-        }
-    }
-    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("runs-{name}-{seed}.csv"));
-    std::fs::write(&file, text + "\n").expect("a recording");
-    file
-}
-
-fn bundled(name: &str) -> PathBuf {
-    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/models");
-    models.join(format!("{name}.toml"))
-}
+use made::{Made, bundled, run};
 
 /// What is told of a run against one to which nothing was done.
 fn told(name: &str, seed: u64, made: Made) -> Vec<Changed> {
@@ -141,14 +23,19 @@ fn told(name: &str, seed: u64, made: Made) -> Vec<Changed> {
             .expect("the recording")
     };
     let [before, later] = files.each_ref().map(read);
-    let mut found = model.runs(&[&before, &later]).expect("an answer");
+    let mut found = held(&model, &[&before, &later], &Asked::default());
     assert!(found.runs[0].changes.is_empty());
     found.runs.remove(1).changes
 }
 
+fn held(model: &Model, recordings: &[&Recording], asked: &Asked) -> Compared {
+    let recordings = recordings.iter().map(|one| Ok(*one));
+    model.runs(recordings, asked).expect("an answer")
+}
+
 /// A value within five deviations of the truth and so many parts of it.
 #[track_caller]
-fn is_near(found: &modelmill::runs::Estimate, truth: f64, part: f64) {
+fn is_near(found: &Estimate, truth: f64, part: f64) {
     let off = (found.value - truth).abs();
     assert!(
         off < part * truth.abs() && off < 6.0 * found.deviation,
@@ -296,7 +183,7 @@ fn lost_forces_move_nothing() {
     ];
     let read = |file: &PathBuf| model.recording(file, &reading).expect("the recording");
     let [before, later] = files.each_ref().map(read);
-    let found = model.runs(&[&before, &later]).expect("an answer");
+    let found = held(&model, &[&before, &later], &Asked::default());
     assert!(found.runs[1].changes.is_empty(), "{:#?}", found.runs[1]);
     assert!(found.runs[1].moved.is_empty(), "{:?}", found.runs[1].moved);
 }
@@ -308,6 +195,195 @@ fn one_run_alone_is_refused() {
     let one = model
         .recording(&file, &Reading::default())
         .expect("the recording");
-    let error = model.runs(&[&one]).err().expect("a refusal");
+    let runs = |all: Vec<Result<&Recording, Unread>>| model.runs(all, &Asked::default());
+    let error = runs(vec![Ok(&one)]).err().expect("a refusal");
     assert!(error.to_string().contains("two or more"), "{error}");
+    // A run that cannot be read is no reason to fail, unless nothing is left.
+    let unread = || {
+        let missing = model.recording("nowhere.csv", &Reading::default());
+        let error = missing.err().expect("a refusal");
+        let file = "nowhere.csv".to_owned();
+        Err(Unread { file, error })
+    };
+    let error = runs(vec![Ok(&one), unread()]).err().expect("a refusal");
+    assert!(error.to_string().contains("nowhere.csv"), "{error}");
+    let found = runs(vec![Ok(&one), unread(), Ok(&one)]).expect("an answer");
+    assert_eq!((found.runs.len(), found.unread.len()), (2, 1));
+    assert_eq!(found.json()["unread"][0]["file"], "nowhere.csv");
+}
+
+const TOOL: &str = "\n[[part]]\nname = \"tool\"\non = \"link6\"\nmass = 2.8\ncentre = [0.03, -0.02, 0.08]\n\
+                    inertia = { xx = 0.004, yy = 0.005, zz = 0.006 }\n";
+
+/// A push is an interval of time on some drives, and no load.
+#[test]
+fn a_push_is_told_with_its_times() {
+    let found = told("puma560", 1200, Made::Bump(&[1, 2], 900, 1000, 0.8));
+    let [
+        Changed {
+            what:
+                What::ContactEvent {
+                    drives,
+                    interval: [from, to],
+                },
+            ..
+        },
+    ] = &found[..]
+    else {
+        panic!("{found:#?}");
+    };
+    assert!(
+        (from - 9.0).abs() < 0.3 && (to - 10.0).abs() < 0.3,
+        "{found:#?}"
+    );
+    let model = Model::open(bundled("puma560")).expect("the model");
+    let names = model.drives();
+    assert!(
+        drives
+            .iter()
+            .all(|(drive, _)| [&names[1], &names[2]].contains(&drive)),
+        "{drives:?}"
+    );
+}
+
+/// In one fit of all runs each has its own load and its own friction.
+#[test]
+fn what_is_each_runs_own_is_told_in_one_fit() {
+    let model = Model::open(bundled("puma560")).expect("the model");
+    let files = [
+        run("puma560", 1300, Made::Nothing),
+        run("puma560", 1301, Made::Body(TOOL)),
+        run("puma560", 1302, Made::BodyAndFriction(TOOL, 3, 0.9, 0.4)),
+    ];
+    let read = |file: &PathBuf| {
+        model
+            .recording(file, &Reading::default())
+            .expect("the recording")
+    };
+    let [a, b, c] = files.each_ref().map(read);
+    let drive = &model.drives()[3];
+    let parse = |text: &str| PerRun::parse(text).expect("a place");
+    let asked = Asked {
+        per_run: vec![parse("payload@link6"), parse(&format!("friction@{drive}"))],
+        loads: Vec::new(),
+    };
+    let found = held(&model, &[&a, &b, &c], &asked);
+    let fit = found.shared.as_ref().expect("a fit");
+    let own = |run: usize, name: &str| {
+        let mut values = fit.runs[run].1.iter();
+        let value = values.find(|one| one.name == name).expect("a value").value;
+        let deviation = value.deviation.expect("a deviation");
+        Estimate {
+            value: value.value,
+            deviation,
+        }
+    };
+    for run in [1, 2] {
+        is_near(&own(run, "mass"), 2.8, 0.05);
+        for (axis, truth) in [("x", 0.03), ("y", -0.02), ("z", 0.08)] {
+            let at = own(run, axis);
+            assert!(
+                (at.value - truth).abs() < (6.0 * at.deviation).min(0.01),
+                "{axis}: {at:?}"
+            );
+        }
+    }
+    let more = |name: &str| {
+        let [before, now] = [own(1, name), own(2, name)];
+        let deviation = before.deviation.hypot(now.deviation);
+        Estimate {
+            value: now.value - before.value,
+            deviation,
+        }
+    };
+    is_near(&more("Fc"), 0.9, 0.2);
+    is_near(&more("Fv"), 0.4, 0.2);
+    let asked = Asked {
+        per_run: vec![parse("payload@nowhere")],
+        loads: Vec::new(),
+    };
+    let error = model
+        .runs([Ok(&a), Ok(&b)], &asked)
+        .err()
+        .expect("a refusal");
+    assert!(error.to_string().contains("link6"), "{error}");
+}
+
+/// One run with a load of known mass tells by how much every measured force is off.
+#[test]
+fn a_known_load_tells_the_scales_of_all_forces() {
+    let model = Model::open(bundled("puma560")).expect("the model");
+    let scales = [1.1, 0.9, 1.25, 0.8, 1.05, 0.95];
+    let files = [
+        run("puma560", 1400, Made::BodyAndScales("", &scales)),
+        run("puma560", 1401, Made::BodyAndScales(TOOL, &scales)),
+    ];
+    let read = |file: &PathBuf| {
+        model
+            .recording(file, &Reading::default())
+            .expect("the recording")
+    };
+    let [bare, loaded] = files.each_ref().map(read);
+    let load = |text: &str| Asked {
+        per_run: Vec::new(),
+        loads: vec![KnownLoad::parse(text).expect("a load")],
+    };
+    let found = held(
+        &model,
+        &[&bare, &loaded],
+        &load("runs-puma560-1401.csv=2.8@link6"),
+    );
+    let fit = found.shared.expect("a fit");
+    for ((drive, gain), scale) in fit.gains.iter().zip(scales) {
+        let deviation = gain.deviation.expect("a deviation");
+        let off = (gain.value - 1.0 / scale).abs();
+        assert!(
+            off < 5.0 * deviation && off < 0.05,
+            "{drive}: {gain:?} is not 1/{scale}"
+        );
+    }
+    let error = model.runs([Ok(&bare), Ok(&loaded)], &load("other.csv=2.8@link6"));
+    let error = error.err().expect("a refusal").to_string();
+    assert!(error.contains("runs-puma560-1401.csv"), "{error}");
+}
+
+/// Friction that rises at one run and stays is told from that run on; a run that is different by itself is no lasting change.
+#[test]
+fn what_changed_and_stayed_is_told_with_its_run() {
+    let model = Model::open(bundled("emps")).expect("the model");
+    let made = |k: u64| match k {
+        4 => Made::Scale(0, 1.1),
+        7.. => Made::Friction(0, 5.0, 30.0),
+        _ => Made::Nothing,
+    };
+    let recordings = (0..12).map(|k| {
+        let file = run("emps", 1500 + k, made(k));
+        Ok(model
+            .recording(file, &Reading::default())
+            .expect("the recording"))
+    });
+    let found = model
+        .runs(recordings, &Asked::default())
+        .expect("an answer");
+    let [point] = &found.points[..] else {
+        panic!("{:#?}", found.points);
+    };
+    assert_eq!(point.run, 7);
+    let [
+        Changed {
+            what: What::Friction { drive, dry, .. },
+            ..
+        },
+    ] = &point.changes[..]
+    else {
+        panic!("{:#?}", point.changes);
+    };
+    assert_eq!(*drive, model.drives()[0]);
+    is_near(dry, 5.0, 0.2);
+    let page = modelmill::report::runs_page(&model, &found).expect("a page");
+    assert!(
+        page.contains("From run 8 on") && page.contains("friction of"),
+        "{}",
+        page.len()
+    );
 }

@@ -58,8 +58,10 @@ impl Case {
                 .inverse_dynamics(&one.states(), &p_min)
                 .map_err(fault)?;
             let drives = evaluator.drives(&one.states()).map_err(fault)?;
-            let jacobian = DMatrix::from_fn(n, n, |d, a| drives[2 * n + d * n + a][0]);
-            let f = DVector::from_iterator(n, forces.iter().map(|f| f[0]));
+            let n_drives = forces.len();
+            let jacobian =
+                DMatrix::from_fn(n_drives, n, |d, a| drives[2 * n_drives + d * n + a][0]);
+            let f = DVector::from_iterator(n_drives, forces.iter().map(|f| f[0]));
             let qdd = DVector::from_iterator(n, one.qdd.iter().map(|x| x[0]));
             let mut other = one.clone();
             for acceleration in &mut other.qdd {

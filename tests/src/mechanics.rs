@@ -7,10 +7,10 @@
 use std::ops::{Add, Mul, Neg, Sub};
 
 use modelmill_spec::{
-    Axis, DriveKind, Exact, Function, Inertial, LumpedMass, Mechanics, Mechanism, Place,
-    PlaceQuantity, PointIdx, Step, Symbol,
+    Axis, DriveKind, Exact, FreeBody, Function, Inertial, LumpedMass, Mechanics, Mechanism, Place,
+    PlaceQuantity, PointIdx, Step, Symbol, TwistAxes,
 };
-use nalgebra::{DMatrix, Matrix3, Matrix4, Vector3};
+use nalgebra::{DMatrix, Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 
 /// A value with its first and second derivative by time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,6 +126,45 @@ impl Pose {
         pose
     }
 
+    /// Derivatives of a rotation R with the angular velocity w in body axes: R' = R [w]x, and so on.
+    fn free(body: &FreeBody, coordinates: &[Jet]) -> Self {
+        let of = |i: modelmill_spec::CoordinateIdx, order: usize| coordinates[i.0].0[order];
+        let [w, x, y, z] = body.quaternion.map(|i| of(i, 0));
+        let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        let turn: Matrix3<f64> = turn.to_rotation_matrix().into_inner();
+        let vector = |all: &[modelmill_spec::CoordinateIdx], order: usize| {
+            Vector3::from_fn(|k, _| of(all[k], order))
+        };
+        let angular = |order: usize| match body.angular {
+            TwistAxes::Body => vector(&body.quaternion[1..], order),
+            TwistAxes::World => turn.transpose() * vector(&body.quaternion[1..], order),
+        };
+        let (omega, alpha) = (angular(1), angular(2));
+        let skew = omega.cross_matrix();
+        let orders = [
+            turn,
+            turn * skew,
+            turn * (skew * skew + alpha.cross_matrix()),
+        ];
+        let [velocity, change] = [1, 2].map(|order| vector(&body.position, order));
+        let (velocity, acceleration) = match body.linear {
+            TwistAxes::World => (velocity, change),
+            TwistAxes::Body => (turn * velocity, turn * (change + omega.cross(&velocity))),
+        };
+        let place = [vector(&body.position, 0), velocity, acceleration];
+        Self(std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                Jet(std::array::from_fn(|k| {
+                    if j == 3 {
+                        place[k][i]
+                    } else {
+                        orders[k][(i, j)]
+                    }
+                }))
+            })
+        }))
+    }
+
     fn point(&self, at: [f64; 3]) -> [Jet; 3] {
         std::array::from_fn(|i| {
             (0..3).fold(self.0[i][3], |sum, k| {
@@ -226,6 +265,7 @@ impl<'a> Numbers<'a> {
             let mut pose = poses[frame.parent.0].clone();
             for step in &frame.steps {
                 pose = pose.then(&match step {
+                    Step::Free(body) => Pose::free(body, coordinates),
                     Step::Rotate(axis, angle) => {
                         let mut total = Jet::constant(rational(&angle.pi) * std::f64::consts::PI);
                         for (symbol, n) in &angle.terms {
@@ -284,9 +324,15 @@ impl<'a> Numbers<'a> {
                 .iter()
                 .any(|(s, _)| matches!(s, Symbol::Coordinate(c) if c.0 == coordinate)),
             Step::Translate(_, length) => length.coordinates.iter().any(|(c, _)| c.0 == coordinate),
+            Step::Free(body) => {
+                let mut all = body.position.iter().chain(&body.quaternion);
+                all.any(|c| c.0 == coordinate)
+            }
         };
         let axis = |step: &Step| match step {
             Step::Rotate(axis, _) | Step::Translate(axis, _) => *axis,
+            // Nothing follows along or about an axis of its own.
+            Step::Free(_) => Axis::X,
         };
         let mut behind = self.mechanism.clone();
         let steps = &mut behind.frames[frame].steps;

@@ -35,8 +35,12 @@ impl Sample {
                     .collect()
             };
             sample.q.push(draw(coordinate.nominal, reach));
-            sample.qd.push(draw(0.0, 2.0));
-            sample.qdd.push(draw(0.0, 8.0));
+            let (rates, accelerations) = (draw(0.0, 2.0), draw(0.0, 8.0));
+            let moved = f64::from(u8::from(coordinate.motion.has_rate()));
+            sample.qd.push(rates.iter().map(|x| moved * x).collect());
+            sample
+                .qdd
+                .push(accelerations.iter().map(|x| moved * x).collect());
         }
         for _ in &mechanism.drives {
             let mut draw = || (0..n).map(|_| stream.between(-50.0, 50.0)).collect();

@@ -1,18 +1,137 @@
 //! `runs`: what changed between recordings of one machine.
 
-use modelmill::Host;
+use std::path::{Path, PathBuf};
 
-use crate::args::RunsArgs;
-use crate::failure::Outcome;
+use modelmill::Host;
+use modelmill::recording::has_ending_of_a_recording;
+use modelmill::report::runs_page;
+use modelmill::runs::Unread;
+
+use crate::args::runs::RunsArgs;
+use crate::failure::{Failure, Outcome};
+use crate::output::{self, Target};
 use crate::{commands, terminal};
 
-/// Prints what changed against the first run.
+/// Name of the page in its folder.
+const PAGE: &str = "runs.html";
+
+/// What is written to a file.
+enum Form {
+    Page,
+    Json,
+}
+
+/// Prints what changed against the first run, and over all of them.
 pub(crate) fn run(host: &Host, args: &RunsArgs) -> Outcome {
+    let data = expanded(&args.data)?;
+    let inputs = || [&args.model].into_iter().chain(&data).map(PathBuf::as_path);
+    let written = match &args.out {
+        Some(out)
+            if out
+                .extension()
+                .is_some_and(|e| e.eq_ignore_ascii_case("json")) =>
+        {
+            Some((Target::new(out, inputs())?, Form::Json))
+        }
+        Some(out) => {
+            output::make_folder(out)?;
+            Some((Target::new(&out.join(PAGE), inputs())?, Form::Page))
+        }
+        None => None,
+    };
     let model = commands::model(host, &args.model)?;
-    let data = commands::recordings(&model, &args.data, &args.preparation.reading())?;
-    let found = model.runs(&data.iter().collect::<Vec<_>>())?;
+    let reading = args.preparation.reading();
+    let recordings = data.iter().map(|path| {
+        let files = commands::files_of(path);
+        let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+        model
+            .recording_of(&files, &reading)
+            .map_err(|error| Unread {
+                file: path.display().to_string(),
+                error,
+            })
+    });
+    let found = model.runs(recordings, &args.asked())?;
+    match &written {
+        Some((target, Form::Page)) => target.write(&runs_page(&model, &found)?)?,
+        Some((target, Form::Json)) => target.write(&format!("{:#}\n", found.json()))?,
+        None => {}
+    }
     if args.json {
         return terminal::print_json(&found.json());
     }
-    terminal::print(&found.text(terminal::style()))
+    terminal::print(&found.text(terminal::style()))?;
+    match &written {
+        Some((target, _)) => terminal::print(&format!("Written to {}.", target.path().display())),
+        None => Ok(()),
+    }
+}
+
+/// Folders and patterns become the recordings in them, in the order of their names, in which numbers count as such.
+fn expanded(paths: &[PathBuf]) -> Outcome<Vec<PathBuf>> {
+    let mut all = Vec::new();
+    for path in paths {
+        let text = path.to_string_lossy();
+        let mut found: Vec<PathBuf> = if path.is_dir() {
+            let entries = std::fs::read_dir(path).map_err(|error| {
+                Failure::Input(format!("the folder {text} cannot be read: {error}"))
+            })?;
+            let files = entries.flatten().map(|entry| entry.path());
+            files
+                .filter(|file| file.is_file() && has_ending_of_a_recording(file))
+                .collect()
+        } else if text.contains(['*', '?']) && !path.exists() {
+            let matching = glob::glob(&text)
+                .map_err(|error| Failure::Input(format!("--data {text}: {}", error.msg)))?;
+            matching.flatten().filter(|file| file.is_file()).collect()
+        } else {
+            all.push(path.clone());
+            continue;
+        };
+        if found.is_empty() {
+            return Err(Failure::Input(format!(
+                "--data {text}: there is no recording; a folder is searched for files whose names end as those of recordings do \
+                 (.csv, .parquet, .mat, .h5, .mcap, .db3, .gz, .zst), a pattern for files of any name"
+            )));
+        }
+        found.sort_by_cached_key(|file| in_order(&file.to_string_lossy()));
+        all.extend(found);
+    }
+    Ok(all)
+}
+
+/// A name as pieces of text and numbers: `run9` comes before `run10`.
+fn in_order(name: &str) -> Vec<(String, u64)> {
+    let mut pieces = Vec::new();
+    let mut rest = name;
+    while !rest.is_empty() {
+        let text = rest
+            .find(|c: char| c.is_ascii_digit())
+            .unwrap_or(rest.len());
+        let (before, after) = rest.split_at(text);
+        let digits = after
+            .find(|c: char| !c.is_ascii_digit())
+            .unwrap_or(after.len());
+        let (number, left) = after.split_at(digits);
+        // Digits that are too many for a number stay in the order of their text.
+        let value = number.parse().unwrap_or(u64::MAX);
+        pieces.push((before.to_owned(), value));
+        rest = left;
+    }
+    pieces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_order;
+
+    #[test]
+    fn numbers_in_names_count_as_numbers() {
+        let mut names = ["run10.csv", "run9.csv", "run9a.csv", "a.csv", "run010.csv"];
+        names.sort_by_cached_key(|name| in_order(name));
+        assert_eq!(
+            names,
+            ["a.csv", "run9.csv", "run9a.csv", "run10.csv", "run010.csv"]
+        );
+    }
 }

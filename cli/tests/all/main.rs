@@ -37,6 +37,7 @@ mod preparation;
 mod recordings;
 mod reduce;
 mod report;
+mod runs;
 mod separate;
 mod simulate;
 mod sound;

@@ -35,7 +35,7 @@ pub(crate) fn promising(
             let all = coordinates_of(graph, &[*e]);
             let slides: Vec<(u64, u64)> = all
                 .iter()
-                .filter(|c| !mechanism.coordinates[**c].motion.is_angle())
+                .filter(|c| mechanism.coordinates[**c].motion.is_length())
                 .map(|c| {
                     let slope = graph.differentiate(&[*e], Atom::Coordinate(*c));
                     (bit(c), mask(&coordinates_of(graph, &slope)))

@@ -126,7 +126,7 @@ fn degree(graph: &Graph, mechanism: &Mechanism, id: ExprId, lengths: &[Atom]) ->
     let value = |unit: f64| {
         let atom = |atom: Atom| {
             let moves = matches!(atom, Atom::Coordinate(i)
-                if !mechanism.coordinates[i].motion.is_angle());
+                if mechanism.coordinates[i].motion.is_length());
             let is_length = moves || lengths.contains(&atom);
             nominal_of(mechanism, atom) * if is_length { unit } else { 1.0 }
         };
@@ -149,7 +149,7 @@ fn lengths(
     of: impl Fn(&mut Graph, f64) -> ExprId,
 ) -> BTreeMap<ExprId, ExprId> {
     let coordinates = mechanism.coordinates.iter().enumerate();
-    let slides = coordinates.filter(|(_, c)| !c.motion.is_angle());
+    let slides = coordinates.filter(|(_, c)| c.motion.is_length());
     slides
         .map(|(i, c)| (graph.atom(Atom::Coordinate(i)), of(graph, c.nominal)))
         .collect()
@@ -176,8 +176,10 @@ pub(crate) fn magnitude(
         Node::Sin(_)
         | Node::Cos(_)
         | Node::Unary(Unary::Sign | Unary::Tanh | Unary::Sin | Unary::Cos, _) => Graph::ONE,
-        // An angle that stands for itself; its turns are known to Newton's method.
-        Node::Atom(Atom::Coordinate(i)) if mechanism.coordinates[i].motion.is_angle() => Graph::ONE,
+        // An angle that stands for itself; its turns are known to Newton's method. Or a component of a unit quaternion.
+        Node::Atom(Atom::Coordinate(i)) if !mechanism.coordinates[i].motion.is_length() => {
+            Graph::ONE
+        }
         Node::Atom(_) | Node::Unary(Unary::Exp, _) => graph.unary(Unary::Abs, id),
         Node::Unary(Unary::Abs, inner) => magnitude(graph, mechanism, known, inner),
         Node::Unary(Unary::Sqrt, inner) => {

@@ -155,7 +155,7 @@ fn eliminable(
     order.into_iter().find_map(|(equation, all)| {
         let inside = all.intersection(left).copied();
         let slides: Vec<usize> = inside
-            .filter(|c| !mechanism.coordinates[*c].motion.is_angle())
+            .filter(|c| mechanism.coordinates[*c].motion.is_length())
             .collect();
         slides.into_iter().find_map(|slide| {
             let slope = graph.differentiate(&[*equation], Atom::Coordinate(slide))[0];

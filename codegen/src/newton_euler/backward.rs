@@ -49,6 +49,10 @@ pub(crate) fn backward(
             let Some(wrench) = total[side as usize][i] else {
                 continue;
             };
+            if let Some(body) = &link.free {
+                rows.leave_free(graph, body, &wrench);
+                continue;
+            }
             rows.leave(link, wrench.moment[2], wrench.force[2]);
             if let Some(parent) = link.parent {
                 let wrench = to_parent(graph, style, link, side, &wrench);
@@ -87,7 +91,14 @@ pub(crate) fn carry(
         let mut at = Some((start, side, wrench));
         while let Some((i, side, wrench)) = at {
             let link = &tree.links[i];
-            if side == Side::Moving && tree.path(Some(i)).len() <= depth {
+            if let Some(body) = &link.free {
+                rows.leave_free(graph, body, &wrench);
+                break;
+            }
+            let path = tree.path(Some(i));
+            // All of a wrench goes down to a free body, and what it leaves on the way costs little.
+            let hangs_free = tree.links[path[0]].free.is_some();
+            if side == Side::Moving && path.len() <= depth && !hangs_free {
                 rows.leave(link, wrench.moment[2], wrench.force[2]);
                 project(graph, tree, style, i, &wrench, &mut rows);
                 break;

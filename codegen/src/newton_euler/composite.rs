@@ -3,10 +3,12 @@
 //! All links below a joint, held as they stand, are one body. The wrench that accelerates it about or along that joint
 //! alone, read off at the joints above, gives a column of the mass matrix; what lies below follows by symmetry.
 
+use modelmill_spec::{CoordinateIdx, FreeBody, TwistAxes};
+
 use super::{Body, Depths, Side, Spread, Style, Wrench, carry};
 use crate::expr::vector::{self, Turn, Vector};
 use crate::expr::{ExprId, Graph, Rational};
-use crate::tree::{Link, Tree};
+use crate::tree::{Link, Tree, free};
 
 /// Mass, first moment and second moments of mass (xx, yy, zz; yz, xz, xy) about the origin of a frame.
 #[derive(Clone, Copy)]
@@ -168,11 +170,24 @@ pub(crate) fn mass_matrix(
             composite[parent] = composite[parent].plus(graph, &carried);
         }
     }
-    // Every link's turning and sliding as a coordinate of its own: turning first, then sliding.
+    // Every link's turning and sliding as a coordinate of its own: turning first, then sliding; behind them the six motions
+    // of every free body.
     let mut apart = tree.clone();
+    let mut bodies_free = Vec::new();
     for (i, link) in apart.links.iter_mut().enumerate() {
         link.turns = vec![(2 * i, 1)];
         link.slides = vec![(2 * i + 1, Rational::ONE)];
+        if let Some(body) = link.free {
+            let first = 2 * n + 6 * bodies_free.len();
+            bodies_free.push((i, body));
+            let [x, y, z, qx, qy, qz] = std::array::from_fn(|k| CoordinateIdx(first + k));
+            link.free = Some(FreeBody {
+                position: [x, y, z],
+                quaternion: [body.quaternion[0], qx, qy, qz],
+                linear: TwistAxes::Body,
+                angular: TwistAxes::Body,
+            });
+        }
     }
     let motions: Vec<Vec<(usize, Rational)>> = tree
         .links
@@ -199,8 +214,23 @@ pub(crate) fn mass_matrix(
             moments.sliding(graph)
         };
         let wrench = [(m / 2, Side::Moving, wrench)];
-        let column = carry(graph, &apart, style, 2 * n, depths, wrench);
-        for (k, entry) in column.into_iter().enumerate() {
+        let column = carry(
+            graph,
+            &apart,
+            style,
+            2 * n + 6 * bodies_free.len(),
+            depths,
+            wrench,
+        );
+        for ((_, body), on_body) in bodies_free.iter().zip(column[2 * n..].chunks(6)) {
+            for (c, entry) in on_free_body(graph, body, on_body) {
+                for (d, g) in coordinates {
+                    terms[c][*d].push((entry, g.clone()));
+                    terms[*d][c].push((entry, g.clone()));
+                }
+            }
+        }
+        for (k, entry) in column.into_iter().take(2 * n).enumerate() {
             // A link's turning and sliding see each other from both sides; each pair counts once.
             if k / 2 == m / 2 && k > m {
                 continue;
@@ -216,8 +246,71 @@ pub(crate) fn mass_matrix(
             }
         }
     }
+    for (link, body) in &bodies_free {
+        for (c, d, entry) in own_block(graph, body, &composite[*link]) {
+            terms[c][d].push((entry, Rational::ONE));
+            if c != d {
+                terms[d][c].push((entry, Rational::ONE));
+            }
+        }
+    }
     terms
         .into_iter()
         .map(|row| row.into_iter().map(|terms| graph.sum(&terms)).collect())
         .collect()
+}
+
+/// The coordinates whose rates are a free body's twist.
+fn of_twist(body: &FreeBody) -> [usize; 6] {
+    let [x, y, z] = body.position;
+    let [_, qx, qy, qz] = body.quaternion;
+    [x, y, z, qx, qy, qz].map(|i| i.0)
+}
+
+/// Force and moment in a free body's axes by the coordinates on which they act.
+fn on_free_body(
+    graph: &mut Graph,
+    body: &FreeBody,
+    wrench: &[ExprId],
+) -> impl Iterator<Item = (usize, ExprId)> + use<> {
+    let force = std::array::from_fn(|k| wrench[k]);
+    let moment = std::array::from_fn(|k| wrench[3 + k]);
+    let force = free::from_body(graph, body, body.linear, &force);
+    let moment = free::from_body(graph, body, body.angular, &moment);
+    of_twist(body)
+        .into_iter()
+        .zip(force.into_iter().chain(moment))
+}
+
+/// Entries of the mass matrix by a free body's own motion: those on and above the diagonal.
+fn own_block(graph: &mut Graph, body: &FreeBody, carried: &Moments) -> Vec<(usize, usize, ExprId)> {
+    let twist = of_twist(body);
+    let mut entries = Vec::new();
+    for (k, d) in twist.into_iter().enumerate() {
+        let mut along = vector::ZERO;
+        along[k % 3] = Graph::ONE;
+        let axes = if k < 3 { body.linear } else { body.angular };
+        let along = free::to_body(graph, body, axes, &along);
+        let (force, moment) = if k < 3 {
+            let force = graph.scale_vector(carried.mass, &along);
+            (force, graph.cross(&carried.first, &along))
+        } else {
+            let moment = std::array::from_fn(|i| {
+                let (j, l) = ((i + 1) % 3, (i + 2) % 3);
+                let about = graph.add(carried.square[j], carried.square[l]);
+                let terms = [
+                    graph.mul(about, along[i]),
+                    graph.mul(carried.mixed[l], along[j]),
+                    graph.mul(carried.mixed[j], along[l]),
+                ];
+                let off = graph.add(terms[1], terms[2]);
+                graph.sub(terms[0], off)
+            });
+            (graph.cross(&along, &carried.first), moment)
+        };
+        let wrench = [force, moment].concat();
+        let column = on_free_body(graph, body, &wrench);
+        entries.extend(column.take(k + 1).map(|(c, entry)| (c, d, entry)));
+    }
+    entries
 }

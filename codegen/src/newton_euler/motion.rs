@@ -3,12 +3,14 @@
 use super::{Side, Style, turn_in_all};
 use crate::expr::vector::{self, Vector};
 use crate::expr::{Atom, ExprId, Graph, Rational};
+use crate::tree::free::FreeMotion;
 use crate::tree::{Link, Tree};
 
 /// Motion of every link in its own frame.
 pub(crate) struct Motion {
     pub(super) links: Vec<LinkMotion>,
     base: LinkMotion,
+    gravity: Vector,
     style: Style,
 }
 
@@ -123,6 +125,7 @@ pub(crate) fn forward(graph: &mut Graph, tree: &Tree, gravity: &Vector, style: S
     let mut motion = Motion {
         links: Vec::new(),
         base,
+        gravity: *gravity,
         style,
     };
     for i in 0..tree.links.len() {
@@ -140,6 +143,13 @@ impl Motion {
     fn link(&self, graph: &mut Graph, tree: &Tree, i: usize) -> LinkMotion {
         let style = self.style;
         let link = &tree.links[i];
+        if let Some(body) = &link.free {
+            let free = FreeMotion::new(graph, body, &self.gravity);
+            let mut moved = LinkMotion::plain(graph, free.omega, free.alpha);
+            moved.acceleration = free.acceleration;
+            moved.carried = free.omega;
+            return moved;
+        }
         let first = &tree.links[style.first(tree, i)];
         let fixed = self.of_link(first.parent);
         let turn = style.turn(link);
@@ -239,7 +249,7 @@ impl Motion {
     ) -> Option<LinkMotion> {
         let link = &tree.links[i];
         let quarter = |t: &crate::expr::vector::Turn| t.sum.is_empty() && t.pi12 % 6 == 0;
-        if !link.pre.iter().all(quarter) || !link.slides.is_empty() {
+        if !link.pre.iter().all(quarter) || !link.slides.is_empty() || link.free.is_some() {
             return None;
         }
         let parent = self.of_link(link.parent);

@@ -1,9 +1,11 @@
 //! What wrenches leave at joints, and what both ways of carrying them share.
 
+use modelmill_spec::FreeBody;
+
 use super::{Style, Wrench};
 use crate::expr::vector::Vector;
 use crate::expr::{ExprId, Graph, Rational};
-use crate::tree::Link;
+use crate::tree::{Link, free};
 
 /// Generalised forces of the coordinates, as terms that are still to be added.
 pub(super) struct ForceRows(Vec<Vec<(ExprId, Rational)>>);
@@ -20,6 +22,17 @@ impl ForceRows {
         }
         for (coordinate, k) in &link.slides {
             self.0[*coordinate].push((force, k.clone()));
+        }
+    }
+
+    /// Leaves the wrench on a free body, in its axes and about its origin.
+    pub(super) fn leave_free(&mut self, graph: &mut Graph, body: &FreeBody, wrench: &Wrench) {
+        let force = free::from_body(graph, body, body.linear, &wrench.force);
+        let moment = free::from_body(graph, body, body.angular, &wrench.moment);
+        let [_, qx, qy, qz] = body.quaternion;
+        let rows = body.position.into_iter().chain([qx, qy, qz]);
+        for (i, component) in rows.zip(force.into_iter().chain(moment)) {
+            self.0[i.0].push((component, Rational::ONE));
         }
     }
 

@@ -25,7 +25,8 @@ use crate::tree::expressions::Monomial;
 /// Straight-line programs of the equation of motion in the independent coordinates, for given p_min.
 #[derive(Clone, Debug)]
 pub struct Dynamics {
-    /// M: a row and a column for every independent coordinate, row by row.
+    /// M: a row and a column for every independent coordinate, row by row. Those of a quaternion's scalar part, which has no
+    /// rate, hold a one on the diagonal and nothing else.
     pub mass_matrix: Program,
     /// c, what rates alone ask for: centrifugal and Coriolis forces.
     pub coriolis: Program,
@@ -285,6 +286,12 @@ fn mass_matrix(
         for b in 0..n_active {
             let more = combined(graph, &row, &motion[b]);
             matrix[a][b] = graph.add(matrix[a][b], more);
+        }
+    }
+    // What has no rate moves nothing: a one on the diagonal keeps the system regular.
+    for a in 0..n_active {
+        if !projection.freedoms.contains(&a) {
+            matrix[a][a] = Graph::ONE;
         }
     }
     matrix.into_iter().flatten().collect()

@@ -124,7 +124,7 @@ pub(crate) fn programs(
     let regressor = row_by_row(&regressor);
     let inverse_dynamics =
         cheapest::total(graph, mechanism, equations, &base_value, all_passes, &weigh)?;
-    let slides = mechanism.coordinates.iter().any(|c| !c.motion.is_angle());
+    let slides = mechanism.coordinates.iter().any(|c| c.motion.is_length());
     let scale = (slides && !projection.loops.residual.is_empty()).then(|| {
         let scale = Size::from_residual(graph, mechanism, &projection.loops.residual).scale(graph);
         plain(graph, &[scale])

@@ -26,6 +26,8 @@ pub(crate) struct DriveMotion {
 #[derive(Clone, Debug)]
 pub(crate) struct Projection {
     pub(crate) loops: Loops,
+    /// Positions, among the independent coordinates, of those that have a rate.
+    pub(crate) freedoms: Vec<usize>,
     /// Rate and acceleration of each passive coordinate, in the order of `passive`.
     pub(crate) passive_rates: Vec<ExprId>,
     pub(crate) passive_accelerations: Vec<ExprId>,
@@ -94,14 +96,19 @@ impl Projection {
         let residual_jacobian = (0..residual.len())
             .map(|r| passive.iter().map(|p| by_coordinate[*p][r]).collect())
             .collect();
+        let has_rate = |a: &usize| mechanism.coordinates[loops.active[*a]].motion.has_rate();
+        let freedoms = (0..loops.active.len()).filter(has_rate).collect();
+        let mut determinants = solution.determinants.clone();
+        determinants.extend(tree.squares(graph));
         let mut projection = Self {
             loops,
+            freedoms,
             passive_rates: Vec::new(),
             passive_accelerations: Vec::new(),
             residual_jacobian,
             drives: Vec::new(),
             drive_jacobian: Vec::new(),
-            determinants: solution.determinants.clone(),
+            determinants,
             rates_of,
             transmission,
         };
@@ -195,11 +202,13 @@ impl Projection {
         forces: &[ExprId],
     ) -> Result<Vec<ExprId>, DeriveError> {
         let projected = self.project(graph, forces);
-        let n = projected.len();
-        let transposed: Vec<Vec<ExprId>> = (0..n)
-            .map(|a| (0..n).map(|d| self.drive_jacobian[d][a]).collect())
+        let n_drives = self.drive_jacobian.len();
+        let transposed: Vec<Vec<ExprId>> = self
+            .freedoms
+            .iter()
+            .map(|a| (0..n_drives).map(|d| self.drive_jacobian[d][*a]).collect())
             .collect();
-        let rhs: Vec<Vec<ExprId>> = projected.into_iter().map(|x| vec![x]).collect();
+        let rhs: Vec<Vec<ExprId>> = self.freedoms.iter().map(|a| vec![projected[*a]]).collect();
         let solution = linear::solve(
             graph,
             &transposed,
@@ -316,7 +325,7 @@ impl Projection {
             });
             self.drive_jacobian.push(row);
         }
-        let n = self.loops.active.len();
+        let n = self.freedoms.len();
         if self.drives.len() != n {
             return Err(DeriveError::DriveCount {
                 drives: self.drives.len(),
@@ -330,12 +339,12 @@ impl Projection {
                     .collect()
             })
             .collect();
-        let solution = linear::solve(
-            graph,
-            &self.drive_jacobian,
-            &identity,
-            "the drives' Jacobian",
-        )?;
+        let square: Vec<Vec<ExprId>> = self
+            .drive_jacobian
+            .iter()
+            .map(|row| self.freedoms.iter().map(|a| row[*a]).collect())
+            .collect();
+        let solution = linear::solve(graph, &square, &identity, "the drives' Jacobian")?;
         self.determinants.extend(solution.determinants);
         Ok(())
     }

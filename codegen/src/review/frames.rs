@@ -1,6 +1,8 @@
 //! Tables of frames, points, bodies and lumped masses.
 
-use modelmill_spec::{Axis, Convention, Exact, Frame, Inertial, Mechanism, Step};
+use modelmill_spec::{
+    Axis, Convention, CoordinateIdx, Exact, Frame, FreeBody, Inertial, Mechanism, Step, TwistAxes,
+};
 
 use super::document::{Block, Document, Inline, Line, Table, cell, code, text};
 use crate::expr::Rational;
@@ -47,6 +49,10 @@ pub(super) fn frames(page: &mut Document, mechanism: &Mechanism) {
             let mut steps: Line = Vec::new();
             for step in &frame.steps {
                 let (letter, axis, by) = match step {
+                    Step::Free(body) => {
+                        steps.extend(free_body(mechanism, body));
+                        continue;
+                    }
                     Step::Rotate(axis, by) => ("R", axis, angle(mechanism, by)),
                     Step::Translate(axis, by) => ("T", axis, length(mechanism, by)),
                 };
@@ -89,6 +95,29 @@ pub(super) fn frames(page: &mut Document, mechanism: &Mechanism) {
         let head = vec!["point", "on", "position in the frame, m"];
         page.table("points", Table { head, rows });
     }
+}
+
+/// What a body that hangs on nothing moves by.
+fn free_body(mechanism: &Mechanism, body: &FreeBody) -> Line {
+    let names = |all: &[CoordinateIdx]| {
+        let names = all.iter().map(|i| mechanism.coordinates[i.0].name.as_str());
+        names.collect::<Vec<_>>().join(", ")
+    };
+    let axes = |axes| match axes {
+        TwistAxes::Body => "the body's axes",
+        TwistAxes::World => "the base's axes",
+    };
+    vec![
+        text("free: position ("),
+        code(names(&body.position)),
+        text("), quaternion w, x, y, z ("),
+        code(names(&body.quaternion)),
+        text(format!(
+            "); velocity and force in {}, angular velocity and moment in {}",
+            axes(body.linear),
+            axes(body.angular)
+        )),
+    ]
 }
 
 /// a, alpha, d, theta of a frame in a Denavit-Hartenberg convention.

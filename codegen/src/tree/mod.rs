@@ -5,8 +5,9 @@
 
 pub(crate) mod checks;
 pub(crate) mod expressions;
+pub(crate) mod free;
 
-use modelmill_spec::{Axis, FrameIdx, Mechanism, Step};
+use modelmill_spec::{Axis, FrameIdx, FreeBody, Mechanism, Step};
 
 use crate::DeriveError;
 use crate::expr::vector::{self, Turn, Vector, push_turn};
@@ -29,6 +30,8 @@ pub(crate) struct Link {
     pub(crate) turns: Vec<(usize, i32)>,
     /// Coordinates that slide it along z, with their factors.
     pub(crate) slides: Vec<(usize, Rational)>,
+    /// How it moves where it has no joint at all: then it hangs on the base, and neither turns nor position say anything.
+    pub(crate) free: Option<FreeBody>,
     /// The first of the links above it whose z axes are all parallel to its own; itself if its parent's axis is not.
     pub(crate) first_parallel: usize,
     /// Its rotation about z relative to the fixed side of that first link's joint.
@@ -43,7 +46,7 @@ pub(crate) struct Link {
 impl Link {
     /// Whether it moves relative to its parent.
     pub(crate) fn is_moving(&self) -> bool {
-        !self.turns.is_empty() || !self.slides.is_empty()
+        !self.turns.is_empty() || !self.slides.is_empty() || self.free.is_some()
     }
 
     /// Components in the axes that the model file reaches behind the joint, of a vector given in the link's own.
@@ -56,6 +59,9 @@ impl Link {
 
     /// Finds the axis of the joint in the parent's frame, and splits the position by it.
     fn find_axis(&mut self, graph: &mut Graph) {
+        if self.free.is_some() {
+            return;
+        }
         let z = [Graph::ZERO, Graph::ZERO, Graph::ONE];
         let z = self
             .pre
@@ -185,6 +191,7 @@ struct Builder {
     joint: Turn,
     turns: Vec<(usize, i32)>,
     slides: Vec<(usize, Rational)>,
+    free: Option<FreeBody>,
 }
 
 const NO_TURN: Turn = Turn {
@@ -203,6 +210,7 @@ impl Builder {
             joint: NO_TURN,
             turns: Vec::new(),
             slides: Vec::new(),
+            free: None,
         }
     }
 
@@ -217,6 +225,8 @@ impl Builder {
         step: &Step,
     ) -> Result<(), DeriveError> {
         match step {
+            // A file has it as the only step of a frame on the base.
+            Step::Free(body) => self.free = Some(*body),
             Step::Rotate(axis, angle) => {
                 let (sum, pi12) = expressions::angle_sum(angle);
                 let turns: Vec<(usize, i32)> = sum
@@ -313,6 +323,7 @@ impl Builder {
         let done = std::mem::replace(self, fresh);
         let parallel = done
             .parent
+            .filter(|parent| links[*parent].free.is_none())
             .filter(|_| done.pre.iter().all(|turn| turn.axis == Axis::Z));
         let mut absolute = NO_TURN;
         let mut first_parallel = links.len();
@@ -334,6 +345,7 @@ impl Builder {
             position: done.position,
             turns: done.turns,
             slides: done.slides,
+            free: done.free,
             first_parallel,
             absolute,
             axis: None,

@@ -21,12 +21,12 @@ const FASTEST: f64 = 2e-6;
 
 impl Run {
     /// Warnings about measured forces of the given drives that are 0 throughout, which fit parameters of 0 exactly.
-    pub fn suspicious_forces(&self, drives: &[String]) -> Vec<Note> {
+    pub fn suspicious_forces(&self, drives: &[String], undriven: &[String]) -> Vec<Note> {
         let forces = self.force.iter().flatten();
         let idle: Vec<String> = drives
             .iter()
             .zip(forces)
-            .filter(|(_, force)| force.iter().all(|f| *f == 0.0))
+            .filter(|(name, force)| !undriven.contains(name) && force.iter().all(|f| *f == 0.0))
             .map(|(name, _)| name.clone())
             .collect();
         if idle.is_empty() {

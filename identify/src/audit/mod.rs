@@ -3,9 +3,13 @@
 
 mod clock;
 mod columns;
-mod delay_and_exchange;
+mod delay;
+mod exchange;
 mod positions;
+mod robust;
 mod signals;
 
-pub use delay_and_exchange::{ForceAudit, ForceDelay, Suspect};
+pub use delay::{Delay, DelayAudit, Delays};
+pub use exchange::{ForceAudit, Suspect};
 pub use positions::PositionFault;
+pub use robust::{RobustFit, robust_fit};

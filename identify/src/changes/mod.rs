@@ -12,12 +12,17 @@
 //!
 //! Rows are made white first, drive by drive ([`Coloured`]), so that sums of squares count independent numbers, and each run
 //! is kept as sums over its rows ([`Moments`]), block by block. [`search`] then finds the fewest changes that explain what
-//! the runs do not share.
+//! the runs do not share. Over many runs, [`segments`] finds when values changed and stayed changed, and [`joint`] fits all runs
+//! at once with some values shared and others each run's own.
 
 mod coloured;
+mod joint;
 mod moments;
 mod search;
+mod segments;
 
 pub use coloured::Coloured;
+pub use joint::{Joint, Part, Values, joint};
 pub use moments::{Moments, Solved};
-pub use search::{Change, Runs, Search, search};
+pub use search::{Candidate, Change, Runs, Search, search, within};
+pub use segments::{Told, mean, segments};

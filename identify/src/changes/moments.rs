@@ -5,6 +5,9 @@ use nalgebra::{DMatrix, DVector};
 /// A column whose rest beside the others is below this part of it says nothing of its own.
 const TELLING: f64 = 1e-7;
 
+/// A column of norm 1 that hangs on another by less than this hardly does.
+const HARDLY: f64 = 1e-3;
+
 /// Inner products of all columns of a least-squares problem among themselves and with the measured values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moments {
@@ -48,20 +51,22 @@ impl Moments {
 
     /// Adds rows by their columns, `z[column][row]` with `None` for a column of zeros, and the measured values.
     pub fn add_rows(&mut self, z: &[Option<&[f64]>], y: &[f64]) {
-        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        for (i, a) in z.iter().enumerate() {
-            let Some(a) = a else { continue };
-            self.rhs[i] += product(a, y);
-            for (j, b) in z.iter().enumerate().take(i + 1) {
-                let Some(b) = b else { continue };
-                let sum = product(a, b);
-                self.gram[(i, j)] += sum;
-                if i != j {
-                    self.gram[(j, i)] += sum;
-                }
-            }
+        let moving: Vec<(usize, &[f64])> = (z.iter().enumerate())
+            .filter_map(|(k, column)| Some((k, (*column)?)))
+            .collect();
+        let mut rows = DMatrix::zeros(y.len(), moving.len() + 1);
+        for (j, (_, column)) in moving.iter().enumerate() {
+            rows.column_mut(j).copy_from_slice(column);
         }
-        self.total += product(y, y);
+        rows.column_mut(moving.len()).copy_from_slice(y);
+        let products = rows.transpose() * &rows;
+        for (i, (a, _)) in moving.iter().enumerate() {
+            for (j, (b, _)) in moving.iter().enumerate() {
+                self.gram[(*a, *b)] += products[(i, j)];
+            }
+            self.rhs[*a] += products[(i, moving.len())];
+        }
+        self.total += products[(moving.len(), moving.len())];
         self.rows += y.len();
     }
 
@@ -71,6 +76,17 @@ impl Moments {
         self.rhs += &other.rhs;
         self.total += other.total;
         self.rows += other.rows;
+    }
+
+    /// The same with rows of another weight.
+    #[must_use]
+    pub fn times(&self, weight: f64) -> Self {
+        Self {
+            gram: &self.gram * weight,
+            rhs: &self.rhs * weight,
+            total: self.total * weight,
+            rows: self.rows,
+        }
     }
 
     /// The same for some of the columns.
@@ -91,24 +107,84 @@ impl Moments {
         (self.total - 2.0 * self.rhs.dot(x) + x.dot(&(&self.gram * x))).max(0.0)
     }
 
-    /// Least squares for all columns, by sweeps of the scaled normal equations; columns that say nothing of their own are held
-    /// at 0.
-    pub fn solve(&self) -> Solved {
+    /// The columns from `fitted` on, beside those before it.
+    pub(crate) fn beside(&self, fitted: usize) -> Beside {
+        let (mut table, _) = self.scaled();
+        for k in 0..fitted {
+            sweep(&mut table, k);
+        }
+        let n = table.nrows() - fitted;
+        Beside {
+            table: table.view((fitted, fitted), (n, n)).into_owned(),
+        }
+    }
+
+    /// Eliminates the first columns: what is left for the others, and how the first follow from them.
+    pub(crate) fn eliminate(&self, first: usize) -> (Self, Eliminated) {
+        let (mut table, scale) = self.scaled();
+        let n = self.rhs.len();
+        let kept: Vec<bool> = (0..first).map(|k| sweep(&mut table, k)).collect();
+        let others = n - first;
+        let left = Self {
+            gram: DMatrix::from_fn(others, others, |i, j| {
+                let (i, j) = (first + i, first + j);
+                table[(i, j)] * scale[i] * scale[j]
+            }),
+            rhs: DVector::from_fn(others, |i, _| table[(first + i, n)] * scale[first + i]),
+            total: table[(n, n)].max(0.0),
+            rows: self.rows,
+        };
+        let of = |i: usize, x: f64| if kept[i] { by(x, scale[i]) } else { 0.0 };
+        let eliminated = Eliminated {
+            alone: DVector::from_fn(first, |i, _| of(i, table[(i, n)])),
+            by_others: DMatrix::from_fn(first, others, |i, j| {
+                of(i, table[(i, first + j)]) * scale[first + j]
+            }),
+            covariance: DMatrix::from_fn(first, first, |i, j| {
+                if kept[j] {
+                    by(of(i, table[(i, j)]), scale[j])
+                } else {
+                    0.0
+                }
+            }),
+            determined: (0..first)
+                .map(|i| {
+                    let is_free =
+                        |k: usize| kept[k] || scale[k] == 0.0 || table[(k, i)].abs() < HARDLY;
+                    kept[i] && (0..first).all(is_free)
+                })
+                .collect(),
+            hangs_on: (0..first)
+                .map(|i| (first..n).map(|j| table[(i, j)].abs() > HARDLY).collect())
+                .collect(),
+            rank: kept.iter().filter(|kept| **kept).count(),
+        };
+        (left, eliminated)
+    }
+
+    /// The normal equations with columns of norm 1, and these norms; the last row and column are those of the measured values.
+    fn scaled(&self) -> (DMatrix<f64>, DVector<f64>) {
         let n = self.rhs.len();
         let scale = DVector::from_fn(n, |i, _| self.gram[(i, i)].sqrt());
-        let by = |x: f64, s: f64| if s > 0.0 { x / s } else { 0.0 };
-        // The last row and column are those of the measured values.
-        let mut table = DMatrix::from_fn(n + 1, n + 1, |i, j| match (i < n, j < n) {
+        let table = DMatrix::from_fn(n + 1, n + 1, |i, j| match (i < n, j < n) {
             (true, true) => by(by(self.gram[(i, j)], scale[i]), scale[j]),
             (true, false) => by(self.rhs[i], scale[i]),
             (false, true) => by(self.rhs[j], scale[j]),
             (false, false) => self.total,
         });
+        (table, scale)
+    }
+
+    /// Least squares for all columns, by sweeps of the scaled normal equations; columns that say nothing of their own are held
+    /// at 0.
+    pub fn solve(&self) -> Solved {
+        let n = self.rhs.len();
+        let (mut table, scale) = self.scaled();
         let kept: Vec<bool> = (0..n).map(|k| sweep(&mut table, k)).collect();
         let value = |x: f64, i: usize| if kept[i] { by(x, scale[i]) } else { 0.0 };
         // A column that was held is a combination of kept ones, which therefore are not determined.
         let determined = |i: usize| {
-            kept[i] && (0..n).all(|k| kept[k] || scale[k] == 0.0 || table[(k, i)].abs() < 1e-3)
+            kept[i] && (0..n).all(|k| kept[k] || scale[k] == 0.0 || table[(k, i)].abs() < HARDLY)
         };
         Solved {
             values: DVector::from_fn(n, |i, _| value(table[(i, n)], i)),
@@ -127,6 +203,77 @@ impl Moments {
     }
 }
 
+/// Values that follow from others: `o = a - B x`.
+#[derive(Clone, Debug)]
+pub(crate) struct Eliminated {
+    /// `a`.
+    alone: DVector<f64>,
+    /// `B`.
+    by_others: DMatrix<f64>,
+    /// Their covariance for given others.
+    covariance: DMatrix<f64>,
+    /// Which of them are told by themselves for given others.
+    determined: Vec<bool>,
+    /// Which others each of them hangs on.
+    hangs_on: Vec<Vec<bool>>,
+    rank: usize,
+}
+
+impl Eliminated {
+    /// The values for given others.
+    pub(crate) fn values(&self, others: &DVector<f64>) -> DVector<f64> {
+        &self.alone - &self.by_others * others
+    }
+
+    /// Their covariance for that of the others.
+    pub(crate) fn covariance(&self, others: &DMatrix<f64>) -> DMatrix<f64> {
+        &self.covariance + &self.by_others * others * self.by_others.transpose()
+    }
+
+    /// Which of them are told, where these of the others are.
+    pub(crate) fn determined(&self, others: &[bool]) -> Vec<bool> {
+        let is_told = |(alone, hangs): (&bool, &Vec<bool>)| {
+            *alone
+                && hangs
+                    .iter()
+                    .zip(others)
+                    .all(|(hangs, told)| *told || !hangs)
+        };
+        self.determined
+            .iter()
+            .zip(&self.hangs_on)
+            .map(is_told)
+            .collect()
+    }
+
+    /// How many say something of their own.
+    pub(crate) fn rank(&self) -> usize {
+        self.rank
+    }
+}
+
+fn by(x: f64, scale: f64) -> f64 {
+    if scale > 0.0 { x / scale } else { 0.0 }
+}
+
+/// What columns say beside others that are fitted with them.
+#[derive(Clone, Debug)]
+pub(crate) struct Beside {
+    /// Their scaled normal equations with those of the others eliminated; the last row and column are the measured values'.
+    table: DMatrix<f64>,
+}
+
+impl Beside {
+    /// What fitting some of the columns leaves, and which of them say something of their own.
+    pub(crate) fn rest(&self, columns: &[usize]) -> (f64, Vec<bool>) {
+        let last = self.table.nrows() - 1;
+        let all: Vec<usize> = columns.iter().copied().chain([last]).collect();
+        let mut table = self.table.select_rows(&all).select_columns(&all);
+        let kept = (0..columns.len()).map(|k| sweep(&mut table, k)).collect();
+        (table[(columns.len(), columns.len())].max(0.0), kept)
+    }
+}
+
 /// Sweeps a symmetric table on one of its columns, if that says something of its own: it then holds minus the regression of
 /// all others upon it (Goodnight, The American Statistician 33, 1979).
 fn sweep(table: &mut DMatrix<f64>, k: usize) -> bool {
@@ -136,10 +283,15 @@ fn sweep(table: &mut DMatrix<f64>, k: usize) -> bool {
     }
     let n = table.nrows();
     let row: Vec<f64> = (0..n).map(|j| table[(k, j)] / pivot).collect();
-    let column: Vec<f64> = (0..n).map(|i| table[(i, k)]).collect();
-    for i in (0..n).filter(|i| *i != k) {
-        for j in (0..n).filter(|j| *j != k) {
-            table[(i, j)] -= column[i] * row[j];
+    let mut column: Vec<f64> = table.column(k).iter().copied().collect();
+    column[k] = 0.0;
+    for (j, factor) in row
+        .iter()
+        .enumerate()
+        .filter(|(j, x)| *j != k && **x != 0.0)
+    {
+        for (x, c) in table.column_mut(j).iter_mut().zip(&column) {
+            *x -= factor * c;
         }
     }
     for j in 0..n {

@@ -2,13 +2,19 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::changes::moments::{Moments, Solved};
+use crate::changes::moments::{Beside, Moments, Solved};
 
 /// How many times the logarithm of the number of rows a value must gain: 1 is Schwarz' criterion, which holds for white noise;
 /// what is left of real runs is never quite white.
 const STRICTER: f64 = 3.0;
 /// The part of a change's gain that must be there on blocks that had no part in its fit.
 const HELD_OUT: f64 = 0.3;
+/// A change must explain so many times what parts of one run differ by among themselves: motions of two runs have less in
+/// common than parts of one.
+const BEYOND: f64 = 2.0;
+/// A change must stand so many deviations clear of none. Deviations count the noise alone: parts of one run show much of what a
+/// model lacks, but not what it lacks along the other motion.
+const CLEAR: f64 = 12.0;
 /// Changes that differ by less than this part of the gain cannot be told apart.
 const NEAR: f64 = 0.02;
 
@@ -19,6 +25,8 @@ pub struct Runs {
     pub reference: Vec<Moments>,
     /// The later run.
     pub later: Vec<Moments>,
+    /// By what parts of one run differ among themselves: the larger of what [`within`] says of the two.
+    pub within: f64,
 }
 
 /// What is asked of two runs.
@@ -26,8 +34,19 @@ pub struct Runs {
 pub struct Search {
     /// Columns whose coefficients both runs share: those of the model, and those of what it may lack in both.
     pub shared: Vec<usize>,
-    /// Columns of each change that is possible, which have coefficients of their own in the later run.
-    pub changes: Vec<Vec<usize>>,
+    /// The changes that are possible.
+    pub changes: Vec<Candidate>,
+}
+
+/// A change that is possible.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// Its columns, which have coefficients of their own in the later run.
+    pub columns: Vec<usize>,
+    /// The most values that it is charged for; fewer than it has where they move together as a rule.
+    pub most: usize,
+    /// What it is charged besides, in values, for being rarer than others.
+    pub rarity: f64,
 }
 
 /// A change that was found.
@@ -49,7 +68,8 @@ pub struct Change {
     pub rivals: Vec<usize>,
 }
 
-/// The fewest changes that explain the later run, the largest first; none where the runs differ by chance alone.
+/// The fewest changes that explain the later run, the largest first; none where the runs differ by chance alone, or by no more
+/// than parts of one run do.
 pub fn search(runs: &Runs, search: &Search) -> Vec<Change> {
     let bench = Bench::new(runs, search);
     let mut chosen: Vec<usize> = Vec::new();
@@ -65,9 +85,69 @@ pub fn search(runs: &Runs, search: &Search) -> Vec<Change> {
         chosen.push(best);
         bench.settle(&mut chosen);
     }
+    // What the exchanges have made small goes again.
+    while let Some(at) = (0..chosen.len()).find(|at| {
+        let rest = without(&chosen, chosen[*at]);
+        bench.gain(&rest, chosen[*at]) < bench.least
+    }) {
+        chosen.remove(at);
+    }
     let mut found: Vec<Change> = chosen.iter().map(|g| bench.change(&chosen, *g)).collect();
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     found
+}
+
+/// By what parts of one run differ among themselves: the largest sum of squares that a single change between parts of it explains,
+/// over the rows that a difference of its parts is worth. Noise makes it small; what a model lacks, and friction that drifts, make
+/// it large, and then the same must be expected between two runs.
+pub fn within(blocks: &[Moments], search: &Search) -> f64 {
+    let n = blocks.len();
+    let halves = [(0, n / 2)];
+    let quarters = (0..4).map(|k| (k * n / 4, (k + 1) * n / 4));
+    let mut most = 0.0_f64;
+    for (start, end) in halves.into_iter().chain(quarters) {
+        let is_later = |k: &usize| (start..end).contains(k);
+        let part = |later: bool| {
+            let some = (0..n).filter(|k| is_later(k) == later);
+            some.map(|k| blocks[k].clone()).collect::<Vec<_>>()
+        };
+        let runs = Runs {
+            reference: part(false),
+            later: part(true),
+            within: 0.0,
+        };
+        let worth = worth([rows(&runs.reference), rows(&runs.later)]);
+        if worth == 0.0 {
+            continue;
+        }
+        let bench = Bench::new(&runs, search);
+        for (g, candidate) in search.changes.iter().enumerate() {
+            let beyond =
+                bench.gain(&[], g) - by_chance(candidate.columns.len(), search.changes.len());
+            most = most.max(beyond * bench.noise / worth);
+        }
+    }
+    most
+}
+
+/// What the best of some changes with so many values gains by chance, which it seldom exceeds (Laurent and Massart, Annals of
+/// Statistics 28, 2000).
+fn by_chance(values: usize, changes: usize) -> f64 {
+    let (k, tail) = (values as f64, (10.0 * changes as f64).ln());
+    k + 2.0 * (k * tail).sqrt() + 2.0 * tail
+}
+
+fn rows(blocks: &[Moments]) -> f64 {
+    blocks.iter().map(|block| block.rows).sum::<usize>() as f64
+}
+
+/// How many rows a difference between two runs is worth.
+fn worth([a, b]: [f64; 2]) -> f64 {
+    if a > 0.0 && b > 0.0 {
+        a * b / (a + b)
+    } else {
+        0.0
+    }
 }
 
 /// All blocks but one.
@@ -87,6 +167,20 @@ fn without(chosen: &[usize], one: usize) -> Vec<usize> {
     chosen.iter().copied().filter(|g| *g != one).collect()
 }
 
+/// Rows of both runs together: the shared columns, and behind them those of changes, which are the later run's alone.
+fn together([reference, later]: [&Moments; 2], shared: &[usize], columns: &[usize]) -> Moments {
+    let mut all = later.of(columns);
+    let reference = reference.of(shared);
+    let n = shared.len();
+    let mut gram = all.gram.view_mut((0, 0), (n, n));
+    gram += &reference.gram;
+    let mut rhs = all.rhs.rows_mut(0, n);
+    rhs += &reference.rhs;
+    all.total += reference.total;
+    all.rows += reference.rows;
+    all
+}
+
 struct Bench<'a> {
     runs: &'a Runs,
     search: &'a Search,
@@ -94,10 +188,15 @@ struct Bench<'a> {
     shared: Vec<usize>,
     /// All blocks of both runs.
     sums: [Moments; 2],
+    /// What the columns of all changes, one after the other, say beside the shared ones, and where each change begins.
+    beside: Beside,
+    starts: Vec<usize>,
     /// Variance of what no change explains.
     noise: f64,
     /// What a value must gain.
     price: f64,
+    /// What a change must gain, whatever it is.
+    least: f64,
 }
 
 impl<'a> Bench<'a> {
@@ -108,52 +207,73 @@ impl<'a> Bench<'a> {
         let telling = all.solve().kept;
         let shared = search.shared.iter().zip(telling);
         let rows = (sums[0].rows + sums[1].rows) as f64;
-        let mut bench = Self {
+        let shared: Vec<usize> = shared
+            .filter(|(_, telling)| *telling)
+            .map(|(k, _)| *k)
+            .collect();
+        let everything = shared
+            .iter()
+            .chain(search.changes.iter().flat_map(|one| &one.columns));
+        let everything: Vec<usize> = everything.copied().collect();
+        let beside = together(sums.each_ref(), &shared, &everything).beside(shared.len());
+        let mut starts = vec![0];
+        for candidate in &search.changes {
+            starts.push(starts[starts.len() - 1] + candidate.columns.len());
+        }
+        let changes: Vec<usize> = (0..starts[search.changes.len()]).collect();
+        let (rest, kept) = beside.rest(&changes);
+        let rank = shared.len() + kept.iter().filter(|kept| **kept).count();
+        let noise = (rest / (rows - rank as f64).max(1.0)).max(1.0);
+        let worth = worth(sums.each_ref().map(|one| one.rows as f64));
+        Self {
             runs,
             search,
-            shared: shared
-                .filter(|(_, telling)| *telling)
-                .map(|(k, _)| *k)
-                .collect(),
-            sums,
-            noise: 1.0,
+            shared,
+            beside,
+            starts,
+            noise,
             price: STRICTER * rows.max(2.0).ln(),
-        };
-        let all: Vec<usize> = (0..search.changes.len()).collect();
-        let solved = bench.solved(&all);
-        bench.noise = (solved.rest / (rows - solved.rank as f64).max(1.0)).max(1.0);
-        bench
+            least: (BEYOND * runs.within * worth / noise).max(CLEAR * CLEAR),
+            sums,
+        }
     }
 
     /// The shared columns, and once more those of some changes.
     fn columns(&self, chosen: &[usize]) -> Vec<usize> {
-        let of = |g: &usize| self.search.changes[*g].iter().copied();
+        let of = |g: &usize| self.search.changes[*g].columns.iter().copied();
         let shared = self.shared.iter().copied();
         shared.chain(chosen.iter().flat_map(of)).collect()
     }
 
-    /// Rows of both runs together.
-    fn together(&self, [reference, later]: [&Moments; 2], chosen: &[usize]) -> Moments {
-        let mut all = later.of(&self.columns(chosen));
-        let reference = reference.of(&self.shared);
-        let n = self.shared.len();
-        let mut gram = all.gram.view_mut((0, 0), (n, n));
-        gram += &reference.gram;
-        let mut rhs = all.rhs.rows_mut(0, n);
-        rhs += &reference.rhs;
-        all.total += reference.total;
-        all.rows += reference.rows;
-        all
+    fn solved(&self, chosen: &[usize]) -> Solved {
+        together(self.sums.each_ref(), &self.shared, &self.columns(chosen)).solve()
     }
 
-    fn solved(&self, chosen: &[usize]) -> Solved {
-        self.together(self.sums.each_ref(), chosen).solve()
+    /// What some changes leave, over the variance of the noise, and how many values they are charged for.
+    fn left(&self, chosen: &[usize]) -> (f64, f64) {
+        let columns = chosen
+            .iter()
+            .flat_map(|g| self.starts[*g]..self.starts[*g + 1]);
+        let (rest, kept) = self.beside.rest(&columns.collect::<Vec<usize>>());
+        let mut kept = kept.into_iter();
+        let charged = chosen.iter().map(|g| {
+            let candidate = &self.search.changes[*g];
+            let own = kept.by_ref().take(candidate.columns.len());
+            own.filter(|kept| *kept).count().min(candidate.most) as f64 + candidate.rarity
+        });
+        let charged = charged.sum();
+        (rest / self.noise, charged)
+    }
+
+    /// By how much a further change lowers the sum of squares, over the variance of the noise.
+    fn gain(&self, chosen: &[usize], further: usize) -> f64 {
+        self.left(chosen).0 - self.left(&with(chosen, further)).0
     }
 
     /// What some changes leave, with a price on each value.
     fn cost(&self, chosen: &[usize]) -> f64 {
-        let solved = self.solved(chosen);
-        solved.rest / self.noise + self.price * solved.rank as f64
+        let (rest, charged) = self.left(chosen);
+        rest + self.price * charged
     }
 
     /// Takes out and exchanges for as long as that costs less.
@@ -182,7 +302,7 @@ impl<'a> Bench<'a> {
     /// By how much a further change lowers the sum of squares, and by how much on blocks that had no part in the fit.
     fn gains(&self, chosen: &[usize], further: usize) -> (f64, f64) {
         let both = with(chosen, further);
-        let gain = (self.solved(chosen).rest - self.solved(&both).rest) / self.noise;
+        let gain = self.gain(chosen, further);
         let mut held_out = 0.0;
         for (run, blocks) in [&self.runs.reference, &self.runs.later]
             .into_iter()
@@ -193,7 +313,8 @@ impl<'a> Bench<'a> {
                 let mut sums = self.sums.each_ref();
                 sums[run] = &others;
                 let rest = |set: &[usize]| {
-                    let values = self.together(sums, set).solve().values;
+                    let both = together(sums, &self.shared, &self.columns(set));
+                    let values = both.solve().values;
                     let columns = self.columns(if run == 0 { &[] } else { set });
                     let own = values.rows(0, columns.len()).into_owned();
                     blocks[k].of(&columns).rest(&own)
@@ -206,14 +327,14 @@ impl<'a> Bench<'a> {
 
     fn holds(&self, chosen: &[usize], further: usize) -> bool {
         let (gain, held_out) = self.gains(chosen, further);
-        held_out > HELD_OUT * gain
+        gain > self.least && held_out > HELD_OUT * gain
     }
 
     fn change(&self, chosen: &[usize], which: usize) -> Change {
         let rest = without(chosen, which);
         let order = with(&rest, which);
         let solved = self.solved(&order);
-        let n = self.search.changes[which].len();
+        let n = self.search.changes[which].columns.len();
         let at = solved.values.len() - n;
         let (gain, held_out) = self.gains(&rest, which);
         let cost = self.cost(&order);
@@ -264,13 +385,21 @@ mod tests {
         Runs {
             reference: (0..5).map(|_| moments(false)).collect(),
             later: (0..5).map(|_| moments(true)).collect(),
+            within: 0.0,
         }
     }
 
     fn possible() -> Search {
         Search {
             shared: (0..7).collect(),
-            changes: vec![vec![3], vec![4, 5], vec![6]],
+            changes: vec![vec![3], vec![4, 5], vec![6]]
+                .into_iter()
+                .map(|columns| Candidate {
+                    columns,
+                    most: 2,
+                    rarity: 0.0,
+                })
+                .collect(),
         }
     }
 
@@ -278,14 +407,14 @@ mod tests {
     fn what_changed_is_found_and_nothing_else() {
         for seed in 0..30 {
             assert_eq!(search(&runs(seed, &[]), &possible()), []);
-            let found = search(&runs(seed, &[(5, 1.0), (6, 0.3)]), &possible());
+            let found = search(&runs(seed, &[(5, 1.0), (6, 0.6)]), &possible());
             let which: Vec<usize> = found.iter().map(|c| c.which).collect();
             assert_eq!(which, [1, 2], "seed {seed}");
             let [pair, single] = &found[..] else {
                 unreachable!()
             };
             assert!((pair.values[1] - 1.0).abs() < 5.0 * pair.covariance[(1, 1)].sqrt());
-            assert!((single.values[0] - 0.3).abs() < 5.0 * single.covariance[(0, 0)].sqrt());
+            assert!((single.values[0] - 0.6).abs() < 5.0 * single.covariance[(0, 0)].sqrt());
             assert!(pair.determined[1] && single.determined[0]);
             assert!(single.held_out > 0.5 * single.gain && single.rivals.is_empty());
         }
@@ -298,6 +427,24 @@ mod tests {
             let mut both = runs(seed, &[(3, 1.0)]);
             both.reference = runs(seed + 100, &[(3, 1.0)]).later;
             assert_eq!(search(&both, &possible()), []);
+        }
+    }
+
+    /// What parts of one run differ by is no change between runs, and what is larger is one.
+    #[test]
+    fn what_parts_of_one_run_differ_by_is_no_change() {
+        let mut drifting = runs(3, &[]);
+        drifting.reference[4] = runs(7, &[(3, 0.8)]).later[4].clone();
+        drifting.later = runs(9, &[(3, 0.6)]).later;
+        assert_eq!(search(&drifting, &possible()).len(), 1);
+        drifting.within = within(&drifting.reference, &possible());
+        assert_eq!(search(&drifting, &possible()), []);
+        drifting.later = runs(9, &[(3, 1.0)]).later;
+        assert_eq!(search(&drifting, &possible()).len(), 1);
+        // Noise alone hides little.
+        let alone = runs(11, &[]);
+        for blocks in [&alone.reference, &alone.later] {
+            assert_eq!(within(blocks, &possible()), 0.0);
         }
     }
 

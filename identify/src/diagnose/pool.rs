@@ -19,7 +19,9 @@ pub(crate) struct Pool {
     check: Range<usize>,
     /// `products[i][j]` for `j <= i`: by part (0 is the fit, 1 the check) and channel, the parts one after the other.
     products: RefCell<Vec<Vec<Products>>>,
-    /// Samples that are left out of every product, by channel and in order.
+    /// Samples that were not measured, by channel: nothing counts them.
+    lost: Vec<Vec<bool>>,
+    /// Samples that are left out of every product, by channel and in order; the lost ones are among them.
     left_out: Vec<Vec<usize>>,
 }
 
@@ -31,17 +33,23 @@ impl Pool {
             fit: 0..fit,
             check: fit..layout.samples(),
             products: RefCell::default(),
-            left_out: Vec::new(),
+            lost: layout.left_out.clone(),
+            left_out: layout.left_out.iter().map(|out| places(out)).collect(),
         }
     }
 
-    /// Leaves samples out of all products and of what is left.
+    /// Leaves further samples out of all products and of what is left.
     pub(crate) fn without(mut self, left_out: &[Vec<bool>]) -> Self {
-        let places = |out: &Vec<bool>| {
-            let samples = out.iter().enumerate();
-            samples.filter_map(|(i, out)| out.then_some(i)).collect()
-        };
-        self.left_out = left_out.iter().map(places).collect();
+        let all = left_out.iter().enumerate().map(|(d, out)| {
+            let lost = self.lost.get(d);
+            let either = out.iter().enumerate().map(|(i, out)| {
+                *out || lost.is_some_and(|lost| lost.get(i).copied().unwrap_or(false))
+            });
+            places(&either.collect::<Vec<bool>>())
+        });
+        if !left_out.is_empty() {
+            self.left_out = all.collect();
+        }
         self
     }
 
@@ -132,7 +140,7 @@ impl Pool {
         rest
     }
 
-    /// The same of all samples.
+    /// The same of all samples but those that were not measured.
     pub(crate) fn whole_rest(&self, of: usize, others: &[usize], factors: &[f64]) -> Vec<Vec<f64>> {
         let samples = self.check.end;
         let mut rest: Vec<Vec<f64>> = (self.columns[of].0.iter())
@@ -147,7 +155,22 @@ impl Pool {
                 }
             }
         }
+        for (rest, out) in rest.iter_mut().zip(&self.lost) {
+            silence(rest, out);
+        }
         rest
+    }
+}
+
+/// Where something is said, in order.
+fn places(said: &[bool]) -> Vec<usize> {
+    let samples = said.iter().enumerate();
+    samples.filter_map(|(i, said)| said.then_some(i)).collect()
+}
+
+fn silence(values: &mut [f64], out: &[bool]) {
+    for (value, _) in values.iter_mut().zip(out).filter(|(_, out)| **out) {
+        *value = 0.0;
     }
 }
 
@@ -252,6 +275,7 @@ mod tests {
                 sampled: 0.1,
                 is_check: false,
             }],
+            left_out: Vec::new(),
         };
         let wave = |k: f64| -> Vec<f64> { (0..50).map(|i| (k * f64::from(i)).sin()).collect() };
         let mut pool = Pool::new(&layout);
@@ -281,5 +305,35 @@ mod tests {
         let residual = pool.rest(y, &[one, two], &[factors[0], factors[1]]);
         let weighed = dot(&residual[0], &residual[0]) + 4.0 * dot(&residual[1], &residual[1]);
         assert!((weighed - rest).abs() < 1e-9 * rest);
+    }
+    /// What stands in the place of a force that was not measured moves nothing.
+    #[test]
+    fn forces_that_lack_have_no_say() {
+        let wave = |k: f64| -> Vec<f64> { (0..50).map(|i| (k * f64::from(i)).sin()).collect() };
+        let mut layout = Layout {
+            channels: vec!["a".into()],
+            stretches: vec![Stretch {
+                name: String::new(),
+                samples: 50,
+                step: 0.1,
+                sampled: 0.1,
+                is_check: false,
+            }],
+            left_out: Vec::new(),
+        };
+        let found = |layout: &Layout| {
+            let mut pool = Pool::new(layout);
+            let one = pool.add(Column(vec![Some(wave(0.3))]));
+            let mut forces: Vec<f64> = wave(0.3).iter().map(|x| 2.0 * x).collect();
+            forces[17] = 100.0;
+            let y = pool.add(Column(vec![Some(forces)]));
+            let (factors, squares) = solve(&pool.gram(&[one, y], &[1.0], On::All));
+            let rest = pool.rest(y, &[one], &[factors[0]]);
+            (factors[0], squares, rest[0][17])
+        };
+        assert!((found(&layout).0 - 2.0).abs() > 0.1);
+        layout.left_out = vec![(0..50).map(|i| i == 17).collect()];
+        let (factor, squares, rest) = found(&layout);
+        assert!((factor - 2.0).abs() < 1e-12 && squares < 1e-12 && rest.abs() < 1e-12);
     }
 }

@@ -26,6 +26,8 @@ pub struct Layout {
     pub channels: Vec<String>,
     /// Stretches in the order in which columns hold them.
     pub stretches: Vec<Stretch>,
+    /// Forces that were not measured, `[channel][sample]`: what stands in their place has no say. Empty if all were.
+    pub left_out: Vec<Vec<bool>>,
 }
 
 /// Blocks that even a short stretch is cut into.
@@ -242,6 +244,7 @@ mod tests {
             let layout = Layout {
                 channels: Vec::new(),
                 stretches: vec![stretch(samples)],
+                left_out: Vec::new(),
             };
             let cut = layout.blocks(12);
             assert_eq!(cut.len(), blocks);

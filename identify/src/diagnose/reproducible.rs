@@ -234,6 +234,7 @@ mod tests {
                 sampled: 0.004,
                 is_check: false,
             }],
+            left_out: Vec::new(),
         };
         let time = |i: usize| 0.004 * i as f64;
         let q: Vec<f64> = (0..n).map(|i| (1.7 * time(i)).sin()).collect();

@@ -52,6 +52,8 @@ pub(crate) fn choose_cutoff(signals: &[Signal<'_>], rate_hz: f64, order: usize) 
         .iter()
         .filter_map(|signal| Spectrum::new(*signal, rate_hz))
         .collect();
+    let bins = spectra.first().map_or(0, |one| one.motion.len());
+    let gains = Gains::new(bins, order);
     if spectra.is_empty() {
         return None;
     }
@@ -63,7 +65,7 @@ pub(crate) fn choose_cutoff(signals: &[Signal<'_>], rate_hz: f64, order: usize) 
             let transient = transients(cutoff / rate_hz, samples);
             let errors = spectra
                 .iter()
-                .map(|s| s.relative_error(cutoff, order, transient));
+                .map(|s| s.relative_error(cutoff, &gains, transient));
             (cutoff, errors.sum())
         })
         .collect();
@@ -151,24 +153,46 @@ impl Spectrum {
     }
 
     /// Expected square error of the filtered acceleration, relative to the square of its size plus that error.
-    fn relative_error(&self, cutoff_hz: f64, order: usize, transient: f64) -> f64 {
-        let bins = self.motion.len();
-        let warped = (PI * cutoff_hz / self.rate_hz).tan();
-        let power = 2 * i32::try_from(order).unwrap_or(i32::MAX / 2);
+    fn relative_error(&self, cutoff_hz: f64, gains: &Gains, transient: f64) -> f64 {
+        let warped = (PI * cutoff_hz / self.rate_hz).tan().powi(gains.power);
+        let times = i32::from(self.times);
         let (mut error, mut size) = (0.0, 0.0);
         for (k, motion) in self.motion.iter().enumerate().skip(1) {
-            let angle = 0.5 * TAU * k as f64 / (bins - 1) as f64;
-            let passed = 1.0 / (1.0 + ((0.5 * angle).tan() / warped).powi(power));
+            let passed = 1.0 / (1.0 + gains.warped[k] / warped);
             // Central differences over two steps.
-            let difference = angle.sin();
-            let gain = passed * (difference / angle).powi(i32::from(self.times));
-            let left = self.noise
-                * (passed * (difference * self.rate_hz).powi(i32::from(self.times))).powi(2);
+            let gain = passed * gains.difference[k].powi(times);
+            let left = self.noise * (passed * (gains.sine[k] * self.rate_hz).powi(times)).powi(2);
             error += (1.0 - gain).powi(2) * motion + left;
             size += motion;
         }
         error += transient * size;
         error / (error + size)
+    }
+}
+
+/// What filter and differences do at each frequency, but for the cut-off: the same for all signals and cut-offs.
+struct Gains {
+    power: i32,
+    /// The power of the filter, of the frequency as the bilinear transformation warps it.
+    warped: Vec<f64>,
+    /// The sine of the angle that a frequency turns in a step, and its ratio to that angle.
+    sine: Vec<f64>,
+    difference: Vec<f64>,
+}
+
+impl Gains {
+    fn new(bins: usize, order: usize) -> Self {
+        let power = 2 * i32::try_from(order).unwrap_or(i32::MAX / 2);
+        let angles = (0..bins).map(|k| 0.5 * TAU * k as f64 / (bins - 1) as f64);
+        Self {
+            power,
+            warped: angles
+                .clone()
+                .map(|a| (0.5 * a).tan().powi(power))
+                .collect(),
+            sine: angles.clone().map(f64::sin).collect(),
+            difference: angles.map(|a| a.sin() / a).collect(),
+        }
     }
 }
 

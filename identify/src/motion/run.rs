@@ -79,9 +79,10 @@ impl Recording {
             .collect();
         let columns = columns?;
         let is_filtered = preparation.decimate > 1 || columns.iter().any(|c| !c.is_complete());
-        let stretches = if is_filtered {
+        let time = self.column("t")?;
+        let stretches = if is_filtered && !even::is_even(time) {
             let positions = columns.iter().map(|c| c.q);
-            let bridged = band::of_motion(self.column("t")?, positions).map(|band| BRIDGED / band);
+            let bridged = band::of_motion(time, positions).map(|band| BRIDGED / band);
             self.stretches(bridged.unwrap_or(0.0))
         } else {
             Vec::new()

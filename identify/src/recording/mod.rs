@@ -25,7 +25,7 @@ pub use error::{Fault, RecordingError};
 pub use file::RecordingFile;
 pub use notes::{Note, Severity};
 pub use options::{Computed, NotFinite, ReadOptions};
-pub use read::{name_of_bytes, place_word};
+pub use read::{has_ending_of_a_recording, name_of_bytes, place_word};
 pub use tables::{ColumnInfo, TableInfo};
 pub use together::RecordingFiles;
 
@@ -150,6 +150,13 @@ impl Recording {
             missing: missing.collect(),
             present: self.names().map(str::to_owned).collect(),
         }))
+    }
+
+    /// Puts numbers in the place of a column, or adds one; one for each sample (asserted).
+    pub fn put(&mut self, name: &str, values: Vec<f64>) {
+        assert_eq!(values.len(), self.samples(), "one number for each sample");
+        let column = self.columns.entry(name.to_owned()).or_default();
+        column.values = values;
     }
 
     /// The samples from `start` to before `end` as a recording of its own, without the notes.

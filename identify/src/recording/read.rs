@@ -92,6 +92,13 @@ pub fn name_of_bytes(name: &str, bytes: &[u8]) -> String {
     format!("{name}{}", format_of(bytes).suffix())
 }
 
+/// Whether a file's name ends as names of recordings do.
+pub fn has_ending_of_a_recording(path: &Path) -> bool {
+    let mut endings = FORMATS.into_iter().flat_map(<dyn Format>::extensions);
+    path.extension()
+        .is_some_and(|extension| endings.any(|ending| extension.eq_ignore_ascii_case(ending)))
+}
+
 /// What a sample of a file, or of bytes that [`name_of_bytes`] names, stands in: text has lines, tables have rows.
 pub fn place_word(file: &str) -> &'static str {
     let extension = Path::new(file).extension();

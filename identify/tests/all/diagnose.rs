@@ -128,6 +128,7 @@ fn problem(random: &mut Random, hidden: &[f64], candidates: Vec<Candidate>) -> P
         layout: Layout {
             channels: vec!["drive".into()],
             stretches: vec![stretch("fit", false), stretch("check", true)],
+            left_out: Vec::new(),
         },
         noise: vec![white_noise(&measured)],
         measured: column(&measured),

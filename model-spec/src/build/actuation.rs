@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::build::Places;
 use crate::build::bodies::check_unique;
-use crate::build::frames::{Points, twice};
+use crate::build::frames::{Points, Tree, twice};
+use crate::build::free;
 use crate::build::symbols::Symbols;
 use crate::column;
 use crate::diagnostic::{Diagnostic, Log, Span};
@@ -76,14 +77,22 @@ pub(super) fn loops(
     loops
 }
 
-/// Reads the drives; there must be one per active coordinate.
+/// Rows of the equation of motion, and drives that have none of their own because there are more of them.
+pub(super) struct Drives {
+    pub(super) rows: Vec<Drive>,
+    pub(super) shared: Vec<Drive>,
+}
+
+/// Reads the drives; there must be one per degree of freedom that is driven, or more than there are freedoms in a tree. What is not has a row of its own, called after
+/// its coordinate: those of free bodies come first, those of joints last.
 pub(super) fn drives(
     model: &ModelEntry,
     symbols: &Symbols,
+    tree: &Tree,
     points: &Points,
     places: &mut Places,
     log: &mut Log,
-) -> Vec<Drive> {
+) -> Drives {
     let entries = model
         .drive
         .as_ref()
@@ -144,10 +153,22 @@ pub(super) fn drives(
         drives.push(Drive {
             name: name.text.clone(),
             kind: kind.unwrap_or(DriveKind::Joint(CoordinateIdx(0))),
+            is_driven: true,
         });
     }
+    let shared = free::take_shared(model, symbols, &mut drives);
+    free::check_apart(tree, &shared, points, &places.drives, log);
+    if !shared.is_empty() {
+        places.drives.clear();
+    }
+    let mut drives = Drives {
+        rows: drives,
+        shared,
+    };
+    free::add_rows(model, symbols, tree, points, places, &mut drives, log);
     if log.n_errors() == before && !log.syntax_broken {
-        check_number(model, symbols, &drives, places, log);
+        free::check_apart(tree, &drives.rows, points, &places.drives, log);
+        check_number(model, symbols, &drives.rows, places, log);
     }
     drives
 }
@@ -162,7 +183,7 @@ fn check_number(
     let n_active = symbols
         .coordinates
         .iter()
-        .filter(|coordinate| !coordinate.passive)
+        .filter(|coordinate| !coordinate.passive && coordinate.motion.has_rate())
         .count();
     let n_declared = model
         .coordinates
@@ -182,6 +203,7 @@ fn check_number(
             .enumerate()
             .find(|(i, coordinate)| {
                 !coordinate.passive
+                    && coordinate.motion.has_rate()
                     && !drives
                         .iter()
                         .any(|drive| drive.kind == DriveKind::Joint(CoordinateIdx(*i)))
@@ -200,14 +222,14 @@ fn check_number(
         } else {
             "no drive is left for this coordinate"
         })
-        .help("each coordinate that is not `passive` is a degree of freedom and needs one drive")
+        .help("each coordinate that is not `passive` is a degree of freedom and needs one drive, or `driven = false`")
         .help(if n_active == 0 {
             "every coordinate is `passive`, so that nothing is driven: take `passive = true` off the one that the drive moves; if \
              the loops tie too many coordinates then, a joint is missing or a loop is too many"
         } else if drives.len() > n_active {
-            "delete a drive, or make another coordinate active"
+            "delete a drive, or make another coordinate active; more drives than degrees of freedom are possible without loops only"
         } else {
-            "add a `[[drive]]`; if the loops settle this coordinate, mark it `passive = true`"
+            "add a `[[drive]]`; if the loops settle this coordinate, mark it `passive = true`, and if it moves freely, `driven = false`"
         }),
     );
 }
@@ -277,7 +299,8 @@ pub(super) fn check_place_names(model: &ModelEntry, log: &mut Log) {
 }
 
 /// Reads what columns of drives measure: by what they are multiplied to be what acts at the joint.
-pub(super) fn torque(model: &ModelEntry, drives: &[Drive], log: &mut Log) -> Vec<(String, f64)> {
+pub(super) fn torque(model: &ModelEntry, drives: &Drives, log: &mut Log) -> Vec<(String, f64)> {
+    let drives: Vec<&Drive> = drives.rows.iter().chain(&drives.shared).collect();
     let recording = model.recording.as_ref();
     let torque = recording.and_then(|entry| entry.torque.as_ref());
     let mut factors = Vec::new();
@@ -317,7 +340,7 @@ pub(super) fn torque(model: &ModelEntry, drives: &[Drive], log: &mut Log) -> Vec
 pub(super) fn recording(
     model: &ModelEntry,
     symbols: &Symbols,
-    drives: &[Drive],
+    drives: &Drives,
     log: &mut Log,
 ) -> Vec<(String, String)> {
     let Some(columns) = model
@@ -330,9 +353,13 @@ pub(super) fn recording(
     let mut known = vec!["t".to_owned()];
     for coordinate in &symbols.coordinates {
         let name = &coordinate.name;
+        if !coordinate.motion.has_rate() {
+            known.push(name.clone());
+            continue;
+        }
         known.extend([name.clone(), format!("{name}_d"), format!("{name}_dd")]);
     }
-    for drive in drives {
+    for drive in drives.rows.iter().chain(&drives.shared) {
         known.extend([drive.name.clone(), format!("{}_var", drive.name)]);
     }
     let mut pairs: Vec<(String, String)> = Vec::new();

@@ -361,6 +361,7 @@ fn without_zeros(steps: Vec<Step>) -> Vec<Step> {
         .filter(|step| match step {
             Step::Rotate(_, angle) => !angle.is_zero(),
             Step::Translate(_, length) => !length.is_zero(),
+            Step::Free(_) => true,
         })
         .collect()
 }

@@ -5,16 +5,39 @@ use num_traits::One;
 use crate::build::frames::{angle_or_zero, length_or_zero};
 use crate::build::symbols::Symbols;
 use crate::diagnostic::{Diagnostic, Log};
-use crate::exact::Exact;
-use crate::formula::Formula;
-use crate::mechanism::{Axis, Step};
+use crate::exact::{CoordinateIdx, Exact, Symbol};
+use crate::formula::{AstKind, Formula};
+use crate::joint_motion::Motion;
+use crate::mechanism::{Axis, FreeBody, Step, TwistAxes};
 use crate::record::List;
 use crate::schema::JointEntry;
-use crate::values::AxisName;
+use crate::scope::Sort;
+use crate::values::{AxisName, QuaternionOrder, TwistName};
 
-/// The coordinates of joints with several, each with whether it is an angle.
-pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&Formula, bool)> {
-    let mut all: Vec<(&Formula, bool)> = Vec::new();
+/// The coordinates of joints with several, each with how it moves.
+pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&Formula, Motion)> {
+    let motion = |is_angle| {
+        if is_angle {
+            Motion::Revolute
+        } else {
+            Motion::Prismatic
+        }
+    };
+    let mut all: Vec<(&Formula, Motion)> = Vec::new();
+    if let Some(list) = joint.free.as_ref().filter(|list| list.entries.len() == 7) {
+        let scalar = match joint.quaternion {
+            Some(QuaternionOrder::Wxyz) => 3,
+            _ => 6,
+        };
+        let entries = list.entries.iter().enumerate();
+        return entries
+            .map(|(i, formula)| match i {
+                0..3 => (formula, Motion::Prismatic),
+                _ if i == scalar => (formula, Motion::QuaternionScalar),
+                _ => (formula, Motion::Quaternion),
+            })
+            .collect();
+    }
     // How many of the first coordinates are lengths; an angle leads in a cylindrical joint.
     for (list, n_lengths) in [
         (&joint.universal, 0),
@@ -22,13 +45,13 @@ pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&Formula, bool)> {
         (&joint.free, 3),
     ] {
         let entries = list.iter().flat_map(|list| &list.entries).enumerate();
-        all.extend(entries.map(|(i, formula)| (formula, i >= n_lengths)));
+        all.extend(entries.map(|(i, formula)| (formula, motion(i >= n_lengths))));
     }
     let cylindrical = joint.cylindrical.iter().flat_map(|list| &list.entries);
     all.extend(
         cylindrical
             .enumerate()
-            .map(|(i, formula)| (formula, i == 0)),
+            .map(|(i, formula)| (formula, motion(i == 0))),
     );
     all
 }
@@ -89,9 +112,15 @@ pub(super) fn steps(
         builder.turns("universal", joint, &angles, text);
     } else if let Some(angles) = builder.entries::<3>(joint.spherical.as_ref(), "three angles") {
         builder.turns("spherical", joint, &angles, text);
+    } else if joint
+        .free
+        .as_ref()
+        .is_some_and(|list| list.entries.len() == 7)
+    {
+        builder.free_body(joint, text);
     } else if let Some([x, y, z, a, b, c]) = builder.entries(
         joint.free.as_ref(),
-        "three coordinates of its position and three angles",
+        "three coordinates of its position and three angles, or seven with a quaternion",
     ) {
         text.push(format!("translation({}, {}, {})", x.text, y.text, z.text));
         for (axis, formula) in [(Axis::X, x), (Axis::Y, y), (Axis::Z, z)] {
@@ -104,6 +133,28 @@ pub(super) fn steps(
 
 /// Says where an axis or axes are given that the joint has no use for.
 fn reject_unused(joint: &JointEntry, log: &mut Log) {
+    let has_quaternion = joint
+        .free
+        .as_ref()
+        .is_some_and(|list| list.entries.len() == 7);
+    if (joint.quaternion.is_some() || joint.twist.is_some()) && !has_quaternion {
+        log.push(
+            Diagnostic::error(
+                joint.span,
+                "`quaternion` and `twist` say nothing of this joint",
+            )
+            .label("they belong to `free` with seven coordinates: three of the position and four of a quaternion"),
+        );
+    }
+    if has_quaternion {
+        if joint.axis.is_some() || joint.axes.is_some() {
+            log.push(
+                Diagnostic::error(joint.span, "a body with a quaternion turns about no axes")
+                    .label("delete `axis` or `axes`"),
+            );
+        }
+        return;
+    }
     let one = joint.revolute.is_some() || joint.prismatic.is_some() || joint.cylindrical.is_some();
     let (unused, wanted) = if one {
         (
@@ -166,6 +217,81 @@ impl Builder<'_> {
             );
         }
         found
+    }
+
+    /// A body that hangs on nothing.
+    fn free_body(&mut self, joint: &JointEntry, text: &mut Vec<String>) {
+        let Some(list) = &joint.free else { return };
+        let (Some(order), Some(twist)) = (joint.quaternion, joint.twist) else {
+            if !joint.faulty {
+                self.log.push(
+                    Diagnostic::error(joint.span, "a free body with a quaternion says two things more")
+                        .label("expected `quaternion` and `twist`")
+                        .help("`quaternion = \"xyzw\"` or `\"wxyz\"` is the order of its last four coordinates")
+                        .help("`twist = \"body\"`, `\"world\"` or `\"mixed\"` are the axes of velocity and force, angular velocity and moment"),
+                );
+            }
+            return;
+        };
+        let found: Vec<CoordinateIdx> = list
+            .entries
+            .iter()
+            .filter_map(|formula| self.coordinate(formula))
+            .collect();
+        let Ok([x, y, z, a, b, c, d]) = <[CoordinateIdx; 7]>::try_from(found) else {
+            return;
+        };
+        let quaternion = match order {
+            QuaternionOrder::Xyzw => [d, a, b, c],
+            QuaternionOrder::Wxyz => [a, b, c, d],
+        };
+        let all = [x, y, z, a, b, c, d];
+        if let Some(k) = (1..7).find(|k| all[..*k].contains(&all[*k])) {
+            self.log.push(
+                Diagnostic::error(list.entries[k].ast.span, "this coordinate stands twice")
+                    .label("expected seven different ones"),
+            );
+            return;
+        }
+        let (linear, angular, axes) = match twist {
+            TwistName::Body => (TwistAxes::Body, TwistAxes::Body, "body"),
+            TwistName::World => (TwistAxes::World, TwistAxes::World, "world"),
+            TwistName::Mixed => (TwistAxes::World, TwistAxes::Body, "mixed"),
+        };
+        let names: Vec<&str> = list
+            .entries
+            .iter()
+            .map(|formula| formula.text.as_str())
+            .collect();
+        let order = match order {
+            QuaternionOrder::Xyzw => "xyzw",
+            QuaternionOrder::Wxyz => "wxyz",
+        };
+        text.push(format!("free({}, {order}, twist {axes})", names.join(", ")));
+        self.steps.push(Step::Free(FreeBody {
+            position: [x, y, z],
+            quaternion,
+            linear,
+            angular,
+        }));
+    }
+
+    /// The coordinate that a formula is.
+    fn coordinate(&mut self, formula: &Formula) -> Option<CoordinateIdx> {
+        let AstKind::Name(name) = &formula.ast.kind else {
+            self.log.push(
+                Diagnostic::error(formula.ast.span, "a free body moves by coordinates alone")
+                    .label("expected the name of a coordinate"),
+            );
+            return None;
+        };
+        let span = formula.ast.span;
+        let scope = &self.symbols.scope;
+        let meaning = scope.look_up(name, span, &[Sort::Coordinate], self.log)?;
+        match meaning.exact {
+            Exact::Symbol(Symbol::Coordinate(idx)) => Some(idx),
+            _ => None,
+        }
     }
 
     fn rotate(&mut self, axis: Axis, minus: bool, formula: &Formula) {

@@ -8,6 +8,7 @@ mod bodies;
 pub(crate) mod effect_places;
 mod effects;
 mod frames;
+mod free;
 mod identified;
 mod joints;
 mod limits;
@@ -56,11 +57,12 @@ pub(crate) fn build(
     let parts = bodies::parts(model, &symbols, &tree, log);
     let lumped_masses = bodies::lumped_masses(model, &symbols, &tree, &points, log);
     let loops = actuation::loops(model, &points, &mut places, log);
-    let drives = actuation::drives(model, &symbols, &points, &mut places, log);
+    free::check_loops(&tree, &loops, &points, &places, log);
+    let drives = actuation::drives(model, &symbols, &tree, &points, &mut places, log);
     let own_kinds = model.effect_kind.iter().flat_map(|list| &list.entries);
     let own_kinds: Vec<&EffectKindEntry> = libraries.iter().chain(own_kinds).collect();
     let scene = Scene {
-        drives: &drives,
+        drives: &drives.rows,
         points: &points,
         parts: &parts,
         lumped_masses: &lumped_masses,
@@ -68,7 +70,13 @@ pub(crate) fn build(
     let effects = effects::effects(model, &own_kinds, &mut symbols, &scene, log);
     let (gravity, force_delay) = mechanics::whole(&effects, gravity, &symbols.constants);
     let retain = retain::retain(model, &symbols, log);
-    let limits = limits::limits(model, &symbols.coordinates, &drives, &points.points, log);
+    let limits = limits::limits(
+        model,
+        &symbols.coordinates,
+        &drives.rows,
+        &points.points,
+        log,
+    );
     let identified_base = identified::identified(model, &mut symbols, log);
     let columns = actuation::recording(model, &symbols, &drives, log);
     let torque = actuation::torque(model, &drives, log);
@@ -96,7 +104,8 @@ pub(crate) fn build(
         parts,
         lumped_masses,
         loops,
-        drives,
+        drives: drives.rows,
+        shared_drives: drives.shared,
         effects,
         force_delay,
         identified_base,

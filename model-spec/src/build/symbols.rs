@@ -352,7 +352,11 @@ fn declare_coordinates(
     places: &mut Places,
     log: &mut Log,
 ) {
-    let (angles, lengths) = joint_formulas(model);
+    let Formulas {
+        angles,
+        lengths,
+        quaternions,
+    } = joint_formulas(model);
     let entries = model
         .coordinates
         .as_ref()
@@ -366,6 +370,21 @@ fn declare_coordinates(
     for (key, entry) in entries.iter().take(MOST_COORDINATES) {
         let turns = angles.iter().find_map(|ast| find(ast, &key.name));
         let slides = lengths.iter().find_map(|ast| find(ast, &key.name));
+        let of_quaternion = quaternions
+            .iter()
+            .find_map(|(ast, motion)| find(ast, &key.name).map(|span| (span, *motion)));
+        if let (Some((span, _)), Some(other)) = (of_quaternion, turns.or(slides)) {
+            log.push(
+                Diagnostic::error(
+                    other,
+                    format!("`{}` is a component of a quaternion", key.name),
+                )
+                .label("used as an angle or a length here")
+                .related(span, "used in a quaternion here")
+                .help("declare a coordinate for each joint"),
+            );
+        }
+        let of_quaternion = of_quaternion.map(|(_, motion)| motion);
         let motion = match (turns, slides) {
             (Some(turns), Some(slides)) => {
                 log.push(
@@ -379,6 +398,7 @@ fn declare_coordinates(
                 );
                 None
             }
+            (None, None) if let Some(motion) = of_quaternion => Some(motion),
             (None, Some(_)) => Some(Motion::Prismatic),
             (Some(_), None) => Some(Motion::Revolute),
             (None, None) => {
@@ -387,6 +407,8 @@ fn declare_coordinates(
                 None
             }
         };
+        // Without values a quaternion turns nothing.
+        let at_rest = f64::from(u8::from(motion == Some(Motion::QuaternionScalar)));
         let dimension = motion.map(Motion::dimension);
         let motion = motion.unwrap_or(Motion::Revolute);
         let symbol = Symbol::Coordinate(CoordinateIdx(symbols.coordinates.len()));
@@ -403,7 +425,7 @@ fn declare_coordinates(
                 name: key.name.clone(),
                 motion,
                 passive: entry.passive.is_some_and(|flag| flag.0),
-                nominal: entry.nominal.map_or(0.0, |number| number.value),
+                nominal: entry.nominal.map_or(at_rest, |number| number.value),
             });
         } else {
             let n_coordinates = symbols.coordinates.len();
@@ -412,10 +434,17 @@ fn declare_coordinates(
     }
 }
 
-/// The expressions of all frames that are angles, and those that are lengths.
-fn joint_formulas(model: &ModelEntry) -> (Vec<&Ast>, Vec<&Ast>) {
+/// The expressions of all frames by what they are.
+struct Formulas<'a> {
+    angles: Vec<&'a Ast>,
+    lengths: Vec<&'a Ast>,
+    quaternions: Vec<(&'a Ast, Motion)>,
+}
+
+fn joint_formulas(model: &ModelEntry) -> Formulas<'_> {
     let mut angles: Vec<&Ast> = Vec::new();
     let mut lengths: Vec<&Ast> = Vec::new();
+    let mut quaternions = Vec::new();
     for frame in model.frame.iter().flat_map(|list| &list.entries) {
         for dh in frame.modified_dh.iter().chain(&frame.standard_dh) {
             angles.extend(dh.alpha.iter().chain(&dh.theta).map(|formula| &formula.ast));
@@ -424,16 +453,22 @@ fn joint_formulas(model: &ModelEntry) -> (Vec<&Ast>, Vec<&Ast>) {
         if let Some(joint) = &frame.joint {
             angles.extend(joint.revolute.iter().map(|formula| &formula.ast));
             lengths.extend(joint.prismatic.iter().map(|formula| &formula.ast));
-            for (formula, is_angle) in crate::build::joints::coordinates(joint) {
-                if is_angle {
-                    angles.push(&formula.ast);
-                } else {
-                    lengths.push(&formula.ast);
+            for (formula, motion) in crate::build::joints::coordinates(joint) {
+                match motion {
+                    Motion::Revolute => angles.push(&formula.ast),
+                    Motion::Prismatic => lengths.push(&formula.ast),
+                    Motion::Quaternion | Motion::QuaternionScalar => {
+                        quaternions.push((&formula.ast, motion));
+                    }
                 }
             }
         }
     }
-    (angles, lengths)
+    Formulas {
+        angles,
+        lengths,
+        quaternions,
+    }
 }
 
 /// The place of a name in an expression.

@@ -5,20 +5,22 @@
 //! not pull the fit to itself. A law that the model lacks leaves errors that come again with the motion; an event is rare, lasts,
 //! and stands far above all that the rest of the run leaves.
 
-use modelmill_identify::Note;
 use modelmill_identify::diagnose::{Disturbance, Quantity};
-use nalgebra::{DMatrix, DVector};
+use modelmill_identify::{Note, robust_fit};
+use nalgebra::DVector;
 
-use super::with_friction;
-use crate::along::drive_rates;
+use super::rows::Rows;
 use crate::model::Model;
 use crate::stretch::Stretch;
 use crate::text::table::significant;
 
 /// Samples that are looked at.
 const LOOKED_AT: usize = 4000;
+/// Samples per second that are looked at in a long run.
+const FINE: f64 = 25.0;
 /// Samples whose median counts: single outliers are none.
-const TOGETHER: usize = 11;
+const FEWEST_TOGETHER: usize = 5;
+const MOST_TOGETHER: usize = 11;
 /// An event stands so many times above what four fifths of the run stay below.
 const ABOVE: f64 = 5.0;
 const USUAL: f64 = 0.8;
@@ -29,17 +31,23 @@ const MOST: usize = 4;
 const LONGEST: f64 = 0.15;
 /// An event lasts at least so long, s.
 const SHORTEST: f64 = 0.1;
+/// So many samples of an event are held against the nearest of the rest of the run: none further than so many deviations of the
+/// states, with less than this part of what is left.
+const COMPARED: usize = 40;
+const NEIGHBOURS: usize = 5;
+const NEAR: f64 = 1.0;
+const ALIKE: f64 = 0.4;
 /// Part of its fastest rate below which a drive may turn round.
 const SLOW: f64 = 0.1;
-/// Huber's bound in standard deviations, and how often rows are reweighted.
-const BOUND: f64 = 1.345;
-const ROUNDS: usize = 4;
 
 /// An interval in which forces act that no parameters explain.
-struct Event {
-    from: f64,
-    to: f64,
-    drives: Vec<(usize, f64, f64)>,
+#[derive(Clone, Debug)]
+pub(crate) struct Event {
+    /// When it begins and ends, s.
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+    /// The drives on which it shows, each with the largest force that is not explained and with what is usual.
+    pub(crate) drives: Vec<(usize, f64, f64)>,
 }
 
 /// Remarks on the events of a stretch; their forces count no more where they are to be left out.
@@ -87,99 +95,86 @@ pub(super) fn found(model: &Model, data: &mut Stretch, leave_out: bool) -> Vec<N
             says: None,
         });
     }
-    if leave_out && !events.is_empty() {
-        let run = &mut data.run;
-        let n = run.time.len();
-        if run.left_out.is_empty() {
-            run.left_out = vec![vec![false; n]; names.len()];
-        }
-        for (i, time) in run.time.iter().enumerate() {
-            let is_in = |event: &Event| (event.from..=event.to).contains(time);
-            if events.iter().any(is_in) {
-                run.left_out.iter_mut().for_each(|out| out[i] = true);
-            }
-        }
+    if leave_out {
+        leave_out_events(data, &events);
     }
     notes
 }
 
-fn events(model: &Model, data: &Stretch) -> Option<Vec<Event>> {
+/// Forces within events count no more.
+pub(crate) fn leave_out_events(data: &mut Stretch, events: &[Event]) {
+    if events.is_empty() {
+        return;
+    }
+    let run = &mut data.run;
+    if run.left_out.is_empty() {
+        let drives = run.force.as_ref().map_or(0, Vec::len);
+        run.left_out = vec![vec![false; run.time.len()]; drives];
+    }
+    for (i, time) in run.time.iter().enumerate() {
+        let is_in = |event: &Event| (event.from..=event.to).contains(time);
+        if events.iter().any(is_in) {
+            run.left_out.iter_mut().for_each(|out| out[i] = true);
+        }
+    }
+}
+
+/// The events of a stretch; `None` where too little is there to tell.
+pub(crate) fn events(model: &Model, data: &Stretch) -> Option<Vec<Event>> {
     let run = &data.run;
     let forces = run.force.as_deref()?;
     let n = run.time.len();
-    let drives = forces.len();
-    let samples: Vec<usize> = (0..n).step_by((n / LOOKED_AT).max(1)).collect();
-    if samples.len() < 40 * TOGETHER {
+    let duration = run.time.last()? - run.time.first()?;
+    let wanted = LOOKED_AT.max(whole(FINE * duration));
+    let samples: Vec<usize> = (0..n).step_by((n / wanted).max(1)).collect();
+    let rate = samples.len() as f64 / duration;
+    let together = whole(SHORTEST * rate).clamp(FEWEST_TOGETHER, MOST_TOGETHER);
+    if samples.len() < 40 * MOST_TOGETHER {
         return None;
     }
-    let regressor = with_friction(model, data, &samples)?;
-    let measured = DVector::from_iterator(
-        samples.len() * drives,
-        (samples.iter()).flat_map(|k| forces.iter().map(move |force| force[*k])),
-    );
-    let rest = robust_rest(&regressor, &measured, drives)?;
-    let rates = drive_rates(model, data).ok()?;
-    let mut flagged = vec![false; samples.len()];
-    let mut levels = Vec::new();
-    for d in 0..drives {
-        let size = (0..samples.len())
-            .map(|i| measured[i * drives + d].powi(2))
-            .sum::<f64>();
-        let size = (size / samples.len() as f64).sqrt();
-        let reverses = reversing(&rates[d], &samples);
-        let together: Vec<f64> = (0..samples.len())
-            .map(|i| {
-                let start = i.saturating_sub(TOGETHER / 2);
-                let end = (start + TOGETHER).min(samples.len());
-                if reverses[start..end].contains(&true) {
-                    return 0.0;
-                }
-                quantile(
-                    (start..end).map(|k| rest[k * drives + d].abs()).collect(),
-                    0.5,
-                )
-            })
-            .collect();
-        let usual = quantile(together.clone(), USUAL);
-        let bound = (ABOVE * usual).max(LEAST * size);
-        for (flag, level) in flagged.iter_mut().zip(&together) {
-            *flag |= *level > bound;
-        }
-        levels.push((together, usual, bound));
-    }
+    let rest = Unexplained::of(model, data, forces, &samples)?;
+    let levels: Vec<Level> = (0..forces.len()).map(|d| rest.level(d, together)).collect();
+    let flagged: Vec<bool> = (0..samples.len())
+        .map(|i| levels.iter().any(|level| level.values[i] > level.bound))
+        .collect();
+    let is_idle = |i: usize| (levels.iter()).all(|level| level.reverses[i]);
     let mut events = Vec::new();
-    let mut i = 0;
     let mut lasted = 0;
+    let mut i = 0;
     while i < flagged.len() {
         let start = i;
-        // Short lulls belong to the event about them.
+        // Short lulls belong to the event about them, and so does a reversal.
         let mut end = i;
-        while i < flagged.len() && (flagged[i] || (end > start && i - end < 2 * TOGETHER)) {
+        let mut lull = 0;
+        while i < flagged.len() && (flagged[i] || (end > start && lull < 2 * together)) {
             if flagged[i] {
                 end = i + 1;
+                lull = 0;
+            } else if !is_idle(i) {
+                lull += 1;
             }
             i += 1;
         }
         let reach = |k: usize| run.time[samples[k.min(samples.len() - 1)]];
         let [from, to] = [
-            reach(start.saturating_sub(TOGETHER / 2)),
-            reach(end + TOGETHER / 2),
+            reach(start.saturating_sub(together / 2)),
+            reach(end + together / 2),
         ];
-        if end > start && to - from >= SHORTEST {
-            let concerned =
-                levels
-                    .iter()
-                    .enumerate()
-                    .filter_map(|(d, (together, usual, bound))| {
-                        let largest = together[start..end].iter().copied().fold(0.0, f64::max);
-                        (largest > *bound).then_some((d, largest, *usual))
-                    });
-            events.push(Event {
-                from,
-                to,
-                drives: concerned.collect(),
+        let lasts = |end: usize| reach(end - 1) - reach(start) >= SHORTEST;
+        if end > start && lasts(end) {
+            let around = start.saturating_sub(together)..end + together;
+            let concerned = levels.iter().enumerate().filter_map(|(d, level)| {
+                let is_in = |i: &usize| level.values[*i] > level.bound;
+                let within: Vec<usize> = (start..end).filter(is_in).collect();
+                let largest = within.iter().map(|i| level.values[*i]).reduce(f64::max)?;
+                let comes_again = rest.comes_again(d, &within, &around, &level.reverses);
+                (!comes_again).then_some((d, largest, level.usual))
             });
+            let drives: Vec<(usize, f64, f64)> = concerned.collect();
             lasted += end - start;
+            if !drives.is_empty() {
+                events.push(Event { from, to, drives });
+            }
         }
         i = i.max(start + 1);
     }
@@ -187,51 +182,158 @@ fn events(model: &Model, data: &Stretch) -> Option<Vec<Event>> {
     is_rare.then_some(events)
 }
 
-/// Samples at which a drive turns round or stands: friction takes values there that no law of the model may say.
-fn reversing(rate: &[f64], samples: &[usize]) -> Vec<bool> {
-    let fastest = rate.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-    samples
-        .iter()
-        .map(|k| rate[*k].abs() < SLOW * fastest)
-        .collect()
+/// What no parameters explain of the forces.
+struct Unexplained {
+    drives: usize,
+    rest: DVector<f64>,
+    measured: DVector<f64>,
+    rows: Rows,
+    counts: Vec<bool>,
 }
 
-/// What Huber's function leaves of the forces, each drive by its own scale.
-fn robust_rest(
-    regressor: &DMatrix<f64>,
-    measured: &DVector<f64>,
-    drives: usize,
-) -> Option<DVector<f64>> {
-    let mut weights = DVector::from_element(measured.len(), 1.0);
-    let mut rest = measured.clone();
-    for _ in 0..ROUNDS {
-        for d in 0..drives {
-            let sizes = (d..rest.len()).step_by(drives).map(|i| rest[i].abs());
-            let scale = (1.4826 * quantile(sizes.collect(), 0.5)).max(f64::MIN_POSITIVE.sqrt());
-            for i in (d..rest.len()).step_by(drives) {
-                let inside = (BOUND * scale / rest[i].abs().max(f64::MIN_POSITIVE)).min(1.0);
-                weights[i] = inside.sqrt() / scale;
-            }
+/// What is left of a drive's force along a run: medians of neighbours, what is usual of them, and what is too much.
+struct Level {
+    values: Vec<f64>,
+    reverses: Vec<bool>,
+    usual: f64,
+    bound: f64,
+}
+
+impl Unexplained {
+    fn of(model: &Model, data: &Stretch, forces: &[Vec<f64>], samples: &[usize]) -> Option<Self> {
+        let drives = forces.len();
+        let rows = Rows::new(model, data, samples)?;
+        let of_samples = samples
+            .iter()
+            .flat_map(|k| forces.iter().map(move |force| force[*k]));
+        let measured = DVector::from_iterator(samples.len() * drives, of_samples);
+        let counts: Vec<bool> = (samples.iter())
+            .flat_map(|k| (0..drives).map(move |d| data.run.counts(d, *k)))
+            .collect();
+        // A long run is fitted on a part of its samples.
+        let every = (samples.len() / LOOKED_AT).max(1);
+        let fit = if every == 1 {
+            robust_fit(&rows.regressor, &measured, drives, &counts)?.values
+        } else {
+            let some: Vec<usize> = (0..samples.len())
+                .step_by(every)
+                .flat_map(|i| i * drives..(i + 1) * drives)
+                .collect();
+            let counts: Vec<bool> = some.iter().map(|row| counts[*row]).collect();
+            let measured = measured.select_rows(&some);
+            robust_fit(
+                &rows.regressor.select_rows(&some),
+                &measured,
+                drives,
+                &counts,
+            )?
+            .values
+        };
+        let mut rest = &measured - &rows.regressor * fit;
+        for (rest, _) in rest.iter_mut().zip(&counts).filter(|(_, counts)| !**counts) {
+            *rest = 0.0;
         }
-        let mut weighted = regressor.clone();
-        for (mut row, weight) in weighted.row_iter_mut().zip(weights.iter()) {
-            row *= *weight;
-        }
-        let mut normal = weighted.tr_mul(&weighted);
-        let right = weighted.tr_mul(&measured.component_mul(&weights));
-        let scale = normal
-            .diagonal()
-            .map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
-        for i in 0..scale.len() {
-            for j in 0..scale.len() {
-                normal[(i, j)] *= scale[i] * scale[j];
-            }
-            normal[(i, i)] += 1e-9;
-        }
-        let values = normal.cholesky()?.solve(&right.component_mul(&scale));
-        rest = measured - regressor * values.component_mul(&scale);
+        Some(Self {
+            drives,
+            rest,
+            measured,
+            rows,
+            counts,
+        })
     }
-    rest.iter().all(|x| x.is_finite()).then_some(rest)
+
+    fn samples(&self) -> usize {
+        self.counts.len() / self.drives
+    }
+
+    fn level(&self, d: usize, together: usize) -> Level {
+        let n = self.samples();
+        let at = |i: usize| i * self.drives + d;
+        let size = (0..n).map(|i| self.measured[at(i)].powi(2)).sum::<f64>();
+        let size = (size / n as f64).sqrt();
+        let reverses = reversing(&self.rows.motion[1][d]);
+        let values: Vec<f64> = (0..n)
+            .map(|i| {
+                let start = i.saturating_sub(together / 2);
+                let end = (start + together).min(n);
+                if reverses[start..end].contains(&true) {
+                    return 0.0;
+                }
+                quantile((start..end).map(|k| self.rest[at(k)].abs()).collect(), 0.5)
+            })
+            .collect();
+        let usual = quantile(values.clone(), USUAL);
+        Level {
+            bound: (ABOVE * usual).max(LEAST * size),
+            values,
+            reverses,
+            usual,
+        }
+    }
+
+    /// Whether what is left of a drive's force at some samples comes again where its position, rate, acceleration and force are
+    /// alike, outside of a range: then it is a law that the model lacks. So it is taken to be where they are nowhere alike.
+    fn comes_again(
+        &self,
+        d: usize,
+        within: &[usize],
+        around: &std::ops::Range<usize>,
+        reverses: &[bool],
+    ) -> bool {
+        let n = self.samples();
+        let at = |i: usize| i * self.drives + d;
+        let explained: Vec<f64> = (0..n)
+            .map(|i| self.measured[at(i)] - self.rest[at(i)])
+            .collect();
+        let states = [
+            &self.rows.motion[0][d],
+            &self.rows.motion[1][d],
+            &self.rows.motion[2][d],
+            &explained,
+        ];
+        let scales = states.map(|values| {
+            let mean = values.iter().sum::<f64>() / n as f64;
+            let sum: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
+            (n as f64 / sum.max(f64::MIN_POSITIVE)).sqrt()
+        });
+        let others: Vec<usize> = (0..n)
+            .filter(|i| !around.contains(i) && !reverses[*i] && self.counts[at(*i)])
+            .collect();
+        let some = within
+            .iter()
+            .step_by(within.len().div_ceil(COMPARED).max(1));
+        let (mut alone, mut asked) = (0, 0);
+        for i in some {
+            let mut near: Vec<(f64, usize)> = others
+                .iter()
+                .map(|k| {
+                    let apart = states
+                        .iter()
+                        .zip(scales)
+                        .map(|(x, s)| (s * (x[*i] - x[*k])).powi(2));
+                    (apart.sum::<f64>(), *k)
+                })
+                .collect();
+            asked += 1;
+            if near.len() < NEIGHBOURS {
+                continue;
+            }
+            near.select_nth_unstable_by(NEIGHBOURS - 1, |a, b| a.0.total_cmp(&b.0));
+            let near = &near[..NEIGHBOURS];
+            let is_near = near.iter().all(|(apart, _)| *apart < NEAR * NEAR);
+            let theirs =
+                near.iter().map(|(_, k)| self.rest[at(*k)]).sum::<f64>() / NEIGHBOURS as f64;
+            let own = self.rest[at(*i)];
+            alone += usize::from(is_near && theirs * own.signum() < ALIKE * own.abs());
+        }
+        2 * alone < asked
+    }
+}
+
+/// Samples at which a drive turns round or stands: friction takes values there that no law of the model may say.
+fn reversing(rate: &[f64]) -> Vec<bool> {
+    let fastest = rate.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    rate.iter().map(|v| v.abs() < SLOW * fastest).collect()
 }
 
 /// The value that this part of all stays below.
@@ -240,11 +342,16 @@ fn quantile(mut values: Vec<f64>, part: f64) -> f64 {
         return 0.0;
     }
     let last = values.len() - 1;
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a part of a count is a count"
-    )]
-    let at = (part * last as f64) as usize;
+    let at = whole(part * last as f64);
     *values.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+/// A count that was computed, rounded down.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a float becomes the nearest count there is"
+)]
+fn whole(value: f64) -> usize {
+    value as usize
 }

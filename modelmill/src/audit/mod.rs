@@ -1,26 +1,24 @@
 //! What a model says of a recording before anything is believed: delays between force and motion, columns that are
 //! exchanged or turned round, angles in degrees. Everything goes into the notes.
 
-mod events;
+mod delay;
+pub(crate) mod events;
 mod nominal_forces;
+mod rows;
 
 use modelmill_codegen::{Evaluator, States};
-use modelmill_identify::{ForceAudit, ForceDelay, Note, Suspect, differentiate};
+use modelmill_identify::{ForceAudit, Note, Suspect};
 use nalgebra::{DMatrix, DVector};
 
-use crate::along::drive_rates;
 use crate::model::Model;
 use crate::stretch::Stretch;
 use crate::text::table::percent;
+use delay::Late;
 
 /// Samples that are looked at, spread over the recording.
 const LOOKED_AT: usize = 1500;
-/// Largest delay that is looked for, in samples.
-const LONGEST_DELAY: usize = 25;
-/// Part of a drive's fastest rate below which its friction may be about to reverse.
-const SLOW: f64 = 0.1;
-/// Standard deviations within which 99 of 100 values lie.
-const SURE: f64 = 2.58;
+/// Fewest samples of which anything is said.
+const FEWEST: usize = 100;
 /// Relative errors below this one raise no suspicion of exchanged columns.
 const BEARABLE: f64 = 0.3;
 /// An exchange must lower the error to this part.
@@ -42,11 +40,11 @@ pub fn examine(model: &Model, data: &mut [Stretch], leave_out_events: bool) {
 fn findings(model: &Model, data: &Stretch) -> Vec<Note> {
     let run = &data.run;
     let n = data.samples();
-    let Some(forces) = run.force.as_deref().filter(|_| n > 4 * LONGEST_DELAY) else {
+    let Some(forces) = run.force.as_deref().filter(|_| n > FEWEST) else {
         return Vec::new();
     };
     let step = (n / LOOKED_AT).max(1);
-    let samples: Vec<usize> = (LONGEST_DELAY..n - LONGEST_DELAY).step_by(step).collect();
+    let samples: Vec<usize> = (0..n).step_by(step).collect();
     let n_drives = forces.len();
     let explained = |change: &Change<'_>| {
         let regressor = regressor(model, data, &samples, change)?;
@@ -64,8 +62,11 @@ fn findings(model: &Model, data: &Stretch) -> Vec<Note> {
         return Vec::new();
     };
     let beside = beside_nominal(model, data, &samples);
+    let late = Late::of(model, data);
+    let with_delay = late.as_ref().and_then(Late::left);
     let mut notes = Vec::new();
-    if error > BEARABLE {
+    // Forces that are late by a good part of a period look like those of another drive.
+    if error > BEARABLE && with_delay.is_none_or(|left| left > BETTER * error) {
         let drives = model.drives();
         if let Some((suspect, [before, after])) = as_it_is.suspect(&measured)
             && after < BETTER * before
@@ -103,94 +104,9 @@ fn findings(model: &Model, data: &Stretch) -> Vec<Note> {
         notes = beside;
     }
     if notes.is_empty() {
-        notes.extend(delay(model, data, &samples));
+        notes.extend(late.and_then(|late| late.note(model, &run.file)));
     }
     notes
-}
-
-/// What the forces come later or earlier than the motion by, all drives together and each by itself.
-fn delay(model: &Model, data: &Stretch, samples: &[usize]) -> Option<Note> {
-    let run = &data.run;
-    let forces = run.force.as_deref()?;
-    let n = run.time.len();
-    let rates = drive_rates(model, data).ok()?;
-    let drives = forces.len();
-    // Friction that reverses has its own way of coming late.
-    let fastest: Vec<f64> = rates
-        .iter()
-        .map(|rate| rate.iter().fold(0.0_f64, |most, v| most.max(v.abs())))
-        .collect();
-    let moves = |row: usize, d: usize| {
-        rates[d][samples[row]].abs() > SLOW * fastest[d] && run.counts(d, samples[row])
-    };
-    let regressor = with_friction(model, data, samples)?;
-    let found = |wanted: &dyn Fn(usize) -> bool| {
-        let mut rows = regressor.clone();
-        for i in 0..samples.len() {
-            for d in 0..drives {
-                if !(wanted(d) && moves(i, d)) {
-                    rows.row_mut(i * drives + d).fill(0.0);
-                }
-            }
-        }
-        let counts = |row: usize, d: usize| wanted(d) && moves(row, d);
-        ForceAudit::new(rows, drives)?.delay_counted(samples, forces, LONGEST_DELAY, counts)
-    };
-    let all = found(&|_| true)?;
-    let [before, after] = all.error;
-    let seconds = (run.time[n - 1] - run.time[0]) / (n - 1) as f64;
-    let gain = 1.0 - after / before.max(f64::MIN_POSITIVE);
-    if gain <= 0.003 || all.samples.abs() < 0.3_f64.max(SURE * all.std) {
-        return None;
-    }
-    let alone: Vec<Option<ForceDelay>> = if drives > 1 {
-        (0..drives).map(|d| found(&|other| other == d)).collect()
-    } else {
-        Vec::new()
-    };
-    // A clock delays all forces alike; where drives differ, it is a law that the model lacks.
-    let agree = alone.iter().flatten().all(|one| {
-        let apart = (one.samples - all.samples).abs();
-        apart < SURE * one.std.hypot(all.std) + 0.1
-    });
-    let needs_more = if drives > 1 { 0.003 } else { 0.03 };
-    if gain <= needs_more || !agree {
-        return None;
-    }
-    let (which, behind) = if all.samples > 0.0 {
-        ("come later than", "behind")
-    } else {
-        ("come earlier than", "before")
-    };
-    let each = if alone.is_empty() {
-        String::new()
-    } else {
-        let each = model.drives().into_iter().zip(&alone).map(|(name, one)| {
-            one.map_or_else(
-                || format!("`{name}` does not tell"),
-                |one| format!("`{name}` {:.1} +- {:.1}", one.samples, SURE * one.std),
-            )
-        });
-        format!(
-            " Each drive by itself, in samples: {}.",
-            each.collect::<Vec<_>>().join(", ")
-        )
-    };
-    let says = format!(
-        "The forces in {} {which} the motion that the model explains them by: {:.1} samples or {:.3} ms {behind} it (+- {:.3} ms, \
-         99 %). Without this shift the best fit would be off by {} rather than {}.{each}",
-        run.file,
-        all.samples.abs(),
-        1e3 * seconds * all.samples.abs(),
-        1e3 * seconds * SURE * all.std,
-        percent(Some(after)),
-        percent(Some(before))
-    );
-    Some(if gain > 0.1 {
-        Note::warning(says)
-    } else {
-        Note::info(says)
-    })
 }
 
 /// Signs and units of the forces, held against those that the nominal values give.
@@ -213,31 +129,6 @@ fn beside_nominal(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<Note>
         .into_iter()
         .map(Note::warning)
         .collect()
-}
-
-/// The regressor with friction, inertia and an offset at every drive besides: where a model lacks these, their force
-/// would pass for a delay.
-fn with_friction(model: &Model, data: &Stretch, samples: &[usize]) -> Option<DMatrix<f64>> {
-    let regressor = regressor(model, data, samples, &|_| {})?;
-    let rates = drive_rates(model, data).ok()?;
-    let n = rates.len();
-    let width = regressor.ncols();
-    let mut more = regressor.resize_horizontally(width + 4 * n, 0.0);
-    let accelerations: Vec<Vec<f64>> = rates
-        .iter()
-        .map(|rate| differentiate(&data.run.time, rate))
-        .collect();
-    for (i, sample) in samples.iter().enumerate() {
-        for (d, rate) in rates.iter().enumerate() {
-            let rate = *rate.get(*sample)?;
-            let acceleration = accelerations[d][*sample];
-            let sign = if rate == 0.0 { 0.0 } else { rate.signum() };
-            for (k, value) in [rate, sign, acceleration, 1.0].into_iter().enumerate() {
-                more[(i * n + d, width + 4 * d + k)] = value;
-            }
-        }
-    }
-    Some(more)
 }
 
 /// Positions, rates and accelerations, `[order][coordinate][sample]`.

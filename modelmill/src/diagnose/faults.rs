@@ -77,7 +77,7 @@ fn told(one: &Difference) -> Disturbance {
     });
     Disturbance {
         kind: kind.to_owned(),
-        at: vec![at.to_owned()],
+        at: at.into_iter().map(str::to_owned).collect(),
         estimates: estimates.collect(),
         recordings: vec![one.first.clone(), one.later.clone()],
         interval: None,
@@ -90,6 +90,7 @@ fn told(one: &Difference) -> Disturbance {
                 What::Scale { .. } => "the scale of a force",
                 What::Clock { .. } => "the clock",
                 What::EncoderZero { .. } => "the zero of an encoder",
+                What::ContactEvent { .. } => "a push",
             },
             one.later,
             one.first,

@@ -28,9 +28,19 @@ pub(crate) fn layout(model: &Model, all: &Runs<'_>) -> Layout {
             is_check: *is_check,
         }
     };
+    let all_count = (all.iter()).all(|(one, _)| one.run.left_out.iter().flatten().all(|out| !out));
+    let of_drive = |drive: usize| {
+        let of = |(one, _): &(&Stretch, bool)| -> Vec<bool> {
+            let kept = 0..one.time().len();
+            kept.map(|i| one.hears_of_faults(drive, i)).collect()
+        };
+        all.iter().flat_map(of).collect()
+    };
+    let drives = if all_count { 0 } else { model.drives().len() };
     Layout {
         channels: model.drives(),
         stretches: all.iter().map(stretch).collect(),
+        left_out: (0..drives).map(of_drive).collect(),
     }
 }
 

@@ -4,6 +4,8 @@ use modelmill_spec::{
     ActsOn, Carries, DriveIdx, DriveKind, EffectKind, Mechanism, PartIdx, Place, PointIdx,
 };
 
+use crate::recording::free::free_bodies;
+
 /// A place with its name and what it carries.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Spot {
@@ -23,7 +25,12 @@ pub(crate) fn spots(mechanism: &Mechanism) -> Vec<Spot> {
     };
     let mut spots = Vec::new();
     let mut driven = Vec::new();
-    for (d, drive) in mechanism.drives.iter().enumerate() {
+    for (d, drive) in mechanism
+        .drives
+        .iter()
+        .enumerate()
+        .filter(|(_, drive)| drive.is_driven)
+    {
         if let DriveKind::Joint(i) = drive.kind {
             driven.push(i.0);
         }
@@ -33,7 +40,7 @@ pub(crate) fn spots(mechanism: &Mechanism) -> Vec<Spot> {
     }
     // A joint with a drive of its own is the same place.
     for (i, coordinate) in mechanism.coordinates.iter().enumerate() {
-        if !driven.contains(&i) {
+        if !driven.contains(&i) && !is_free(mechanism, i) {
             let place = Place::Coordinate(modelmill_spec::CoordinateIdx(i));
             let carries = coordinate.motion.carries();
             spots.push(spot(&coordinate.name, carries, ActsOn::Coordinate, place));
@@ -58,6 +65,15 @@ pub(crate) fn spots(mechanism: &Mechanism) -> Vec<Spot> {
         Place::Force,
     ));
     spots
+}
+
+/// Whether a coordinate belongs to a free body, which has no joint that could rub.
+fn is_free(mechanism: &Mechanism, coordinate: usize) -> bool {
+    let mut bodies = free_bodies(mechanism);
+    bodies.any(|body| {
+        let mut all = body.position.iter().chain(&body.quaternion);
+        all.any(|i| i.0 == coordinate)
+    })
 }
 
 /// Whether a kind may act at a place and could say something there.

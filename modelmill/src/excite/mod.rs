@@ -15,6 +15,7 @@ use crate::diagnose::Named;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::Recording;
+use crate::recording::free::free_bodies;
 use crate::text::csv::csv;
 use crate::text::svg::Figure;
 use crate::text::table::significant;
@@ -91,6 +92,13 @@ impl Model {
     ///
     /// Fails when a coordinate has no limits, when no trajectory keeps them, or when no motion tells the effects apart.
     pub fn excite(&self, request: &Request, recordings: &[&Recording]) -> Outcome<Excited> {
+        if free_bodies(&self.derivation.mechanism).next().is_some() {
+            return Err(Error::input(format!(
+                "{}: motion is planned for joints, and this model has a body that hangs on nothing; plan with the body held, \
+                 its frame fixed to the base",
+                self.path
+            )));
+        }
         let all_limits = limits::limits(self, &request.limits)?;
         let coordinates = limits::of_active(self, &all_limits)?;
         let mut options = request.options.clone();

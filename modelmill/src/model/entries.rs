@@ -1,8 +1,8 @@
 //! The entries of a model as pairs of a name and a text, so that two models can be compared.
 
 use modelmill_spec::{
-    Angle, Axis, Convention, DriveKind, Effect, Exact, Inertial, Length, Mechanism, Place,
-    PlaceQuantity, Step, Symbol,
+    Angle, Axis, Convention, CoordinateIdx, DriveKind, Effect, Exact, Inertial, Length, Mechanism,
+    Place, PlaceQuantity, Step, Symbol, TwistAxes,
 };
 
 /// Entries as they are collected.
@@ -182,6 +182,23 @@ fn step(m: &Mechanism, step: &Step) -> String {
     match step {
         Step::Rotate(axis, angle) => format!("R{}({})", letter(axis), angle_text(m, angle)),
         Step::Translate(axis, length) => format!("T{}({})", letter(axis), length_text(m, length)),
+        Step::Free(body) => {
+            let names = |all: &[CoordinateIdx]| {
+                let names = all.iter().map(|i| m.coordinates[i.0].name.as_str());
+                names.collect::<Vec<_>>().join(", ")
+            };
+            let axes = |axes| match axes {
+                TwistAxes::Body => "body",
+                TwistAxes::World => "world",
+            };
+            format!(
+                "free({}; w, x, y, z = {}; force in {} axes, moment in {} axes)",
+                names(&body.position),
+                names(&body.quaternion),
+                axes(body.linear),
+                axes(body.angular)
+            )
+        }
     }
 }
 

@@ -384,6 +384,13 @@ impl Model {
         drives.map(|d| d.name.clone()).collect()
     }
 
+    /// Names of the rows on which no drive acts, among [`Model::drives`].
+    pub fn undriven(&self) -> Vec<String> {
+        let drives = self.derivation.mechanism.drives.iter();
+        let undriven = drives.filter(|drive| !drive.is_driven);
+        undriven.map(|drive| drive.name.clone()).collect()
+    }
+
     /// Unit of a drive's force: N or N m.
     pub fn force_unit(&self, drive: usize) -> &'static str {
         let mechanism = &self.derivation.mechanism;

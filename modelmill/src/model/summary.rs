@@ -59,6 +59,8 @@ pub struct Summary {
     pub loops: Vec<String>,
     /// Drives.
     pub drives: Vec<String>,
+    /// Rows on which no drive acts.
+    pub undriven: Vec<String>,
     /// Kinds of the effects.
     pub effects: Vec<String>,
     /// Dynamic parameters.
@@ -72,13 +74,21 @@ impl Summary {
             let wanted = m.coordinates.iter().filter(|c| c.passive == passive);
             wanted.map(|c| c.name.clone()).collect()
         };
+        let drives = |is_driven: bool| -> Vec<String> {
+            let wanted = m.drives.iter().filter(|d| d.is_driven == is_driven);
+            wanted.map(|d| d.name.clone()).collect()
+        };
         Self {
             bodies: m.parts.len(),
             lumped_masses: m.lumped_masses.len(),
             active: coordinates(false),
             passive: coordinates(true),
             loops: m.loops.iter().map(|l| l.name.clone()).collect(),
-            drives: m.drives.iter().map(|d| d.name.clone()).collect(),
+            drives: {
+                let shared = m.shared_drives.iter().map(|d| d.name.clone());
+                drives(true).into_iter().chain(shared).collect()
+            },
+            undriven: drives(false),
             effects: m.effects.iter().map(|e| e.kind.clone()).collect(),
             parameters: m.parameters.iter().map(|p| p.name.clone()).collect(),
         }

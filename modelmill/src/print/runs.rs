@@ -3,9 +3,9 @@
 use modelmill_identify::ParameterInfo;
 use serde_json::{Value, json};
 
-use crate::runs::{Changed, Compared, Fitted, OneRun};
+use crate::runs::{ChangePoint, Changed, Compared, Fitted, OneRun, SharedFit, Valued, What};
 use crate::text::Style;
-use crate::text::table::{Align, count, number, table};
+use crate::text::table::{Align, count, table, with_deviation};
 
 impl Compared {
     /// All that was found as one JSON object.
@@ -13,8 +13,11 @@ impl Compared {
         let later = || self.runs.iter().enumerate().skip(1);
         let moved =
             later().flat_map(|(k, run)| run.moved.iter().map(move |p| self.moved_json(k, *p)));
-        let changes = later()
-            .flat_map(|(k, run)| run.changes.iter().map(move |change| change_json(k, change)));
+        let all = self.runs.iter().enumerate();
+        let changes =
+            all.flat_map(|(k, run)| run.changes.iter().map(move |one| change_json([0, k], one)));
+        let unread = self.unread.iter();
+        let unread = unread.map(|one| json!({ "file": one.file, "says": one.error.to_string() }));
         let runs = self.runs.iter().map(|run| {
             json!({
                 "file": run.file,
@@ -28,6 +31,58 @@ impl Compared {
             "runs": runs.collect::<Vec<_>>(),
             "moved": moved.collect::<Vec<_>>(),
             "changes": changes.collect::<Vec<_>>(),
+            "change_points": self.points.iter().map(|one| self.point_json(one)).collect::<Vec<_>>(),
+            "unread": unread.collect::<Vec<_>>(),
+            "per_run": self.shared.as_ref().map(|shared| self.shared_json(shared)),
+        })
+    }
+
+    fn point_json(&self, point: &ChangePoint) -> Value {
+        let steps = point.steps.iter().map(|step| {
+            json!({
+                "parameter": self.parameters[step.parameter].name,
+                "before": step.before.value,
+                "now": step.now.value,
+                "std": step.before.beside(step.now),
+                "unit": self.parameters[step.parameter].unit,
+            })
+        });
+        let changes = point.changes.iter();
+        json!({
+            "run": point.run,
+            "file": self.runs[point.run].file,
+            "parameters": steps.collect::<Vec<_>>(),
+            "changes": changes.map(|one| change_json([point.run - 1, point.run], one)).collect::<Vec<_>>(),
+        })
+    }
+
+    /// The fit in which some values are each run's own.
+    fn shared_json(&self, fit: &SharedFit) -> Value {
+        let shared = self.parameters.iter().zip(&fit.shared);
+        let shared = shared.filter_map(|(info, value)| {
+            let value = (*value)?;
+            Some(json!({ "name": info.name, "expression": info.expression, "value": value.value, "std": value.deviation, "unit": info.unit }))
+        });
+        let gains = fit.gains.iter().map(
+            |(drive, gain)| json!({ "drive": drive, "gain": gain.value, "std": gain.deviation }),
+        );
+        let runs = fit.runs.iter().map(|(file, values)| {
+            let values = values.iter().map(|one| {
+                json!({
+                    "of": one.of,
+                    "name": one.name,
+                    "value": one.value.value,
+                    "std": one.value.deviation,
+                    "unit": one.unit,
+                    "against_first": one.is_against_first,
+                })
+            });
+            json!({ "file": file, "values": values.collect::<Vec<_>>() })
+        });
+        json!({
+            "shared": shared.collect::<Vec<_>>(),
+            "gains": gains.collect::<Vec<_>>(),
+            "runs": runs.collect::<Vec<_>>(),
         })
     }
 
@@ -71,72 +126,222 @@ impl Compared {
             count(later.len(), "run", "runs"),
             first.file
         ))];
-        for run in later {
+        if later.len() > SINGLY {
+            self.say_points(&mut lines, style);
+        }
+        if let Some(shared) = &self.shared {
+            say_shared(shared, &mut lines, style);
+        }
+        if !first.changes.is_empty() {
             lines.push(String::new());
-            lines.push(style.bold(&run.file));
-            if run.changes.is_empty() {
-                lines.push(
-                    "  nothing changed beyond what chance and the noise of the runs make"
-                        .to_owned(),
-                );
+            lines.push(style.bold(&first.file));
+            lines.extend(first.changes.iter().map(|one| format!("  {}", one.says)));
+        }
+        if later.len() > SINGLY {
+            say_many(later, &mut lines, style);
+        } else {
+            for run in later {
+                self.say_run(first, run, &mut lines, style);
             }
-            for change in &run.changes {
-                lines.push(format!("  {}", change.says));
-                if !change.rivals.is_empty() {
-                    lines.push(format!(
-                        "    these runs cannot tell it from: {}",
-                        change.rivals.join("; ")
-                    ));
-                }
-            }
-            if !run.moved.is_empty() {
-                lines.push("  Base parameters that moved, each run fitted alone:".to_owned());
-                let rows: Vec<Vec<String>> = run
-                    .moved
-                    .iter()
-                    .map(|k| self.moved(first, run, *k))
-                    .collect();
-                let columns = [
-                    ("name", Align::Left),
-                    ("before", Align::Right),
-                    ("now", Align::Right),
-                    ("+-", Align::Right),
-                    ("unit", Align::Left),
-                    ("expression", Align::Left),
-                ];
-                lines.extend(table(4, &columns, &rows));
-            }
+            self.say_points(&mut lines, style);
+        }
+        for one in &self.unread {
+            lines.push(String::new());
+            lines.push(format!("{} gave no answer: {}", one.file, one.error));
         }
         lines.push(String::new());
         lines.join("\n")
     }
 
+    /// A run against the first.
+    fn say_run(&self, first: &OneRun, run: &OneRun, lines: &mut Vec<String>, style: Style) {
+        lines.push(String::new());
+        lines.push(style.bold(&run.file));
+        say_changes(&run.changes, lines);
+        let is_event = |one: &Changed| matches!(one.what, What::ContactEvent { .. });
+        if run.changes.iter().all(is_event) {
+            let else_ = if run.changes.is_empty() { "" } else { " else" };
+            lines.push(format!(
+                "  nothing{else_} changed beyond what chance, the noise of the runs and the errors of the model make"
+            ));
+        }
+        if !run.moved.is_empty() {
+            lines.push("  Base parameters that moved, each run fitted alone:".to_owned());
+            let rows: Vec<Vec<String>> = run
+                .moved
+                .iter()
+                .map(|k| self.moved(first, run, *k))
+                .collect();
+            let columns = [
+                ("name", Align::Left),
+                ("before", Align::Right),
+                ("now", Align::Right),
+                ("+-", Align::Right),
+                ("unit", Align::Left),
+                ("expression", Align::Left),
+            ];
+            lines.extend(table(4, &columns, &rows));
+        }
+    }
+
+    /// When something changed and stayed changed.
+    fn say_points(&self, lines: &mut Vec<String>, style: Style) {
+        if self.runs.len() < 4 {
+            return;
+        }
+        lines.push(String::new());
+        lines.push(style.bold("Over the order of the runs"));
+        if self.points.is_empty() {
+            lines.push("  no base parameter changed and stayed changed".to_owned());
+        }
+        for point in &self.points {
+            let names: Vec<&str> = (point.steps.iter().take(6))
+                .map(|step| self.parameters[step.parameter].name.as_str())
+                .collect();
+            let more = point.steps.len().saturating_sub(names.len());
+            lines.push(format!(
+                "  from run {} on ({}): {}{} changed",
+                point.run + 1,
+                self.runs[point.run].file,
+                names.join(", "),
+                if more > 0 {
+                    format!(" and {more} more")
+                } else {
+                    String::new()
+                },
+            ));
+            let mut said = Vec::new();
+            say_changes(&point.changes, &mut said);
+            lines.extend(said.iter().map(|line| format!("  {line}")));
+        }
+    }
+
     fn moved(&self, first: &OneRun, run: &OneRun, k: usize) -> Vec<String> {
         let (before, now) = (first.alone[k], run.alone[k]);
         let info = &self.parameters[k];
+        let [value, deviation] = with_deviation(now.value, before.beside(now));
         vec![
             info.name.clone(),
-            number(before.value),
-            number(now.value),
-            number(before.beside(now)),
+            with_deviation(before.value, before.beside(now))[0].clone(),
+            value,
+            deviation,
             info.unit.clone(),
             info.expression.clone(),
         ]
     }
 }
 
-fn change_json(run: usize, change: &Changed) -> Value {
+/// Up to so many later runs are told one after the other with their base parameters.
+const SINGLY: usize = 12;
+
+fn say_changes(changes: &[Changed], lines: &mut Vec<String>) {
+    for change in changes {
+        lines.push(format!("  {}", change.says));
+        if !change.rivals.is_empty() {
+            lines.push(format!(
+                "    these runs cannot tell it from: {}",
+                change.rivals.join("; ")
+            ));
+        }
+    }
+}
+
+/// Many runs, each with its changes alone; those without any are counted.
+fn say_many(later: &[OneRun], lines: &mut Vec<String>, style: Style) {
+    let unchanged = later.iter().filter(|run| run.changes.is_empty()).count();
+    lines.push(String::new());
+    lines.push(format!(
+        "Against the first run {unchanged} of {} later ones changed in nothing",
+        later.len()
+    ));
+    for run in later.iter().filter(|run| !run.changes.is_empty()) {
+        lines.push(style.bold(&run.file));
+        say_changes(&run.changes, lines);
+    }
+}
+
+fn change_json(between: [usize; 2], change: &Changed) -> Value {
     let (kind, at, estimates) = change.what.parts(change.unit);
     let estimates = estimates.iter().map(|(name, estimate, unit)| {
         json!({ "name": name, "value": estimate.value, "std": estimate.deviation, "unit": unit })
     });
+    let interval = match &change.what {
+        What::ContactEvent { interval, .. } => Some(interval),
+        _ => None,
+    };
     json!({
         "kind": kind,
-        "at": [at],
+        "at": at,
         "estimates": estimates.collect::<Vec<_>>(),
-        "between": [0, run],
+        "between": between,
+        "interval": interval,
         "gain": change.gain,
         "indistinguishable_from": change.rivals,
         "says": change.says,
     })
+}
+
+/// Values of the fit in which some are each run's own.
+fn say_shared(fit: &SharedFit, lines: &mut Vec<String>, style: Style) {
+    lines.push(String::new());
+    let n = fit.shared.iter().flatten().count();
+    lines.push(style.bold(&format!(
+        "One fit of all runs, with {} shared",
+        count(n, "base parameter", "base parameters")
+    )));
+    let text = |value: Fitted| match value.deviation {
+        Some(deviation) => with_deviation(value.value, deviation),
+        None => ["not told".to_owned(), String::new()],
+    };
+    if !fit.gains.is_empty() {
+        lines.push("  True forces are the measured ones times".to_owned());
+        let rows: Vec<Vec<String>> = (fit.gains.iter())
+            .map(|(drive, gain)| [vec![drive.clone()], text(*gain).to_vec()].concat())
+            .collect();
+        let columns = [
+            ("drive", Align::Left),
+            ("factor", Align::Right),
+            ("+-", Align::Right),
+        ];
+        lines.extend(table(4, &columns, &rows));
+    }
+    for (file, values) in fit.runs.iter().filter(|(_, values)| !values.is_empty()) {
+        lines.push(format!("  {file}"));
+        let row = |one: &Valued| {
+            let [value, deviation] = text(one.value);
+            let against = if one.is_against_first {
+                "against the first run"
+            } else {
+                ""
+            };
+            [
+                one.of.as_str(),
+                &one.name,
+                &value,
+                &deviation,
+                &one.unit,
+                against,
+            ]
+            .map(str::to_owned)
+            .to_vec()
+        };
+        let told = values.iter().filter(|one| one.value.deviation.is_some());
+        let rows: Vec<Vec<String>> = told.map(row).collect();
+        let columns = [
+            ("of", Align::Left),
+            ("", Align::Left),
+            ("value", Align::Right),
+            ("+-", Align::Right),
+            ("unit", Align::Left),
+            ("", Align::Left),
+        ];
+        lines.extend(table(4, &columns, &rows));
+        let not_told = values.iter().filter(|one| one.value.deviation.is_none());
+        let not_told: Vec<String> = not_told
+            .map(|one| format!("{} of {}", one.name, one.of))
+            .collect();
+        if !not_told.is_empty() {
+            lines.push(format!("    not told: {}", not_told.join(", ")));
+        }
+    }
 }

@@ -99,8 +99,9 @@ impl Summary {
             "joints": { "active": self.active, "passive": self.passive },
             "loops": self.loops,
             "actuators": self.drives,
+            "undriven": self.undriven,
             "effects": self.effects,
-            "degrees_of_freedom": self.active.len(),
+            "degrees_of_freedom": derivation.mechanism.drives.len(),
             "parameters": self.parameters,
             "products": derivation.reduction.products.len(),
             "base_parameters": derivation.reduction.retained.len(),
@@ -149,9 +150,15 @@ impl Summary {
         );
         line(
             "actuators",
-            format!("{}{}", self.drives.len(), list(&drives(m))),
+            format!("{}{}", self.drives.len(), list(&drives(m, true))),
         );
-        line("degrees of freedom", self.active.len().to_string());
+        if !self.undriven.is_empty() {
+            line(
+                "undriven",
+                format!("{}{}", self.undriven.len(), list(&drives(m, false))),
+            );
+        }
+        line("degrees of freedom", m.drives.len().to_string());
         if !self.effects.is_empty() {
             line(
                 "effects",
@@ -215,9 +222,12 @@ fn joint(motion: Motion, name: &str, passive: bool) -> String {
     format!("{name} ({})", remarks.join(", "))
 }
 
-fn drives(m: &Mechanism) -> Vec<String> {
+fn drives(m: &Mechanism, is_driven: bool) -> Vec<String> {
+    let shared = m.shared_drives.iter();
     m.drives
         .iter()
+        .chain(shared)
+        .filter(|drive| drive.is_driven == is_driven)
         .map(|drive| match drive.kind {
             DriveKind::Joint(i) => format!("{} (on {})", drive.name, m.coordinates[i.0].name),
             DriveKind::Linear { from, to } => format!(

@@ -12,6 +12,7 @@ use modelmill_codegen::{Evaluator, States};
 use modelmill_identify::{LowPass, Note, Open, PASSED_BY_DECIMATION, Recording as Raw, Run};
 use nalgebra::{DMatrix, DVector};
 
+use super::free;
 use super::options::Reading;
 use crate::error::Outcome;
 use crate::model::Model;
@@ -188,8 +189,9 @@ impl Search<'_> {
     fn runs(&self, cutoff: f64) -> Option<Vec<Run>> {
         let mut preparation = self.reading.preparation.clone();
         preparation.cutoff_hz = Some(cutoff);
-        let (active, drives) = (self.model.active(), self.model.drives());
-        let mut runs = self.raw.runs_with(&active, &drives, &preparation).ok()?;
+        // What the band is was found already, and costs spectra of all positions.
+        preparation.band_hz = Some(self.open.band_hz);
+        let mut runs = free::runs(self.model, self.raw, &preparation).ok()?;
         let delay = self.model.derivation.mechanism.force_delay;
         if delay != 0.0 {
             for run in &mut runs {

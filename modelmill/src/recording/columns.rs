@@ -89,10 +89,19 @@ pub(crate) fn read_options(
             NotFinite::Refuse
         },
         wanted: Some(known.into_iter().map(|(name, _)| name).collect()),
-        may_lack: model.drives(),
+        may_lack: may_lack(model),
         between: args.between,
         ..ReadOptions::default()
     })
+}
+
+/// Forces of which samples may be missing. Those of drives that share rows are looked at before they are repaired.
+fn may_lack(model: &Model) -> Vec<String> {
+    if model.derivation.mechanism.shared_drives.is_empty() {
+        model.drives()
+    } else {
+        Vec::new()
+    }
 }
 
 /// Several faults as one, each on a line of its own; wrong options weigh more than what the recording lacks.
@@ -187,7 +196,7 @@ fn quantity_of(known: &[(String, Quantity)], ours: &str) -> Option<Quantity> {
 /// Derivatives, forces and variances may be missing: they are prepared, or asked for where they are needed.
 fn can_lack(ours: &str, quantity: Quantity) -> bool {
     match quantity {
-        Quantity::Time => false,
+        Quantity::Time | Quantity::Number => false,
         Quantity::Angle(order) | Quantity::Length(order) => order > 0 && ours.contains("_d"),
         _ => true,
     }

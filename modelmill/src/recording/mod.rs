@@ -4,6 +4,7 @@
 mod choice;
 mod columns;
 mod contents;
+pub(crate) mod free;
 mod leverage;
 mod options;
 
@@ -24,7 +25,7 @@ use columns::read_options;
 use leverage::Leverage;
 
 pub use contents::{ColumnInfo, Contents, TableInfo};
-pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER};
+pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER, has_ending_of_a_recording};
 pub use modelmill_identify::{Preparation, Smoothing};
 pub use options::Reading;
 
@@ -36,6 +37,9 @@ fn read_raw(model: &Model, paths: &[&Path], reading: &Reading) -> Outcome<Raw> {
     let mut raw = model
         .host()
         .watched(&format!("reading {name}"), 0, |_| file.read(&options))??;
+    for note in free::complete(model, &mut raw)? {
+        model.host().note(&note);
+    }
     let leverage = Leverage::new(model, &raw);
     raw.repair(
         &model.active(),
@@ -131,10 +135,17 @@ fn prepare(model: &Model, recording: &Raw, args: &Reading, delay: f64) -> Outcom
         model
             .host()
             .watched(&format!("preparing {}", recording.file()), 0, |_| {
-                recording.runs_with(&model.active(), &model.drives(), preparation)
+                free::runs(model, recording, preparation)
             })??;
     if let Some(first) = runs.first_mut() {
-        let suspicions = recording.suspicions(&model.motions(), preparation.source);
+        let mut motions = model.motions();
+        // Twists are no derivatives of the coordinates whose names they have.
+        let free: Vec<&str> = free::free_bodies(&model.derivation.mechanism)
+            .flat_map(|body| body.position.iter().chain(&body.quaternion))
+            .map(|i| model.derivation.mechanism.coordinates[i.0].name.as_str())
+            .collect();
+        motions.retain(|(name, _)| !free.contains(&name.as_str()));
+        let suspicions = recording.suspicions(&motions, preparation.source);
         first.notes.splice(0..0, suspicions);
         let oddities = recording.oddities(&model.motions(), &model.drives());
         first.notes.splice(0..0, oddities);
@@ -146,7 +157,7 @@ fn prepare(model: &Model, recording: &Raw, args: &Reading, delay: f64) -> Outcom
         .collect();
     let maps_from_degrees = maps.join(" ");
     for run in &mut runs {
-        let idle = run.suspicious_forces(&model.drives());
+        let idle = run.suspicious_forces(&model.drives(), &model.undriven());
         run.notes.extend(idle);
         pair(run, delay)?;
     }

@@ -1,5 +1,7 @@
 //! `report`: what a diagnosis found as one self-contained page.
 //!
+//! [`runs_page`] is the page of what differs between runs.
+//!
 //! `words`, `tables`, and pictures (`ladder`, `curves`, `maps`, `regions`, `spectrum`) -> `page`. The pictures stand by
 //! themselves; `page.js` makes curves that can be zoomed and tables that can be sorted out of them.
 
@@ -9,6 +11,7 @@ mod ladder;
 mod maps;
 mod page;
 mod regions;
+mod runs;
 mod spectrum;
 mod tables;
 mod units;
@@ -16,6 +19,7 @@ mod units;
 use crate::diagnose::{Findings, Version, words};
 
 pub use page::page;
+pub use runs::runs_page;
 
 /// Which colour is which model.
 fn keys(with_after: bool) -> &'static str {

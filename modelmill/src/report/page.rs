@@ -19,16 +19,8 @@ pub fn page(findings: &Findings, spelling: &dyn Spelling) -> Outcome<String> {
     let last = findings.last();
     let equations = last.model.equations(Format::Html)?.text;
     let name = &findings.before.model.name;
-    let mut page = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta name=\"color-scheme\" content=\"light dark\">\n\
-         <title>{0}: what the model lacks</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{1}{2}</style>\n</head>\n\
-         <body>\n<main>\n<h1>{0}: what the model lacks</h1>\n",
-        escape(name),
-        between(&equations, "<style>", "</style>"),
-        include_str!("page.css"),
-    );
+    let title = format!("{name}: what the model lacks");
+    let mut page = begin(&title, between(&equations, "<style>", "</style>"));
     let sections = [
         ("ladder", "How the error falls", the_ladder(findings)),
         (
@@ -68,14 +60,32 @@ pub fn page(findings: &Findings, spelling: &dyn Spelling) -> Outcome<String> {
             "<section id=\"report-{id}\">\n<h2>{title}</h2>\n{html}</section>\n"
         );
     }
-    page.push_str("</main>\n<script>\n");
-    page.push_str(include_str!("page.js"));
-    page.push_str("</script>\n</body>\n</html>\n");
+    page.push_str(END);
     Ok(page)
 }
 
+/// The page up to its heading, in the style of the page of equations.
+pub(super) fn begin(title: &str, style: &str) -> String {
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <title>{0}</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{style}{1}</style>\n</head>\n\
+         <body>\n<main>\n<h1>{0}</h1>\n",
+        escape(title),
+        include_str!("page.css"),
+    )
+}
+
+/// The page from its last section on.
+pub(super) const END: &str = concat!(
+    "</main>\n<script>\n",
+    include_str!("page.js"),
+    "</script>\n</body>\n</html>\n"
+);
+
 /// What stands between two marks; empty if they are missing.
-fn between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
+pub(super) fn between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
     let inner = text
         .split_once(from)
         .and_then(|(_, rest)| rest.split_once(to));

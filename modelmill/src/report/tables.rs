@@ -19,15 +19,15 @@ const FIRST: usize = 20;
 pub(crate) struct Cell(String, Option<f64>);
 
 impl Cell {
-    fn text(text: &str) -> Self {
+    pub(crate) fn text(text: &str) -> Self {
         Self(escape(text), None)
     }
 
-    fn number(text: &str, value: f64) -> Self {
+    pub(crate) fn number(text: &str, value: f64) -> Self {
         Self(escape(text), Some(value))
     }
 
-    fn html(html: String) -> Self {
+    pub(crate) fn html(html: String) -> Self {
         Self(html, None)
     }
 }

@@ -1,13 +1,14 @@
 //! What a change is in physics.
 
-use modelmill_identify::changes::Change;
+use modelmill_identify::changes::{Candidate, Change, Values};
 use modelmill_spec::{DriveKind, Place};
 use nalgebra::DVector;
 
+use crate::audit::events::Event;
 use crate::model::Model;
-use crate::runs::columns::Layout;
+use crate::runs::layout::Layout;
 use crate::runs::payload::{Payloads, TEN};
-use crate::text::table::number;
+use crate::text::table::{significant, with_deviation};
 
 /// A value with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,13 +21,10 @@ pub struct Estimate {
 
 impl Estimate {
     fn text(self, unit: &str) -> String {
-        format!(
-            "{} +- {} {unit}",
-            number(self.value),
-            number(self.deviation)
-        )
-        .trim_end()
-        .to_owned()
+        let [value, deviation] = with_deviation(self.value, self.deviation);
+        format!("{value} +- {deviation} {unit}")
+            .trim_end()
+            .to_owned()
     }
 
     /// Whether it is known to a third of its size.
@@ -77,6 +75,13 @@ pub enum What {
         /// How many times as fast as its time stamps say the run was; 1 where nothing changed.
         factor: Estimate,
     },
+    /// A contact or a push within the run.
+    ContactEvent {
+        /// The drives on which it shows, each with the largest force that nothing explains, N or N m.
+        drives: Vec<(String, f64)>,
+        /// When it begins and ends, s.
+        interval: [f64; 2],
+    },
     /// Another zero of an encoder.
     EncoderZero {
         /// The coordinate.
@@ -86,17 +91,23 @@ pub enum What {
     },
 }
 
+/// A value with its name and unit.
+pub type Named = (&'static str, Estimate, &'static str);
+
 impl What {
     /// What scripts call it, where it is, and its values with their names and units; `unit` is that of the force or coordinate.
-    pub fn parts(
-        &self,
-        unit: &'static str,
-    ) -> (
-        &'static str,
-        &str,
-        Vec<(&'static str, Estimate, &'static str)>,
-    ) {
-        match self {
+    pub fn parts(&self, unit: &'static str) -> (&'static str, Vec<&str>, Vec<Named>) {
+        let (kind, at, estimates) = match self {
+            Self::ContactEvent { drives, interval } => {
+                let names = drives.iter().map(|(name, _)| name.as_str()).collect();
+                // An event is told by its samples, which lie a step apart.
+                let [from, to] = interval.map(|value| Estimate {
+                    value,
+                    deviation: 0.0,
+                });
+                let times = vec![("from", from, "s"), ("to", to, "s")];
+                return ("contact_event", names, times);
+            }
             Self::Payload {
                 frame,
                 mass,
@@ -119,11 +130,14 @@ impl What {
             ),
             Self::Offset { drive, force } => ("offset", drive, vec![("F0", *force, unit)]),
             Self::Scale { drive, factor } => ("drive_gain", drive, vec![("gain", *factor, "1")]),
-            Self::Clock { factor } => ("time_base", "t", vec![("factor", *factor, "1")]),
+            Self::Clock { factor } => {
+                return ("time_base", vec!["t"], vec![("factor", *factor, "1")]);
+            }
             Self::EncoderZero { coordinate, shift } => {
                 ("encoder_zero", coordinate, vec![("shift", *shift, unit)])
             }
-        }
+        };
+        (kind, vec![at.as_str()], estimates)
     }
 }
 
@@ -132,7 +146,8 @@ impl What {
 pub struct Changed {
     /// What it is.
     pub what: What,
-    /// By how much the sum of squares of the white residual would rise without it.
+    /// By how much the sum of squares of the white residual would rise without it; 0 for events, which are looked for by
+    /// themselves.
     pub gain: f64,
     /// Unit of its values where it is that of a drive or a coordinate.
     pub unit: &'static str,
@@ -157,19 +172,39 @@ enum Kind {
 #[derive(Clone, Debug)]
 pub(crate) struct Possible {
     kind: Kind,
-    /// Its columns.
-    pub(crate) columns: Vec<usize>,
+    /// What the search knows of it.
+    pub(crate) candidate: Candidate,
 }
+
+/// What a drive's other scale is charged beside its value: friction changes every day, sensors, torque constants and gears
+/// hardly ever. It decides where both explain the same, as at a drive that carries nothing but its own friction.
+const RARE: f64 = 0.2;
 
 /// All changes that are possible.
 pub(crate) fn possible(model: &Model, payloads: &Payloads, layout: Layout) -> Vec<Possible> {
+    let possible = |kind: Kind, columns: Vec<usize>| {
+        let (most, rarity) = match kind {
+            // Dry and viscous friction rise and fall together.
+            Kind::Friction(_) => (1, 0.0),
+            Kind::Scale(_) => (1, RARE),
+            _ => (columns.len(), 0.0),
+        };
+        Possible {
+            kind,
+            candidate: Candidate {
+                columns,
+                most,
+                rarity,
+            },
+        }
+    };
     let mut all = Vec::new();
     for (f, frame) in payloads.frames.iter().enumerate() {
         let at = layout.payload(f);
-        all.push(Possible {
-            kind: Kind::Payload(frame.clone()),
-            columns: (at..at + TEN).collect(),
-        });
+        all.push(possible(
+            Kind::Payload(frame.clone()),
+            (at..at + TEN).collect(),
+        ));
     }
     for drive in 0..model.drives().len() {
         let friction = layout.friction(drive);
@@ -178,17 +213,13 @@ pub(crate) fn possible(model: &Model, payloads: &Payloads, layout: Layout) -> Ve
             (Kind::Offset(drive), vec![layout.offset(drive)]),
             (Kind::Scale(drive), vec![layout.scale(drive)]),
         ] {
-            all.push(Possible { kind, columns });
+            all.push(possible(kind, columns));
         }
     }
-    all.push(Possible {
-        kind: Kind::Clock,
-        columns: vec![layout.clock()],
-    });
-    all.extend((0..layout.coordinates).map(|i| Possible {
-        kind: Kind::EncoderZero(i),
-        columns: vec![layout.zero(i)],
-    }));
+    all.push(possible(Kind::Clock, vec![layout.clock()]));
+    let zeros =
+        (0..layout.coordinates).map(|i| possible(Kind::EncoderZero(i), vec![layout.zero(i)]));
+    all.extend(zeros);
     all
 }
 
@@ -213,6 +244,25 @@ pub(crate) fn told(
     }
 }
 
+/// A contact or a push within a run.
+pub(crate) fn event(model: &Model, event: &Event) -> Changed {
+    let names = model.drives();
+    let drives = event.drives.iter();
+    let what = What::ContactEvent {
+        drives: drives
+            .map(|(d, largest, _)| (names[*d].clone(), *largest))
+            .collect(),
+        interval: [event.from, event.to],
+    };
+    Changed {
+        says: says(model, &what),
+        unit: "s",
+        what,
+        gain: 0.0,
+        rivals: Vec::new(),
+    }
+}
+
 fn what(model: &Model, kind: &Kind, found: &Change, values: &DVector<f64>) -> What {
     let estimate = |i: usize| Estimate {
         value: found.values[i],
@@ -224,25 +274,18 @@ fn what(model: &Model, kind: &Kind, found: &Change, values: &DVector<f64>) -> Wh
             let mass = found.determined[0]
                 .then(|| estimate(0))
                 .filter(|m| m.is_known());
-            // The centre is first moment over mass, with the deviations of both and what they share.
-            let centre = |i: usize| {
-                let mass = mass?;
-                let value = found.values[i] / mass.value;
-                let c = |a: usize, b: usize| found.covariance[(a, b)];
-                let variance = c(i, i) - 2.0 * value * c(0, i) + value * value * c(0, 0);
-                found.determined[i].then(|| Estimate {
-                    value,
-                    deviation: variance.max(0.0).sqrt() / mass.value.abs(),
-                })
-            };
             What::Payload {
                 frame: frame.clone(),
                 mass,
-                centre: [1, 2, 3].map(centre),
+                centre: centre(&Values {
+                    values: found.values.clone(),
+                    covariance: found.covariance.clone(),
+                    determined: found.determined.clone(),
+                }),
             }
         }
         Kind::Friction(d) => {
-            let before = friction(model, *d, values);
+            let before = friction(model, *d).map(|k| k.map(|k| values[k]));
             let part = |i: usize| before[i].filter(|f| *f != 0.0).map(|f| found.values[i] / f);
             What::Friction {
                 drive: drive(d),
@@ -280,7 +323,7 @@ fn unit(model: &Model, kind: &Kind) -> &'static str {
 }
 
 /// The unit of viscous friction of a drive whose force has the unit.
-fn per_rate(unit: &str) -> &'static str {
+pub(crate) fn per_rate(unit: &str) -> &'static str {
     if unit == "N" { "N s/m" } else { "N m s/rad" }
 }
 
@@ -291,22 +334,49 @@ fn one_more(part: Estimate) -> Estimate {
     }
 }
 
-/// Dry and viscous friction of a drive in the first run, where they are base parameters of their own.
-fn friction(model: &Model, drive: usize, values: &DVector<f64>) -> [Option<f64>; 2] {
+/// Columns of a drive's dry and viscous friction, where they are base parameters of their own.
+pub(crate) fn friction(model: &Model, drive: usize) -> [Option<usize>; 2] {
+    ["coulomb_friction", "viscous_friction"].map(|kind| column_of(model, drive, kind))
+}
+
+/// The column of a drive's constant force, where it is a base parameter of its own.
+pub(crate) fn offset(model: &Model, drive: usize) -> Option<usize> {
+    column_of(model, drive, "force_offset")
+}
+
+/// The column of a kind of effect with one parameter on a drive.
+fn column_of(model: &Model, drive: usize, kind: &str) -> Option<usize> {
     let mechanism = &model.derivation.mechanism;
     let is_here = |place: &Place| match (place, mechanism.drives[drive].kind) {
         (Place::Drive(d), _) => d.0 == drive,
         (Place::Coordinate(a), DriveKind::Joint(b)) => *a == b,
         _ => false,
     };
-    let unknown = (0..model.base.len()).filter(|k| !model.is_known(*k));
+    let mut effects = mechanism.effects.iter();
+    let effect = effects.find(|e| e.kind == kind && e.places.iter().all(is_here))?;
+    let name = &mechanism.parameters[effect.terms.first()?.parameter.0].name;
     let infos = model.infos();
-    ["coulomb_friction", "viscous_friction"].map(|kind| {
-        let mut effects = mechanism.effects.iter();
-        let effect = effects.find(|e| e.kind == kind && e.places.iter().any(is_here))?;
-        let name = &mechanism.parameters[effect.terms.first()?.parameter.0].name;
-        let at = unknown.clone().position(|k| infos[k].expression == *name)?;
-        Some(values[at])
+    let mut unknown = (0..model.base.len()).filter(|k| !model.is_known(*k));
+    unknown.position(|k| infos[k].expression == *name)
+}
+
+/// The centre of a body whose first four values are mass and first moments: first moment over mass, with the deviations of both
+/// and what they share; `None` for directions that are not told.
+pub(crate) fn centre(found: &Values) -> [Option<Estimate>; 3] {
+    let estimate = |i: usize| Estimate {
+        value: found.values[i],
+        deviation: found.covariance[(i, i)].max(0.0).sqrt(),
+    };
+    [1, 2, 3].map(|i| {
+        let mass = found.determined[0].then(|| estimate(0));
+        let mass = mass.filter(|mass| mass.is_known())?;
+        let value = found.values[i] / mass.value;
+        let c = |a: usize, b: usize| found.covariance[(a, b)];
+        let variance = c(i, i) - 2.0 * value * c(0, i) + value * value * c(0, 0);
+        found.determined[i].then(|| Estimate {
+            value,
+            deviation: variance.max(0.0).sqrt() / mass.value.abs(),
+        })
     })
 }
 
@@ -391,6 +461,23 @@ fn says(model: &Model, what: &What) -> String {
             "the time base: this run was {} times as fast as its time stamps say",
             factor.text("")
         ),
+        What::ContactEvent {
+            drives,
+            interval: [from, to],
+        } => {
+            let drives: Vec<String> = drives
+                .iter()
+                .map(|(name, force)| {
+                    format!("{name} by up to {} {}", significant(*force, 3), unit(name))
+                })
+                .collect();
+            format!(
+                "a contact or a push from {} to {} s: {}; left out of what follows",
+                significant(*from, 5),
+                significant(*to, 5),
+                drives.join(", ")
+            )
+        }
         What::EncoderZero { coordinate, shift } => {
             let is_angle = |(name, is): &(String, bool)| name == coordinate && *is;
             let is_angle = model.motions().iter().any(is_angle);
@@ -403,10 +490,6 @@ fn says(model: &Model, what: &What) -> String {
 }
 
 fn signed(estimate: Estimate) -> String {
-    format!(
-        "{}{} +- {}",
-        if estimate.value > 0.0 { "+" } else { "" },
-        number(estimate.value),
-        number(estimate.deviation)
-    )
+    let sign = if estimate.value > 0.0 { "+" } else { "" };
+    format!("{sign}{}", estimate.text(""))
 }

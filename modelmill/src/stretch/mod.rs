@@ -57,6 +57,59 @@ impl Stretch {
         self.run.prepared.decimate.max(1)
     }
 
+    /// The stretch in pieces of no more than so many kept samples, each of which stands alone.
+    pub(crate) fn pieces(&self, longest: usize) -> Vec<Self> {
+        let every = self.decimation();
+        let kept = self.samples().div_ceil(every);
+        let n = kept.div_ceil(longest).max(1);
+        let drives = self.run.force.as_ref().map_or(0, Vec::len);
+        let piece = |k: usize| {
+            let [from, to] = [k, k + 1].map(|k| k * kept / n);
+            let (start, end) = (every * from, (every * to).min(self.samples()));
+            let cut = |all: &[Vec<f64>]| all.iter().map(|one| one[start..end].to_vec()).collect();
+            let run = &self.run;
+            Self {
+                run: Run {
+                    time: run.time[start..end].to_vec(),
+                    q: cut(&run.q),
+                    qd: cut(&run.qd),
+                    qdd: cut(&run.qdd),
+                    force: run.force.as_deref().map(cut),
+                    left_out: (run.left_out.iter())
+                        .map(|one| one[start..end].to_vec())
+                        .collect(),
+                    lines: run.lines.get(start..end).unwrap_or_default().to_vec(),
+                    file: run.file.clone(),
+                    missing_force: run.missing_force.clone(),
+                    repeats: run.repeats.clone(),
+                    prepared: run.prepared.clone(),
+                    notes: Vec::new(),
+                },
+                variance: self.variance.as_deref().map(cut),
+                weights: (self.weights.as_ref())
+                    .map(|weights| weights[from * drives..to * drives].to_vec()),
+                load: self.load.as_deref().map(cut),
+                maps_from_degrees: self.maps_from_degrees.clone(),
+                faults: Vec::new(),
+            }
+        };
+        (0..n).map(piece).collect()
+    }
+
+    /// Whether a kept sample has heard, through the filter before it, of a force of a drive that does not count.
+    pub(crate) fn hears_of_faults(&self, drive: usize, kept: usize) -> bool {
+        let every = self.decimation();
+        self.run.left_out.get(drive).is_some_and(|out| {
+            let to = if every == 1 {
+                kept + 1
+            } else {
+                every * (kept + 1) + 1
+            };
+            let around = (every * kept).saturating_sub(every - 1)..to.min(out.len());
+            out[around].contains(&true)
+        })
+    }
+
     /// Times of the samples that are kept.
     pub fn time(&self) -> Vec<f64> {
         decimate_time(&self.run.time, self.decimation())

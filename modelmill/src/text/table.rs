@@ -45,6 +45,22 @@ pub fn number(value: f64) -> String {
     significant(value, 6)
 }
 
+/// A value and its standard deviation, both to the second digit of the deviation.
+pub fn with_deviation(value: f64, deviation: f64) -> [String; 2] {
+    let exponent = deviation.abs().log10().floor();
+    let decimals = 1.0 - exponent;
+    if !(value.is_finite() && (0.0..=12.0).contains(&decimals)) {
+        return [number(value), number(deviation)];
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a whole number from 0 to 12"
+    )]
+    let decimals = decimals as usize;
+    [value, deviation].map(|x| format!("{x:.decimals$}"))
+}
+
 /// A number with some significant digits; very large and very small ones with an exponent.
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {

@@ -207,7 +207,11 @@ fn elementary(
     let evaluate = |value: &dyn Fn(Symbol) -> f64| match step {
         Step::Rotate(_, angle) => angle.evaluate(value),
         Step::Translate(_, length) => length.evaluate(value),
+        Step::Free(_) => f64::NAN,
     };
+    if let Step::Free(_) = step {
+        return Err("a free body has no joint".to_owned());
+    }
     let offset = evaluate(value);
     let mut moved = None;
     for i in 0..mechanism.coordinates.len() {
@@ -223,6 +227,7 @@ fn elementary(
     let (axis, slides) = match step {
         Step::Rotate(axis, _) => (axis, false),
         Step::Translate(axis, _) => (axis, true),
+        Step::Free(_) => unreachable!("refused above"),
     };
     let axis = match axis {
         Axis::X => 0,

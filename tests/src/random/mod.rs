@@ -1,8 +1,10 @@
 //! Random mechanisms, built as values without a model file; the same seed makes the same mechanism.
 
+mod free;
 mod planar_loop;
 mod tree;
 
+pub use free::hung_free;
 pub use planar_loop::{planar_loop, regularity_at};
 pub use tree::tree;
 
@@ -76,6 +78,7 @@ impl Draft {
                 lumped_masses: Vec::new(),
                 loops: Vec::new(),
                 drives: Vec::new(),
+                shared_drives: Vec::new(),
                 effects: Vec::new(),
                 force_delay: 0.0,
                 identified_base: Vec::new(),
@@ -374,7 +377,11 @@ impl Draft {
                 DriveKind::Joint(*coordinate)
             };
             let name = format!("drive{}", self.mechanism.drives.len());
-            self.mechanism.drives.push(Drive { name, kind });
+            self.mechanism.drives.push(Drive {
+                name,
+                kind,
+                is_driven: true,
+            });
         }
     }
 

@@ -172,6 +172,9 @@ agrees! {
     arm_parallelogram_agrees_with_the_evaluator: arm_parallelogram "arm_parallelogram" passive;
     delta_agrees_with_the_evaluator: delta "delta" passive;
     delta_tied_agrees_with_the_evaluator: delta_tied "delta_tied" passive;
+    drone_agrees_with_the_evaluator: drone "drone";
+    humanoid_agrees_with_the_evaluator: humanoid "humanoid";
+    quadruped_agrees_with_the_evaluator: quadruped "quadruped";
     emps_agrees_with_the_evaluator: emps "emps";
     five_bar_agrees_with_the_evaluator: five_bar "five_bar" passive;
     four_bar_agrees_with_the_evaluator: four_bar "four_bar" passive;

@@ -19,6 +19,7 @@ mod blocks;
 mod dynamics;
 mod effects;
 mod emitted;
+mod floating;
 mod loops_in_space;
 mod many_states;
 mod many_twists;

@@ -25,6 +25,10 @@ const LONGEST_RECORD: usize = 64 << 20;
 pub(crate) struct Csv;
 
 impl Format for Csv {
+    fn extensions(&self) -> &'static [&'static str] {
+        &["csv", "tsv"]
+    }
+
     fn is_table(&self) -> bool {
         false
     }
@@ -273,7 +277,9 @@ fn read_header(stream: &mut impl BufRead) -> Result<(String, Vec<u8>), Fault> {
         line if line.trim_ascii().contains(&b'\r') => {
             Some("text with lone carriage returns as line ends")
         }
-        _ if bytes.len() as u64 == LONGEST_HEADER => Some("a file without lines"),
+        _ if bytes.len() as u64 == LONGEST_HEADER => {
+            Some("a file whose first line is longer than 1 MB")
+        }
         _ => None,
     };
     if let Some(looks_like) = looks_like {

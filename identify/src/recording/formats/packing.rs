@@ -227,6 +227,10 @@ impl Packed {
 }
 
 impl Format for Packed {
+    fn extensions(&self) -> &'static [&'static str] {
+        &["gz", "zst"]
+    }
+
     fn is_table(&self) -> bool {
         false
     }

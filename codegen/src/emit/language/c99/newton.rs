@@ -2,8 +2,6 @@
 
 use std::fmt::Write as _;
 
-use modelmill_spec::Motion;
-
 use super::Unit;
 use super::source::{given, single};
 use crate::emit::tree::Routine;
@@ -20,7 +18,7 @@ pub(super) fn newton(unit: &Unit<'_>, text: &mut String) {
     let nominal = |i: &usize| {
         let coordinate = &derivation.mechanism.coordinates[*i];
         let value = coordinate.nominal;
-        if has_scale && coordinate.motion != Motion::Revolute && in_loops.contains(i) {
+        if has_scale && coordinate.motion.is_length() && in_loops.contains(i) {
             format!("self->scale * {value:?}")
         } else {
             format!("{value:?}")

@@ -2,8 +2,6 @@
 
 use std::fmt::Write as _;
 
-use modelmill_spec::Motion;
-
 use super::Unit;
 use super::source::{given, single};
 use crate::derive::self_test::reaches;
@@ -42,7 +40,7 @@ typedef struct {{
 
     let (active, _) = derivation.coordinates();
     let has_scale = derivation.programs.scale.is_some();
-    let is_length = |i: &usize| mechanism.coordinates[*i].motion != Motion::Revolute;
+    let is_length = |i: &usize| mechanism.coordinates[*i].motion.is_length();
     let scaled = |i: &usize, value: f64| {
         if has_scale && is_length(i) {
             format!("scale * {value:?}")

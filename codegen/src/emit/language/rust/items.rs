@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use modelmill_spec::Motion;
 use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};
 
@@ -239,7 +238,7 @@ pub(super) fn nominal<'a>(
     coordinates.iter().map(move |i| {
         let coordinate = &derivation.mechanism.coordinates[*i];
         let value = signed(coordinate.nominal);
-        let is_length = coordinate.motion != Motion::Revolute && in_loops.contains(i);
+        let is_length = coordinate.motion.is_length() && in_loops.contains(i);
         let scale = scale.filter(|_| is_length);
         let scaled = scale.map(|scale| quote! { #scale * });
         quote! { #scaled T::from_f64(#value) }

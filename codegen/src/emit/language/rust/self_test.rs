@@ -1,6 +1,5 @@
 //! A test of the base parameters that goes with the module.
 
-use modelmill_spec::Motion;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
@@ -62,7 +61,7 @@ pub(super) fn self_test(derivation: &Derivation, scope: &Scope) -> TokenStream {
     let reach = active.iter().zip(reaches(derivation)).map(|(i, reach)| {
         let scale = scaled
             .as_ref()
-            .filter(|_| mechanism.coordinates[*i].motion != Motion::Revolute);
+            .filter(|_| mechanism.coordinates[*i].motion.is_length());
         let (scaled, reach) = (
             scale.map(|s| quote! { #s * }),
             Literal::f64_unsuffixed(reach),
@@ -73,7 +72,7 @@ pub(super) fn self_test(derivation: &Derivation, scope: &Scope) -> TokenStream {
     let units = active.iter().map(|i| {
         let scale = scaled
             .as_ref()
-            .filter(|_| mechanism.coordinates[*i].motion != Motion::Revolute);
+            .filter(|_| mechanism.coordinates[*i].motion.is_length());
         scale.cloned().unwrap_or_else(|| quote! { 1.0 })
     });
     let scale = scale.map(|scale| quote! { let scale = #scale; });

@@ -1,0 +1,76 @@
+//! Arguments of what is made of a model: equations and code.
+
+use std::path::PathBuf;
+
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueEnum};
+use modelmill::generate::{Language, LanguageForm};
+
+/// How equations are printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum EquationsFormat {
+    /// Plain text for the terminal
+    Text,
+    /// Markdown with TeX formulas
+    Markdown,
+    /// A LaTeX document
+    Latex,
+    /// One self-contained page with MathML
+    Html,
+    /// One JSON object
+    Json,
+}
+
+/// `equations`.
+#[derive(Debug, Args)]
+pub(crate) struct EquationsArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Form of the equations
+    #[arg(long, value_enum, default_value = "text")]
+    pub(crate) format: EquationsFormat,
+    /// The same as --format json
+    #[arg(long, conflicts_with = "format")]
+    pub(crate) json: bool,
+    /// Write to this file instead of standard output
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// `generate`.
+#[derive(Debug, Args)]
+pub(crate) struct GenerateArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Write the source to this file instead of standard output; with --language c99, c or python, files to this folder
+    #[arg(long, value_name = "FILE.rs|DIR", required_if_eq_any(in_folders()))]
+    pub(crate) out: Option<PathBuf>,
+    /// With the equation of motion: mass matrix, velocity terms, gravity, forward dynamics
+    #[arg(long)]
+    pub(crate) dynamics: bool,
+    /// With what the joints transmit: forces and moments in all joints, and the forces that close loops
+    #[arg(long)]
+    pub(crate) reactions: bool,
+    /// With a function `self_test` that holds base parameters against all parameters, for a test of your own
+    #[arg(long)]
+    pub(crate) self_test: bool,
+    /// What to make: a Rust module, sources of plain C99, or a crate that builds a C library with its header or a Python module
+    #[arg(long, value_parser = languages(), default_value = Language::default().name())]
+    pub(crate) language: Language,
+}
+
+/// The languages by their names.
+fn languages() -> impl TypedValueParser<Value = Language> {
+    let all = Language::all();
+    let values = all.map(|language| PossibleValue::new(language.name()).help(language.about()));
+    let parser = PossibleValuesParser::new(values);
+    parser.map(|name| Language::named(&name).expect("the parser knows these names alone"))
+}
+
+/// Languages whose files need a folder.
+fn in_folders() -> Vec<(&'static str, &'static str)> {
+    let others = Language::all().filter(|language| language.form() != LanguageForm::Module);
+    others
+        .map(|language| ("language", language.name()))
+        .collect()
+}

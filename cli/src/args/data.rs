@@ -1,0 +1,222 @@
+//! Arguments of what works on recordings and fits.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use modelmill::{Host, Model};
+
+use crate::args::estimation::{EstimatorArgs, StandstillArgs};
+use crate::args::preparation::PreparationArgs;
+use crate::failure::Outcome;
+use crate::terminal;
+
+/// Where the values of the base parameters come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum ParameterSource {
+    /// The model file's nominal values.
+    Nominal,
+    /// A file that `identify` wrote.
+    Fit(PathBuf),
+}
+
+impl ParameterSource {
+    /// Reads the argument of `--parameters`.
+    pub(crate) fn parse(text: &str) -> Result<Self, String> {
+        match text {
+            "" => Err("expected `nominal` or the path of a fit".to_owned()),
+            "nominal" => Ok(Self::Nominal),
+            path => Ok(Self::Fit(PathBuf::from(path))),
+        }
+    }
+
+    /// The file, if there is one.
+    pub(crate) fn file(&self) -> Option<&PathBuf> {
+        match self {
+            Self::Nominal => None,
+            Self::Fit(path) => Some(path),
+        }
+    }
+
+    /// The values of the base parameters of a model, with remarks.
+    pub(crate) fn values(&self, host: &Host, model: &Model) -> Outcome<Vec<f64>> {
+        let values = match self {
+            Self::Nominal => model.nominal_values(),
+            Self::Fit(path) => {
+                let fit = host.fit(path)?;
+                model.values_of(&fit, &path.display().to_string())?
+            }
+        };
+        for note in &values.notes {
+            terminal::remark(note);
+        }
+        Ok(values.values)
+    }
+
+    /// The model with these values in the place of the file's.
+    pub(crate) fn in_model(&self, host: &Host, model: Model) -> Outcome<Model> {
+        Ok(match self {
+            Self::Nominal => model,
+            Self::Fit(_) => model.with_values(&self.values(host, &model)?),
+        })
+    }
+
+    /// What the JSON calls it.
+    pub(crate) fn name(&self) -> String {
+        match self {
+            Self::Nominal => "nominal".to_owned(),
+            Self::Fit(path) => path.display().to_string(),
+        }
+    }
+}
+
+/// `evaluate`.
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Recording whose states are taken
+    #[arg(long, value_name = "RUN")]
+    pub(crate) data: PathBuf,
+    /// Values of the base parameters: `nominal`, or a file that `identify` wrote
+    #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
+    pub(crate) parameters: ParameterSource,
+    /// What the joints transmit instead of the drives' forces: forces (N) and moments (N m) in all joints, and the forces
+    /// that close loops; for the nominal values of all parameters, since base parameters do not say
+    #[arg(long)]
+    pub(crate) reactions: bool,
+    /// Write the forces to this file instead of standard output
+    #[arg(long, value_name = "OUT.csv")]
+    pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) preparation: PreparationArgs,
+}
+
+/// `identify`.
+#[derive(Debug, Args)]
+pub(crate) struct IdentifyArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2) to identify from; may be repeated; files of one run that are to be
+    /// joined on time have a `+` between them
+    #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
+    pub(crate) data: Vec<PathBuf>,
+    /// Recordings to check the result on, which the fit does not see; may be repeated
+    #[arg(long, value_name = "RUN", num_args = 1..)]
+    pub(crate) check: Vec<PathBuf>,
+    /// Write the result as JSON to this file, for `--parameters`
+    #[arg(long, value_name = "FIT.json")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) estimators: EstimatorArgs,
+    #[command(flatten)]
+    pub(crate) standstill: StandstillArgs,
+    #[command(flatten)]
+    pub(crate) preparation: PreparationArgs,
+}
+
+/// `adopt`.
+#[derive(Debug, Args)]
+pub(crate) struct AdoptArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// A file that `identify` wrote
+    pub(crate) fit: PathBuf,
+    /// Change the model file
+    #[arg(long, conflicts_with = "out")]
+    pub(crate) in_place: bool,
+    /// Write the model with the fit to this file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `recordings`.
+#[derive(Debug, Args)]
+pub(crate) struct RecordingsArgs {
+    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2)
+    #[arg(required = true, value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `compare`.
+#[derive(Debug, Args)]
+pub(crate) struct CompareArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Recordings (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated; `a.csv+b.csv` joins files of one run on time
+    #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
+    pub(crate) data: Vec<PathBuf>,
+    /// Values of the base parameters: `nominal`, or a file that `identify` wrote
+    #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
+    pub(crate) parameters: ParameterSource,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) preparation: PreparationArgs,
+}
+
+/// What is diagnosed, for the commands that do.
+#[derive(Debug, Args)]
+pub(crate) struct AskArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Recordings to find it in (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated
+    #[arg(long, value_name = "RUN", required = true, num_args = 1..)]
+    pub(crate) data: Vec<PathBuf>,
+    /// Recordings that decide what is believed; without any, blocks of --data take turns
+    #[arg(long, value_name = "RUN", num_args = 1..)]
+    pub(crate) check: Vec<PathBuf>,
+    /// Hold all parameters at their nominal values, so that what is wrong with them shows too
+    #[arg(long)]
+    pub(crate) held: bool,
+    /// What takes the place of the nominal values: a file that `identify` wrote; with --held it is what is held
+    #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
+    pub(crate) parameters: ParameterSource,
+    #[command(flatten)]
+    pub(crate) preparation: PreparationArgs,
+}
+
+/// `diagnose`.
+#[derive(Debug, Args)]
+pub(crate) struct DiagnoseArgs {
+    #[command(flatten)]
+    pub(crate) ask: AskArgs,
+    /// Print one JSON object on standard output
+    #[arg(long, help_heading = None)]
+    pub(crate) json: bool,
+}
+
+/// `report`.
+#[derive(Debug, Args)]
+pub(crate) struct ReportArgs {
+    #[command(flatten)]
+    pub(crate) ask: AskArgs,
+    /// Write the page `report.html` into this folder
+    #[arg(long, value_name = "DIR", help_heading = None)]
+    pub(crate) out: PathBuf,
+}
+
+/// `interpret`.
+#[derive(Debug, Args)]
+pub(crate) struct InterpretArgs {
+    /// Model file (TOML); all parameters that are not unknown keep its nominal values
+    pub(crate) model: PathBuf,
+    /// Identified base parameters: a file that `identify` wrote
+    #[arg(long, value_name = "FIT.json")]
+    pub(crate) fit: PathBuf,
+    /// Parameters of the model file to solve for, separated by commas
+    #[arg(long, value_name = "NAME,...", required = true, value_delimiter = ',')]
+    pub(crate) unknown: Vec<String>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}

@@ -1,0 +1,139 @@
+//! Arguments of what plans and runs motions.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use modelmill::excite::Limit;
+
+use crate::args::data::ParameterSource;
+use crate::args::preparation;
+use crate::args::separate::SeparateArgs;
+
+/// `simulate`.
+#[derive(Debug, Args)]
+pub(crate) struct SimulateArgs {
+    /// Rig file (TOML)
+    pub(crate) rig: PathBuf,
+    /// Trajectory (CSV): t and the coordinates, with or without derivatives
+    #[arg(long, value_name = "TRAJ.csv")]
+    pub(crate) trajectory: PathBuf,
+    /// Write the recording to this file
+    #[arg(long, value_name = "RUN.csv")]
+    pub(crate) out: PathBuf,
+    /// Seed of the noise; the rig's own if not given
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// The trajectory calls our column by another name, e.g. `--map theta1=pos_left`; may be repeated
+    #[arg(long, value_name = "OURS=THEIRS", value_parser = preparation::parse_map)]
+    pub(crate) map: Vec<(String, String)>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// What excitation makes small.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum CriterionArg {
+    /// The condition number of the regressor in SI units, as in eq. (13) of the paper
+    Condition,
+    /// The logarithm of the determinant of W'W/N, negative: the volume of the parameters' uncertainty
+    LogDet,
+}
+
+/// `excite`.
+#[derive(Debug, Args)]
+pub(crate) struct ExciteArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Harmonics of the Fourier series of each active coordinate
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = parse_harmonics)]
+    pub(crate) harmonics: usize,
+    /// Period of the trajectory, s
+    #[arg(long, value_name = "S", default_value_t = 7.29, value_parser = parse_period)]
+    pub(crate) period: f64,
+    /// Limits beside those of the model file, or in their place: a coordinate (`theta1=1.5:2.1`), its rate
+    /// (`theta1_d=1.2`) or acceleration (`theta1_dd=4`), the force of a drive (`spindle_left=1500`), a point
+    /// (`R3m.x=0.2:0.7`), or `singularity=0.3`; may be repeated
+    #[arg(long, value_name = "NAME=RANGE", value_delimiter = ',', value_parser = Limit::parse, allow_hyphen_values = true)]
+    pub(crate) limits: Vec<Limit>,
+    /// What is made small
+    #[arg(long, value_enum, default_value = "condition")]
+    pub(crate) criterion: CriterionArg,
+    /// Values of the base parameters, from which forces along the motion follow: `nominal`, or a file that `identify` wrote
+    #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
+    pub(crate) parameters: ParameterSource,
+    /// Random trajectories within the limits that are tried first
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = parse_count)]
+    pub(crate) random: usize,
+    /// How many of the best random trajectories the search starts from
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = parse_count)]
+    pub(crate) starts: usize,
+    /// The same seed gives the same trajectory
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Samples per second in the file
+    #[arg(long, value_name = "HZ", default_value_t = 500.0, value_parser = parse_rate)]
+    pub(crate) rate: f64,
+    /// Write one period of the trajectory to this file: `t`, coordinates, rates, accelerations
+    #[arg(long, value_name = "TRAJ.csv")]
+    pub(crate) out: PathBuf,
+    /// Write its picture to this file; beside the trajectory if not given
+    #[arg(long, value_name = "FILE.svg")]
+    pub(crate) figure: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) separate: SeparateArgs,
+}
+
+/// `experiment`.
+#[derive(Debug, Args)]
+pub(crate) struct ExperimentArgs {
+    /// Write the page `experiment.html` into this folder
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Random trajectories within the limits that the search for the excitation tries first
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = parse_count)]
+    pub(crate) random: usize,
+    /// How many of the best random trajectories the search starts from
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = parse_count)]
+    pub(crate) starts: usize,
+    /// Seed of the search and of the test trajectory
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Samples per second of the runs
+    #[arg(long, value_name = "HZ", default_value_t = 200.0, value_parser = parse_rate)]
+    pub(crate) rate: f64,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+fn parse_harmonics(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(value) if (1..=50).contains(&value) => Ok(value),
+        _ => Err("expected a whole number from 1 to 50".to_owned()),
+    }
+}
+
+fn parse_count(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(value) if (1..=1_000_000).contains(&value) => Ok(value),
+        _ => Err("expected a whole number from 1 to 1000000".to_owned()),
+    }
+}
+
+fn parse_period(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (1e-3..=1e4).contains(&value) => Ok(value),
+        _ => Err("expected a time in s between 0.001 and 10000, such as 7.29".to_owned()),
+    }
+}
+
+fn parse_rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (1.0..=1e5).contains(&value) => Ok(value),
+        _ => Err("expected samples per second between 1 and 100000, such as 500".to_owned()),
+    }
+}

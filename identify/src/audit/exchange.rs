@@ -1,0 +1,125 @@
+//! Forces that are exchanged or turned round: a regressor and the measured forces go in; what swapping or turning round forces
+//! would gain comes out.
+//!
+//! For a regressor `W = Q R` the best fit to any forces `y` leaves `|y|^2 - |Q'y|^2`, so that one factorisation serves
+//! every permutation of the forces.
+
+use nalgebra::{DMatrix, DVector};
+
+/// How well a regressor can explain forces.
+#[derive(Debug, Clone)]
+pub struct ForceAudit {
+    q: DMatrix<f64>,
+    n_channels: usize,
+}
+
+/// Something about the forces that would explain them better.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Suspect {
+    /// Two channels are exchanged.
+    Swapped(usize, usize),
+    /// A channel has another sign than the others; of two channels it is not known which.
+    Turned(usize),
+}
+
+impl ForceAudit {
+    /// Factorises a regressor of rows interleaved per sample; `None` if it has fewer rows than twice its columns.
+    pub fn new(mut regressor: DMatrix<f64>, n_channels: usize) -> Option<Self> {
+        if n_channels == 0 || regressor.nrows() < 2 * regressor.ncols() {
+            return None;
+        }
+        for mut column in regressor.column_iter_mut() {
+            let norm = column.norm();
+            if norm > 0.0 {
+                column /= norm;
+            }
+        }
+        Some(Self {
+            q: regressor.qr().q(),
+            n_channels,
+        })
+    }
+
+    /// Relative error of the best fit to forces interleaved per sample; `None` where they are all zero.
+    pub fn error(&self, forces: &DVector<f64>) -> Option<f64> {
+        let size = forces.norm_squared();
+        let explained = self.q.tr_mul(forces).norm_squared();
+        (size > 0.0).then(|| ((size - explained).max(0.0) / size).sqrt())
+    }
+
+    /// The exchange or change of sign of forces that lowers the error most, with the error without and with it.
+    pub fn suspect(&self, forces: &DVector<f64>) -> Option<(Suspect, [f64; 2])> {
+        let n = self.n_channels;
+        let now = self.error(forces)?;
+        let changed = |change: Suspect| {
+            let mut changed = forces.clone();
+            for row in 0..forces.len() / n {
+                match change {
+                    Suspect::Swapped(a, b) => changed.swap((row * n + a, 0), (row * n + b, 0)),
+                    Suspect::Turned(a) => changed[row * n + a] *= -1.0,
+                }
+            }
+            changed
+        };
+        let swaps = (0..n).flat_map(|a| (a + 1..n).map(move |b| Suspect::Swapped(a, b)));
+        swaps
+            .chain((0..n).map(Suspect::Turned))
+            .filter_map(|change| Some((change, [now, self.error(&changed(change))?])))
+            .min_by(|a, b| a.1[1].total_cmp(&b.1[1]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_noise::Noise;
+
+    /// Two joints with inertia and friction each, coupled by gravity.
+    fn rows(time: impl Fn(usize) -> f64, samples: &[usize]) -> DMatrix<f64> {
+        DMatrix::from_row_iterator(
+            2 * samples.len(),
+            3,
+            samples.iter().flat_map(|k| {
+                let t = time(*k);
+                let (a, b) = ((3.1 * t).sin(), (4.7 * t + 0.3).cos());
+                [a, b, 0.2 * a, 0.5 * b, (1.9 * t).sin(), 0.1]
+            }),
+        )
+    }
+
+    const TRUTH: [f64; 3] = [2.0, -1.5, 0.7];
+
+    fn forces() -> (Vec<usize>, Vec<Vec<f64>>) {
+        let n = 3000;
+        let all: Vec<usize> = (0..n).collect();
+        let y = rows(|k| k as f64 * 0.002, &all) * DVector::from_row_slice(&TRUTH);
+        let mut random = Noise::new(7);
+        let channels = (0..2).map(|c| {
+            let values = (0..n).map(|k| y[2 * k + c] + 0.01 * random.normal());
+            values.collect()
+        });
+        let channels = channels.collect();
+        ((0..n).step_by(3).collect(), channels)
+    }
+
+    #[test]
+    fn exchanged_and_turned_forces_are_found() {
+        let (samples, forces) = forces();
+        let explained = ForceAudit::new(rows(|k| k as f64 * 0.002, &samples), 2).unwrap();
+        let interleaved = |channels: [&Vec<f64>; 2], sign: f64| {
+            let rows = samples
+                .iter()
+                .flat_map(|k| [channels[0][*k], sign * channels[1][*k]]);
+            DVector::from_iterator(2 * samples.len(), rows)
+        };
+        let swapped = interleaved([&forces[1], &forces[0]], 1.0);
+        let (found, [before, after]) = explained.suspect(&swapped).unwrap();
+        assert_eq!(found, Suspect::Swapped(0, 1));
+        assert!(before > 0.2 && after < 0.02, "{before} {after}");
+        let turned = interleaved([&forces[0], &forces[1]], -1.0);
+        // With two channels the one cannot be told from the other: all parameters may change their signs.
+        let (found, [before, after]) = explained.suspect(&turned).unwrap();
+        assert!(matches!(found, Suspect::Turned(_)));
+        assert!(before > 0.2 && after < 0.02, "{before} {after}");
+    }
+}

@@ -1,0 +1,310 @@
+//! One fit of many runs: some coefficients are shared by all, others are each run's own.
+//!
+//! ```text
+//! y_rd = s_d (Z_rd [x, o_r, f_r] + e)
+//! ```
+//!
+//! for run r and channel d, with shared `x`, own `o_r`, and `f_r` that are known. The scale `s_d` of a channel is 1, or unknown
+//! as well: a load of known mass in one of the runs then says it (Gautier and Briot, IEEE ICRA 2012). Own values are eliminated
+//! run by run, so that the cost grows with the number of runs and not with its cube.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::changes::moments::{Eliminated, Moments};
+
+/// Steps of Gauss and Newton at most, where scales are unknown.
+const STEPS: usize = 60;
+/// Steps end where they change the sum of squares by less than this part of it.
+const SETTLED: f64 = 1e-12;
+
+/// One run of a joint fit.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Sums over rows of variance 1, channel by channel.
+    pub channels: Vec<Moments>,
+    /// Columns that have values of their own in this run; columns that are neither shared nor own count as 0.
+    pub own: Vec<usize>,
+    /// Columns whose values are known in this run.
+    pub known: Vec<(usize, f64)>,
+}
+
+/// Values with their covariance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Values {
+    /// The values.
+    pub values: DVector<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+    /// Which of them the runs tell.
+    pub determined: Vec<bool>,
+}
+
+/// The result of a joint fit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// Shared values, in the order in which they were asked for, and behind them the scales of channels, if these are unknown.
+    pub shared: Values,
+    /// Own values of each run, in the order of [`Part::own`].
+    pub own: Vec<Values>,
+}
+
+/// Fits all runs at once; with `scaled` the scale of each channel is unknown.
+pub fn joint(parts: &[Part], shared: &[usize], scaled: bool) -> Joint {
+    let mut at = Point {
+        shared: DVector::zeros(shared.len()),
+        scales: vec![1.0; parts.first().map_or(0, |part| part.channels.len())],
+        own: parts
+            .iter()
+            .map(|part| DVector::zeros(part.own.len()))
+            .collect(),
+    };
+    let mut step = Step::new(parts, shared, &at, false);
+    at = step.taken(&at, 1.0);
+    if scaled {
+        for _ in 0..STEPS {
+            step = Step::new(parts, shared, &at, true);
+            let tried = [1.0, 0.5, 0.25, 0.1, 0.01].map(|part| step.taken(&at, part));
+            let rest = |point: &Point| Step::new(parts, shared, point, true).before;
+            let best = tried.into_iter().find_map(|point| {
+                let left = rest(&point);
+                (left < step.before).then_some((left, point))
+            });
+            let Some((left, point)) = best else { break };
+            at = point;
+            if step.before - left <= SETTLED * step.before {
+                break;
+            }
+        }
+        step = Step::new(parts, shared, &at, true);
+    }
+    step.result(&at)
+}
+
+/// Values on the way.
+#[derive(Clone)]
+struct Point {
+    shared: DVector<f64>,
+    scales: Vec<f64>,
+    own: Vec<DVector<f64>>,
+}
+
+/// The linear problem around a point.
+struct Step {
+    solved: crate::changes::moments::Solved,
+    /// Own values of each run as they follow from the shared ones.
+    own: Vec<Eliminated>,
+    /// Sum of squares at the point.
+    before: f64,
+    /// Variance of what is left.
+    noise: f64,
+    scaled: bool,
+}
+
+impl Step {
+    fn new(parts: &[Part], shared: &[usize], at: &Point, scaled: bool) -> Self {
+        let n = shared.len() + if scaled { at.scales.len() } else { 0 };
+        let mut sum = Moments::new(n);
+        let mut before = 0.0;
+        let mut own = Vec::new();
+        for (part, values) in parts.iter().zip(&at.own) {
+            let around = around(part, shared, at, values, scaled);
+            before += around.total;
+            let (left, one) = around.eliminate(part.own.len());
+            sum.merge(&left);
+            own.push(one);
+        }
+        let solved = sum.solve();
+        let rank = solved.rank + own.iter().map(Eliminated::rank).sum::<usize>();
+        Self {
+            noise: (solved.rest / (sum.rows as f64 - rank as f64).max(1.0)).max(1.0),
+            solved,
+            own,
+            before,
+            scaled,
+        }
+    }
+
+    /// The point after a part of the step.
+    fn taken(&self, at: &Point, part: f64) -> Point {
+        let mut next = at.clone();
+        let n = next.shared.len();
+        next.shared += part * self.solved.values.rows(0, n);
+        if self.scaled {
+            for (scale, step) in next
+                .scales
+                .iter_mut()
+                .zip(self.solved.values.iter().skip(n))
+            {
+                *scale += part * step;
+            }
+        }
+        for (own, one) in next.own.iter_mut().zip(&self.own) {
+            *own += part * one.values(&self.solved.values);
+        }
+        next
+    }
+
+    fn result(&self, at: &Point) -> Joint {
+        let scales = at.scales.iter().filter(|_| self.scaled);
+        let own = at.own.iter().zip(&self.own).map(|(values, one)| Values {
+            values: values.clone(),
+            covariance: self.noise * one.covariance(&self.solved.covariance),
+            determined: one.determined(&self.solved.determined),
+        });
+        Joint {
+            shared: Values {
+                values: DVector::from_iterator(
+                    self.solved.values.len(),
+                    at.shared.iter().chain(scales).copied(),
+                ),
+                covariance: self.noise * &self.solved.covariance,
+                determined: self.solved.determined.clone(),
+            },
+            own: own.collect(),
+        }
+    }
+}
+
+/// The linear problem of one run around a point: columns of its own values, of shared ones, and of scales.
+fn around(part: &Part, shared: &[usize], at: &Point, own: &DVector<f64>, scaled: bool) -> Moments {
+    let columns: Vec<usize> = part.own.iter().chain(shared).copied().collect();
+    let n = columns.len();
+    let mut all = Moments::new(n + if scaled { at.scales.len() } else { 0 });
+    for (d, (sums, scale)) in part.channels.iter().zip(&at.scales).enumerate() {
+        let mut values = DVector::zeros(sums.rhs.len());
+        let own = part.own.iter().zip(own.iter());
+        for (k, x) in own.chain(shared.iter().zip(at.shared.iter())) {
+            values[*k] += x;
+        }
+        for (k, x) in &part.known {
+            values[*k] = *x;
+        }
+        // What the values make of the columns, and what they leave.
+        let made = &sums.gram * &values;
+        let left = &sums.rhs - *scale * &made;
+        for (i, a) in columns.iter().enumerate() {
+            for (j, b) in columns.iter().enumerate() {
+                all.gram[(i, j)] += scale * scale * sums.gram[(*a, *b)];
+            }
+            all.rhs[i] += scale * left[*a];
+            if scaled {
+                all.gram[(i, n + d)] += scale * made[*a];
+                all.gram[(n + d, i)] += scale * made[*a];
+            }
+        }
+        let size = values.dot(&made);
+        let measured = values.dot(&sums.rhs);
+        if scaled {
+            all.gram[(n + d, n + d)] += size;
+            all.rhs[n + d] += measured - scale * size;
+        }
+        all.total += (sums.total - 2.0 * scale * measured + scale * scale * size).max(0.0);
+        all.rows += sums.rows;
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_noise::Noise;
+
+    /// Two channels, two shared columns and one that is a run's own; forces times a scale of each channel.
+    fn part(noise: &mut Noise, shared: [f64; 2], own: f64, scales: [f64; 2]) -> Vec<Moments> {
+        let channel = |scale: f64| {
+            let z: Vec<Vec<f64>> = (0..3)
+                .map(|_| (0..300).map(|_| noise.normal()).collect())
+                .collect();
+            let y: Vec<f64> = (0..300)
+                .map(|i| {
+                    let force = shared[0] * z[0][i] + shared[1] * z[1][i] + own * z[2][i];
+                    100.0 * scale * force + noise.normal()
+                })
+                .collect();
+            let z: Vec<Vec<f64>> = (z.iter())
+                .map(|column| column.iter().map(|x| 100.0 * x).collect())
+                .collect();
+            let mut sums = Moments::new(3);
+            let z: Vec<Option<&[f64]>> = z.iter().map(|column| Some(&column[..])).collect();
+            sums.add_rows(&z, &y);
+            sums
+        };
+        scales.map(channel).to_vec()
+    }
+
+    fn is_near(found: &Values, truth: &[f64]) {
+        for (i, truth) in truth.iter().enumerate() {
+            let deviation = found.covariance[(i, i)].sqrt();
+            assert!(found.determined[i], "{found:?}");
+            assert!(
+                deviation < 0.01 && (found.values[i] - truth).abs() < 5.0 * deviation,
+                "{found:?} is not {truth}"
+            );
+        }
+    }
+
+    #[test]
+    fn shared_and_own_values_are_told_apart() {
+        for seed in 0..20 {
+            let mut noise = Noise::new(seed);
+            let owns = [0.0, 0.7, -0.3];
+            let parts: Vec<Part> = (owns.iter())
+                .map(|own| Part {
+                    channels: part(&mut noise, [2.0, -1.0], *own, [1.0, 1.0]),
+                    own: vec![2],
+                    known: Vec::new(),
+                })
+                .collect();
+            let found = joint(&parts, &[0, 1], false);
+            is_near(&found.shared, &[2.0, -1.0]);
+            for (own, truth) in found.own.iter().zip(owns) {
+                is_near(own, &[truth]);
+            }
+            // The same by one problem with all columns.
+            let mut all = Moments::new(5);
+            for (r, part) in parts.iter().enumerate() {
+                for sums in &part.channels {
+                    let places = [0, 1, 2 + r];
+                    for i in 0..3 {
+                        for j in 0..3 {
+                            all.gram[(places[i], places[j])] += sums.gram[(i, j)];
+                        }
+                        all.rhs[places[i]] += sums.rhs[i];
+                    }
+                    all.total += sums.total;
+                    all.rows += sums.rows;
+                }
+            }
+            let expected = all.solve();
+            assert!((found.shared.values[1] - expected.values[1]).abs() < 1e-9);
+            assert!((found.own[2].values[0] - expected.values[4]).abs() < 1e-9);
+            let ratio = found.own[2].covariance[(0, 0)] / expected.covariance[(4, 4)];
+            assert!((1.0 - 1e-9..2.0).contains(&ratio), "{ratio}");
+        }
+    }
+
+    /// A load that is known says the scales of both channels, though the load itself is seen with them alone.
+    #[test]
+    fn a_known_load_tells_scales() {
+        let mut noise = Noise::new(5);
+        let scales = [0.8, 1.3];
+        let unloaded = part(&mut noise, [2.0, -1.0], 0.0, scales);
+        let loaded = part(&mut noise, [2.0, -1.0], 0.5, scales);
+        let parts = |mass: &[(usize, f64)]| {
+            [
+                (unloaded.clone(), Vec::new()),
+                (loaded.clone(), mass.to_vec()),
+            ]
+            .map(|(channels, known)| Part {
+                channels,
+                own: Vec::new(),
+                known,
+            })
+        };
+        let found = joint(&parts(&[(2, 0.5)]), &[0, 1], true);
+        is_near(&found.shared, &[2.0, -1.0, 0.8, 1.3]);
+        // Without a load only products are known.
+        let found = joint(&parts(&[])[..1], &[0, 1], true);
+        assert!(!found.shared.determined[0] && !found.shared.determined[2]);
+    }
+}

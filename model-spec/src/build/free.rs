@@ -1,0 +1,312 @@
+//! What moves without a drive: free bodies and undriven joints. They get their rows of the equation of motion here, and what
+//! would need more than that is refused.
+
+use std::collections::BTreeMap;
+
+use crate::build::Places;
+use crate::build::actuation::Drives;
+use crate::build::frames::{Points, Tree};
+use crate::build::symbols::Symbols;
+use crate::diagnostic::{Diagnostic, Log, Span};
+use crate::exact::{CoordinateIdx, Symbol};
+use crate::mechanism::{Drive, DriveKind, FrameIdx, FreeBody, Loop, PointIdx, Step};
+use crate::schema::ModelEntry;
+
+/// The free bodies with the frames that they carry.
+fn free_bodies(tree: &Tree) -> impl Iterator<Item = (usize, &FreeBody)> {
+    let steps = tree.frames.iter().enumerate();
+    steps.flat_map(|(i, frame)| {
+        let of_frame = frame.steps.iter();
+        of_frame.filter_map(move |step| match step {
+            Step::Free(body) => Some((i, body)),
+            _ => None,
+        })
+    })
+}
+
+/// Takes the drives out of a tree that has more of them than degrees of freedom: they share its rows.
+pub(super) fn take_shared(
+    model: &ModelEntry,
+    symbols: &Symbols,
+    drives: &mut Vec<Drive>,
+) -> Vec<Drive> {
+    let coordinates = symbols.coordinates.iter();
+    let freedoms = coordinates
+        .filter(|c| !c.passive && c.motion.has_rate())
+        .count();
+    let has_loops = model
+        .loops
+        .as_ref()
+        .is_some_and(|list| !list.entries.is_empty());
+    let has_passive = symbols.coordinates.iter().any(|c| c.passive);
+    if drives.len() <= freedoms || freedoms == 0 || has_loops || has_passive {
+        return Vec::new();
+    }
+    std::mem::take(drives)
+}
+
+/// Adds a row for every degree of freedom that nothing drives, or that drives share.
+pub(super) fn add_rows(
+    model: &ModelEntry,
+    symbols: &Symbols,
+    tree: &Tree,
+    points: &Points,
+    places: &mut Places,
+    drives: &mut Drives,
+    log: &mut Log,
+) {
+    let Drives {
+        rows: drives,
+        shared,
+    } = drives;
+    let mut of_bodies = Vec::new();
+    for (frame, body) in free_bodies(tree) {
+        check_body(symbols, tree, frame, body, places, log);
+        let [_, qx, qy, qz] = body.quaternion;
+        of_bodies.extend(body.position);
+        of_bodies.extend([qx, qy, qz]);
+    }
+    let mut undriven = undriven(model, symbols, places, drives, log);
+    if !shared.is_empty() {
+        let all = (0..symbols.coordinates.len()).map(CoordinateIdx);
+        undriven = all
+            .filter(|i| symbols.coordinates[i.0].motion.has_rate() && !of_bodies.contains(i))
+            .collect();
+    }
+    let driven: Vec<CoordinateIdx> = drives
+        .iter()
+        .filter_map(|drive| match drive.kind {
+            DriveKind::Joint(i) => Some(i),
+            DriveKind::Linear { .. } => None,
+        })
+        .collect();
+    let row = |i: CoordinateIdx| Drive {
+        name: format!("on_{}", symbols.coordinates[i.0].name),
+        kind: DriveKind::Joint(i),
+        is_driven: false,
+    };
+    let span = |i: &CoordinateIdx| places.coordinates[i.0];
+    of_bodies.retain(|i| !driven.contains(i));
+    for (i, row) in of_bodies.iter().chain(&undriven).map(|i| (i, row(*i))) {
+        let is_taken = symbols.coordinates.iter().any(|c| c.name == row.name)
+            || drives
+                .iter()
+                .chain(&*shared)
+                .any(|drive| drive.name == row.name)
+            || points.get(&row.name).is_some();
+        if is_taken {
+            log.push(
+                Diagnostic::error(
+                    span(i),
+                    format!(
+                        "nothing drives this coordinate, and `{}` is the name of its force",
+                        row.name
+                    ),
+                )
+                .label("something else has this name")
+                .help("rename one of the two"),
+            );
+        }
+    }
+    let spans: Vec<_> = of_bodies.iter().map(span).collect();
+    let last: Vec<_> = undriven.iter().map(span).collect();
+    drives.splice(0..0, of_bodies.into_iter().map(row));
+    drives.extend(undriven.into_iter().map(row));
+    places.drives.splice(0..0, spans);
+    places.drives.extend(last);
+}
+
+/// Coordinates of joints that the file says nothing drives.
+fn undriven(
+    model: &ModelEntry,
+    symbols: &Symbols,
+    places: &Places,
+    drives: &[Drive],
+    log: &mut Log,
+) -> Vec<CoordinateIdx> {
+    let mut found = Vec::new();
+    for (key, entry) in model.coordinates.iter().flat_map(|table| &table.entries) {
+        if entry.driven.is_none_or(|flag| flag.0) {
+            continue;
+        }
+        let Some(i) = symbols.coordinates.iter().position(|c| c.name == key.name) else {
+            continue;
+        };
+        let coordinate = &symbols.coordinates[i];
+        if coordinate.motion.is_quaternion() {
+            continue; // Said of the whole body by its joint.
+        }
+        if coordinate.passive {
+            log.push(
+                Diagnostic::error(
+                    key.span,
+                    format!(
+                        "`{}` is `passive`, so that no drive could act on it",
+                        key.name
+                    ),
+                )
+                .label("delete `driven = false`: the loops settle this coordinate"),
+            );
+            continue;
+        }
+        let kind = DriveKind::Joint(CoordinateIdx(i));
+        if let Some(at) = drives.iter().position(|drive| drive.kind == kind) {
+            log.push(
+                Diagnostic::error(
+                    key.span,
+                    format!("nothing drives `{}`, and a drive does", key.name),
+                )
+                .label("`driven = false` here")
+                .related(places.drives[at], "this drive acts on it")
+                .help("delete one of the two"),
+            );
+            continue;
+        }
+        found.push(CoordinateIdx(i));
+    }
+    found
+}
+
+/// Reports what a free body cannot be.
+fn check_body(
+    symbols: &Symbols,
+    tree: &Tree,
+    frame: usize,
+    body: &FreeBody,
+    places: &Places,
+    log: &mut Log,
+) {
+    let here = &tree.frames[frame];
+    let Some(span) = places.frames.get(frame).copied().flatten() else {
+        return;
+    };
+    if here.parent != FrameIdx(0) || here.steps.len() != 1 {
+        log.push(
+            Diagnostic::error(
+                span,
+                "a free body with a quaternion hangs on `base`, and on nothing between",
+            )
+            .label("its coordinates are its pose in the base frame")
+            .help("write `on = \"base\"` and leave `transform` away; a frame on it may have one"),
+        );
+    }
+    let all = body.position.iter().chain(&body.quaternion);
+    for i in all.clone() {
+        if symbols.coordinates[i.0].passive {
+            log.push(
+                Diagnostic::error(
+                    places.coordinates[i.0],
+                    "a coordinate of a free body with a quaternion cannot be `passive`",
+                )
+                .label("no loop settles it")
+                .help("a platform whose loops settle its pose has `free` with six coordinates"),
+            );
+        }
+    }
+    let size: f64 = body
+        .quaternion
+        .iter()
+        .map(|i| symbols.coordinates[i.0].nominal.powi(2))
+        .sum();
+    if size.is_nan() || size <= 1e-12 {
+        log.push(
+            Diagnostic::error(
+                places.coordinates[body.quaternion[0].0],
+                "the nominal quaternion has no length",
+            )
+            .label("so it stands for no orientation")
+            .help("leave its values away, or give it a length of one"),
+        );
+    }
+    for i in all {
+        let uses = tree
+            .frames
+            .iter()
+            .flat_map(|frame| &frame.steps)
+            .filter(|step| uses(step, *i));
+        if uses.count() > 1 {
+            log.push(
+                Diagnostic::error(
+                    places.coordinates[i.0],
+                    "a coordinate of a free body moves something else as well",
+                )
+                .label("its rate is that of the body alone")
+                .help("declare a coordinate for each joint"),
+            );
+        }
+    }
+}
+
+fn uses(step: &Step, coordinate: CoordinateIdx) -> bool {
+    match step {
+        Step::Rotate(_, angle) => angle
+            .terms
+            .iter()
+            .any(|(s, _)| *s == Symbol::Coordinate(coordinate)),
+        Step::Translate(_, length) => length.coordinates.iter().any(|(i, _)| *i == coordinate),
+        Step::Free(body) => body
+            .position
+            .iter()
+            .chain(&body.quaternion)
+            .any(|i| *i == coordinate),
+    }
+}
+
+/// Reports linear drives that reach from one free body to another, or to what stands on the base.
+pub(super) fn check_apart(
+    tree: &Tree,
+    drives: &[Drive],
+    points: &Points,
+    spans: &[Span],
+    log: &mut Log,
+) {
+    let root = roots(tree);
+    for (drive, span) in drives.iter().zip(spans) {
+        if let DriveKind::Linear { from, to } = drive.kind
+            && root(points, from) != root(points, to)
+        {
+            log.push(across(*span, "a drive"));
+        }
+    }
+}
+
+/// The same for loops.
+pub(super) fn check_loops(
+    tree: &Tree,
+    loops: &[Loop],
+    points: &Points,
+    places: &Places,
+    log: &mut Log,
+) {
+    let root = roots(tree);
+    for (closed, span) in loops.iter().zip(&places.loops) {
+        let [one, other] = closed.joins;
+        if root(points, one) != root(points, other) {
+            log.push(across(*span, "a loop"));
+        }
+    }
+}
+
+fn across(span: Span, what: &str) -> Diagnostic {
+    Diagnostic::error(
+        span,
+        format!("{what} cannot reach across a free body with a quaternion"),
+    )
+    .label("one end moves with the body and the other does not")
+    .help("give that body `free` with six coordinates, its position and three angles")
+}
+
+/// On which free body, if any, a point moves.
+fn roots(tree: &Tree) -> impl Fn(&Points, PointIdx) -> Option<usize> {
+    let mut of_frame: BTreeMap<usize, usize> = BTreeMap::new();
+    for (i, frame) in tree.frames.iter().enumerate() {
+        let is_free = frame.steps.iter().any(|step| matches!(step, Step::Free(_)));
+        let root = if is_free {
+            Some(i)
+        } else {
+            of_frame.get(&frame.parent.0).copied()
+        };
+        of_frame.extend(root.map(|root| (i, root)));
+    }
+    move |points, point| of_frame.get(&points.points[point.0].frame.0).copied()
+}

@@ -1,0 +1,286 @@
+//! What recordings hold of free bodies and of what nothing drives: quaternions whose sign may change from sample to sample,
+//! twists that are recorded or follow from the pose, and forces that are zero because nothing acts.
+
+use modelmill_identify::{Note, Preparation, Recording as Raw, Run};
+use modelmill_spec::{DriveKind, FreeBody, Kinematics, Mechanism, Step, TwistAxes};
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+
+/// How far the length of a recorded quaternion may be from one: more is no rounding, but another column.
+const UNIT: f64 = 0.02;
+
+/// The free bodies of a mechanism.
+pub(crate) fn free_bodies(mechanism: &Mechanism) -> impl Iterator<Item = &FreeBody> {
+    let steps = mechanism.frames.iter().flat_map(|frame| &frame.steps);
+    steps.filter_map(|step| match step {
+        Step::Free(body) => Some(body),
+        _ => None,
+    })
+}
+
+/// Makes a raw recording whole: quaternions of unit length that do not change sides, and forces of zero where nothing drives
+/// and nothing was measured; what was done comes back as notes.
+pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<Note>> {
+    let mechanism = &model.derivation.mechanism;
+    for body in free_bodies(mechanism) {
+        let names = body
+            .quaternion
+            .map(|i| mechanism.coordinates[i.0].name.as_str());
+        // What is missing is said where states are made.
+        if names.iter().all(|name| raw.has(name)) {
+            one_sided(raw, names)?;
+        }
+        check_twist(mechanism, body, raw)?;
+    }
+    share(mechanism, raw)?;
+    let mut zero = Vec::new();
+    for drive in mechanism.drives.iter().filter(|drive| !drive.is_driven) {
+        if !raw.has(&drive.name) && mechanism.shared_drives.is_empty() {
+            raw.put(&drive.name, vec![0.0; raw.samples()]);
+            zero.push(format!("`{}`", drive.name));
+        }
+    }
+    if zero.is_empty() {
+        return Ok(Vec::new());
+    }
+    Ok(vec![Note::info(format!(
+        "{} has no column {}: nothing drives there, and no other force, such as that of a contact, is taken to act.",
+        raw.file(),
+        zero.join(", ")
+    ))])
+}
+
+/// Adds what drives that share the rows do on each of them, `J' f`, to what is recorded there.
+fn share(mechanism: &Mechanism, raw: &mut Raw) -> Outcome {
+    let shared = &mechanism.shared_drives;
+    let has = |name: &str| raw.has(name);
+    if !shared.iter().any(|drive| has(&drive.name))
+        || !mechanism.coordinates.iter().all(|c| has(&c.name))
+    {
+        // No forces were measured, or poses are missing, which is said where states are made.
+        return Ok(());
+    }
+    let column = |name: &str| raw.column(name).map(<[f64]>::to_vec);
+    let forces: Vec<Vec<f64>> = shared
+        .iter()
+        .map(|d| column(&d.name))
+        .collect::<Result<_, _>>()?;
+    let q: Vec<Vec<f64>> = mechanism
+        .coordinates
+        .iter()
+        .map(|c| column(&c.name))
+        .collect::<Result<_, _>>()?;
+    let kinematics = Kinematics::new(mechanism);
+    let mut rows: Vec<Vec<f64>> = Vec::new();
+    for row in &mechanism.drives {
+        rows.push(if has(&row.name) {
+            column(&row.name)?
+        } else {
+            vec![0.0; raw.samples()]
+        });
+    }
+    for sample in 0..raw.samples() {
+        let here: Vec<f64> = q.iter().map(|q| q[sample]).collect();
+        let poses = kinematics.poses(&here);
+        for (drive, force) in shared.iter().zip(&forces) {
+            let slopes = kinematics.drive_slopes(&poses, drive.kind);
+            for (row, total) in mechanism.drives.iter().zip(&mut rows) {
+                if let DriveKind::Joint(i) = row.kind {
+                    total[sample] += slopes[i.0] * force[sample];
+                }
+            }
+        }
+    }
+    for (row, total) in mechanism.drives.iter().zip(rows) {
+        raw.put(&row.name, total);
+    }
+    Ok(())
+}
+
+/// Scales quaternions to unit length, and turns the sign of those that lie on the other side of the one before.
+fn one_sided(raw: &mut Raw, names: [&str; 4]) -> Outcome {
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    for name in names {
+        columns.push(raw.column(name)?.to_vec());
+    }
+    let mut last = [0.0; 4];
+    for sample in 0..raw.samples() {
+        let here: [f64; 4] = std::array::from_fn(|k| columns[k][sample]);
+        let length = here.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if (length - 1.0).abs() > UNIT {
+            let line = raw.line(sample).unwrap_or(0);
+            return Err(Error::input(format!(
+                "{}: the quaternion `{}` in line {line} has the length {length:.4}, and that of a unit quaternion is 1; check \
+                 which columns are its components (option `columns`)",
+                raw.file(),
+                names.join("`, `")
+            )));
+        }
+        let side: f64 = here.iter().zip(&last).map(|(a, b)| a * b).sum();
+        let scale = if side < 0.0 {
+            -1.0 / length
+        } else {
+            1.0 / length
+        };
+        for (k, column) in columns.iter_mut().enumerate() {
+            column[sample] *= scale;
+            last[k] = column[sample];
+        }
+    }
+    for (name, column) in names.into_iter().zip(columns) {
+        raw.put(name, column);
+    }
+    Ok(())
+}
+
+/// Refuses a half of a twist that is recorded in part, and accelerations without the velocities that they change.
+fn check_twist(mechanism: &Mechanism, body: &FreeBody, raw: &Raw) -> Outcome {
+    let name = |i: usize| mechanism.coordinates[i].name.as_str();
+    for half in halves(body) {
+        let [rates, accelerations] = ["_d", "_dd"].map(|suffix| {
+            let recorded = half
+                .iter()
+                .filter(|i| raw.has(&format!("{}{suffix}", name(**i))));
+            recorded.count()
+        });
+        let is_whole = |n: usize| n == 0 || n == 3;
+        if is_whole(rates) && is_whole(accelerations) && (accelerations == 0 || rates == 3) {
+            continue;
+        }
+        let of = |suffix: &str| half.map(|i| format!("`{}{suffix}`", name(i))).join(", ");
+        return Err(Error::input(format!(
+            "{}: a free body's velocity and acceleration are recorded by all their components: expected {}, with {} or without \
+             (option `columns`), or none of them",
+            raw.file(),
+            of("_d"),
+            of("_dd")
+        )));
+    }
+    Ok(())
+}
+
+/// Coordinates whose rates are the velocity, and those whose rates are the angular velocity.
+fn halves(body: &FreeBody) -> [[usize; 3]; 2] {
+    let [_, x, y, z] = body.quaternion;
+    [body.position, [x, y, z]].map(|half| half.map(|i| i.0))
+}
+
+/// The states of a recording for a model, in which rates of free bodies are their twist.
+pub(super) fn runs(model: &Model, raw: &Raw, preparation: &Preparation) -> Outcome<Vec<Run>> {
+    let mechanism = &model.derivation.mechanism;
+    let mut runs = raw.runs_with(&model.active(), &model.drives(), preparation)?;
+    for body in free_bodies(mechanism) {
+        let [velocity, angular] = halves(body).map(|half| {
+            let name = &mechanism.coordinates[half[0]].name;
+            raw.has(&format!("{name}_d"))
+        });
+        for run in &mut runs {
+            twist(mechanism, body, run, [velocity, angular]);
+        }
+    }
+    Ok(runs)
+}
+
+/// Replaces derivatives of a pose by the twist and its derivative, half by half where it was not recorded.
+fn twist(mechanism: &Mechanism, body: &FreeBody, run: &mut Run, recorded: [bool; 2]) {
+    // States hold the independent coordinates alone.
+    let at = |i: usize| {
+        let before = mechanism.coordinates[..i].iter();
+        before.filter(|c| !c.passive).count()
+    };
+    let quaternion = body.quaternion.map(|i| at(i.0));
+    let [position, vector] = halves(body).map(|half| half.map(at));
+    for sample in 0..run.time.len() {
+        let of = |columns: &[Vec<f64>], i: usize| columns[i][sample];
+        let q = quaternion.map(|i| of(&run.q, i));
+        let turn = Turn::new(q);
+        let (mut omega, mut alpha) = (
+            vector.map(|i| of(&run.qd, i)),
+            vector.map(|i| of(&run.qdd, i)),
+        );
+        if !recorded[1] {
+            // q' = q w / 2 in body axes, w' likewise; what changes the length of q drops out.
+            let square: f64 = q.iter().map(|x| x * x).sum();
+            let [first, second] = [&run.qd, &run.qdd].map(|of_order| {
+                imaginary(q, quaternion.map(|i| of(of_order, i))).map(|x| 2.0 * x / square)
+            });
+            let growth: f64 = quaternion
+                .iter()
+                .zip(q)
+                .map(|(i, x)| of(&run.qd, *i) * x)
+                .sum();
+            let shrink = 2.0 * growth / square;
+            omega = first;
+            alpha = std::array::from_fn(|k| second[k] - shrink * first[k]);
+            if body.angular == TwistAxes::World {
+                (omega, alpha) = (turn.out(omega), turn.out(alpha));
+            }
+        }
+        let (mut velocity, mut acceleration) = (
+            position.map(|i| of(&run.qd, i)),
+            position.map(|i| of(&run.qdd, i)),
+        );
+        if !recorded[0] && body.linear == TwistAxes::Body {
+            let omega = match body.angular {
+                TwistAxes::Body => omega,
+                TwistAxes::World => turn.inside(omega),
+            };
+            velocity = turn.inside(velocity);
+            let carried = cross(omega, velocity);
+            let inside = turn.inside(acceleration);
+            acceleration = std::array::from_fn(|k| inside[k] - carried[k]);
+        }
+        for k in 0..3 {
+            run.qd[vector[k]][sample] = omega[k];
+            run.qdd[vector[k]][sample] = alpha[k];
+            run.qd[position[k]][sample] = velocity[k];
+            run.qdd[position[k]][sample] = acceleration[k];
+        }
+        run.qd[quaternion[0]][sample] = 0.0;
+        run.qdd[quaternion[0]][sample] = 0.0;
+    }
+}
+
+/// The vector part of the conjugate of one quaternion times another, both w, x, y, z.
+fn imaginary([w, x, y, z]: [f64; 4], [a, b, c, d]: [f64; 4]) -> [f64; 3] {
+    [
+        w * b - a * x - (y * d - z * c),
+        w * c - a * y - (z * b - x * d),
+        w * d - a * z - (x * c - y * b),
+    ]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        a[j] * b[k] - a[k] * b[j]
+    })
+}
+
+/// A rotation from a body's axes to the base's, by rows.
+struct Turn([[f64; 3]; 3]);
+
+impl Turn {
+    fn new([w, x, y, z]: [f64; 4]) -> Self {
+        let v = [x, y, z];
+        let per = 2.0 / (w * w + x * x + y * y + z * z);
+        let column = |j: usize| {
+            let mut axis = [0.0; 3];
+            axis[j] = 1.0;
+            let once = cross(v, axis);
+            let twice = cross(v, once);
+            std::array::from_fn::<f64, 3, _>(|i| axis[i] + per * (w * once[i] + twice[i]))
+        };
+        let columns = [0, 1, 2].map(column);
+        Self(std::array::from_fn(|i| columns.map(|column| column[i])))
+    }
+
+    fn out(&self, v: [f64; 3]) -> [f64; 3] {
+        self.0.map(|row| (0..3).map(|k| row[k] * v[k]).sum())
+    }
+
+    fn inside(&self, v: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|k| (0..3).map(|i| self.0[i][k] * v[i]).sum())
+    }
+}

@@ -1,0 +1,306 @@
+//! What differs between runs as one self-contained page: what changed and when, and every base parameter over the runs.
+
+use std::fmt::Write as _;
+
+use modelmill_codegen::review::Format;
+
+use super::draw::{Axis, LEFT, Picture, RIGHT, WIDTH, range, with_room};
+use super::page::{END, begin, between};
+use super::tables::{Cell, table};
+use super::units::pretty;
+use crate::error::Outcome;
+use crate::model::Model;
+use crate::runs::{Changed, Compared, Fitted, SharedFit};
+use crate::text::svg::escape;
+use crate::text::table::{count, significant};
+
+/// Height of a picture of one parameter.
+const HEIGHT: f64 = 170.0;
+/// How many standard deviations a bar reaches up and down.
+const BARS: f64 = 2.0;
+
+/// The page's text.
+///
+/// Fails only when whoever watches stops it.
+pub fn runs_page(model: &Model, compared: &Compared) -> Outcome<String> {
+    let equations = model.equations(Format::Html)?.text;
+    let title = format!("{}: what changed between runs", compared.model);
+    let mut page = begin(&title, between(&equations, "<style>", "</style>"));
+    page.push_str(&summary(compared));
+    let mut sections = vec![
+        (
+            "when",
+            "When something changed and stayed changed",
+            points(compared),
+        ),
+        ("against", "Every run against the first", against(compared)),
+    ];
+    if let Some(shared) = &compared.shared {
+        sections.push(("own", "One fit of all runs", own(shared)));
+    }
+    sections.push((
+        "parameters",
+        "Base parameters over the runs",
+        parameters(compared),
+    ));
+    sections.push(("runs", "The runs", runs(compared)));
+    for (id, title, html) in sections {
+        let _ = write!(
+            page,
+            "<section id=\"runs-{id}\">\n<h2>{title}</h2>\n{html}</section>\n"
+        );
+    }
+    page.push_str(END);
+    Ok(page)
+}
+
+fn summary(compared: &Compared) -> String {
+    let later = compared.runs.len() - 1;
+    let changed = compared.runs.iter().skip(1);
+    let changed = changed.filter(|run| !run.changes.is_empty()).count();
+    let class = if changed == 0 && compared.points.is_empty() {
+        "adequate"
+    } else {
+        "missing"
+    };
+    let mut says = match compared.points.len() {
+        0 => String::new(),
+        n => format!("{}. ", count(n, "lasting change", "lasting changes")),
+    };
+    let _ = write!(
+        says,
+        "{changed} of {later} later runs differ from {} by more than chance, noise and the errors of the model.",
+        compared.runs[0].file
+    );
+    format!("<p class=\"verdict {class}\">{}</p>\n", escape(&says))
+}
+
+fn said(changes: &[Changed]) -> String {
+    let mut html = String::from("<ul>\n");
+    for one in changes {
+        let _ = write!(html, "<li>{}", escape(&one.says));
+        if !one.rivals.is_empty() {
+            let rivals = escape(&one.rivals.join("; "));
+            let _ = write!(html, "<br><small>not told from: {rivals}</small>");
+        }
+        html.push_str("</li>\n");
+    }
+    html.push_str("</ul>\n");
+    html
+}
+
+fn points(compared: &Compared) -> String {
+    if compared.points.is_empty() {
+        return "<p>No base parameter changed and stayed changed over two or more runs.</p>\n"
+            .to_owned();
+    }
+    let mut html = String::new();
+    for point in &compared.points {
+        let file = escape(&compared.runs[point.run].file);
+        let _ = writeln!(html, "<h3>From run {} on: {file}</h3>", point.run + 1);
+        if point.changes.is_empty() {
+            html.push_str("<p>No single change in physics explains it.</p>\n");
+        } else {
+            html.push_str(&said(&point.changes));
+        }
+        let rows: Vec<Vec<Cell>> = (point.steps.iter())
+            .map(|step| {
+                let info = &compared.parameters[step.parameter];
+                vec![
+                    Cell::text(&info.name),
+                    value(Some(step.before)),
+                    value(Some(step.now)),
+                    Cell::text(&pretty(&info.unit)),
+                    Cell::html(format!(
+                        "<code class=\"expression\">{}</code>",
+                        escape(&info.expression)
+                    )),
+                ]
+            })
+            .collect();
+        html.push_str(&table(
+            "parameters",
+            &["parameter", "#before", "#since", "unit", "expression"],
+            &rows,
+        ));
+    }
+    html
+}
+
+fn value(fitted: Option<Fitted>) -> Cell {
+    match fitted {
+        Some(Fitted {
+            value,
+            deviation: Some(deviation),
+        }) => Cell::number(
+            &format!("{} ± {}", significant(value, 5), significant(deviation, 2)),
+            value,
+        ),
+        _ => Cell::text("not told"),
+    }
+}
+
+fn against(compared: &Compared) -> String {
+    let rows: Vec<Vec<Cell>> = (compared.runs.iter().enumerate())
+        .filter(|(_, run)| !run.changes.is_empty())
+        .map(|(k, run)| {
+            vec![
+                Cell::number(&format!("{}", k + 1), k as f64),
+                Cell::text(&run.file),
+                Cell::html(said(&run.changes)),
+            ]
+        })
+        .collect();
+    if rows.is_empty() {
+        return "<p>No run differs from the first.</p>\n".to_owned();
+    }
+    table(
+        "changes",
+        &["#run", "recording", "what is different"],
+        &rows,
+    )
+}
+
+fn own(shared: &SharedFit) -> String {
+    let mut html = String::from(
+        "<p>Base parameters are shared by all runs; these values are each run's own.</p>\n",
+    );
+    if !shared.gains.is_empty() {
+        html.push_str(
+            "<p>True forces are the measured ones times these factors, by the known load.</p>\n",
+        );
+        let rows: Vec<Vec<Cell>> = (shared.gains.iter())
+            .map(|(drive, gain)| vec![Cell::text(drive), value(Some(*gain))])
+            .collect();
+        html.push_str(&table("gains", &["drive", "#factor"], &rows));
+    }
+    let rows: Vec<Vec<Cell>> = (shared.runs.iter())
+        .flat_map(|(file, values)| {
+            values.iter().map(move |one| {
+                vec![
+                    Cell::text(file),
+                    Cell::text(&one.of),
+                    Cell::text(&one.name),
+                    value(Some(one.value)),
+                    Cell::text(&pretty(&one.unit)),
+                ]
+            })
+        })
+        .collect();
+    html.push_str(&table(
+        "own",
+        &["recording", "of", "name", "#value", "unit"],
+        &rows,
+    ));
+    html
+}
+
+fn parameters(compared: &Compared) -> String {
+    let has_changed = |k: &usize| {
+        let mut steps = compared.points.iter().flat_map(|point| &point.steps);
+        steps.any(|step| step.parameter == *k)
+    };
+    let is_told = |k: &usize| {
+        compared
+            .runs
+            .iter()
+            .any(|run| told(run.alone[*k]).is_some())
+    };
+    let all = (0..compared.parameters.len()).filter(is_told);
+    let (changed, same): (Vec<usize>, Vec<usize>) = all.partition(has_changed);
+    let mut html = String::from(
+        "<p>Each run fitted alone, with bars of two standard deviations; lines are means between the changes above.</p>\n",
+    );
+    for k in changed {
+        html.push_str(&picture(compared, k));
+    }
+    if !same.is_empty() {
+        html.push_str("<details>\n<summary>Those that did not change</summary>\n");
+        for k in same {
+            html.push_str(&picture(compared, k));
+        }
+        html.push_str("</details>\n");
+    }
+    html
+}
+
+/// A value that the run tells, with its deviation.
+fn told(fitted: Fitted) -> Option<[f64; 2]> {
+    Some([fitted.value, fitted.deviation.filter(|d| *d > 0.0)?])
+}
+
+/// One base parameter over the runs.
+fn picture(compared: &Compared, k: usize) -> String {
+    let info = &compared.parameters[k];
+    let runs = &compared.runs;
+    let known: Vec<(usize, [f64; 2])> = (runs.iter().enumerate())
+        .filter_map(|(at, run)| Some((at, told(run.alone[k])?)))
+        .collect();
+    let ends: Vec<f64> = (known.iter())
+        .flat_map(|(_, [x, d])| [x - BARS * d, x + BARS * d])
+        .collect();
+    let x = Axis::new([0.5, runs.len() as f64 + 0.5], [LEFT, WIDTH - RIGHT]);
+    let y = Axis::new(with_room(range(&ends), 0.05), [HEIGHT - 40.0, 8.0]);
+    let mut picture = Picture::new(WIDTH, HEIGHT);
+    picture.frame(&x, &y, "run", [runs.len().min(12), 4]);
+    for (at, [value, deviation]) in &known {
+        let across = x.at(*at as f64 + 1.0);
+        let [low, high] = [-BARS, BARS].map(|b| y.at(value + b * deviation));
+        picture.path("curve c-fit", &format!("M{across:.1} {low:.1}V{high:.1}"));
+        picture.dot("dot c-before", [across, y.at(*value)], 2.4);
+    }
+    let steps = compared.points.iter().flat_map(|point| {
+        let own = point.steps.iter().filter(|step| step.parameter == k);
+        own.map(move |step| (point.run, step))
+    });
+    let steps: Vec<_> = steps.collect();
+    for (i, (run, step)) in steps.iter().enumerate() {
+        let start = if i == 0 { 0 } else { steps[i - 1].0 };
+        let end = steps.get(i + 1).map_or(runs.len(), |next| next.0);
+        let at = |run: usize| x.at(run as f64 + 0.5);
+        if i == 0 {
+            let level = y.at(step.before.value);
+            let d = format!("M{:.1} {level:.1}H{:.1}", at(start), at(*run));
+            picture.path("curve c-after", &d);
+        }
+        let level = y.at(step.now.value);
+        picture.path(
+            "curve c-after",
+            &format!("M{:.1} {level:.1}H{:.1}", at(*run), at(end)),
+        );
+        picture.path(
+            "cursor",
+            &format!("M{:.1} {:.1}V{:.1}", at(*run), y.start, y.end),
+        );
+    }
+    let says = format!("{} over {} runs", info.name, runs.len());
+    format!(
+        "<figure class=\"still\"><figcaption><b>{}</b> {} <code class=\"expression\">{}</code></figcaption>\n{}</figure>\n",
+        escape(&info.name),
+        escape(&pretty(&info.unit)),
+        escape(&info.expression),
+        picture.finish(&says)
+    )
+}
+
+fn runs(compared: &Compared) -> String {
+    let mut rows: Vec<Vec<Cell>> = (compared.runs.iter().enumerate())
+        .map(|(k, run)| {
+            vec![
+                Cell::number(&format!("{}", k + 1), k as f64),
+                Cell::text(&run.file),
+                Cell::number(&run.samples.to_string(), run.samples as f64),
+                Cell::number(&run.moved.len().to_string(), run.moved.len() as f64),
+            ]
+        })
+        .collect();
+    rows.extend(compared.unread.iter().map(|one| {
+        let says = Cell::text(&format!("gave no answer: {}", one.error));
+        vec![Cell::text(""), Cell::text(&one.file), Cell::text(""), says]
+    }));
+    table(
+        "runs",
+        &["#run", "recording", "#samples", "#parameters that moved"],
+        &rows,
+    )
+}

@@ -1,0 +1,513 @@
+//! One fit of all runs in which base parameters are shared and what is named is each run's own, and the scales of measured forces
+//! from a load of known mass.
+
+use modelmill_identify::ParameterInfo;
+use modelmill_identify::changes::{Joint, Part, Values, joint};
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::runs::changes::{friction, offset, per_rate};
+use crate::runs::layout::Layout;
+use crate::runs::payload::{Payloads, TEN};
+use crate::runs::rows::White;
+use crate::runs::{Estimate, Fitted, centre};
+
+/// Kinds of values that a run may have of its own.
+const KINDS: [&str; 6] = ["payload", "friction", "offset", "gain", "clock", "zero"];
+/// What a body's ten parameters are called, with their units.
+const OF_BODY: [(&str, &str); TEN] = [
+    ("mass", "kg"),
+    ("mx", "kg m"),
+    ("my", "kg m"),
+    ("mz", "kg m"),
+    ("xx", "kg m^2"),
+    ("xy", "kg m^2"),
+    ("xz", "kg m^2"),
+    ("yy", "kg m^2"),
+    ("yz", "kg m^2"),
+    ("zz", "kg m^2"),
+];
+
+/// Values that each run has of its own: a kind, and where.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PerRun {
+    what: String,
+    at: Option<String>,
+}
+
+impl PerRun {
+    /// Reads `payload@FRAME`, `friction`, `friction@DRIVE`, `offset`, `offset@DRIVE`, `gain`, `gain@DRIVE`, `clock`, `zero`,
+    /// `zero@COORDINATE`, or the name of a base parameter.
+    ///
+    /// Fails with what is expected.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let (what, at) = match text.split_once('@') {
+            Some((what, at)) => (what.trim(), Some(at.trim())),
+            None => (text.trim(), None),
+        };
+        let is_kind = KINDS.contains(&what);
+        let says = if what.is_empty() || at == Some("") {
+            "a kind and a place are expected, such as `payload@flange` or `friction`"
+        } else if what == "payload" && at.is_none() {
+            "a payload needs its body, as in `payload@flange`"
+        } else if what == "clock" && at.is_some() {
+            "a run has one clock; write `clock`"
+        } else if !is_kind && at.is_some() {
+            "kinds are payload, friction, offset, gain, clock, zero"
+        } else {
+            return Ok(Self {
+                what: what.to_owned(),
+                at: at.map(str::to_owned),
+            });
+        };
+        Err(format!("`{text}`: {says}"))
+    }
+}
+
+/// A load of known mass on a body in one of the runs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownLoad {
+    /// Which run: the end of its file's name.
+    pub run: String,
+    /// What the load weighs, kg.
+    pub mass: f64,
+    /// The frame that carries it.
+    pub frame: String,
+}
+
+impl KnownLoad {
+    /// Reads `RUN=MASS@FRAME`, such as `with-tool.csv=2.8@flange`.
+    ///
+    /// Fails with what is expected.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let expected = || {
+            format!(
+                "`{text}`: a run, its load in kg and the body are expected, as in `with-tool.csv=2.8@flange`"
+            )
+        };
+        let (run, load) = text.rsplit_once('=').ok_or_else(expected)?;
+        let (mass, frame) = load.split_once('@').ok_or_else(expected)?;
+        let mass: f64 = mass.trim().parse().map_err(|_| expected())?;
+        if run.trim().is_empty() || frame.trim().is_empty() || !(mass.is_finite() && mass != 0.0) {
+            return Err(expected());
+        }
+        Ok(Self {
+            run: run.trim().to_owned(),
+            mass,
+            frame: frame.trim().to_owned(),
+        })
+    }
+}
+
+/// A value of one run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Valued {
+    /// What it belongs to, as it was asked for: `payload@flange`, `friction@joint1`.
+    pub of: String,
+    /// Its name there.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Whether it is told against the first run, which has none of it, rather than as it is.
+    pub is_against_first: bool,
+    /// The value.
+    pub value: Fitted,
+}
+
+/// All runs in one fit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SharedFit {
+    /// Shared base parameters, by position; `None` for those that are each run's own.
+    pub shared: Vec<Option<Fitted>>,
+    /// By which factor each drive's measured force becomes the true one, where a known load tells.
+    pub gains: Vec<(String, Fitted)>,
+    /// The runs, each with its own values.
+    pub runs: Vec<(String, Vec<Valued>)>,
+}
+
+/// Columns that belong to one thing that was asked for.
+struct Own {
+    of: String,
+    columns: Vec<usize>,
+    /// Names and units of the values.
+    names: Vec<(String, String)>,
+    is_against_first: bool,
+    /// What stands for no change: 1 for factors.
+    origin: f64,
+}
+
+/// A fit that gathers its runs.
+pub(crate) struct Asking<'a> {
+    model: &'a Model,
+    layout: Layout,
+    own: Vec<Own>,
+    loads: &'a [KnownLoad],
+    /// First column of each load's body.
+    loaded: Vec<usize>,
+    /// Columns that are used at all.
+    used: Vec<usize>,
+    runs: Vec<(String, Vec<modelmill_identify::changes::Moments>)>,
+}
+
+impl<'a> Asking<'a> {
+    pub(crate) fn new(
+        model: &'a Model,
+        payloads: &Payloads,
+        layout: Layout,
+        asked: &'a super::Asked,
+    ) -> Outcome<Self> {
+        let infos = model.infos();
+        let mut own: Vec<Own> = Vec::new();
+        for one in &asked.per_run {
+            for further in owned(model, payloads, layout, &infos, one)? {
+                if own.iter().all(|other| other.columns != further.columns) {
+                    own.push(further);
+                }
+            }
+        }
+        let loaded: Outcome<Vec<usize>> = (asked.loads.iter())
+            .map(|load| Ok(layout.payload(frame(payloads, &load.frame)?)))
+            .collect();
+        let loaded = loaded?;
+        let of_base = 0..layout.base;
+        let mut used: Vec<usize> = of_base
+            .chain(own.iter().flat_map(|one| one.columns.iter().copied()))
+            .chain(loaded.iter().flat_map(|at| *at..*at + TEN))
+            .collect();
+        used.sort_unstable();
+        used.dedup();
+        Ok(Self {
+            model,
+            layout,
+            own,
+            loads: &asked.loads,
+            loaded,
+            used,
+            runs: Vec::new(),
+        })
+    }
+
+    fn is_asked(&self) -> bool {
+        !self.own.is_empty() || !self.loads.is_empty()
+    }
+
+    /// Takes what the fit needs of a run.
+    pub(crate) fn take(&mut self, file: &str, white: &White) {
+        if !self.is_asked() {
+            return;
+        }
+        let sums = if self.loads.is_empty() {
+            vec![white.whole().of(&self.used)]
+        } else {
+            white.drives.iter().map(|one| one.of(&self.used)).collect()
+        };
+        self.runs.push((file.to_owned(), sums));
+    }
+
+    fn place(&self, column: usize) -> usize {
+        self.used.partition_point(|other| *other < column)
+    }
+
+    /// The fit; `None` if none was asked for.
+    pub(crate) fn answer(self) -> Outcome<Option<SharedFit>> {
+        if !self.is_asked() {
+            return Ok(None);
+        }
+        let loads: Outcome<Vec<usize>> = self.loads.iter().map(|load| self.run(load)).collect();
+        let loads = loads?;
+        let absolute = (self.own.iter()).filter(|one| !one.is_against_first);
+        let not_shared: Vec<usize> = absolute.flat_map(|one| one.columns.clone()).collect();
+        let shared: Vec<usize> = (0..self.layout.base)
+            .filter(|k| !not_shared.contains(k))
+            .collect();
+        let parts: Vec<(Part, Vec<&Own>)> =
+            (0..self.runs.len()).map(|r| self.part(r, &loads)).collect();
+        let (parts, owns): (Vec<Part>, Vec<Vec<&Own>>) = parts.into_iter().unzip();
+        let places: Vec<usize> = shared.iter().map(|k| self.place(*k)).collect();
+        let found = joint(&parts, &places, !self.loads.is_empty());
+        Ok(Some(self.told(&found, &shared, &parts, &owns)))
+    }
+
+    /// Which run carries a load.
+    fn run(&self, load: &KnownLoad) -> Outcome<usize> {
+        let names = self.runs.iter().enumerate();
+        let found: Vec<usize> = names
+            .filter(|(_, (file, _))| {
+                let before = file.strip_suffix(load.run.as_str());
+                before.is_some_and(|before| before.is_empty() || before.ends_with(['/', '\\']))
+            })
+            .map(|(r, _)| r)
+            .collect();
+        match found[..] {
+            [one] => Ok(one),
+            _ => Err(Error::options(format!(
+                "`{}` of option `loads` is the name of {} of the runs that were read; give the end of one file's name: {}",
+                load.run,
+                if found.is_empty() { "none" } else { "several" },
+                self.runs
+                    .iter()
+                    .map(|(file, _)| file.as_str())
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            ))),
+        }
+    }
+
+    /// What a run has of its own.
+    fn part(&self, r: usize, loads: &[usize]) -> (Part, Vec<&Own>) {
+        let owns: Vec<&Own> = (self.own.iter())
+            .filter(|one| r > 0 || !one.is_against_first)
+            .collect();
+        let mut own: Vec<usize> = owns.iter().flat_map(|one| one.columns.clone()).collect();
+        let mut known = Vec::new();
+        for ((load, at), _) in (self.loads.iter().zip(&self.loaded))
+            .zip(loads)
+            .filter(|(_, run)| **run == r)
+        {
+            // The first of ten is the mass; where the centre is and how the load turns is not known.
+            known.push((self.place(*at), load.mass));
+            let further = (*at + 1..*at + TEN).filter(|k| !own.contains(k));
+            let further: Vec<usize> = further.collect();
+            own.extend(further);
+        }
+        let is_known = |k: &usize| known.iter().any(|(at, _)| at == k);
+        let own = own.into_iter().map(|k| self.place(k));
+        let part = Part {
+            channels: self.runs[r].1.clone(),
+            own: own.filter(|k| !is_known(k)).collect(),
+            known,
+        };
+        (part, owns)
+    }
+
+    fn told(
+        &self,
+        found: &Joint,
+        shared: &[usize],
+        parts: &[Part],
+        owns: &[Vec<&Own>],
+    ) -> SharedFit {
+        let unknown: Vec<usize> = (0..self.model.base.len())
+            .filter(|k| !self.model.is_known(*k))
+            .collect();
+        let of_base = |k: usize| match unknown.iter().position(|one| *one == k) {
+            None => Some(Fitted {
+                value: self.model.nominal[k],
+                deviation: Some(0.0),
+            }),
+            Some(column) => {
+                let at = shared.iter().position(|one| *one == column)?;
+                Some(fitted(&found.shared, at))
+            }
+        };
+        let gain = |(d, drive): (usize, String)| {
+            let scale = fitted(&found.shared, shared.len() + d);
+            let value = scale.value.recip();
+            let deviation = scale.deviation.map(|one| one * value * value);
+            (drive, Fitted { value, deviation })
+        };
+        let drives = self.model.drives().into_iter().enumerate();
+        let runs = self.runs.iter().zip(parts).zip(owns).zip(&found.own);
+        SharedFit {
+            shared: (0..self.model.base.len()).map(of_base).collect(),
+            gains: (drives.filter(|_| !self.loads.is_empty()))
+                .map(gain)
+                .collect(),
+            runs: runs
+                .map(|((((file, _), part), owns), values)| {
+                    let own = owns.iter().flat_map(|own| self.values(own, part, values));
+                    (file.clone(), own.collect())
+                })
+                .collect(),
+        }
+    }
+
+    /// Values of one thing in a run.
+    fn values(&self, own: &Own, part: &Part, values: &Values) -> Vec<Valued> {
+        let at = |column: &usize| {
+            let place = self.place(*column);
+            part.own.iter().position(|one| *one == place)
+        };
+        let places: Vec<Option<usize>> = own.columns.iter().map(at).collect();
+        let valued = |name: &str, unit: &str, value: Fitted| Valued {
+            of: own.of.clone(),
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            is_against_first: own.is_against_first,
+            value,
+        };
+        let mut told: Vec<Valued> = (own.names.iter().zip(&places))
+            .filter_map(|((name, unit), place)| {
+                let mut one = fitted(values, (*place)?);
+                one.value += own.origin;
+                Some(valued(name, unit, one))
+            })
+            .collect();
+        if let (TEN, Some(places)) = (
+            own.columns.len(),
+            places
+                .iter()
+                .take(4)
+                .copied()
+                .collect::<Option<Vec<usize>>>(),
+        ) {
+            let four = Values {
+                values: values.values.select_rows(&places),
+                covariance: values
+                    .covariance
+                    .select_rows(&places)
+                    .select_columns(&places),
+                determined: places.iter().map(|k| values.determined[*k]).collect(),
+            };
+            let axes = ["x", "y", "z"].into_iter().zip(centre(&four));
+            told.extend(axes.filter_map(|(axis, at)| {
+                let Estimate { value, deviation } = at?;
+                let deviation = Some(deviation);
+                Some(valued(axis, "m", Fitted { value, deviation }))
+            }));
+        }
+        told
+    }
+}
+
+fn fitted(values: &Values, at: usize) -> Fitted {
+    let variance = values.covariance[(at, at)].max(0.0);
+    Fitted {
+        value: values.values[at],
+        deviation: values.determined[at].then(|| variance.sqrt()),
+    }
+}
+
+/// Position of a frame among those that may carry a load.
+fn frame(payloads: &Payloads, name: &str) -> Outcome<usize> {
+    let at = payloads.frames.iter().position(|frame| frame == name);
+    at.ok_or_else(|| no_such("body", name, &payloads.frames))
+}
+
+fn no_such(what: &str, name: &str, names: &[String]) -> Error {
+    Error::options(format!(
+        "there is no {what} `{name}`; there are {}",
+        names.join(", ")
+    ))
+}
+
+/// The columns that something asked for has.
+fn owned(
+    model: &Model,
+    payloads: &Payloads,
+    layout: Layout,
+    infos: &[ParameterInfo],
+    asked: &PerRun,
+) -> Outcome<Vec<Own>> {
+    let PerRun { what, at } = asked;
+    let places = |what: &str, names: Vec<String>| match at {
+        None => Ok((0..names.len()).collect::<Vec<usize>>()),
+        Some(at) => match names.iter().position(|name| name == at) {
+            Some(k) => Ok(vec![k]),
+            None => Err(no_such(what, at, &names)),
+        },
+    };
+    let named = |all: &[(&str, &str)]| -> Vec<(String, String)> {
+        let both = |(name, unit): &(&str, &str)| ((*name).to_owned(), (*unit).to_owned());
+        all.iter().map(both).collect()
+    };
+    let drives = model.drives();
+    Ok(match what.as_str() {
+        "payload" => {
+            let name = at.as_deref().unwrap_or_default();
+            let start = layout.payload(frame(payloads, name)?);
+            vec![Own {
+                of: format!("payload@{name}"),
+                columns: (start..start + TEN).collect(),
+                names: named(&OF_BODY),
+                is_against_first: true,
+                origin: 0.0,
+            }]
+        }
+        "friction" => (places("drive", drives.clone())?.into_iter())
+            .map(|d| {
+                let unit = model.force_unit(d);
+                let start = layout.friction(d);
+                // Friction that the model has is told as it is.
+                let own = friction(model, d);
+                let (columns, is_against_first) = match own {
+                    [Some(dry), Some(viscous)] => (vec![dry, viscous], false),
+                    _ => (vec![start, start + 1], true),
+                };
+                Own {
+                    of: format!("friction@{}", drives[d]),
+                    columns,
+                    names: named(&[("Fc", unit), ("Fv", per_rate(unit))]),
+                    is_against_first,
+                    origin: 0.0,
+                }
+            })
+            .collect(),
+        "offset" => (places("drive", drives.clone())?.into_iter())
+            .map(|d| {
+                let own = offset(model, d);
+                Own {
+                    of: format!("offset@{}", drives[d]),
+                    columns: vec![own.unwrap_or(layout.offset(d))],
+                    names: named(&[("F0", model.force_unit(d))]),
+                    is_against_first: own.is_none(),
+                    origin: 0.0,
+                }
+            })
+            .collect(),
+        "gain" => (places("drive", drives.clone())?.into_iter())
+            .map(|d| Own {
+                of: format!("gain@{}", drives[d]),
+                columns: vec![layout.scale(d)],
+                names: named(&[("gain", "1")]),
+                is_against_first: true,
+                origin: 1.0,
+            })
+            .collect(),
+        "clock" => vec![Own {
+            of: "clock".to_owned(),
+            columns: vec![layout.clock()],
+            names: named(&[("factor", "1")]),
+            is_against_first: true,
+            origin: 1.0,
+        }],
+        "zero" => (places("coordinate", model.active())?.into_iter())
+            .map(|i| Own {
+                of: format!("zero@{}", model.active()[i]),
+                columns: vec![layout.zero(i)],
+                names: named(&[("shift", if model.motions()[i].1 { "rad" } else { "m" })]),
+                is_against_first: true,
+                origin: 0.0,
+            })
+            .collect(),
+        name => vec![base_parameter(model, payloads, infos, name)?],
+    })
+}
+
+/// A base parameter by its name.
+fn base_parameter(
+    model: &Model,
+    payloads: &Payloads,
+    infos: &[ParameterInfo],
+    name: &str,
+) -> Outcome<Own> {
+    let unknown: Vec<usize> = (0..model.base.len())
+        .filter(|k| !model.is_known(*k))
+        .collect();
+    let Some(column) = unknown.iter().position(|k| infos[*k].name == name) else {
+        return Err(Error::options(format!(
+            "`{name}` is neither a base parameter whose value is unknown nor a kind; kinds are {}, as in `payload@{}`, \
+             `friction` or `gain@{}`",
+            KINDS.join(", "),
+            payloads.frames.last().map_or("body", String::as_str),
+            model.drives().first().map_or("drive", String::as_str)
+        )));
+    };
+    Ok(Own {
+        of: name.to_owned(),
+        columns: vec![column],
+        names: vec![(name.to_owned(), infos[unknown[column]].unit.clone())],
+        is_against_first: false,
+        origin: 0.0,
+    })
+}

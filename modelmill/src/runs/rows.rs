@@ -1,0 +1,267 @@
+//! A run as sums over its rows. Rows are laid out piece by piece, so that however long a run is, no more of it is held than its
+//! states and a piece of its columns.
+
+use std::ops::Range;
+
+use modelmill_identify::changes::{Coloured, Moments};
+use nalgebra::DVector;
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::runs::columns::Laid;
+use crate::runs::layout::Layout;
+use crate::runs::payload::Payloads;
+use crate::stretch::Stretch;
+
+/// Blocks of a run that decide for each other.
+pub(crate) const BLOCKS: usize = 8;
+/// Rounds of weighing the drives by what is left.
+const ROUNDS: usize = 2;
+/// Noise that every run is taken to have besides, as a part of a drive's effective force: no model is better.
+const FLOOR: f64 = 1e-3;
+/// The most samples of a piece, after decimation.
+const PIECE: usize = 4096;
+/// Runs of so many pieces keep their columns; those of longer ones are made anew for each look.
+const KEPT: usize = 2;
+
+/// The rows of one run.
+pub(crate) struct Rows<'a> {
+    model: &'a Model,
+    payloads: &'a Payloads,
+    pieces: Vec<Stretch>,
+    kept: Option<Vec<Laid>>,
+    /// Base parameters on which scales and clocks are built: those of the first run.
+    pub(crate) values: DVector<f64>,
+    /// Sums over the rows of each drive as they were measured.
+    sums: Vec<Moments>,
+}
+
+/// A run whose rows are white: what it says.
+pub(crate) struct White {
+    /// Block by block, all drives together.
+    pub(crate) blocks: Vec<Moments>,
+    /// Drive by drive, the whole run.
+    pub(crate) drives: Vec<Moments>,
+}
+
+impl White {
+    /// The whole run.
+    pub(crate) fn whole(&self) -> Moments {
+        let mut whole = Moments::new(self.blocks[0].rhs.len());
+        for block in &self.blocks {
+            whole.merge(block);
+        }
+        whole
+    }
+}
+
+impl<'a> Rows<'a> {
+    /// The rows of stretches; `values` are base parameters of the run before, in whose place come those of this run where there
+    /// is none before.
+    pub(crate) fn new(
+        model: &'a Model,
+        stretches: &[Stretch],
+        payloads: &'a Payloads,
+        values: Option<&DVector<f64>>,
+    ) -> Outcome<Self> {
+        let layout = Layout::new(model, payloads);
+        let pieces: Vec<Stretch> = (stretches.iter())
+            .flat_map(|stretch| stretch.pieces(PIECE))
+            .collect();
+        let values = match values {
+            Some(values) => values.clone(),
+            None => {
+                let mut sums = vec![Moments::new(layout.base); layout.drives];
+                for piece in &pieces {
+                    add(&mut sums, &Laid::base(model, piece)?);
+                }
+                weighed(&sums)?
+            }
+        };
+        let mut rows = Self {
+            model,
+            payloads,
+            pieces,
+            kept: None,
+            values,
+            sums: Vec::new(),
+        };
+        if rows.pieces.len() <= KEPT {
+            let laid = rows.pieces.iter().map(|piece| rows.laid(piece));
+            rows.kept = Some(laid.collect::<Outcome<_>>()?);
+        }
+        let mut sums = vec![Moments::new(layout.total()); layout.drives];
+        rows.visit(|laid| {
+            add(&mut sums, laid);
+            Ok(())
+        })?;
+        rows.sums = sums;
+        Ok(rows)
+    }
+
+    fn laid(&self, piece: &Stretch) -> Outcome<Laid> {
+        Laid::all(self.model, piece, self.payloads, &self.values)
+    }
+
+    /// Shows the columns, one piece after the other.
+    fn visit(&self, mut look: impl FnMut(&Laid) -> Outcome) -> Outcome {
+        match &self.kept {
+            Some(kept) => kept.iter().try_for_each(look),
+            None => (self.pieces.iter()).try_for_each(|piece| look(&self.laid(piece)?)),
+        }
+    }
+
+    /// Sums over the rows as they were measured.
+    pub(crate) fn sizes(self) -> Sizes {
+        Sizes(self.sums)
+    }
+
+    /// The force of some columns along the run, drive by drive.
+    pub(crate) fn force(&self, columns: &[usize], values: &DVector<f64>) -> Outcome<Vec<Vec<f64>>> {
+        let mut forces: Vec<Vec<f64>> = vec![Vec::new(); self.sums.len()];
+        self.visit(|laid| {
+            for (drive, all) in forces.iter_mut().enumerate() {
+                let start = all.len();
+                all.resize(start + laid.samples(), 0.0);
+                for (k, value) in columns.iter().zip(values.iter()) {
+                    let column = laid.column(*k, drive).unwrap_or_default();
+                    for (f, z) in all[start..].iter_mut().zip(column) {
+                        *f += value * z;
+                    }
+                }
+            }
+            Ok(())
+        })?;
+        Ok(forces)
+    }
+
+    /// The rows with the memory of each drive's noise taken out, as sums.
+    pub(crate) fn white(&self) -> Outcome<White> {
+        let columns = Layout::new(self.model, self.payloads).total();
+        let values = weighed(&self.sums)?;
+        let mut rests: Vec<Vec<Vec<f64>>> = vec![Vec::new(); self.sums.len()];
+        self.visit(|laid| {
+            for (drive, rests) in rests.iter_mut().enumerate() {
+                let rest = laid.rest(drive, &values);
+                rests.extend(
+                    laid.pieces(drive)
+                        .into_iter()
+                        .map(|some| rest[some].to_vec()),
+                );
+            }
+            Ok(())
+        })?;
+        let noise = |(rests, sums): (&Vec<Vec<f64>>, &Moments)| {
+            let rests: Vec<&[f64]> = rests.iter().map(Vec::as_slice).collect();
+            Coloured::of(&rests, FLOOR * size(sums, sums.total))
+        };
+        let noise: Vec<Coloured> = rests.iter().zip(&self.sums).map(noise).collect();
+        let length: usize = (self.pieces.iter())
+            .map(|piece| piece.samples().div_ceil(piece.decimation()))
+            .sum();
+        let mut white = White {
+            blocks: vec![Moments::new(columns); BLOCKS],
+            drives: vec![Moments::new(columns); self.sums.len()],
+        };
+        let mut before = 0;
+        self.visit(|laid| {
+            for (drive, noise) in noise.iter().enumerate().filter(|(_, n)| n.deviation > 0.0) {
+                for some in laid.pieces(drive) {
+                    let start = before + some.start;
+                    whiten(laid, drive, some, noise, columns, |i, sums| {
+                        // Neighbouring blocks, each of the same part of the run.
+                        let block = BLOCKS * (start + i) / length.max(1);
+                        white.blocks[block.min(BLOCKS - 1)].merge(sums);
+                        white.drives[drive].merge(sums);
+                    });
+                }
+            }
+            before += laid.samples();
+            Ok(())
+        })?;
+        Ok(white)
+    }
+}
+
+/// Sums over the rows of each drive as they were measured.
+pub(crate) struct Sizes(Vec<Moments>);
+
+impl Sizes {
+    /// How large the force of some columns is on the drive where it is largest, as a part of what that drive does.
+    pub(crate) fn part(&self, columns: &[usize], values: &DVector<f64>) -> f64 {
+        let of_drive = |sums: &Moments| {
+            let force = values.dot(&(sums.of(columns).gram * values));
+            if sums.total > 0.0 {
+                (force.max(0.0) / sums.total).sqrt()
+            } else {
+                0.0
+            }
+        };
+        self.0.iter().map(of_drive).fold(0.0, f64::max)
+    }
+}
+
+/// Shows sums over white rows of a stretch of samples, some hundreds at a time, with the place of the first.
+fn whiten(
+    laid: &Laid,
+    drive: usize,
+    some: Range<usize>,
+    noise: &Coloured,
+    columns: usize,
+    mut show: impl FnMut(usize, &Moments),
+) {
+    const TOGETHER: usize = 256;
+    let white = |values: &[f64]| noise.whitened(&values[some.clone()]);
+    let y = white(&laid.forces[drive]);
+    let z: Vec<Option<Vec<f64>>> = (0..columns)
+        .map(|k| laid.column(k, drive).map(white))
+        .collect();
+    for start in (0..y.len()).step_by(TOGETHER) {
+        let rows = start..(start + TOGETHER).min(y.len());
+        let z: Vec<Option<&[f64]>> = z
+            .iter()
+            .map(|column| column.as_ref().map(|column| &column[rows.clone()]))
+            .collect();
+        let mut sums = Moments::new(columns);
+        sums.add_rows(&z, &y[rows]);
+        show(start, &sums);
+    }
+}
+
+/// Adds the rows of a stretch to sums of each drive.
+fn add(sums: &mut [Moments], laid: &Laid) {
+    for (drive, sums) in sums.iter_mut().enumerate() {
+        let columns = 0..sums.rhs.len();
+        let z: Vec<Option<&[f64]>> = columns.map(|k| laid.column(k, drive)).collect();
+        sums.add_rows(&z, &laid.forces[drive]);
+    }
+}
+
+/// Effective value of so large a sum of squares over the rows of a drive.
+fn size(sums: &Moments, squares: f64) -> f64 {
+    (squares / sums.rows.max(1) as f64).sqrt()
+}
+
+/// Least squares with every drive weighed by what is left on it.
+fn weighed(sums: &[Moments]) -> Outcome<DVector<f64>> {
+    let mut deviations: Vec<f64> = sums.iter().map(|one| size(one, one.total)).collect();
+    let floors: Vec<f64> = deviations.iter().map(|size| 1e-6 * size).collect();
+    let mut values = DVector::zeros(0);
+    for _ in 0..=ROUNDS {
+        let mut all = Moments::new(sums.first().map_or(0, |one| one.rhs.len()));
+        for (one, deviation) in sums.iter().zip(&deviations) {
+            if *deviation > 0.0 {
+                all.merge(&one.times(deviation.powi(-2)));
+            }
+        }
+        values = all.solve().values;
+        if values.iter().any(|x| !x.is_finite()) {
+            return Err(Error::input(
+                "a run has numbers that are too large to be fitted; look at its units".to_owned(),
+            ));
+        }
+        let left = sums.iter().map(|one| size(one, one.rest(&values)));
+        deviations = left.zip(&floors).map(|(d, floor)| d.max(*floor)).collect();
+    }
+    Ok(values)
+}
