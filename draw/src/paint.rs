@@ -258,9 +258,9 @@ impl<'a> Paper<'a> {
         ));
         let length = round_length(0.2 * width / self.scale);
         let (x, y) = (width - 14.0, height - 14.0);
-        _ = write!(
+        _ = writeln!(
             out,
-            "<path class=\"scale\" d=\"M{:.1} {:.1}v5H{x:.1}v-5\"/><text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text></g>\n",
+            "<path class=\"scale\" d=\"M{:.1} {:.1}v5H{x:.1}v-5\"/><text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text></g>",
             x - length * self.scale,
             y - 5.0,
             x - length * self.scale - 6.0,

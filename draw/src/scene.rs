@@ -217,7 +217,8 @@ impl Builder<'_> {
             // Coordinates of one step, or of a turn and a slide along one axis, are one joint.
             let is_same = |other: &modelmill_spec::Moved| {
                 let [a, b] = [first, other].map(|m| Vector3::from(m.axis));
-                other.origin == first.origin && (a - b).norm() < 1e-9
+                let [p, q] = [first, other].map(|m| Vector3::from(m.origin));
+                (p - q).norm() < 1e-12 && (a - b).norm() < 1e-9
             };
             let count = pose.moved[next..].iter().take_while(|m| is_same(m)).count();
             let together = &pose.moved[next..next + count];

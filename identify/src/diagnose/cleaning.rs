@@ -388,6 +388,7 @@ mod tests {
                     sampled: 0.004,
                     is_check: false,
                 }],
+                left_out: Vec::new(),
             },
             measured: Column(vec![Some(measured)]),
             base: vec![Column(vec![Some(base)])],
