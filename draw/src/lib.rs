@@ -40,6 +40,6 @@ mod scene;
 mod symbols;
 mod view;
 
-pub use paint::{Style, svg};
+pub use paint::{Style, inline_svg, svg};
 pub use scene::{Joint, Mark, Scene, Shape, Use};
 pub use view::View;

@@ -14,6 +14,8 @@ use crate::view::View;
 const STYLE: &str = include_str!("picture.css");
 /// Room around the mechanism, in units of the picture.
 const MARGIN: f64 = 46.0;
+/// What makes a file of SVG one.
+const NAMESPACE: &str = " xmlns=\"http://www.w3.org/2000/svg\"";
 /// How far each layer of signs stands before the one below it, in units of the picture.
 const BEFORE: f64 = 8.0;
 /// Colours of bodies in the style.
@@ -61,13 +63,18 @@ pub fn svg(scenes: &[&Scene], view: &View, style: &Style) -> String {
     body.push_str(&paper.labels(scene));
     let names = if style.names { " named" } else { "" };
     format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"mechanism{names}\" role=\"img\" aria-label=\"{}\" \
-         viewBox=\"0 0 {:.0} {:.0}\">\n<style>{STYLE}</style>\n\
+        "<svg{NAMESPACE} class=\"mechanism{names}\" role=\"img\" \
+         viewBox=\"0 0 {:.0} {:.0}\">\n<title>{}</title>\n<style>{STYLE}</style>\n\
          <rect class=\"paper\" width=\"100%\" height=\"100%\"/>\n{body}</svg>\n",
-        escape(&says(scene)),
         style.width,
-        style.height
+        style.height,
+        escape(&says(scene)),
     )
+}
+
+/// The same as a part of a page of HTML, which needs no namespace.
+pub fn inline_svg(scenes: &[&Scene], view: &View, style: &Style) -> String {
+    svg(scenes, view, style).replacen(NAMESPACE, "", 1)
 }
 
 /// What a picture shows, for those who cannot see it.

@@ -134,11 +134,17 @@ impl Scene {
             Shape::Joint(joint) => Some(joint),
             _ => None,
         });
+        let mut steps = mechanism.frames.iter().flat_map(|frame| &frame.steps);
+        let flies = steps.any(|step| matches!(step, Step::Free(_)));
         let gravity = Vector3::from(mechanism.gravity.each_ref().map(|g| constant(mechanism, g)));
         let down = gravity.try_normalize(0.0);
         Self {
             title: (mechanism.title.clone()).unwrap_or_else(|| mechanism.name.clone()),
-            plane: plane_of_motion(joints, down),
+            plane: if flies {
+                None
+            } else {
+                plane_of_motion(joints, down)
+            },
             marks: builder.marks,
             down,
         }

@@ -161,6 +161,17 @@ fn relative(figures: &Figures) -> f64 {
     })
 }
 
+/// The twist of a free body is recorded, its derivative is made: without decimation, so that figures are of all samples as they
+/// are where accelerations are recorded too.
+fn reading(mechanism: &Mechanism) -> Reading {
+    let mut reading = Reading::default();
+    let coordinates = &mechanism.coordinates;
+    if coordinates.iter().any(|c| c.motion.is_quaternion()) {
+        reading.preparation.cutoff_hz = Some(8.0);
+    }
+    reading
+}
+
 fn scratch(name: &str) -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join(name)
 }
@@ -181,7 +192,7 @@ fn check(name: &str, path: &Path) {
         recording(name, &modelmill_codegen::derive(&valued).expect("derived"))
     };
     let fault = |error: modelmill::Error| -> ! { panic!("{name}: {error}") };
-    let run = (model.recording(&run, &Reading::default())).unwrap_or_else(|e| fault(e));
+    let run = (model.recording(&run, &reading(mechanism))).unwrap_or_else(|e| fault(e));
 
     let identified = model.identify(&[&run], &[], &Estimation::default());
     let identified = identified.unwrap_or_else(|e| fault(e)).fit;

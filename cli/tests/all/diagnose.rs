@@ -344,7 +344,12 @@ fn joints(found: &Kinds, kinds: &[&str]) -> BTreeSet<String> {
     all.flat_map(|(_, at)| at.clone()).collect()
 }
 
-const DRY: [&str; 2] = ["coulomb_friction", "directional_coulomb_friction"];
+const DRY: [&str; 3] = [
+    "coulomb_friction",
+    "directional_coulomb_friction",
+    // Dry friction that yields before it slides.
+    "dahl_friction",
+];
 const VISCOUS: [&str; 2] = ["viscous_friction", "directional_viscous_friction"];
 
 /// A real welding arm from its bodies alone, held against another motion.

@@ -258,7 +258,16 @@ fn runs_says_what_changed() {
     ]);
     assert_eq!(
         keys(&found),
-        ["model", "together", "runs", "moved", "changes"]
+        [
+            "model",
+            "together",
+            "runs",
+            "moved",
+            "changes",
+            "change_points",
+            "unread",
+            "per_run"
+        ]
     );
     let [first, second] = &found["runs"].as_array().expect("runs")[..] else {
         panic!("{found:#}");

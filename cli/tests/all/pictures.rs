@@ -49,7 +49,7 @@ fn what_cannot_be_drawn_is_said() {
     let file = scratch("never.svg");
     let at = |value: &str| {
         refused(
-            1,
+            2,
             &["check", &spidermill, "--picture", &file, "--at", value],
         )
     };

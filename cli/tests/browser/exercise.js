@@ -5,7 +5,7 @@
   const drawn = (svg) => [...svg.querySelectorAll('.curve')].map((path) => path.getAttribute('d'));
   try {
     await wait(200);
-    for (const svg of document.querySelectorAll('figure svg')) {
+    for (const svg of document.querySelectorAll('figure svg:not(.mechanism)')) {
       if (!svg.getBoundingClientRect().width) continue; // In what is folded.
       const marks = svg.querySelectorAll('.curve, .heat, .dot');
       const longest = Math.max(0, ...[...marks].map((m) => (m.getAttribute('d') || 'circle').length));

@@ -25,7 +25,7 @@ pub use base_parameters::{base_expression, base_grouped};
 pub use equations::{BaseLine, DependencyLine, Equations, NumericMethod, Operations, Rank};
 pub use rank::NumericRank;
 
-use modelmill_draw::{Scene, Style, svg};
+use modelmill_draw::{Scene, Style, inline_svg};
 use modelmill_spec::Mechanism;
 
 use crate::Derivation;
@@ -66,7 +66,7 @@ pub fn page(derivation: &Derivation, format: Format, numeric: Option<&NumericRan
 fn picture(mechanism: &Mechanism) -> String {
     let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
     let scene = Scene::new(mechanism, &nominal);
-    svg(&[&scene], &scene.view(), &Style::default())
+    inline_svg(&[&scene], &scene.view(), &Style::default())
 }
 
 /// The derivation, step by step.

@@ -146,7 +146,9 @@ pub(crate) fn markup_is_balanced(markup: &str) -> bool {
                     return false;
                 }
             }
-            None if tag.starts_with('!') || ["meta", "br"].contains(&name) => {}
+            None if tag.ends_with('/')
+                || tag.starts_with('!')
+                || ["meta", "br"].contains(&name) => {}
             None => open.push(name),
         }
     }
