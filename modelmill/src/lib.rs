@@ -177,6 +177,7 @@ pub mod print;
 pub mod progress;
 pub mod recording;
 pub mod reduce;
+mod regressors;
 pub mod report;
 pub mod runs;
 pub mod simulate;

@@ -10,8 +10,8 @@ use crate::model::Model;
 
 use super::candidates::{Candidates, Change, Entry, Variant, single, tilted, uses_load};
 use super::columns::{carried, columns};
-use super::numbers::{Runs, regressor};
 use super::places::{Spot, spots};
+use crate::regressors::{Runs, regressor};
 
 /// An effect by its name, with values of its parameters and constants.
 #[derive(Clone, Debug, PartialEq)]

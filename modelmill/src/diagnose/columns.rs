@@ -12,8 +12,9 @@ use crate::model::Model;
 use crate::stretch::Stretch;
 
 use super::candidates::{Candidates, Change, Entry, Single, Sort, grid, sign};
-use super::numbers::{Motions, Runs, regressor_of};
+use super::numbers::Motions;
 use super::tilt::{TILTS, tilt};
+use crate::regressors::{Runs, regressor_of};
 
 /// Candidates with their columns; where each comes from is said in the same order.
 pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) -> Outcome<Made> {

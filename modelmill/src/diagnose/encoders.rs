@@ -11,8 +11,9 @@ use crate::along;
 use crate::model::Model;
 use crate::stretch::Stretch;
 
-use super::numbers::{Runs, stack};
+use super::numbers::stack;
 use super::problem::Held;
+use crate::regressors::Runs;
 
 /// How often an error may come again in a turn, or along the travel of a coordinate that slides.
 const TIMES: [u32; 16] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 48, 60];

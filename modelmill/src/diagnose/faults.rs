@@ -8,7 +8,7 @@ use crate::model::Model;
 use crate::recording::Recording;
 use crate::runs::{Difference, What, differences};
 
-use super::numbers::Runs;
+use crate::regressors::Runs;
 
 /// About a push so long is left out on either side, s.
 const MARGIN: f64 = 0.15;

@@ -11,7 +11,8 @@ use crate::error::Outcome;
 use crate::model::Model;
 use crate::stretch::Stretch;
 
-use super::numbers::{Runs, stack};
+use super::numbers::stack;
+use crate::regressors::Runs;
 
 /// Lengths that are tried, as parts of the travel.
 const LENGTHS: [f64; 12] = [

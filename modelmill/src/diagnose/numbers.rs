@@ -1,16 +1,14 @@
 //! Numbers along all recordings of a diagnosis: regressors, motions of places, each channel stacked and decimated alike.
 
 use modelmill_codegen::Evaluator;
-use modelmill_identify::diagnose::{Column, Layout, Stretch as LaidOut};
+use modelmill_identify::diagnose::{Layout, Stretch as LaidOut};
 use modelmill_spec::Place;
 
 use crate::along::decimated;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
+use crate::regressors::Runs;
 use crate::stretch::Stretch;
-
-/// Recordings of the fit, then those of the check.
-pub(crate) type Runs<'a> = [(&'a Stretch, bool)];
 
 /// Names of the channels and lengths of the stretches.
 pub(crate) fn layout(model: &Model, all: &Runs<'_>) -> Layout {
@@ -58,92 +56,6 @@ pub(crate) fn stack(
         }
     }
     Ok(stacked)
-}
-
-/// Columns of a regressor along all recordings.
-pub(crate) fn regressor(
-    all: &Runs<'_>,
-    evaluator: &Evaluator<'_>,
-    model: &Model,
-) -> Outcome<Vec<Column>> {
-    regressor_of(all, evaluator, model, &|_| true)
-}
-
-/// The same of some columns only; the others are zero.
-pub(crate) fn regressor_of(
-    all: &Runs<'_>,
-    evaluator: &Evaluator<'_>,
-    model: &Model,
-    wanted: &dyn Fn(usize) -> bool,
-) -> Outcome<Vec<Column>> {
-    let n_drives = model.drives().len();
-    let mut stacked: Vec<Option<Vec<f64>>> = Vec::new();
-    let mut before = 0;
-    for (one, _) in all {
-        let columns = moving(one, evaluator, model, wanted)?;
-        stacked.resize(columns.len(), None);
-        let (slots, mut columns): (Vec<_>, Vec<_>) = (stacked.iter_mut().zip(columns))
-            .filter_map(|(slot, column)| Some((slot, column?)))
-            .unzip();
-        // A column without a finite value somewhere has none at all once it is filtered.
-        let mut is_none = vec![false; columns.len()];
-        for (column, is_none) in columns.iter_mut().zip(&mut is_none) {
-            if column.iter().any(|x| !x.is_finite()) {
-                column.fill(0.0);
-                *is_none = true;
-            }
-        }
-        let columns = decimated(columns, one)?.into_iter().zip(is_none);
-        for (slot, (mut column, is_none)) in slots.into_iter().zip(columns) {
-            if is_none {
-                column.fill(f64::NAN);
-            }
-            slot.get_or_insert_with(|| vec![0.0; before]).extend(column);
-        }
-        before += one.samples().div_ceil(one.decimation());
-        for column in stacked.iter_mut().flatten() {
-            column.resize(before, 0.0);
-        }
-    }
-    let n = stacked.len() / n_drives.max(1);
-    // Drives are outermost.
-    let mut by_column = vec![Column::default(); n];
-    for (k, values) in stacked.into_iter().enumerate() {
-        by_column[k % n].0.push(values);
-    }
-    Ok(by_column)
-}
-
-/// Columns along one recording, drive by drive; `None` where they are zero throughout, as most are on most drives.
-fn moving(
-    one: &Stretch,
-    evaluator: &Evaluator<'_>,
-    model: &Model,
-    wanted: &dyn Fn(usize) -> bool,
-) -> Outcome<Vec<Option<Vec<f64>>>> {
-    let n_drives = model.drives().len();
-    let mut columns: Vec<Option<Vec<f64>>> = Vec::new();
-    let mut before = 0;
-    one.for_each_block(model, |states| {
-        Ok::<_, Error>(evaluator.regressor_blocks(states, |samples, block| {
-            columns.resize(block.len(), None);
-            let n = block.len() / n_drives.max(1);
-            for (k, (column, values)) in columns.iter_mut().zip(block).enumerate() {
-                if !wanted(k % n) || (column.is_none() && values.iter().all(|x| *x == 0.0)) {
-                    continue;
-                }
-                let column = column.get_or_insert_with(|| {
-                    let mut zeros = Vec::with_capacity(one.samples());
-                    zeros.resize(before, 0.0);
-                    zeros
-                });
-                column.extend_from_slice(values);
-            }
-            before += samples;
-            Ok(())
-        }))
-    })?;
-    Ok(columns)
 }
 
 /// Variables on which an unknown force may depend.

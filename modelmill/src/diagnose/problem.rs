@@ -19,8 +19,9 @@ use super::columns::{Origin, carried, columns, finer};
 use super::encoders::encoders;
 use super::faults::take_off;
 use super::memory::memories;
-use super::numbers::{Runs, layout, regressor, stack, variables};
+use super::numbers::{layout, stack, variables};
 use super::words;
+use crate::regressors::{Runs, regressor};
 
 /// Errors below this share of a force are rounding, of the recording or of whatever simulated it.
 pub(crate) const ROUNDING: f64 = 3e-6;

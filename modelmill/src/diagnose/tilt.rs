@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use crate::error::Outcome;
 use crate::model::Model;
 
-use super::numbers::{Runs, regressor};
+use crate::regressors::{Runs, regressor};
 
 /// Constants of a tilt, about x, y and z.
 pub(crate) const TILTS: [&str; 3] = ["tx", "ty", "tz"];

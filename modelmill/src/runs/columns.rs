@@ -5,9 +5,9 @@ use modelmill_identify::diagnose::Column;
 use nalgebra::DVector;
 
 use crate::along::{self, decimated, measured};
-use crate::diagnose::numbers::regressor;
 use crate::error::Outcome;
 use crate::model::Model;
+use crate::regressors::regressor;
 use crate::runs::payload::Payloads;
 use crate::stretch::Stretch;
 
