@@ -405,8 +405,8 @@ fn friction_and_the_coupled_wrist_of_a_real_arm_are_found() {
     let answer = diagnosed(&bare, &fit, None, &flags);
     check_form(&answer);
     let found = found(&answer);
-    for friction in [DRY, VISCOUS] {
-        let mut joints = joints(&found, &friction);
+    for friction in [&DRY[..], &VISCOUS[..]] {
+        let mut joints = joints(&found, friction);
         // The coupling of the wrist has both kinds of friction between joints 5 and 6.
         joints.extend(["joint5", "joint6"].map(str::to_owned));
         assert_eq!(joints.len(), 6, "{found:?}");
