@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use modelmill::Model;
@@ -57,6 +58,29 @@ pub(crate) fn with_part(name: &str, part: &str) -> Model {
     Model::from_text(name, &format!("{text}{part}")).expect("the model")
 }
 
+/// Adds so many times what a model weighs more than another.
+fn push(
+    forces: &mut [Vec<f64>],
+    with: &[Vec<f64>],
+    without: &[Vec<f64>],
+    times: f64,
+    when: Range<usize>,
+) {
+    for (d, force) in forces.iter_mut().enumerate() {
+        for k in when.clone() {
+            force[k] += times * (with[d][k] - without[d][k]);
+        }
+    }
+}
+
+/// Adds half a wave.
+fn bump(force: &mut [f64], height: f64) {
+    let n = force.len() as f64;
+    for (k, f) in force.iter_mut().enumerate() {
+        *f += height * (0.5 * TAU * k as f64 / n).sin();
+    }
+}
+
 /// A recording of a model that is derived already.
 pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBuf {
     let mut draws = Draws(seed);
@@ -109,17 +133,12 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
         .inverse_dynamics(&states, &model.nominal)
         .expect("forces");
     if let Made::Push(pushed, times, from, to) = made {
-        let weight = |model: &Model| {
+        let [with, without] = [pushed, model].map(|model| {
             let evaluator = Evaluator::new(&model.derivation);
             let forces = evaluator.inverse_dynamics(&at_rest, &model.nominal);
             forces.expect("forces")
-        };
-        let [with, without] = [weight(pushed), weight(model)];
-        for (d, force) in forces.iter_mut().enumerate() {
-            for k in from..to {
-                force[k] += times * (with[d][k] - without[d][k]);
-            }
-        }
+        });
+        push(&mut forces, &with, &without, times, from..to);
     }
     let motion = evaluator.drives(&states).expect("drives");
     let drives = model.drives();
@@ -145,9 +164,7 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
         if let Made::Bump(drives, from, to, by) = made
             && drives.contains(&d)
         {
-            for (k, f) in force[from..to].iter_mut().enumerate() {
-                *f += by * size * (0.5 * TAU * k as f64 / (to - from) as f64).sin();
-            }
+            bump(&mut force[from..to], by * size);
         }
         let mut noise = 0.0;
         for f in force {
