@@ -6,7 +6,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use modelmill::Model;
-use modelmill_codegen::{Evaluator, States};
+use modelmill_codegen::{Derivation, Evaluator, States};
+use modelmill_spec::Coordinate;
 
 use crate::draws::Draws;
 
@@ -58,6 +59,20 @@ pub(crate) fn with_part(name: &str, part: &str) -> Model {
     Model::from_text(name, &format!("{text}{part}")).expect("the model")
 }
 
+/// How far a coordinate goes, rad or m; loops leave less room.
+fn reach(derivation: &Derivation, coordinate: &Coordinate) -> f64 {
+    let wide = if derivation.mechanism.loops.is_empty() {
+        1.0
+    } else {
+        0.3
+    };
+    wide * if coordinate.motion.is_angle() {
+        0.35
+    } else {
+        0.1
+    }
+}
+
 /// Adds so many times what a model weighs more than another.
 fn push(
     forces: &mut [Vec<f64>],
@@ -89,18 +104,7 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
     let coordinates = &model.derivation.mechanism.coordinates;
     for (i, coordinate) in coordinates.iter().filter(|c| !c.passive).enumerate() {
         columns[0][i].fill(coordinate.nominal);
-        // Loops leave less room.
-        let wide = if model.derivation.mechanism.loops.is_empty() {
-            1.0
-        } else {
-            0.3
-        };
-        let reach = wide
-            * if coordinate.motion.is_angle() {
-                0.35
-            } else {
-                0.1
-            };
+        let reach = reach(&model.derivation, coordinate);
         for _ in 0..4 {
             let rate = TAU * (0.1 + 0.9 * draws.uniform());
             let phase = TAU * draws.uniform();
