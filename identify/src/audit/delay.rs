@@ -9,7 +9,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::audit::robust::{RobustFit, robust_fit, solve_normal};
+use super::by_channel::ByChannel;
+use super::robust::{RobustFit, robust_fit, solve_normal};
 
 /// Blocks of time that are left out one by one.
 const BLOCKS: usize = 20;
@@ -27,17 +28,16 @@ const CLEARLY: f64 = 0.05;
 /// No delay is known better than to this part of a step.
 const FINEST: f64 = 0.05;
 
-/// Rows of a model along a recording, interleaved per sample (`row = sample * channels + channel`), and the forces that they are
-/// to explain.
+/// Rows of a model along a recording, and the forces that they are to explain.
 #[derive(Debug, Clone)]
 pub struct DelayAudit<'a> {
     /// The regressor, with columns of whatever the model may lack.
-    pub regressor: DMatrix<f64>,
+    pub regressor: ByChannel,
     /// Its slope in time, per s.
-    pub slope: DMatrix<f64>,
+    pub slope: ByChannel,
     /// Times of its samples, s.
     pub time: Vec<f64>,
-    /// Rows that count.
+    /// Rows that count, `sample * channels + channel`.
     pub counts: Vec<bool>,
     /// Times of the whole recording, s.
     pub recorded: &'a [f64],
@@ -158,42 +158,29 @@ impl DelayAudit<'_> {
     fn coarse(&self, channels: &[usize], left: &[f64]) -> Option<f64> {
         let n = self.forces.len();
         let step = self.step()?;
-        let rows: Vec<usize> = (0..self.time.len())
-            .flat_map(|k| channels.iter().map(move |c| k * n + c))
-            .filter(|row| self.counts[*row])
-            .collect();
-        let mut weighted = self.regressor.select_rows(&rows);
-        let weight = |row: usize| {
-            let size = self.forces[row % n]
-                .iter()
-                .map(|f| f * f)
-                .sum::<f64>()
-                .sqrt();
-            (left[row % n] * size).max(f64::MIN_POSITIVE.sqrt()).recip()
+        let weight = |c: usize| {
+            let size = self.forces[c].iter().map(|f| f * f).sum::<f64>().sqrt();
+            (left[c] * size).max(f64::MIN_POSITIVE.sqrt()).recip()
         };
-        let weights: Vec<f64> = rows.iter().map(|row| weight(*row)).collect();
-        for (mut row, weight) in weighted.row_iter_mut().zip(&weights) {
-            row *= *weight;
-        }
+        let weights: Vec<f64> = (0..n).map(weight).collect();
+        let (mut weighted, rows) = self.regressor.dense(channels, &self.counts, &weights);
         for mut column in weighted.column_iter_mut() {
             let norm = column.norm();
             if norm > 0.0 {
                 column /= norm;
             }
         }
-        let mut normal = weighted.tr_mul(&weighted);
+        let transposed = weighted.transpose();
+        let mut normal = &transposed * &weighted;
         for i in 0..normal.ncols() {
             normal[(i, i)] += 1e-9;
         }
         let normal = normal.cholesky()?;
         let error = |steps: f64| {
             let (forces, _) = self.shifted(&vec![steps * step; n]);
-            let of_row = rows
-                .iter()
-                .zip(&weights)
-                .map(|(row, weight)| forces[*row] * weight);
+            let of_row = rows.iter().map(|row| forces[*row] * weights[row % n]);
             let forces = DVector::from_iterator(rows.len(), of_row);
-            let right = weighted.tr_mul(&forces);
+            let right = &transposed * &forces;
             let size = forces.norm_squared();
             (size > 0.0).then(|| 1.0 - right.dot(&normal.solve(&right)) / size)
         };
@@ -232,21 +219,15 @@ impl DelayAudit<'_> {
             shifts = vec![(mean / step).round() * step; channels];
         }
         let (mut forces, mut counts) = self.shifted(&shifts);
-        let mut fit = robust_fit(&self.regressor, &forces, channels, &counts)?;
-        let width = self.regressor.ncols();
+        let mut fit = robust_fit(&self.regressor, &forces, &counts)?;
+        let width = self.regressor.columns();
         if delays == 0 {
             return Some(self.judged(&fit, &forces, &counts, Vec::new()));
         }
         for round in 0..ROUNDS {
-            let mut columns = self
-                .regressor
-                .clone()
-                .resize_horizontally(width + delays, 0.0);
-            let late = &self.slope * fit.values.rows(0, width);
-            for (row, late) in late.iter().enumerate() {
-                columns[(row, width + (row % channels) % delays)] = -late;
-            }
-            fit = robust_fit(&columns, &forces, channels, &counts)?;
+            let late = -self.slope.times(&fit.values.as_slice()[..width]);
+            let columns = self.regressor.with(delays, |c| c % delays, &late);
+            fit = robust_fit(&columns, &forces, &counts)?;
             let further: Vec<f64> = (0..channels)
                 .map(|c| fit.values[width + c % delays])
                 .collect();
@@ -304,27 +285,20 @@ impl DelayAudit<'_> {
     /// jackknife): a swift move that alone tells the delay makes it wide.
     fn half_widths(
         &self,
-        columns: &DMatrix<f64>,
+        columns: &ByChannel,
         fit: &RobustFit,
         forces: &DVector<f64>,
         last: usize,
     ) -> Option<Vec<f64>> {
-        let rows = columns.nrows();
-        let per_block = self.time.len().div_ceil(BLOCKS) * self.forces.len();
-        let blocks: Vec<(DMatrix<f64>, DVector<f64>)> = (0..rows)
-            .step_by(per_block)
+        let samples = columns.samples();
+        let blocks: Vec<(DMatrix<f64>, DVector<f64>)> = (0..samples)
+            .step_by(samples.div_ceil(BLOCKS))
             .map(|from| {
-                let length = per_block.min(rows - from);
-                let own = columns.rows(from, length);
-                let mut weighted = own.into_owned();
-                for mut column in weighted.column_iter_mut() {
-                    column.component_mul_assign(&fit.weights.rows(from, length));
-                }
-                let right = weighted.tr_mul(&forces.rows(from, length));
-                (own.tr_mul(&weighted), right)
+                let to = (from + samples.div_ceil(BLOCKS)).min(samples);
+                columns.normal(&fit.weights, forces, from..to)
             })
             .collect();
-        let n = columns.ncols();
+        let n = columns.columns();
         let mut all = (DMatrix::zeros(n, n), DVector::zeros(n));
         for (normal, right) in &blocks {
             all.0 += normal;
@@ -391,7 +365,7 @@ mod tests {
             let rows = time
                 .iter()
                 .flat_map(|t| row(*t)[which].into_iter().flatten());
-            DMatrix::from_row_iterator(2 * time.len(), 3, rows)
+            ByChannel::new(&DMatrix::from_row_iterator(2 * time.len(), 3, rows), 2)
         };
         let audit = DelayAudit {
             regressor: matrix(0),

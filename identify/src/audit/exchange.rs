@@ -1,16 +1,21 @@
 //! Forces that are exchanged or turned round: a regressor and the measured forces go in; what swapping or turning round forces
 //! would gain comes out.
 //!
-//! For a regressor `W = Q R` the best fit to any forces `y` leaves `|y|^2 - |Q'y|^2`, so that one factorisation serves
-//! every permutation of the forces.
+//! What the best fit to any forces `y` leaves is `|y|^2 - y'W (W'W)^-1 W'y`, so that one factorisation of the normal equations
+//! serves every permutation of the forces.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DVector, Dyn};
+
+use super::by_channel::ByChannel;
+use super::robust::factored;
 
 /// How well a regressor can explain forces.
 #[derive(Debug, Clone)]
 pub struct ForceAudit {
-    q: DMatrix<f64>,
-    n_channels: usize,
+    regressor: ByChannel,
+    /// Of the normal equations of scaled columns, with the scales.
+    factor: Cholesky<f64, Dyn>,
+    scale: DVector<f64>,
 }
 
 /// Something about the forces that would explain them better.
@@ -23,33 +28,34 @@ pub enum Suspect {
 }
 
 impl ForceAudit {
-    /// Factorises a regressor of rows interleaved per sample; `None` if it has fewer rows than twice its columns.
-    pub fn new(mut regressor: DMatrix<f64>, n_channels: usize) -> Option<Self> {
-        if n_channels == 0 || regressor.nrows() < 2 * regressor.ncols() {
+    /// Factorises a regressor; `None` if it has fewer rows than twice its columns, or a number that is not finite.
+    pub fn new(regressor: ByChannel) -> Option<Self> {
+        let rows = regressor.samples() * regressor.channels();
+        if rows == 0 || rows < 2 * regressor.columns() {
             return None;
         }
-        for mut column in regressor.column_iter_mut() {
-            let norm = column.norm();
-            if norm > 0.0 {
-                column /= norm;
-            }
-        }
+        let alike = DVector::from_element(rows, 1.0);
+        let none = DVector::zeros(rows);
+        let (normal, _) = regressor.normal(&alike, &none, 0..regressor.samples());
+        let (factor, scale) = factored(normal)?;
         Some(Self {
-            q: regressor.qr().q(),
-            n_channels,
+            regressor,
+            factor,
+            scale,
         })
     }
 
     /// Relative error of the best fit to forces interleaved per sample; `None` where they are all zero.
     pub fn error(&self, forces: &DVector<f64>) -> Option<f64> {
         let size = forces.norm_squared();
-        let explained = self.q.tr_mul(forces).norm_squared();
+        let right = (self.regressor.transposed_times(forces)).component_mul(&self.scale);
+        let explained = right.dot(&self.factor.solve(&right));
         (size > 0.0).then(|| ((size - explained).max(0.0) / size).sqrt())
     }
 
     /// The exchange or change of sign of forces that lowers the error most, with the error without and with it.
     pub fn suspect(&self, forces: &DVector<f64>) -> Option<(Suspect, [f64; 2])> {
-        let n = self.n_channels;
+        let n = self.regressor.channels();
         let now = self.error(forces)?;
         let changed = |change: Suspect| {
             let mut changed = forces.clone();
@@ -71,6 +77,8 @@ impl ForceAudit {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::DMatrix;
+
     use super::*;
     use crate::test_noise::Noise;
 
@@ -105,7 +113,8 @@ mod tests {
     #[test]
     fn exchanged_and_turned_forces_are_found() {
         let (samples, forces) = forces();
-        let explained = ForceAudit::new(rows(|k| k as f64 * 0.002, &samples), 2).unwrap();
+        let explained =
+            ForceAudit::new(ByChannel::new(&rows(|k| k as f64 * 0.002, &samples), 2)).unwrap();
         let interleaved = |channels: [&Vec<f64>; 2], sign: f64| {
             let rows = samples
                 .iter()

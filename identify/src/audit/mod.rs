@@ -1,6 +1,7 @@
 //! What looks wrong with a recording although every number can be read: columns and signals by themselves, and forces
 //! against a model's regressor.
 
+mod by_channel;
 mod clock;
 mod columns;
 mod delay;
@@ -9,6 +10,7 @@ mod positions;
 mod robust;
 mod signals;
 
+pub use by_channel::ByChannel;
 pub use delay::{Delay, DelayAudit, Delays};
 pub use exchange::{ForceAudit, Suspect};
 pub use positions::PositionFault;

@@ -4,8 +4,9 @@
 //! Huber's function by reweighted rows (Ann. Math. Statist. 35, 1964), each channel by its own scale: 1.4826 times the median of
 //! what is left. Columns may depend on each other, since a trace of a ridge stands on the scaled normal equations.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use super::by_channel::ByChannel;
 use crate::signal::median;
 
 /// Huber's bound in standard deviations, and how often rows are reweighted.
@@ -27,14 +28,14 @@ pub struct RobustFit {
     pub weights: DVector<f64>,
 }
 
-/// Fits rows interleaved per sample, `row = sample * channels + channel`, of which those count that `counts` says so.
+/// Fits measured values interleaved per sample, `row = sample * channels + channel`, of which those count that `counts` says so.
 /// `None` where a number is not finite or nothing counts.
 pub fn robust_fit(
-    regressor: &DMatrix<f64>,
+    regressor: &ByChannel,
     measured: &DVector<f64>,
-    channels: usize,
     counts: &[bool],
 ) -> Option<RobustFit> {
+    let channels = regressor.channels();
     let mut rest = measured.clone();
     let mut weights = DVector::zeros(measured.len());
     let mut found = None;
@@ -62,12 +63,9 @@ pub fn robust_fit(
         if weights.iter().all(|weight| *weight == 0.0) {
             return None;
         }
-        let mut weighted = regressor.clone();
-        for mut column in weighted.column_iter_mut() {
-            column.component_mul_assign(&weights);
-        }
-        let values = solve_normal(regressor.tr_mul(&weighted), &weighted.tr_mul(measured))?;
-        rest = measured - regressor * &values;
+        let (normal, right) = regressor.normal(&weights, measured, 0..regressor.samples());
+        let values = solve_normal(normal, &right)?;
+        rest = measured - regressor.times(values.as_slice());
         found = Some(values);
     }
     let values = found?;
@@ -80,7 +78,14 @@ pub fn robust_fit(
 }
 
 /// Values that solve normal equations with a trace of a ridge.
-pub(crate) fn solve_normal(mut normal: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+pub(super) fn solve_normal(normal: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    let (factor, scale) = factored(normal)?;
+    let solved = factor.solve(&right.component_mul(&scale));
+    Some(solved.component_mul(&scale))
+}
+
+/// Normal equations of columns scaled to one, with a trace of a ridge: their factor and the scales.
+pub(super) fn factored(mut normal: DMatrix<f64>) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
     let scale = normal
         .diagonal()
         .map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
@@ -90,8 +95,7 @@ pub(crate) fn solve_normal(mut normal: DMatrix<f64>, right: &DVector<f64>) -> Op
         }
         normal[(i, i)] += RIDGE;
     }
-    let solved = normal.cholesky()?.solve(&right.component_mul(&scale));
-    Some(solved.component_mul(&scale))
+    Some((normal.cholesky()?, scale))
 }
 
 #[cfg(test)]
@@ -111,10 +115,11 @@ mod tests {
             let push = if (600..700).contains(&i) { 50.0 } else { 0.0 };
             2.0 * regressor[(i, 0)] - 3.0 + push + 0.1 * noise.normal()
         });
-        let found = robust_fit(&regressor, &measured, 1, &vec![true; n]).unwrap();
+        let regressor = ByChannel::new(&regressor, 1);
+        let found = robust_fit(&regressor, &measured, &vec![true; n]).unwrap();
         assert!((found.values[0] - 2.0).abs() < 0.02, "{found:?}");
         assert!((found.values[1] + found.values[2] + 3.0).abs() < 0.02);
         assert!((found.rest[650] - 50.0).abs() < 1.0);
-        assert!(robust_fit(&regressor, &measured, 1, &vec![false; n]).is_none());
+        assert!(robust_fit(&regressor, &measured, &vec![false; n]).is_none());
     }
 }

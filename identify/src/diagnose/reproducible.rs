@@ -4,15 +4,18 @@
 //! The functions are all products of up to three variables (two if there are many) and smooth signs of the rates, with a
 //! ridge whose strength is chosen by the same folds.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 
-use super::pool::dot;
 use super::problem::Layout;
 
 /// Folds over all recordings.
 const FOLDS: usize = 8;
-/// Samples that are looked at, at most.
+/// Samples that are looked at, at most; fewer where there are many functions.
 const MOST: usize = 6000;
+const MOST_FEATURES: usize = 1500;
+const MOST_OF_MANY: usize = 1500;
 /// Strengths of the ridge, relative to a function's own squares.
 const RIDGES: [f64; 5] = [1e-6, 1e-4, 1e-2, 1e-1, 1.0];
 
@@ -31,87 +34,124 @@ pub(crate) fn reproducible(
     rest: &[Vec<f64>],
 ) -> Vec<f64> {
     let n = layout.samples();
-    let step = n.div_ceil(MOST).max(1);
-    let picked: Vec<usize> = (0..n).step_by(step).collect();
+    let count = features_of(variables.len());
+    let most = if count > MOST_FEATURES {
+        MOST_OF_MANY
+    } else {
+        MOST
+    };
+    let picked: Vec<usize> = (0..n).step_by(n.div_ceil(most).max(1)).collect();
     let features = features(variables, &picked);
     if features.is_empty() {
         return vec![0.0; rest.len()];
     }
-    let folds: Vec<Vec<usize>> = layout
-        .blocks(FOLDS)
-        .iter()
+    let folds: Vec<Range<usize>> = (layout.blocks(FOLDS).iter())
         .map(|block| {
-            let places = picked.iter().enumerate();
-            places
-                .filter(|(_, at)| block.contains(at))
-                .map(|(i, _)| i)
-                .collect()
+            let at = |sample: usize| picked.partition_point(|i| *i < sample);
+            at(block.start)..at(block.end)
         })
         .collect();
-    let m = features.len();
-    let targets: Vec<Vec<f64>> = rest
-        .iter()
-        .map(|r| picked.iter().map(|i| r[*i]).collect())
-        .collect();
-    let pick =
-        |values: &[f64], fold: &[usize]| -> Vec<f64> { fold.iter().map(|i| values[*i]).collect() };
-    // Inner products fold by fold; their sum less one fold is what the others say.
-    let parts: Vec<(DMatrix<f64>, Vec<DVector<f64>>)> = folds
-        .iter()
+    let target = |r: &Vec<f64>| DVector::from_iterator(picked.len(), picked.iter().map(|i| r[*i]));
+    let targets: Vec<DVector<f64>> = rest.iter().map(target).collect();
+    let targets = DMatrix::from_columns(&targets);
+    let columns: Vec<DVector<f64>> = features.into_iter().map(DVector::from).collect();
+    let features = DMatrix::from_columns(&columns);
+    let held_out = if features.ncols() <= features.nrows() {
+        by_features(&features, &targets, &folds)
+    } else {
+        by_samples(features, &targets, &folds)
+    };
+    let totals = targets.column_iter().map(|target| target.norm_squared());
+    let share = |(d, total): (usize, f64)| {
+        let explained = held_out.iter().map(|left| 1.0 - left[d] / total);
+        let best = explained.fold(0.0, f64::max);
+        if total > 0.0 { best } else { 0.0 }
+    };
+    totals.enumerate().map(share).collect()
+}
+
+/// Squared errors on folds that were not fitted, of each target, for each strength of the ridge.
+type HeldOut = Vec<Vec<f64>>;
+
+/// Errors by normal equations of the features. Inner products fold by fold; their sum less one fold is what the others say.
+fn by_features(features: &DMatrix<f64>, targets: &DMatrix<f64>, folds: &[Range<usize>]) -> HeldOut {
+    let m = features.ncols();
+    let rows = |of: &DMatrix<f64>, fold: &Range<usize>| of.rows_range(fold.clone()).into_owned();
+    let parts: Vec<[DMatrix<f64>; 2]> = (folds.iter())
         .map(|fold| {
-            let columns: Vec<DVector<f64>> = features
-                .iter()
-                .map(|f| DVector::from(pick(f, fold)))
-                .collect();
-            let matrix = DMatrix::from_columns(&columns);
-            let right = targets
-                .iter()
-                .map(|t| matrix.tr_mul(&DVector::from(pick(t, fold))))
-                .collect();
-            (matrix.tr_mul(&matrix), right)
+            let own = rows(features, fold);
+            let transposed = own.transpose();
+            [&transposed * own, transposed * rows(targets, fold)]
         })
         .collect();
-    let whole = parts
-        .iter()
-        .fold(DMatrix::zeros(m, m), |sum, (gram, _)| sum + gram);
-    let mut best = vec![0.0_f64; rest.len()];
-    let totals: Vec<f64> = targets.iter().map(|t| dot(t, t)).collect();
-    for ridge in RIDGES {
-        let mut left = vec![0.0; rest.len()];
-        for (fold, (gram, _)) in folds.iter().zip(&parts) {
-            let mut others = &whole - gram;
+    let mut whole = [DMatrix::zeros(m, m), DMatrix::zeros(m, targets.ncols())];
+    for part in &parts {
+        for (sum, part) in whole.iter_mut().zip(part) {
+            *sum += part;
+        }
+    }
+    let of_ridge = |ridge: &f64| {
+        let mut left = vec![0.0; targets.ncols()];
+        for (fold, [gram, right]) in folds.iter().zip(&parts) {
+            let mut others = &whole[0] - gram;
             for i in 0..m {
                 others[(i, i)] *= 1.0 + ridge;
                 others[(i, i)] += 1e-12;
             }
-            let Some(factor) = others.cholesky() else {
-                return best;
-            };
-            for (d, target) in targets.iter().enumerate() {
-                let mut right = DVector::zeros(m);
-                for ((other, (_, rights)), _) in folds.iter().zip(&parts).zip(0..) {
-                    if !std::ptr::eq(other, fold) {
-                        right += &rights[d];
-                    }
-                }
-                let factors = factor.solve(&right);
-                for i in fold {
-                    let said: f64 = features
-                        .iter()
-                        .zip(factors.iter())
-                        .map(|(f, x)| f[*i] * x)
-                        .sum();
-                    left[d] += (target[*i] - said).powi(2);
-                }
-            }
+            let factors = others.cholesky()?.solve(&(&whole[1] - right));
+            add_errors(
+                &mut left,
+                rows(features, fold) * factors,
+                &rows(targets, fold),
+            );
         }
-        for (best, (left, total)) in best.iter_mut().zip(left.iter().zip(&totals)) {
-            if *total > 0.0 {
-                *best = best.max(1.0 - left / total);
-            }
+        Some(left)
+    };
+    RIDGES.iter().map_while(of_ridge).collect()
+}
+
+/// The same where there are more features than samples: by inner products of the samples, which say the same of ridges
+/// (C. Saunders, A. Gammerman and V. Vovk, ICML 1998).
+fn by_samples(
+    mut features: DMatrix<f64>,
+    targets: &DMatrix<f64>,
+    folds: &[Range<usize>],
+) -> HeldOut {
+    for mut column in features.column_iter_mut() {
+        let norm = column.norm();
+        if norm > 0.0 {
+            column /= norm;
         }
     }
-    best
+    let products = &features * features.transpose();
+    let n = products.nrows();
+    let of_ridge = |ridge: &f64| {
+        let mut left = vec![0.0; targets.ncols()];
+        for fold in folds {
+            let others: Vec<usize> = (0..n).filter(|i| !fold.contains(i)).collect();
+            let mut own = products.select_rows(&others).select_columns(&others);
+            for i in 0..others.len() {
+                own[(i, i)] += ridge + 1e-12;
+            }
+            let factors = own.cholesky()?.solve(&targets.select_rows(&others));
+            let across = products.rows_range(fold.clone()).select_columns(&others);
+            let target = targets.rows_range(fold.clone()).into_owned();
+            add_errors(&mut left, across * factors, &target);
+        }
+        Some(left)
+    };
+    RIDGES.iter().map_while(of_ridge).collect()
+}
+
+fn add_errors(left: &mut [f64], said: DMatrix<f64>, target: &DMatrix<f64>) {
+    for (left, column) in left.iter_mut().zip((target - said).column_iter()) {
+        *left += column.norm_squared();
+    }
+}
+
+/// How many products of two so many variables have.
+fn features_of(variables: usize) -> usize {
+    variables * (variables + 1) / 2
 }
 
 /// Functions of the variables at some samples, each of unit size.
@@ -253,5 +293,31 @@ mod tests {
         let expected = 1.0 - 0.09 / size;
         assert!((found[0] - expected).abs() < 0.03, "{found:?} {expected}");
         assert!(found[1] < 0.01, "{found:?}");
+    }
+
+    /// Few features and many samples, or the other way round: the errors are the same.
+    #[test]
+    fn errors_by_features_and_by_samples_agree() {
+        let mut noise = Noise::new(3);
+        let features = DMatrix::from_fn(60, 25, |_, _| noise.normal());
+        let targets = DMatrix::from_fn(60, 2, |i, d| features[(i, d)] + noise.normal());
+        let folds = [0..20, 20..45, 45..60];
+        let mut scaled = features.clone();
+        for mut column in scaled.column_iter_mut() {
+            column.normalize_mut();
+        }
+        let [by_features, by_samples] = [
+            by_features(&scaled, &targets, &folds),
+            by_samples(features, &targets, &folds),
+        ];
+        assert_eq!((by_features.len(), by_samples.len()), (5, 5));
+        // A ridge counts the squares of what is fitted in the one, of all samples in the other.
+        let [weakest, strongest] = [0, 4];
+        for d in 0..2 {
+            let ratio = by_features[weakest][d] / by_samples[weakest][d];
+            assert!((ratio - 1.0).abs() < 1e-3, "{ratio}");
+            let ratio = by_features[strongest][d] / by_samples[strongest][d];
+            assert!((0.7..1.3).contains(&ratio), "{ratio}");
+        }
     }
 }

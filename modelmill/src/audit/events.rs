@@ -213,7 +213,7 @@ impl Unexplained {
         // A long run is fitted on a part of its samples.
         let every = (samples.len() / LOOKED_AT).max(1);
         let fit = if every == 1 {
-            robust_fit(&rows.regressor, &measured, drives, &counts)?.values
+            robust_fit(&rows.regressor, &measured, &counts)?.values
         } else {
             let some: Vec<usize> = (0..samples.len())
                 .step_by(every)
@@ -221,15 +221,9 @@ impl Unexplained {
                 .collect();
             let counts: Vec<bool> = some.iter().map(|row| counts[*row]).collect();
             let measured = measured.select_rows(&some);
-            robust_fit(
-                &rows.regressor.select_rows(&some),
-                &measured,
-                drives,
-                &counts,
-            )?
-            .values
+            robust_fit(&rows.regressor.every(every), &measured, &counts)?.values
         };
-        let mut rest = &measured - &rows.regressor * fit;
+        let mut rest = &measured - rows.regressor.times(fit.as_slice());
         for (rest, _) in rest.iter_mut().zip(&counts).filter(|(_, counts)| !**counts) {
             *rest = 0.0;
         }

@@ -7,7 +7,7 @@ mod nominal_forces;
 mod rows;
 
 use modelmill_codegen::{Evaluator, States};
-use modelmill_identify::{ForceAudit, Note, Suspect};
+use modelmill_identify::{ByChannel, ForceAudit, Note, Suspect};
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::Model;
@@ -15,8 +15,10 @@ use crate::stretch::Stretch;
 use crate::text::table::percent;
 use delay::Late;
 
-/// Samples that are looked at, spread over the recording.
+/// Samples that are looked at, spread over the recording; fewer of many drives, but at least [`FEWEST_LOOKED_AT`].
 const LOOKED_AT: usize = 1500;
+const ROWS_LOOKED_AT: usize = 12_000;
+const FEWEST_LOOKED_AT: usize = 300;
 /// Fewest samples of which anything is said.
 const FEWEST: usize = 100;
 /// Relative errors below this one raise no suspicion of exchanged columns.
@@ -43,12 +45,12 @@ fn findings(model: &Model, data: &Stretch) -> Vec<Note> {
     let Some(forces) = run.force.as_deref().filter(|_| n > FEWEST) else {
         return Vec::new();
     };
-    let step = (n / LOOKED_AT).max(1);
-    let samples: Vec<usize> = (0..n).step_by(step).collect();
     let n_drives = forces.len();
+    let wanted = (ROWS_LOOKED_AT / n_drives.max(1)).clamp(FEWEST_LOOKED_AT, LOOKED_AT);
+    let samples: Vec<usize> = (0..n).step_by((n / wanted).max(1)).collect();
     let explained = |change: &Change<'_>| {
         let regressor = regressor(model, data, &samples, change)?;
-        ForceAudit::new(regressor, n_drives)
+        ForceAudit::new(ByChannel::new(&regressor, n_drives))
     };
     // Poses without answer are reported with their place when the whole recording is evaluated.
     let Some(as_it_is) = explained(&|_| {}) else {

@@ -2,6 +2,7 @@
 //! where a model lacks these their force would pass for something else.
 
 use modelmill_codegen::{Evaluator, States};
+use modelmill_identify::ByChannel;
 use nalgebra::DMatrix;
 
 use crate::model::Model;
@@ -17,10 +18,10 @@ const REACH: f64 = 1.0 / 16.0;
 pub(super) struct Rows {
     /// Times of the samples, s.
     pub(super) time: Vec<f64>,
-    /// The regressor and the further columns, `row = sample * drives + drive`.
-    pub(super) regressor: DMatrix<f64>,
+    /// The regressor and the further columns.
+    pub(super) regressor: ByChannel,
     /// Their slope in time, per s.
-    pub(super) slope: DMatrix<f64>,
+    pub(super) slope: ByChannel,
     /// Positions, rates and accelerations of the drives, `[order][drive][sample]`.
     pub(super) motion: [Vec<Vec<f64>>; 3],
 }
@@ -89,8 +90,8 @@ impl Rows {
             .all(|m| m.iter().all(|x| x.is_finite()));
         is_finite.then(|| Self {
             time: samples.iter().map(|k| time[*k]).collect(),
-            regressor,
-            slope,
+            regressor: ByChannel::new(&regressor, n),
+            slope: ByChannel::new(&slope, n),
             motion: [w.positions, w.rates, accelerations],
         })
     }

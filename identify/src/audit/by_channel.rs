@@ -1,0 +1,230 @@
+//! Rows of a regressor, channel by channel: of a channel only the columns that act on it are kept, as the joints of a leg know
+//! nothing of the other, and friction acts on one drive.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+/// A regressor whose rows are those of some channels at some samples.
+#[derive(Debug, Clone)]
+pub struct ByChannel {
+    columns: usize,
+    channels: Vec<Channel>,
+}
+
+/// Rows of a channel, `[sample, own column]`, and which columns these are.
+#[derive(Debug, Clone)]
+struct Channel {
+    which: Vec<usize>,
+    rows: DMatrix<f64>,
+}
+
+impl ByChannel {
+    /// From rows interleaved per sample, `row = sample * channels + channel`.
+    pub fn new(regressor: &DMatrix<f64>, channels: usize) -> Self {
+        let samples = regressor.nrows() / channels.max(1);
+        let one = |c: usize| {
+            let acts = |k: &usize| (0..samples).any(|i| regressor[(i * channels + c, *k)] != 0.0);
+            let which: Vec<usize> = (0..regressor.ncols()).filter(acts).collect();
+            let rows = DMatrix::from_fn(samples, which.len(), |i, k| {
+                regressor[(i * channels + c, which[k])]
+            });
+            Channel { which, rows }
+        };
+        Self {
+            columns: regressor.ncols(),
+            channels: (0..channels).map(one).collect(),
+        }
+    }
+
+    /// Number of columns.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Number of channels.
+    pub fn channels(&self) -> usize {
+        self.channels.len()
+    }
+
+    /// Number of samples of each channel.
+    pub fn samples(&self) -> usize {
+        self.channels.first().map_or(0, |c| c.rows.nrows())
+    }
+
+    /// One sample of so many each.
+    #[must_use]
+    pub fn every(&self, step: usize) -> Self {
+        let kept: Vec<usize> = (0..self.samples()).step_by(step).collect();
+        let channels = self.channels.iter().map(|channel| Channel {
+            which: channel.which.clone(),
+            rows: channel.rows.select_rows(&kept),
+        });
+        Self {
+            columns: self.columns,
+            channels: channels.collect(),
+        }
+    }
+
+    /// With further columns behind the others, each of which takes what is given of the channels that `takes` says.
+    pub(super) fn with(
+        &self,
+        further: usize,
+        takes: impl Fn(usize) -> usize,
+        of: &DVector<f64>,
+    ) -> Self {
+        let n = self.channels.len();
+        let channels = self.channels.iter().enumerate().map(|(c, channel)| {
+            let own = channel.which.len();
+            let mut which = channel.which.clone();
+            which.push(self.columns + takes(c));
+            let mut rows = channel.rows.clone().resize_horizontally(own + 1, 0.0);
+            for i in 0..rows.nrows() {
+                rows[(i, own)] = of[i * n + c];
+            }
+            Channel { which, rows }
+        });
+        Self {
+            channels: channels.collect(),
+            columns: self.columns + further,
+        }
+    }
+
+    /// What values of the columns give, interleaved per sample.
+    pub fn times(&self, values: &[f64]) -> DVector<f64> {
+        let n = self.channels.len();
+        let mut result = DVector::zeros(self.samples() * n);
+        for (c, channel) in self.channels.iter().enumerate() {
+            let own = DVector::from_iterator(
+                channel.which.len(),
+                channel.which.iter().map(|k| values[*k]),
+            );
+            for (i, value) in (&channel.rows * own).iter().enumerate() {
+                result[i * n + c] = *value;
+            }
+        }
+        result
+    }
+
+    /// Inner products of all columns with what is given, interleaved per sample.
+    pub(super) fn transposed_times(&self, of: &DVector<f64>) -> DVector<f64> {
+        let n = self.channels.len();
+        let mut result = DVector::zeros(self.columns);
+        for (c, channel) in self.channels.iter().enumerate() {
+            let own = DVector::from_fn(channel.rows.nrows(), |i, _| of[i * n + c]);
+            for (k, column) in channel.which.iter().zip(channel.rows.column_iter()) {
+                result[*k] += column.dot(&own);
+            }
+        }
+        result
+    }
+
+    /// Normal equations of some samples with weighted rows: their matrix and right side.
+    pub(super) fn normal(
+        &self,
+        weights: &DVector<f64>,
+        measured: &DVector<f64>,
+        samples: Range<usize>,
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        let n = self.channels.len();
+        let mut normal = DMatrix::zeros(self.columns, self.columns);
+        let mut right = DVector::zeros(self.columns);
+        for (c, channel) in self.channels.iter().enumerate() {
+            let at = |i: usize| (samples.start + i) * n + c;
+            let mut weighted = channel.rows.rows_range(samples.clone()).transpose();
+            for (i, mut column) in weighted.column_iter_mut().enumerate() {
+                column *= weights[at(i)];
+            }
+            let own = &weighted * channel.rows.rows_range(samples.clone());
+            let forces = DVector::from_fn(samples.len(), |i, _| measured[at(i)]);
+            let own_right = &weighted * forces;
+            for (j, column) in channel.which.iter().enumerate() {
+                right[*column] += own_right[j];
+                for (i, row) in channel.which.iter().enumerate() {
+                    normal[(*row, *column)] += own[(i, j)];
+                }
+            }
+        }
+        (normal, right)
+    }
+
+    /// Rows of some channels that count, below each other, times a weight of each channel; with their places,
+    /// `sample * channels + channel`. Only columns that act on these channels.
+    pub(super) fn dense(
+        &self,
+        of: &[usize],
+        counts: &[bool],
+        weights: &[f64],
+    ) -> (DMatrix<f64>, Vec<usize>) {
+        let n = self.channels.len();
+        let mut place = vec![None; self.columns];
+        let mut width = 0;
+        for k in of.iter().flat_map(|c| &self.channels[*c].which) {
+            place[*k].get_or_insert_with(|| {
+                width += 1;
+                width - 1
+            });
+        }
+        let rows: Vec<usize> = (of.iter())
+            .flat_map(|c| (0..self.samples()).map(move |i| i * n + c))
+            .filter(|row| counts[*row])
+            .collect();
+        let mut matrix = DMatrix::zeros(rows.len(), width);
+        for (to, row) in rows.iter().enumerate() {
+            let channel = &self.channels[row % n];
+            let weight = weights[row % n];
+            for (j, k) in channel.which.iter().enumerate() {
+                if let Some(at) = place[*k] {
+                    matrix[(to, at)] = weight * channel.rows[(row / n, j)];
+                }
+            }
+        }
+        (matrix, rows)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_noise::Noise;
+
+    /// Products channel by channel are those of the whole matrix.
+    #[test]
+    fn products_are_those_of_the_whole_matrix() {
+        let mut noise = Noise::new(5);
+        let (n, samples, columns) = (3, 40, 7);
+        let whole = DMatrix::from_fn(n * samples, columns, |row, k| {
+            if (row % n + k) % 2 == 0 {
+                noise.normal()
+            } else {
+                0.0
+            }
+        });
+        let weights = DVector::from_fn(n * samples, |_, _| noise.normal().abs());
+        let measured = DVector::from_fn(n * samples, |_, _| noise.normal());
+        let rows = ByChannel::new(&whole, n);
+        assert!(rows.channels.iter().all(|c| c.which.len() < columns));
+        let values = DVector::from_fn(columns, |_, _| noise.normal());
+        let close = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).amax() < 1e-12;
+        let column = |v: DVector<f64>| DMatrix::from_column_slice(v.len(), 1, v.as_slice());
+        assert!(close(
+            &column(rows.times(values.as_slice())),
+            &column(&whole * &values)
+        ));
+        assert!(close(
+            &column(rows.transposed_times(&measured)),
+            &column(whole.transpose() * &measured)
+        ));
+        let (normal, right) = rows.normal(&weights, &measured, 10..samples);
+        let part = whole.rows_range(10 * n..);
+        let weighted = DMatrix::from_diagonal(&weights.rows_range(10 * n..).into_owned()) * part;
+        assert!(close(&normal, &(part.transpose() * &weighted)));
+        let expected = weighted.transpose() * measured.rows_range(10 * n..);
+        assert!(close(&column(right), &column(expected)));
+        let further = rows.with(1, |_| 0, &measured);
+        assert_eq!(further.columns(), columns + 1);
+        let mut one = vec![0.0; columns + 1];
+        one[columns] = 1.0;
+        assert!(close(&column(further.times(&one)), &column(measured)));
+    }
+}
