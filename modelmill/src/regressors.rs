@@ -76,23 +76,25 @@ fn moving(
     let mut columns: Vec<Option<Vec<f64>>> = Vec::new();
     let mut before = 0;
     one.for_each_block(model, |states| {
-        Ok::<_, Error>(evaluator.regressor_blocks(states, |samples, block| {
-            columns.resize(block.len(), None);
-            let n = block.len() / n_drives.max(1);
-            for (k, (column, values)) in columns.iter_mut().zip(block).enumerate() {
-                if !wanted(k % n) || (column.is_none() && values.iter().all(|x| *x == 0.0)) {
-                    continue;
+        Ok::<_, Error>(
+            evaluator.regressor_blocks_of(states, wanted, |samples, block| {
+                columns.resize(block.len(), None);
+                let n = block.len() / n_drives.max(1);
+                for (k, (column, values)) in columns.iter_mut().zip(block).enumerate() {
+                    if !wanted(k % n) || (column.is_none() && values.iter().all(|x| *x == 0.0)) {
+                        continue;
+                    }
+                    let column = column.get_or_insert_with(|| {
+                        let mut zeros = Vec::with_capacity(one.samples());
+                        zeros.resize(before, 0.0);
+                        zeros
+                    });
+                    column.extend_from_slice(values);
                 }
-                let column = column.get_or_insert_with(|| {
-                    let mut zeros = Vec::with_capacity(one.samples());
-                    zeros.resize(before, 0.0);
-                    zeros
-                });
-                column.extend_from_slice(values);
-            }
-            before += samples;
-            Ok(())
-        }))
+                before += samples;
+                Ok(())
+            }),
+        )
     })?;
     Ok(columns)
 }

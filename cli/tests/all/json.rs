@@ -300,6 +300,7 @@ fn runs_says_what_changed() {
             "at",
             "estimates",
             "between",
+            "interval",
             "gain",
             "indistinguishable_from",
             "says"

@@ -60,6 +60,8 @@ pub(super) struct Machine<'a> {
     steps: Vec<Step>,
     /// Slot of each operation of the state stage, and of fixed values that are needed there.
     slots: Vec<usize>,
+    /// Slot of each output; of those that are not wanted one that stays zero.
+    outputs: Vec<usize>,
     n_slots: usize,
 }
 
@@ -87,10 +89,21 @@ pub(super) struct Block<'m> {
 }
 
 impl<'a> Machine<'a> {
+    /// For all outputs.
     pub(super) fn new(program: &'a Program, atom: impl Fn(Atom) -> f64) -> Self {
+        Self::of(program, &|_| true, atom)
+    }
+
+    /// For some outputs; the others are zero, and what only they need is not computed.
+    pub(super) fn of(
+        program: &'a Program,
+        wanted: &dyn Fn(usize) -> bool,
+        atom: impl Fn(Atom) -> f64,
+    ) -> Self {
+        let computed = program.needed(wanted);
         let mut fixed = vec![0.0; program.ops.len()];
         for (i, op) in program.ops.iter().enumerate() {
-            if program.stages[i] == Stage::Fixed {
+            if computed[i] && program.stages[i] == Stage::Fixed {
                 fixed[i] = match op {
                     Op::Input(input) => atom(*input),
                     _ => scalar(op, |v| fixed[v]),
@@ -99,19 +112,17 @@ impl<'a> Machine<'a> {
         }
         let mut last_use: Vec<usize> = (0..program.ops.len()).collect();
         let mut needed = vec![false; program.ops.len()];
-        for (i, op) in program.ops.iter().enumerate() {
+        let ops = program.ops.iter().enumerate();
+        for (i, op) in ops.filter(|(i, _)| computed[*i]) {
             let is_state = program.stages[i] == Stage::State;
             op.for_each_operand(|v| {
                 last_use[v.index()] = i;
                 needed[v.index()] |= is_state;
             });
         }
-        for value in program
-            .outputs
-            .iter()
-            .copied()
-            .chain(program.guards.iter().flat_map(|g| g.values()))
-        {
+        let outputs = program.outputs.iter().enumerate();
+        let outputs = outputs.filter(|(k, _)| wanted(*k)).map(|(_, value)| *value);
+        for value in outputs.chain(program.guards.iter().flat_map(|g| g.values())) {
             last_use[value.index()] = program.ops.len();
             needed[value.index()] = true;
         }
@@ -126,7 +137,7 @@ impl<'a> Machine<'a> {
         }
         let mut ends: Vec<Vec<usize>> = vec![Vec::new(); program.ops.len() + 1];
         for i in 0..program.ops.len() {
-            if program.stages[i] == Stage::State {
+            if computed[i] && program.stages[i] == Stage::State {
                 slots[i] = free.pop().unwrap_or_else(|| {
                     n_slots += 1;
                     n_slots - 1
@@ -140,15 +151,24 @@ impl<'a> Machine<'a> {
             .map(|i| (slots[i], fixed[i]))
             .collect();
         // Where only one of sine and cosine is needed, the other goes here.
-        let spare = n_slots;
-        let steps = steps(program, &slots, spare);
+        let (spare, zero) = (n_slots, n_slots + 1);
+        let steps = steps(program, &computed, &slots, spare);
+        let outputs = program.outputs.iter().enumerate();
+        let outputs = outputs.map(|(k, value)| {
+            if wanted(k) {
+                slots[value.index()]
+            } else {
+                zero
+            }
+        });
         Self {
             program,
             fixed,
             kept,
             steps,
+            outputs: outputs.collect(),
             slots,
-            n_slots: n_slots + 1,
+            n_slots: n_slots + 2,
         }
     }
 
@@ -190,8 +210,7 @@ impl<'a> Machine<'a> {
                 let sample = start + k;
                 return Err(PoseFault { sample, reason }.into());
             }
-            let outputs = self.program.outputs.iter();
-            let columns = outputs.map(|value| &self.values(*value, &memory)[..len]);
+            let columns = self.outputs.iter().map(|slot| &memory[*slot][..len]);
             visit(&Block {
                 len,
                 columns: columns.collect(),
@@ -222,11 +241,11 @@ impl<'a> Machine<'a> {
 }
 
 /// The state stage on slots.
-fn steps(program: &Program, slots: &[usize], spare: usize) -> Vec<Step> {
+fn steps(program: &Program, computed: &[bool], slots: &[usize], spare: usize) -> Vec<Step> {
     let slot = |v: &ValueId| slots[v.index()];
     let mut steps = Vec::with_capacity(program.ops.len());
     for (i, op) in program.ops.iter().enumerate() {
-        if program.stages[i] == Stage::Fixed {
+        if program.stages[i] == Stage::Fixed || !computed[i] {
             continue;
         }
         let to = slots[i];
@@ -241,7 +260,7 @@ fn steps(program: &Program, slots: &[usize], spare: usize) -> Vec<Step> {
             Op::Unary(function, a) => Step::Unary(to, *function, slot(a)),
             Op::Cos(a) => Step::SinCos(spare, to, slot(a)),
             // The cosine of the same angle stands right before the sine if both are needed; the angle is still there.
-            Op::Sin(a) if i > 0 && program.ops[i - 1] == Op::Cos(*a) => {
+            Op::Sin(a) if i > 0 && computed[i - 1] && program.ops[i - 1] == Op::Cos(*a) => {
                 steps.pop();
                 let cos = if slots[i - 1] == to {
                     spare

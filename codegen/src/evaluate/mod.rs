@@ -167,9 +167,21 @@ impl<'a> Evaluator<'a> {
     pub fn regressor_blocks<E: From<PoseFault>>(
         &self,
         states: &States<'_>,
+        visit: impl FnMut(usize, &[&[f64]]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        self.regressor_blocks_of(states, &|_| true, visit)
+    }
+
+    /// The same of some columns of H_min: the others are zero, and nothing is computed for them.
+    pub fn regressor_blocks_of<E: From<PoseFault>>(
+        &self,
+        states: &States<'_>,
+        wanted: &dyn Fn(usize) -> bool,
         mut visit: impl FnMut(usize, &[&[f64]]) -> Result<(), E>,
     ) -> Result<(), E> {
-        self.run_blocks(&self.programs.regressor, states, &[], |block| {
+        let program = &self.programs.regressor;
+        let columns = program.outputs.len() / self.mechanism.drives.len().max(1);
+        self.run_blocks(program, &|k| wanted(k % columns), states, &[], |block| {
             visit(block.len, &block.columns)
         })
     }
@@ -314,7 +326,7 @@ impl<'a> Evaluator<'a> {
         base: &[f64],
     ) -> Result<Vec<Vec<f64>>, PoseFault> {
         let mut outputs = vec![Vec::with_capacity(states.len()); program.outputs.len()];
-        self.run_blocks(program, states, base, |block| {
+        self.run_blocks(program, &|_| true, states, base, |block| {
             for (output, column) in outputs.iter_mut().zip(&block.columns) {
                 output.extend_from_slice(column);
             }
@@ -326,6 +338,7 @@ impl<'a> Evaluator<'a> {
     fn run_blocks<E: From<PoseFault>>(
         &self,
         program: &Program,
+        wanted: &dyn Fn(usize) -> bool,
         states: &States<'_>,
         base: &[f64],
         visit: impl FnMut(&Block<'_>) -> Result<(), E>,
@@ -343,7 +356,7 @@ impl<'a> Evaluator<'a> {
                 fault = Some(earlier);
             }
         }
-        let machine = Machine::new(program, |atom| self.fixed(atom, base));
+        let machine = Machine::of(program, wanted, |atom| self.fixed(atom, base));
         let input = |atom| match atom {
             Atom::Coordinate(i) => match self.place(i) {
                 Place::Active(k) => states.q[k],

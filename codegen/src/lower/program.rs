@@ -146,6 +146,25 @@ pub struct Program {
     pub guards: Vec<Guard>,
 }
 
+impl Program {
+    /// Which operations some outputs and the guards need.
+    pub(crate) fn needed(&self, wanted: &dyn Fn(usize) -> bool) -> Vec<bool> {
+        let mut needed = vec![false; self.ops.len()];
+        let outputs = self.outputs.iter().enumerate();
+        let outputs = outputs.filter(|(k, _)| wanted(*k)).map(|(_, value)| *value);
+        let guards = self.guards.iter().flat_map(|guard| guard.values());
+        for value in outputs.chain(guards) {
+            needed[value.index()] = true;
+        }
+        for (i, op) in self.ops.iter().enumerate().rev() {
+            if needed[i] {
+                op.for_each_operand(|v| needed[v.index()] = true);
+            }
+        }
+        needed
+    }
+}
+
 /// Operations per call. Negations, and what is computed once per geometry, are not counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(any(test, feature = "json"), derive(Serialize))]

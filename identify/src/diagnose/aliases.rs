@@ -1,7 +1,7 @@
 //! What a recording cannot tell apart: effects that, put in place of a found one, explain it as well.
 
 use super::bench::{Bench, Pick, Trial, n_columns};
-use super::pool::solve;
+use super::beside::Beside;
 use super::problem::{Effect, Source};
 
 /// How much worse (twice the logarithm of the likelihood, with the samples that the residual is worth) a set may be and
@@ -11,8 +11,8 @@ pub(crate) const APART: f64 = 9.0;
 const STANDS_IN: f64 = 0.8;
 /// A wrong reading that leaves less than this factor is looked at with a column of its own size.
 const CLOSE: f64 = 3.0;
-/// A column of which others leave less than this share of squares lies in their span.
-const WITHIN: f64 = 1e-6;
+/// What takes off less than this share of squares takes nothing off.
+const NOTHING: f64 = 1e-6;
 
 /// An effect that cannot be told from a found one.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +33,7 @@ impl Bench<'_> {
             let mut others = picks.to_vec();
             let pick = others.remove(i);
             self.look(&others);
+            let beside = self.beside(&others);
             let channels: Vec<usize> = (0..rest.len()).collect();
             let worth = self.worth(&rest, &channels);
             let table = self.table(picks);
@@ -42,7 +43,7 @@ impl Bench<'_> {
                 let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
                 // What takes nothing off cannot be stood in for.
                 let own = left - squares;
-                let stands_in = own > WITHIN * left && left - trial.squares > STANDS_IN * own;
+                let stands_in = own > NOTHING * left && left - trial.squares > STANDS_IN * own;
                 (worse < APART && stands_in && trial.wrong_sign.is_empty()).then_some(worse)
             };
             let mut found: Vec<Alias> = Vec::new();
@@ -58,7 +59,7 @@ impl Bench<'_> {
                 if one.kind == two.kind && one.at.iter().any(|place| two.at.contains(place)) {
                     continue;
                 }
-                let more = self.is_within(&pick, candidate, &others);
+                let more = self.is_within_beside(&pick, candidate, &beside);
                 if more && candidate.rank > pick.rank {
                     continue; // It holds the found one and more, so that nothing speaks for it.
                 }
@@ -105,7 +106,7 @@ impl Bench<'_> {
             let halves: Vec<&Pick> = (self.present.iter().flatten())
                 .filter(|one| one.rank < pick.rank && self.candidate(one).searched == 0)
                 .filter(|one| picks.iter().all(|p| p.candidate != one.candidate))
-                .filter(|one| self.is_within(one, &pick, &[]))
+                .filter(|one| self.is_within(one, &pick))
                 .collect();
             for (k, one) in halves.iter().enumerate() {
                 for two in &halves[k + 1..] {
@@ -142,8 +143,19 @@ impl Bench<'_> {
         self.trial(refreshed)
     }
 
-    /// Whether all columns of one effect lie in the span of the base, some effects and another one.
-    pub(crate) fn is_within(&self, one: &Pick, other: &Pick, beside: &[Pick]) -> bool {
+    /// Whether all columns of one effect lie in the span of the base and another one.
+    pub(crate) fn is_within(&self, one: &Pick, other: &Pick) -> bool {
+        let key = (one.columns.clone(), other.columns.clone());
+        let known = self.within.borrow().get(&key).copied();
+        known.unwrap_or_else(|| {
+            let found = self.is_within_beside(one, other, &self.alone);
+            self.within.borrow_mut().insert(key, found);
+            found
+        })
+    }
+
+    /// Whether all columns of one effect lie in the span of a set and another one.
+    pub(crate) fn is_within_beside(&self, one: &Pick, other: &Pick, beside: &Beside) -> bool {
         if one.columns == other.columns {
             return true;
         }
@@ -155,24 +167,6 @@ impl Bench<'_> {
                 return false;
             }
         }
-        let key = (one.columns.clone(), other.columns.clone());
-        if beside.is_empty()
-            && let Some(known) = self.within.borrow().get(&key)
-        {
-            return *known;
-        }
-        let mut span = self.columns(beside);
-        span.extend(&other.columns);
-        let found = one.columns.iter().all(|k| {
-            let mut which = span.clone();
-            which.push(*k);
-            let gram = self.pool.gram(&which, &self.weights, super::pool::On::All);
-            let own = gram[(which.len() - 1, which.len() - 1)];
-            solve(&gram).1 <= WITHIN * own
-        });
-        if beside.is_empty() {
-            self.within.borrow_mut().insert(key, found);
-        }
-        found
+        self.lies_within(&one.columns, &other.columns, beside)
     }
 }

@@ -5,14 +5,13 @@ use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::beside::Beside;
 use super::column::Column;
 use super::factored::Factored;
 use super::noise::effective_samples;
 use super::pool::{On, Pool, dot, solve};
 use super::problem::{Candidate, Choice, EffectParameter, Problem, Sign, Source, Supply};
 
-/// A column of which the others leave a smaller share of squares than this says nothing new.
-const SAID: f64 = 1e-6;
 /// If an estimate of the wrong sign takes off less than this share of the squared error, the sign is chance.
 const SIGN_IS_CHANCE: f64 = 0.05;
 
@@ -29,10 +28,6 @@ pub(crate) struct Pick {
     pub(crate) rank: usize,
 }
 
-/// A column of a choice: candidate, choice, column.
-type ChoiceColumn = (usize, usize, usize);
-/// Inner products with columns of the pool, channel by channel of the choice's column.
-type Seen = HashMap<ChoiceColumn, Vec<Option<Box<[f64]>>>>;
 /// Columns that lie in the span of others and the base.
 type Within = HashMap<(Vec<usize>, Vec<usize>), bool>;
 
@@ -53,7 +48,7 @@ pub(crate) struct Trial {
 /// Columns, weights, and what every candidate looks like at present.
 pub(crate) struct Bench<'a> {
     pub(crate) problem: &'a Problem,
-    pub(crate) pool: Pool,
+    pub(crate) pool: Pool<'a>,
     pub(crate) base: Vec<usize>,
     pub(crate) measured: usize,
     /// A column of zeros, for parameters of an effect that are held at zero.
@@ -64,10 +59,10 @@ pub(crate) struct Bench<'a> {
     pub(crate) present: Vec<Option<Pick>>,
     pub(crate) supply: &'a dyn Supply,
     pub(crate) friction: Vec<usize>,
+    /// The base alone, at the present weights.
+    pub(crate) alone: Beside,
     /// Pool columns by candidate and choice.
-    known: HashMap<(usize, usize), Vec<usize>>,
-    /// Inner products of the columns of choices with those of the pool, channel by channel of the choice's column.
-    seen: RefCell<Seen>,
+    choices: Vec<Vec<Vec<usize>>>,
     /// Which columns lie in the span of others and the base.
     pub(crate) within: RefCell<Within>,
 }
@@ -75,26 +70,29 @@ pub(crate) struct Bench<'a> {
 impl<'a> Bench<'a> {
     pub(crate) fn new(problem: &'a Problem, supply: &'a dyn Supply) -> Self {
         let mut pool = Pool::new(&problem.layout).without(&problem.undecided());
-        let base = problem.base.iter().map(|c| pool.add(c.clone())).collect();
-        let measured = pool.add(problem.measured.clone());
+        let base = problem.base.iter().map(|c| pool.add(c)).collect();
+        let measured = pool.add(&problem.measured);
         let zero = pool.add(Column(vec![None; problem.layout.channels.len()]));
-        let friction = problem
-            .friction
-            .iter()
-            .map(|c| pool.add(c.clone()))
-            .collect();
+        let friction = problem.friction.iter().map(|c| pool.add(c)).collect();
+        let mut of_choice =
+            |choice: &'a Choice| choice.columns.iter().map(|c| pool.add(c)).collect();
+        let of_candidate = |candidate: &'a Candidate| match &candidate.source {
+            Source::Columns(choices) => choices.iter().map(&mut of_choice).collect(),
+            _ => Vec::new(),
+        };
+        let choices = problem.candidates.iter().map(of_candidate).collect();
         let mut bench = Self {
             problem,
             supply,
             friction,
+            alone: Beside::default(),
             pool,
             base,
             measured,
             zero,
             weights: vec![1.0; problem.layout.channels.len()],
             present: vec![None; problem.candidates.len()],
-            known: HashMap::new(),
-            seen: RefCell::default(),
+            choices,
             within: RefCell::default(),
         };
         // Channels of very different forces count alike from the start.
@@ -138,6 +136,7 @@ impl<'a> Bench<'a> {
             let variance = size(values).max(noise).max(rounding);
             self.weights[d] = if variance > 0.0 { 1.0 / variance } else { 1.0 };
         }
+        self.alone = self.beside(&[]);
     }
 
     /// How many independent equations the residual of a set is worth, on some channels.
@@ -156,180 +155,51 @@ impl<'a> Bench<'a> {
     /// Chooses the constants of every candidate that suit what a set leaves best, and makes the columns of those that
     /// depend on the fit.
     pub(crate) fn look(&mut self, picks: &[Pick]) {
-        let (factors, _) = self.fit(picks, On::All);
-        let rest = self.rest(picks, &factors);
-        let which = self.columns(picks);
-        let weights = self.weights.clone();
-        let factor = Factored::new(&self.pool.gram(&which, &weights, On::All));
+        let beside = self.beside(picks);
         let problem = self.problem;
         let carried = self.carried(picks);
         let mut present = Vec::with_capacity(problem.candidates.len());
         for (k, candidate) in problem.candidates.iter().enumerate() {
             let pick = match &candidate.source {
-                Source::Columns(choices) => {
-                    let best = if choices.len() == 1 {
-                        Some(0)
-                    } else {
-                        let score = |(at, choice): (usize, &Choice)| {
-                            let products = self.products_of_choice((k, at), choice, &which);
-                            self.explained(&choice.columns, &products, &factor, &rest)
-                        };
-                        let scored = choices.iter().enumerate().map(score).enumerate();
-                        scored
-                            .max_by(|a, b| a.1.total_cmp(&b.1))
-                            .map(|(best, _)| best)
-                    };
-                    best.map(|best| self.pick(k, best))
+                Source::Columns(_) => self
+                    .best_choice(k, &beside)
+                    .map(|(best, _)| self.pick(k, best)),
+                Source::Tilt(_) | Source::Reading(_) => {
+                    Some(self.changed(k, picks, &beside.factors))
                 }
-                Source::Tilt(_) | Source::Reading(_) => Some(self.changed(k, picks, &factors)),
                 Source::Carried => carried.get(&k).cloned(),
             };
             present.push(pick.and_then(|mut pick| {
-                pick.rank = self.rank(&pick, &which, &factor);
+                pick.rank = self.rank(&pick.columns, &beside);
                 (pick.rank > 0).then_some(pick)
             }));
         }
         self.present = present;
     }
 
+    /// The choice of a candidate that explains most beside a set, and how much; an only one is not asked.
+    pub(crate) fn best_choice(&self, candidate: usize, beside: &Beside) -> Option<(usize, f64)> {
+        let choices = &self.choices[candidate];
+        if choices.len() == 1 {
+            return Some((0, 0.0));
+        }
+        let score = |columns: &Vec<usize>| self.explained(columns, beside);
+        let scored = choices.iter().map(score).enumerate();
+        scored.max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
     /// A candidate with one of its choices.
-    pub(crate) fn pick(&mut self, candidate: usize, choice: usize) -> Pick {
+    pub(crate) fn pick(&self, candidate: usize, choice: usize) -> Pick {
         let Source::Columns(choices) = &self.problem.candidates[candidate].source else {
             unreachable!("only known columns have choices")
         };
-        let chosen = &choices[choice];
-        let columns = match self.known.get(&(candidate, choice)) {
-            Some(columns) => columns.clone(),
-            None => {
-                let add = |column: &Column| self.pool.add(column.clone());
-                let columns: Vec<usize> = chosen.columns.iter().map(add).collect();
-                self.known.insert((candidate, choice), columns.clone());
-                columns
-            }
-        };
+        let columns = self.choices[candidate][choice].clone();
         Pick {
             candidate,
-            constants: chosen.constants.clone(),
+            constants: choices[choice].constants.clone(),
             rank: columns.len(),
             columns,
         }
-    }
-
-    /// How many columns of a candidate say something that others do not say already.
-    fn rank(&self, pick: &Pick, which: &[usize], factor: &Factored) -> usize {
-        let columns: Vec<&Column> = pick.columns.iter().map(|k| self.pool.column(*k)).collect();
-        let halves: Vec<DVector<f64>> = columns
-            .iter()
-            .map(|c| factor.half(&self.products(c, which)))
-            .collect();
-        let n = columns.len();
-        let own = |i: usize, j: usize| self.product(columns[i], columns[j]);
-        let left = DMatrix::from_fn(n, n, |i, j| {
-            let scale = (own(i, i) * own(j, j)).sqrt();
-            if scale > 0.0 {
-                (own(i, j) - halves[i].dot(&halves[j])) / scale
-            } else {
-                0.0
-            }
-        });
-        let values = left.symmetric_eigenvalues();
-        values.iter().filter(|value| **value > SAID).count()
-    }
-
-    /// Weighted inner products of a column that need not be in the pool with some that are.
-    pub(crate) fn products(&self, column: &Column, which: &[usize]) -> DVector<f64> {
-        let product = |k: &usize| self.product(column, self.pool.column(*k));
-        DVector::from_iterator(which.len(), which.iter().map(product))
-    }
-
-    pub(crate) fn all_products(&self, columns: &[Column], which: &[usize]) -> Vec<DVector<f64>> {
-        columns.iter().map(|c| self.products(c, which)).collect()
-    }
-
-    /// Weighted inner products of a choice's columns with some of the pool; each is computed once.
-    pub(crate) fn products_of_choice(
-        &self,
-        (candidate, choice): (usize, usize),
-        columns: &Choice,
-        which: &[usize],
-    ) -> Vec<DVector<f64>> {
-        let mut seen = self.seen.borrow_mut();
-        let mut all = Vec::with_capacity(columns.columns.len());
-        for (i, column) in columns.columns.iter().enumerate() {
-            let known = seen.entry((candidate, choice, i)).or_default();
-            let mut products = DVector::zeros(which.len());
-            for (product, k) in products.iter_mut().zip(which) {
-                if known.len() <= *k {
-                    known.resize(*k + 1, None);
-                }
-                let by_channel = known[*k].get_or_insert_with(|| {
-                    let pairs = column.0.iter().zip(&self.pool.column(*k).0).enumerate();
-                    pairs
-                        .filter_map(|(d, (a, b))| {
-                            let a = a.as_ref()?;
-                            let all = self.pool.all();
-                            Some(b.as_ref().map_or(0.0, |b| self.pool.inner(d, a, b, all)))
-                        })
-                        .collect()
-                });
-                let weights = column.channels().map(|d| self.weights[d]);
-                *product = by_channel.iter().zip(weights).map(|(x, w)| x * w).sum();
-            }
-            all.push(products);
-        }
-        all
-    }
-
-    fn product(&self, a: &Column, b: &Column) -> f64 {
-        let pairs = a.0.iter().zip(&b.0).zip(&self.weights).enumerate();
-        pairs
-            .map(|(d, ((a, b), weight))| match (a, b) {
-                (Some(a), Some(b)) => weight * self.pool.inner(d, a, b, self.pool.all()),
-                _ => 0.0,
-            })
-            .sum()
-    }
-
-    /// By how much some columns would lower the weighted sum of squares of a residual beside those that made it.
-    pub(crate) fn explained(
-        &self,
-        columns: &[Column],
-        products: &[DVector<f64>],
-        factor: &Factored,
-        rest: &[Vec<f64>],
-    ) -> f64 {
-        let n = columns.len();
-        let halves: Vec<DVector<f64>> = products.iter().map(|p| factor.half(p)).collect();
-        let mut gram = DMatrix::zeros(n + 1, n + 1);
-        for i in 0..n {
-            for j in 0..=i {
-                let own = self.product(&columns[i], &columns[j]);
-                let left = own - halves[i].dot(&halves[j]);
-                // Rounding is nothing to explain by.
-                let left = if i == j && left < 1e-7 * own {
-                    0.0
-                } else {
-                    left
-                };
-                gram[(i, j)] = left;
-                gram[(j, i)] = left;
-            }
-            let mut right = 0.0;
-            for ((values, rest), weight) in columns[i].0.iter().zip(rest).zip(&self.weights) {
-                if let Some(values) = values {
-                    right += weight * dot(values, rest);
-                }
-            }
-            gram[(i, n)] = right;
-            gram[(n, i)] = right;
-        }
-        let total: f64 = rest
-            .iter()
-            .zip(&self.weights)
-            .map(|(rest, weight)| weight * dot(rest, rest))
-            .sum();
-        gram[(n, n)] = total;
-        total - solve(&gram).1
     }
 
     /// A set of effects, fitted to all samples.
@@ -453,7 +323,10 @@ impl<'a> Bench<'a> {
                 .map(|k| table.place[k])
                 .collect();
             which.push(table.left.nrows() - 1);
-            solve(&table.left.select_rows(&which).select_columns(&which))
+            let n = which.len();
+            // Number by number: whole rows of the table would be read for a few numbers each.
+            let part = DMatrix::from_fn(n, n, |i, j| table.left[(which[i], which[j])]);
+            solve(&part)
         })
     }
 }

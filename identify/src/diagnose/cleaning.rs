@@ -60,8 +60,8 @@ pub(crate) fn clean(problem: &mut Problem) -> Vec<Disturbance> {
 fn rest(problem: &Problem) -> Vec<Vec<f64>> {
     let mut pool = Pool::new(&problem.layout).without(&problem.undecided());
     let columns = problem.base.iter().chain(&problem.friction);
-    let mut which: Vec<usize> = columns.map(|c| pool.add(c.clone())).collect();
-    let measured = pool.add(problem.measured.clone());
+    let mut which: Vec<usize> = columns.map(|c| pool.add(c)).collect();
+    let measured = pool.add(&problem.measured);
     let size = |values: &Option<Vec<f64>>| {
         values
             .as_ref()

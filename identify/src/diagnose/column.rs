@@ -1,5 +1,7 @@
 //! What an effect adds to the forces along all recordings.
 
+use std::borrow::Cow;
+
 /// Numbers along all recordings, for each channel one for every sample: recordings of the fit first, then those of the
 /// check; `None` for a channel on which the column is zero throughout.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -35,8 +37,29 @@ impl Column {
             .filter_map(|(d, values)| values.as_ref().map(|_| d))
     }
 
+    /// Channels on which both columns act, with the values of both.
+    pub(crate) fn beside<'a>(
+        &'a self,
+        other: &'a Self,
+    ) -> impl Iterator<Item = (usize, &'a [f64], &'a [f64])> {
+        let pairs = self.0.iter().zip(&other.0).enumerate();
+        pairs.filter_map(|(d, (a, b))| Some((d, a.as_deref()?, b.as_deref()?)))
+    }
+
     /// Whether it is zero everywhere.
     pub fn is_zero(&self) -> bool {
         self.0.iter().all(Option::is_none)
+    }
+}
+
+impl<'a> From<&'a Column> for Cow<'a, Column> {
+    fn from(column: &'a Column) -> Self {
+        Cow::Borrowed(column)
+    }
+}
+
+impl From<Column> for Cow<'_, Column> {
+    fn from(column: Column) -> Self {
+        Cow::Owned(column)
     }
 }

@@ -8,6 +8,7 @@
 //! J. Econometrics 99 (2000); G. Schwarz, Annals of Statistics 6 (1978); J. Chen and Z. Chen, "Extended Bayesian
 //! information criteria for model selection with large model spaces", Biometrika 95 (2008).
 
+use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::bench::{Bench, Pick};
@@ -15,8 +16,6 @@ use super::pool::{On, dot, solve};
 
 /// Blocks that the error of a stretch is cut into.
 const BLOCKS: usize = 12;
-/// Folds of the cross-validation where there is no check.
-const FOLDS: usize = 10;
 /// A change must lower the squared error on its channels by this share where it was not fitted.
 pub(crate) const LEAST_GAIN: f64 = 0.02;
 /// Squared errors below this, in units of what counts as noise, are nobody's.
@@ -158,26 +157,11 @@ impl Bench<'_> {
         }
         let mut which = self.columns(picks);
         which.push(self.measured);
-        let whole = self.pool.gram(&which, &self.weights, On::All);
-        let folds = layout.blocks(FOLDS);
-        let fold_errors = folds.iter().map(|fold| {
-            let mut part = whole.clone();
-            for i in 0..which.len() {
-                for j in 0..=i {
-                    let (a, b) = (self.pool.column(which[i]), self.pool.column(which[j]));
-                    let pairs = a.0.iter().zip(&b.0).zip(&self.weights).enumerate();
-                    let own: f64 = pairs
-                        .map(|(d, ((a, b), weight))| match (a, b) {
-                            (Some(a), Some(b)) => weight * self.pool.inner(d, a, b, fold.clone()),
-                            _ => 0.0,
-                        })
-                        .sum();
-                    part[(i, j)] -= own;
-                    if i != j {
-                        part[(j, i)] -= own;
-                    }
-                }
-            }
+        let folds = self.pool.fold_grams(&which, &self.weights);
+        let n = which.len();
+        let whole = (folds.iter()).fold(DMatrix::zeros(n, n), |sum, (_, part)| sum + part);
+        let fold_errors = folds.iter().map(|(fold, own)| {
+            let part = &whole - own;
             let (factors, _) = solve(&part);
             // Only the fold itself is of interest.
             let mut error = 0.0;

@@ -1,69 +1,55 @@
 //! Inner products of columns, decomposed, so that what they explain of others is quickly said.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
-use super::pool::DEPENDENT;
+use super::pool::{DEPENDENT, dot};
 
 /// A decomposed matrix of inner products; columns that depend on earlier ones are passed over.
+#[derive(Default)]
 pub(crate) struct Factored {
+    /// Cholesky's factor of the columns that are kept, each scaled to one.
     lower: DMatrix<f64>,
-    scale: Vec<f64>,
-    kept: Vec<bool>,
+    /// Those columns, with their scales.
+    kept: Vec<(usize, f64)>,
 }
 
 impl Factored {
     pub(crate) fn new(gram: &DMatrix<f64>) -> Self {
         let n = gram.nrows();
-        let scale: Vec<f64> = (0..n)
-            .map(|i| {
-                let root = gram[(i, i)].sqrt();
-                if root > 0.0 { root } else { 1.0 }
-            })
-            .collect();
-        let mut lower = DMatrix::zeros(n, n);
-        let mut kept = vec![false; n];
+        // Rows of the factor are the columns of `upper`, which lie in one piece.
+        let mut upper = DMatrix::<f64>::zeros(n, n);
+        let mut kept: Vec<(usize, f64)> = Vec::with_capacity(n);
         for i in 0..n {
-            for j in 0..=i {
-                if j < i && !kept[j] {
-                    continue;
-                }
-                let mut sum = gram[(i, j)] / (scale[i] * scale[j]);
-                for k in 0..j {
-                    sum -= lower[(i, k)] * lower[(j, k)];
-                }
-                if j < i {
-                    lower[(i, j)] = sum / lower[(j, j)];
-                } else if sum > DEPENDENT {
-                    kept[i] = true;
-                    lower[(i, i)] = sum.sqrt();
-                }
-            }
-        }
-        Self { lower, scale, kept }
-    }
-
-    /// `L^-1 x`: its square is what the columns explain.
-    pub(crate) fn half(&self, products: &DVector<f64>) -> DVector<f64> {
-        let n = products.len();
-        let mut half = DVector::zeros(n);
-        for i in 0..n {
-            if !self.kept[i] {
+            let scale = gram[(i, i)].sqrt();
+            if scale <= 0.0 {
                 continue;
             }
-            let mut sum = products[i] / self.scale[i];
-            for k in 0..i {
-                sum -= self.lower[(i, k)] * half[k];
+            let m = kept.len();
+            let mut own = vec![0.0; m];
+            for (j, (column, other)) in kept.iter().enumerate() {
+                let known = dot(&upper.column(j).as_slice()[..j], &own[..j]);
+                own[j] = (gram[(*column, i)] / (other * scale) - known) / upper[(j, j)];
             }
-            half[i] = sum / self.lower[(i, i)];
+            let left = 1.0 - dot(&own, &own);
+            if left > DEPENDENT {
+                upper.column_mut(m).as_mut_slice()[..m].copy_from_slice(&own);
+                upper[(m, m)] = left.sqrt();
+                kept.push((i, scale));
+            }
         }
-        half
+        let m = kept.len();
+        let lower = upper.view((0, 0), (m, m)).transpose();
+        Self { lower, kept }
     }
 
+    /// `L^-1 x` for each column: its square is what the columns explain.
     pub(crate) fn halves(&self, products: &DMatrix<f64>) -> DMatrix<f64> {
-        let columns: Vec<DVector<f64>> = products
-            .column_iter()
-            .map(|column| self.half(&column.into_owned()))
-            .collect();
-        DMatrix::from_columns(&columns)
+        let scaled = |i: usize, j: usize| {
+            let (k, scale) = self.kept[i];
+            products[(k, j)] / scale
+        };
+        let mut halves = DMatrix::from_fn(self.kept.len(), products.ncols(), scaled);
+        self.lower.solve_lower_triangular_unchecked_mut(&mut halves);
+        halves
     }
 }

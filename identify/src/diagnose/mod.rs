@@ -2,7 +2,7 @@
 //! comes out, with what cannot be told apart, and an honest answer where nothing explains it.
 //!
 //! 1. [`Problem`] - measured forces, columns of the model, candidates with the constants that are searched for.
-//! 2. `pool`, `factored`, `bench` - inner products of all columns, so that a set of effects is fitted in microseconds;
+//! 2. `pool`, `factored`, `beside`, `bench` - inner products of all columns, so that a set of effects is fitted in microseconds;
 //!    `tuning` finds constants, `following` makes columns that depend on the fit, `readings` those of forces that are read
 //!    wrongly, `tilt` turns gravity.
 //! 3. `search` - forward over sets, with exchanges; `evidence` decides on time that was not fitted; `settle` makes the last
@@ -15,6 +15,7 @@
 
 mod aliases;
 mod bench;
+mod beside;
 mod cleaning;
 mod column;
 mod disturbance;

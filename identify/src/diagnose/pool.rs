@@ -1,7 +1,9 @@
 //! Inner products of columns, channel by channel and apart for fit and check, so that any set of columns is fitted in
 //! microseconds.
 
+use std::borrow::Cow;
 use std::cell::RefCell;
+use std::collections::HashMap;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
@@ -9,30 +11,42 @@ use nalgebra::{DMatrix, DVector};
 use super::column::Column;
 use super::problem::Layout;
 
-/// Inner products of two columns by part and channel, where they were asked for.
-type Products = Option<Box<[f64]>>;
+/// Inner products of a column with earlier ones by part (0 is the fit, 1 the check) and channel on which both act, the parts one
+/// after the other.
+type Products = HashMap<usize, Box<[f64]>>;
+
+/// Folds of the cross-validation where there is no check.
+const FOLDS: usize = 10;
 
 /// Columns with their inner products, each of which is computed when it is asked for first.
-pub(crate) struct Pool {
-    columns: Vec<Column>,
+pub(crate) struct Pool<'a> {
+    columns: Vec<Cow<'a, Column>>,
+    /// Channels on which each column acts, a bit for each.
+    acts: Vec<Box<[u64]>>,
     fit: Range<usize>,
     check: Range<usize>,
-    /// `products[i][j]` for `j <= i`: by part (0 is the fit, 1 the check) and channel, the parts one after the other.
-    products: RefCell<Vec<Vec<Products>>>,
+    products: RefCell<Vec<Products>>,
+    /// Inner products of pairs by fold and common channel.
+    of_folds: RefCell<HashMap<(usize, usize), Box<[f64]>>>,
+    /// Folds of all samples.
+    folds: Vec<Range<usize>>,
     /// Samples that were not measured, by channel: nothing counts them.
     lost: Vec<Vec<bool>>,
     /// Samples that are left out of every product, by channel and in order; the lost ones are among them.
     left_out: Vec<Vec<usize>>,
 }
 
-impl Pool {
+impl<'a> Pool<'a> {
     pub(crate) fn new(layout: &Layout) -> Self {
         let fit = layout.fit_samples();
         Self {
             columns: Vec::new(),
+            acts: Vec::new(),
             fit: 0..fit,
             check: fit..layout.samples(),
             products: RefCell::default(),
+            of_folds: RefCell::default(),
+            folds: layout.blocks(FOLDS),
             lost: layout.left_out.clone(),
             left_out: layout.left_out.iter().map(|out| places(out)).collect(),
         }
@@ -78,9 +92,15 @@ impl Pool {
     }
 
     /// Adds a column; its place.
-    pub(crate) fn add(&mut self, column: Column) -> usize {
+    pub(crate) fn add(&mut self, column: impl Into<Cow<'a, Column>>) -> usize {
+        let column = column.into();
+        let mut acts = vec![0; column.0.len().div_ceil(64)];
+        for d in column.channels() {
+            acts[d / 64] |= 1 << (d % 64);
+        }
+        self.acts.push(acts.into());
         self.columns.push(column);
-        self.products.get_mut().push(Vec::new());
+        self.products.get_mut().push(HashMap::new());
         self.columns.len() - 1
     }
 
@@ -88,47 +108,102 @@ impl Pool {
         &self.columns[k]
     }
 
-    /// Inner products of two columns by part and channel.
+    /// Whether two columns act on a channel both.
+    fn meet(&self, a: usize, b: usize) -> bool {
+        let mut words = self.acts[a].iter().zip(&*self.acts[b]);
+        words.any(|(a, b)| a & b != 0)
+    }
+
+    /// Inner products of two columns by part and common channel.
     fn products_of(&self, a: usize, b: usize) -> Box<[f64]> {
+        let [a, b] = [a, b].map(|k| &self.columns[k]);
         let parts = [&self.fit, &self.check].into_iter();
-        let of_part = |range: &Range<usize>| -> Vec<f64> {
-            let pairs = self.columns[a].0.iter().zip(&self.columns[b].0).enumerate();
-            pairs
-                .map(|(d, pair)| match pair {
-                    (Some(a), Some(b)) => self.inner(d, a, b, range.clone()),
-                    _ => 0.0,
-                })
-                .collect()
+        let of_part = |range: &Range<usize>| {
+            let range = range.clone();
+            let common = a.beside(b);
+            common.map(move |(d, a, b)| self.inner(d, a, b, range.clone()))
         };
         parts.flat_map(of_part).collect()
     }
 
+    /// Weighted inner product of two columns on all samples.
+    pub(crate) fn product(&self, a: usize, b: usize, weights: &[f64]) -> f64 {
+        self.weighted(a, b, weights, On::All)
+    }
+
+    /// The same of columns that need not be in the pool, computed anew.
+    pub(crate) fn product_of(&self, a: &Column, b: &Column, weights: &[f64]) -> f64 {
+        let on = |(d, a, b)| weights[d] * self.inner(d, a, b, self.all());
+        a.beside(b).map(on).sum()
+    }
+
+    fn weighted(&self, a: usize, b: usize, weights: &[f64], on: On) -> f64 {
+        if !self.meet(a, b) {
+            return 0.0;
+        }
+        let (a, b) = (a.max(b), a.min(b));
+        let mut products = self.products.borrow_mut();
+        let known = products[a]
+            .entry(b)
+            .or_insert_with(|| self.products_of(a, b));
+        let (fit, check) = known.split_at(known.len() / 2);
+        let common = self.columns[a].beside(&self.columns[b]);
+        let sums = common
+            .zip(fit.iter().zip(check))
+            .map(|((d, ..), (fit, check))| {
+                weights[d] * if on == On::All { fit + check } else { *fit }
+            });
+        sums.sum()
+    }
+
     /// Weighted inner products of some columns on fit, check or both.
     pub(crate) fn gram(&self, which: &[usize], weights: &[f64], on: On) -> DMatrix<f64> {
-        let parts = match on {
-            On::Fit => 1,
-            On::All => 2,
-        };
         let n = which.len();
         let mut gram = DMatrix::zeros(n, n);
-        let mut products = self.products.borrow_mut();
         for i in 0..n {
             for j in 0..=i {
-                let (a, b) = (which[i].max(which[j]), which[i].min(which[j]));
-                let row = &mut products[a];
-                if row.len() <= b {
-                    row.resize(b + 1, None);
-                }
-                let known = row[b].get_or_insert_with(|| self.products_of(a, b));
-                let by_channel = known.chunks(weights.len().max(1)).take(parts);
-                let sum = by_channel
-                    .map(|part| part.iter().zip(weights).map(|(p, w)| p * w).sum::<f64>())
-                    .sum();
+                let sum = self.weighted(which[i], which[j], weights, on);
                 gram[(i, j)] = sum;
                 gram[(j, i)] = sum;
             }
         }
         gram
+    }
+
+    /// Weighted inner products of some columns on each fold.
+    pub(crate) fn fold_grams(
+        &self,
+        which: &[usize],
+        weights: &[f64],
+    ) -> Vec<(Range<usize>, DMatrix<f64>)> {
+        let n = which.len();
+        let mut grams = vec![DMatrix::zeros(n, n); self.folds.len()];
+        let mut products = self.of_folds.borrow_mut();
+        let mut common: Vec<f64> = Vec::new();
+        for i in 0..n {
+            for j in 0..=i {
+                let (a, b) = (which[i].max(which[j]), which[i].min(which[j]));
+                if !self.meet(a, b) {
+                    continue;
+                }
+                let both = || self.columns[a].beside(&self.columns[b]);
+                common.clear();
+                common.extend(both().map(|(d, ..)| weights[d]));
+                let known = products.entry((a, b)).or_insert_with(|| {
+                    let of_fold = |fold: &Range<usize>| {
+                        let fold = fold.clone();
+                        both().map(move |(d, a, b)| self.inner(d, a, b, fold.clone()))
+                    };
+                    self.folds.iter().flat_map(of_fold).collect()
+                });
+                for (gram, part) in grams.iter_mut().zip(known.chunks(common.len())) {
+                    let sum = part.iter().zip(&common).map(|(p, w)| p * w).sum();
+                    gram[(i, j)] = sum;
+                    gram[(j, i)] = sum;
+                }
+            }
+        }
+        self.folds.iter().cloned().zip(grams).collect()
     }
 
     /// What is left of the column `of` when others are taken off with some factors; zero where samples are left out.
@@ -205,9 +280,9 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// sum of squares that is left. Columns that depend on those before them get the factor zero.
 pub(crate) fn solve(gram: &DMatrix<f64>) -> (DVector<f64>, f64) {
     let n = gram.nrows() - 1;
-    // Cholesky's decomposition with columns scaled to 1.
+    // Cholesky's decomposition with columns scaled to 1; rows of the factor are columns here, which lie in one piece.
     let scale: Vec<f64> = (0..=n).map(|i| gram[(i, i)].sqrt()).collect();
-    let mut lower = DMatrix::<f64>::zeros(n + 1, n + 1);
+    let mut upper = DMatrix::<f64>::zeros(n + 1, n + 1);
     let mut kept = vec![false; n];
     for i in 0..=n {
         if scale[i] == 0.0 {
@@ -217,21 +292,20 @@ pub(crate) fn solve(gram: &DMatrix<f64>) -> (DVector<f64>, f64) {
             if j < i && !kept[j] {
                 continue;
             }
-            let mut sum = gram[(i, j)] / (scale[i] * scale[j]);
-            for k in 0..j {
-                sum -= lower[(i, k)] * lower[(j, k)];
-            }
+            let known = dot(
+                &upper.column(i).as_slice()[..j],
+                &upper.column(j).as_slice()[..j],
+            );
+            let sum = gram[(j, i)] / (scale[i] * scale[j]) - known;
             if j < i {
-                lower[(i, j)] = sum / lower[(j, j)];
+                upper[(j, i)] = sum / upper[(j, j)];
             } else if i == n {
-                lower[(n, n)] = sum.max(0.0);
+                upper[(n, n)] = sum.max(0.0);
             } else if sum > DEPENDENT {
                 kept[i] = true;
-                lower[(i, i)] = sum.sqrt();
+                upper[(i, i)] = sum.sqrt();
             } else {
-                for k in 0..j {
-                    lower[(i, k)] = 0.0;
-                }
+                upper.column_mut(i).fill(0.0);
             }
         }
     }
@@ -240,20 +314,20 @@ pub(crate) fn solve(gram: &DMatrix<f64>) -> (DVector<f64>, f64) {
         if !kept[i] {
             continue;
         }
-        let mut sum = lower[(n, i)];
+        let mut sum = upper[(i, n)];
         for k in i + 1..n {
             if kept[k] {
-                sum -= lower[(k, i)] * factors[k];
+                sum -= upper[(i, k)] * factors[k];
             }
         }
-        factors[i] = sum / lower[(i, i)];
+        factors[i] = sum / upper[(i, i)];
     }
     for i in 0..n {
         if kept[i] {
             factors[i] *= scale[n] / scale[i];
         }
     }
-    (factors, lower[(n, n)] * scale[n] * scale[n])
+    (factors, upper[(n, n)] * scale[n] * scale[n])
 }
 
 /// Share of a column's squares below which what others leave of it is rounding.

@@ -1,6 +1,8 @@
 //! The search for the smallest set of effects that explains what the model cannot say: forward over sets, with every
 //! member tried against every other candidate, back again, and simpler ones preferred.
 
+use std::collections::HashSet;
+
 use super::bench::{Bench, Pick, Table, Trial};
 use super::evidence::Evidence;
 use super::pool::On;
@@ -146,7 +148,7 @@ impl Bench<'_> {
             return false;
         };
         let replaced = Self::replaced(accepted, &trial.picks);
-        replaced.iter().all(|p| self.is_within(p, new, &[]))
+        replaced.iter().all(|p| self.is_within(p, new))
     }
 
     /// The first of some sets that evidence speaks for; why single effects were refused goes into a list.
@@ -186,6 +188,7 @@ impl Bench<'_> {
         let problem = self.problem;
         let score = |trial: &Trial| criterion(problem, trial, worth);
         let mut trials: Vec<Trial> = Vec::new();
+        let mut known: HashSet<Vec<usize>> = HashSet::new();
         for set in beam {
             for pick in self.present.iter().flatten() {
                 if set.iter().any(|p| p.candidate == pick.candidate) {
@@ -195,16 +198,15 @@ impl Bench<'_> {
                 // What holds more than a member takes its place.
                 let mut pick = pick.clone();
                 if pick.columns.len() > 1 {
-                    let (within, rest): (Vec<Pick>, Vec<Pick>) = picks
-                        .into_iter()
-                        .partition(|p| self.is_within(p, &pick, &[]));
+                    let (within, rest): (Vec<Pick>, Vec<Pick>) =
+                        picks.into_iter().partition(|p| self.is_within(p, &pick));
                     // Its rank beside the accepted set does not count what it replaces.
                     let more: usize = within.iter().map(|p| p.rank).sum();
                     pick.rank = (pick.rank + more).min(pick.columns.len());
                     picks = rest;
                 }
                 picks.push(pick);
-                if trials.iter().all(|known| !same(&known.picks, &picks)) {
+                if known.insert(members(&picks)) {
                     trials.push(self.try_in(&table, picks));
                 }
             }
@@ -249,7 +251,7 @@ impl Bench<'_> {
                         }
                         let mut picks = best.picks.clone();
                         let mut pick = pick.clone();
-                        if pick.columns.len() > 1 && self.is_within(&picks[i], &pick, &[]) {
+                        if pick.columns.len() > 1 && self.is_within(&picks[i], &pick) {
                             pick.rank = (pick.rank + picks[i].rank).min(pick.columns.len());
                         }
                         picks[i] = pick;
@@ -424,6 +426,7 @@ impl Bench<'_> {
         // A kind that holds a simpler one, such as friction that differs by direction, comes after it.
         // So does what refines a member, after other simple kinds.
         let refines = !Self::replaced(accepted, &chosen.0.picks).is_empty();
+        let beside = self.beside(accepted);
         let nested = trials.iter().filter(|trial| {
             let news = difference(&trial.picks, accepted);
             let bests = difference(&chosen.0.picks, accepted);
@@ -437,7 +440,7 @@ impl Bench<'_> {
                 && Self::replaced(accepted, &trial.picks).is_empty()
                 && simple.rank < own.rank
                 && self.candidate(simple).searched <= self.candidate(own).searched
-                && (refines || self.is_within(simple, own, accepted))
+                && (refines || self.is_within_beside(simple, own, &beside))
         });
         let mut simpler: Vec<(Trial, Evidence)> = Vec::new();
         for trial in nested {
@@ -524,6 +527,13 @@ pub(crate) fn difference(set: &[Pick], other: &[Pick]) -> Vec<Pick> {
     let is_new = |pick: &&Pick| other.iter().all(|p| p.candidate != pick.candidate);
     let new: Vec<Pick> = set.iter().filter(is_new).cloned().collect();
     if new.is_empty() { set.to_vec() } else { new }
+}
+
+/// The candidates of a set, in order.
+fn members(picks: &[Pick]) -> Vec<usize> {
+    let mut members: Vec<usize> = picks.iter().map(|pick| pick.candidate).collect();
+    members.sort_unstable();
+    members
 }
 
 /// Whether two sets hold the same candidates.

@@ -18,10 +18,11 @@ impl Bench<'_> {
             let own = others.remove(i);
             self.look(&others);
             let rank = self.present[own.candidate].as_ref().map_or(0, |p| p.rank);
+            let beside = self.beside(&others);
             let nested: Vec<Pick> = (self.present.iter().flatten())
                 .filter(|one| one.rank < rank)
                 .filter(|one| self.candidate(one).searched <= self.candidate(&own).searched)
-                .filter(|one| self.is_within(one, &own, &others))
+                .filter(|one| self.is_within_beside(one, &own, &beside))
                 .cloned()
                 .collect();
             let channels = self.acted_on(std::slice::from_ref(&own));
@@ -87,7 +88,7 @@ impl Bench<'_> {
                     is_new
                         && one.rank == n_columns(&pair)
                         && self.candidate(one).searched == 0
-                        && pair.iter().all(|p| self.is_within(p, one, &[]))
+                        && pair.iter().all(|p| self.is_within(p, one))
                 });
                 let Some(same) = same.cloned() else { continue };
                 let mut set = others.clone();

@@ -2,9 +2,7 @@
 
 use super::bench::{Bench, Pick};
 use super::column::Column;
-use super::factored::Factored;
-use super::pool::On;
-use super::problem::{Choice, Source};
+use super::problem::Source;
 
 impl Bench<'_> {
     /// Chooses the constants of each effect of a set anew, beside those of the others.
@@ -13,37 +11,19 @@ impl Bench<'_> {
         for _ in 0..2 {
             let before = picks.clone();
             for i in 0..picks.len() {
-                let Source::Columns(choices) = &problem.candidates[picks[i].candidate].source
-                else {
-                    continue;
-                };
-                if choices.len() < 2 {
-                    continue;
+                let candidate = picks[i].candidate;
+                match &problem.candidates[candidate].source {
+                    Source::Columns(choices) if choices.len() > 1 => {}
+                    _ => continue,
                 }
                 let mut others = picks.clone();
                 let old = others.remove(i);
-                let (factors, _) = self.fit(&others, On::All);
-                let rest = self.rest(&others, &factors);
-                let which = self.columns(&others);
-                let factor = Factored::new(&self.pool.gram(&which, &self.weights, On::All));
-                let candidate = old.candidate;
-                let score = |(at, choice): (usize, &Choice)| {
-                    let products = self.products_of_choice((candidate, at), choice, &which);
-                    self.explained(&choice.columns, &products, &factor, &rest)
-                };
-                let scored = choices.iter().enumerate().map(score).enumerate();
-                let Some((best, explained)) = scored.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+                let beside = self.beside(&others);
+                let Some((best, explained)) = self.best_choice(candidate, &beside) else {
                     continue;
                 };
-                let own: Vec<Column> = old
-                    .columns
-                    .iter()
-                    .map(|k| self.pool.column(*k).clone())
-                    .collect();
-                if explained
-                    > self.explained(&own, &self.all_products(&own, &which), &factor, &rest)
-                {
-                    picks[i] = self.pick(old.candidate, best);
+                if explained > self.explained(&old.columns, &beside) {
+                    picks[i] = self.pick(candidate, best);
                 }
             }
             if picks == before {
@@ -90,25 +70,15 @@ impl Bench<'_> {
             let unscale = |x: f64| if is_positive { x.exp() } else { x };
             let mut others = picks.clone();
             others.remove(i);
-            let (factors, _) = self.fit(&others, On::All);
-            let rest = self.rest(&others, &factors);
-            let which = self.columns(&others);
-            let factor = Factored::new(&self.pool.gram(&which, &self.weights, On::All));
+            let beside = self.beside(&others);
             let at = |x: f64| -> Option<(f64, Vec<Column>)> {
                 let columns = supply.finer(candidate, unscale(x))?;
-                let products = self.all_products(&columns, &which);
-                Some((self.explained(&columns, &products, &factor, &rest), columns))
+                Some((self.explained_by(&columns, &beside), columns))
             };
             let Some(best) = golden(scale(low), scale(high), &at) else {
                 continue;
             };
-            let own: Vec<Column> = picks[i]
-                .columns
-                .iter()
-                .map(|k| self.pool.column(*k).clone())
-                .collect();
-            let products = self.all_products(&own, &which);
-            let now = self.explained(&own, &products, &factor, &rest);
+            let now = self.explained(&picks[i].columns, &beside);
             let (x, (explained, columns)) = best;
             if explained > now {
                 picks[i] = Pick {

@@ -42,6 +42,39 @@ fn blocks_hold_what_the_regressor_holds() {
     }
 }
 
+/// Some columns alone are the same numbers, and the others zero.
+#[test]
+fn some_columns_are_what_they_are_among_all() {
+    for name in ["five_bar-tied", "panda", "spidermill"] {
+        let derivation = derived(name);
+        let evaluator = Evaluator::new(&derivation);
+        let sample = Sample::random(&derivation.mechanism, 70, 0.2, &mut Stream::new(3));
+        let matrix = evaluator.regressor(&sample.states()).unwrap();
+        let n = matrix.ncols();
+        let drives = derivation.mechanism.drives.len();
+        for wanted in [vec![0], vec![n - 1], (0..n).step_by(3).collect()] {
+            let mut before = 0;
+            let is_wanted = |k: usize| wanted.contains(&k);
+            let end = evaluator.regressor_blocks_of::<PoseFault>(
+                &sample.states(),
+                &is_wanted,
+                |len, block| {
+                    for (k, values) in block.iter().enumerate() {
+                        for (i, value) in values.iter().enumerate() {
+                            let entry = matrix[((before + i) * drives + k / n, k % n)];
+                            let expected = if is_wanted(k % n) { entry } else { 0.0 };
+                            assert_eq!(value.to_bits(), expected.to_bits(), "{name} {wanted:?}");
+                        }
+                    }
+                    before += len;
+                    Ok(())
+                },
+            );
+            assert_eq!((end, before), (Ok(()), 70));
+        }
+    }
+}
+
 /// Angles beyond the range of the fast sine go another way, and turns by whole circles change nothing but rounding.
 #[test]
 fn large_angles_are_turned_back() {
