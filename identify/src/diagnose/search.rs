@@ -133,7 +133,7 @@ impl Bench<'_> {
     }
 
     /// Whether evidence speaks for one set beside another that is to take its place.
-    fn is_worse(&mut self, settled: &[Pick], before: &[Pick]) -> bool {
+    pub(crate) fn is_worse(&mut self, settled: &[Pick], before: &[Pick]) -> bool {
         self.weigh(before);
         let channels: Vec<usize> = (0..self.weights.len()).collect();
         let evidence = self.evidence(settled, before, &channels);

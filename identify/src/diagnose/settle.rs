@@ -44,6 +44,7 @@ impl Bench<'_> {
     /// Takes out, one by one, what is no longer needed.
     pub(crate) fn prune(&mut self, picks: Vec<Pick>) -> Vec<Pick> {
         self.weigh(&picks);
+        let whole = picks.clone();
         let mut picks = self.simplify(picks);
         loop {
             let without = |i: usize| {
@@ -58,15 +59,19 @@ impl Bench<'_> {
                 let channels = self.acted_on(std::slice::from_ref(&picks[i]));
                 tests.push((i, self.evidence(&rest, &picks, &channels)));
             }
-            let weakest = tests
+            let mut unsupported: Vec<(usize, f64)> = tests
                 .into_iter()
                 .filter(|(_, evidence)| !evidence.holds())
-                .min_by(|a, b| a.1.gain.total_cmp(&b.1.gain));
-            match weakest {
-                Some((i, _)) => {
-                    let fewer = self.refresh(without(i));
-                    picks = self.simplify(fewer);
-                }
+                .map(|(i, evidence)| (i, evidence.gain))
+                .collect();
+            unsupported.sort_by(|a, b| a.1.total_cmp(&b.1));
+            let fewer = unsupported.into_iter().find_map(|(i, _)| {
+                let fewer = self.refresh(without(i));
+                // Members that do little one by one may do much together.
+                (!self.is_worse(&fewer, &whole)).then_some(fewer)
+            });
+            match fewer {
+                Some(fewer) => picks = self.simplify(fewer),
                 None => break,
             }
         }
