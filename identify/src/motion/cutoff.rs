@@ -52,7 +52,7 @@ pub(crate) fn choose_cutoff(signals: &[Signal<'_>], rate_hz: f64, order: usize) 
         .iter()
         .filter_map(|signal| Spectrum::new(*signal, rate_hz))
         .collect();
-    let bins = spectra.first().map_or(0, |one| one.motion.len());
+    let bins = spectra.first().map_or(0, |one| one.bins);
     let gains = Gains::new(bins, order);
     if spectra.is_empty() {
         return None;
@@ -63,9 +63,12 @@ pub(crate) fn choose_cutoff(signals: &[Signal<'_>], rate_hz: f64, order: usize) 
         .map(|i| lowest * (highest / lowest).powf(f64::from(i) / f64::from(STEPS)))
         .map(|cutoff| {
             let transient = transients(cutoff / rate_hz, samples);
-            let errors = spectra
-                .iter()
-                .map(|s| s.relative_error(cutoff, &gains, transient));
+            let passed = gains.passed(cutoff, rate_hz);
+            let noise = [1, 2].map(|times| gains.noise(&passed, times, rate_hz));
+            let errors = spectra.iter().map(|spectrum| {
+                let noise = noise[usize::from(spectrum.times == 2)];
+                spectrum.relative_error(&passed, noise, &gains, transient)
+            });
             (cutoff, errors.sum())
         })
         .collect();
@@ -92,10 +95,11 @@ fn transients(cutoff: f64, samples: usize) -> f64 {
 
 /// Power of an acceleration over frequency, split into motion and noise.
 struct Spectrum {
-    rate_hz: f64,
     times: u8,
-    /// Power of the true acceleration at each frequency, 0 where the noise hides it.
-    motion: Vec<f64>,
+    /// Frequencies that there are.
+    bins: usize,
+    /// Power of the true acceleration at the frequencies at which the noise does not hide it.
+    motion: Vec<(usize, f64)>,
     /// Power of the noise of the measured values, the same at all frequencies.
     noise: f64,
 }
@@ -126,7 +130,7 @@ impl Spectrum {
                 .map(|c| c.iter().sum::<f64>() / c.len() as f64)
                 .collect(),
         );
-        let mut motion = vec![0.0; bins];
+        let mut motion = Vec::new();
         // A window of von Hann and padding spread one frequency over some bins.
         let narrowest = (8 * bins).div_ceil(differences.len());
         let mut start = 1;
@@ -139,30 +143,32 @@ impl Spectrum {
                     // What differences of neighbours take of a motion at this frequency.
                     let half = 0.5 * angle(k);
                     let taken = (half.sin() / half).powi(2 * i32::from(signal.times));
-                    motion[k] = (power[k] - noise * shape(k)).max(0.0) / taken;
+                    let above = power[k] - noise * shape(k);
+                    if above > 0.0 {
+                        motion.push((k, above / taken));
+                    }
                 }
             }
             start = end;
         }
-        motion.iter().any(|power| *power > 0.0).then_some(Self {
-            rate_hz,
+        (!motion.is_empty()).then_some(Self {
             times: signal.times,
+            bins,
             motion,
             noise,
         })
     }
 
-    /// Expected square error of the filtered acceleration, relative to the square of its size plus that error.
-    fn relative_error(&self, cutoff_hz: f64, gains: &Gains, transient: f64) -> f64 {
-        let warped = (PI * cutoff_hz / self.rate_hz).tan().powi(gains.power);
+    /// Expected square error of the filtered acceleration, relative to the square of its size plus that error, where the
+    /// filter passes `passed` of each frequency and noise of power 1 becomes one of power `noise`.
+    fn relative_error(&self, passed: &[f64], noise: f64, gains: &Gains, transient: f64) -> f64 {
         let times = i32::from(self.times);
-        let (mut error, mut size) = (0.0, 0.0);
-        for (k, motion) in self.motion.iter().enumerate().skip(1) {
-            let passed = 1.0 / (1.0 + gains.warped[k] / warped);
+        let mut error = self.noise * noise;
+        let mut size = 0.0;
+        for (k, motion) in &self.motion {
             // Central differences over two steps.
-            let gain = passed * gains.difference[k].powi(times);
-            let left = self.noise * (passed * (gains.sine[k] * self.rate_hz).powi(times)).powi(2);
-            error += (1.0 - gain).powi(2) * motion + left;
+            let gain = passed[*k] * gains.difference[*k].powi(times);
+            error += (1.0 - gain).powi(2) * motion;
             size += motion;
         }
         error += transient * size;
@@ -193,6 +199,24 @@ impl Gains {
             sine: angles.clone().map(f64::sin).collect(),
             difference: angles.map(|a| a.sin() / a).collect(),
         }
+    }
+
+    /// What the filter of a cut-off passes of each frequency.
+    fn passed(&self, cutoff_hz: f64, rate_hz: f64) -> Vec<f64> {
+        let warped = (PI * cutoff_hz / rate_hz).tan().powi(self.power);
+        let passed = |frequency: &f64| 1.0 / (1.0 + frequency / warped);
+        self.warped.iter().map(passed).collect()
+    }
+
+    /// The power of accelerations from noise of power 1 of what is differentiated so many times.
+    fn noise(&self, passed: &[f64], times: i32, rate_hz: f64) -> f64 {
+        let pairs = passed.iter().zip(&self.sine).skip(1);
+        pairs
+            .map(|(passed, sine)| {
+                let slope = (sine * rate_hz).powi(times);
+                (passed * slope).powi(2)
+            })
+            .sum()
     }
 }
 

@@ -52,26 +52,28 @@ pub fn decimate_columns(columns: &[&[f64]], factor: usize) -> Result<Vec<Vec<f64
             .map(|column| decimate(column, factor))
             .collect();
     }
-    let filter = anti_alias(factor)?;
     let mut short = Vec::with_capacity(columns.len());
     for group in columns.chunks(LANES) {
         let samples = group.iter().map(|column| column.len()).min().unwrap_or(0);
-        if factor >= samples {
-            return Err(FilterError::FactorOutOfRange { factor });
-        }
         let mut lanes = vec![[0.0; LANES]; samples];
         for (k, column) in group.iter().enumerate() {
             for (lane, value) in lanes.iter_mut().zip(*column) {
                 lane[k] = *value;
             }
         }
-        let filtered = filter.zero_phase_lanes(&lanes)?;
-        short.extend((0..group.len()).map(|k| {
-            let kept = filtered.iter().step_by(factor);
-            kept.map(|lane| lane[k]).collect::<Vec<f64>>()
-        }));
+        let kept = decimate_lanes(&lanes, factor)?;
+        short.extend((0..group.len()).map(|k| kept.iter().map(|lane| lane[k]).collect()));
     }
     Ok(short)
+}
+
+/// Every `factor`-th sample of columns that stand side by side.
+fn decimate_lanes(lanes: &[[f64; LANES]], factor: usize) -> Result<Vec<[f64; LANES]>, FilterError> {
+    if factor >= lanes.len() {
+        return Err(FilterError::FactorOutOfRange { factor });
+    }
+    let filtered = anti_alias(factor)?.zero_phase_lanes(lanes)?;
+    Ok(filtered.into_iter().step_by(factor).collect())
 }
 
 /// [`decimate`] on each of `width` interleaved columns: `table[sample * width + column]` in, the
@@ -85,20 +87,40 @@ pub fn decimate_table(table: &[f64], width: usize, factor: usize) -> Result<Vec<
             per_sample: width,
         });
     }
-    if factor == 1 {
-        return Ok(table.to_vec());
+    match factor {
+        0 => return Err(FilterError::FactorOutOfRange { factor }),
+        1 => return Ok(table.to_vec()),
+        _ => {}
     }
     let samples = table.len() / width;
-    let mut short = vec![0.0; samples.div_ceil(factor.max(1)) * width];
+    let mut short = vec![0.0; samples.div_ceil(factor) * width];
+    // A drive knows nothing of bodies that it does not move: their columns are zero, and stay so.
+    let mut is_zero = vec![true; width];
+    for row in table.chunks_exact(width) {
+        for (is_zero, value) in is_zero.iter_mut().zip(row) {
+            *is_zero &= *value == 0.0;
+        }
+    }
+    let mut columns: Vec<usize> = (0..width).filter(|column| !is_zero[*column]).collect();
+    if columns.is_empty() {
+        // The length is looked at in any case.
+        columns.push(0);
+    }
     // A few at a time, so that a long table is not held twice.
-    for first in (0..width).step_by(LANES) {
-        let some: Vec<Vec<f64>> = (first..width.min(first + LANES))
-            .map(|column| table.iter().skip(column).step_by(width).copied().collect())
+    for group in columns.chunks(LANES) {
+        let lanes: Vec<[f64; LANES]> = (table.chunks_exact(width))
+            .map(|row| {
+                let mut lane = [0.0; LANES];
+                for (value, column) in lane.iter_mut().zip(group) {
+                    *value = row[*column];
+                }
+                lane
+            })
             .collect();
-        let some: Vec<&[f64]> = some.iter().map(Vec::as_slice).collect();
-        for (column, values) in (first..).zip(decimate_columns(&some, factor)?) {
-            for (sample, value) in values.into_iter().enumerate() {
-                short[sample * width + column] = value;
+        let kept = decimate_lanes(&lanes, factor)?;
+        for (row, lane) in short.chunks_exact_mut(width).zip(&kept) {
+            for (column, value) in group.iter().zip(lane) {
+                row[*column] = *value;
             }
         }
     }

@@ -40,6 +40,8 @@ const WINDOWS: usize = 10;
 const DROPPED: (f64, f64) = (1.5, 0.2);
 /// Bands of the parallel filter that are tried, in parts of the band of the forces.
 const PARALLEL: [f64; 3] = [0.5, 1.0, 2.0];
+/// Samples beside a window, of those that are looked at, beyond which its low-pass remembers nothing.
+const BEYOND: usize = 60;
 /// Fewest samples of a window.
 const FEWEST: usize = 40;
 /// What is left of a force below this part of it is rounding.
@@ -345,17 +347,20 @@ impl Search<'_> {
         }
         let regressor = self.regressor(run, &samples)?;
         let mut picked = DMatrix::zeros(samples.len(), forces.len());
+        // What the filter feels beyond the window, with room to spare.
+        let from = start.saturating_sub(BEYOND * every);
         for (d, force) in forces.iter().enumerate() {
+            let around = &force[from..(end + BEYOND * every).min(force.len())];
             // The noise of the forces must not fold down.
             let smooth = if every > 1 {
                 let rate = self.open.rate_hz;
                 let low_pass = LowPass::butterworth(4, 0.4 * rate / every as f64, rate).ok()?;
-                low_pass.zero_phase(force).ok()?
+                low_pass.zero_phase(around).ok()?
             } else {
-                force.clone()
+                around.to_vec()
             };
             for (i, sample) in samples.iter().enumerate() {
-                picked[(i, d)] = smooth[*sample];
+                picked[(i, d)] = smooth[*sample - from];
             }
         }
         Some(Samples {
