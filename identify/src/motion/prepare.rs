@@ -5,6 +5,7 @@ use crate::motion::derivatives::mean_rate;
 use crate::motion::even::{is_even, on_even_times};
 use crate::motion::options::{Preparation, Smoothing};
 use crate::motion::prepared_as::PreparedAs;
+use crate::motion::run::Run;
 use crate::motion::series::{self, Periodic};
 use crate::motion::smooth::{Recorded, Way};
 use crate::motion::{local_polynomials, periods};
@@ -116,7 +117,8 @@ impl Recording {
             )));
         }
         let states = self.smoothed(time, columns, cutoff, way)?;
-        if found.is_none() && matches!(way, Way::Series { .. }) {
+        // Where forces have chosen a series, they have told that what it leaves is no motion.
+        if found.is_none() && !preparation.chosen && matches!(way, Way::Series { .. }) {
             self.note_left_over(columns, &states, notes);
         }
         Ok(states)
@@ -202,6 +204,8 @@ pub struct Open {
     pub band_hz: f64,
     /// The cut-off that the spectra of the positions alone propose, Hz.
     pub cutoff_hz: f64,
+    /// The period after which the motion repeats itself, s, where it does.
+    pub period: Option<f64>,
 }
 
 impl Recording {
@@ -230,18 +234,29 @@ impl Recording {
         let longest = runs.iter().max_by_key(|run| run.samples());
         let found = longest.and_then(|run| {
             let prepared = &run.prepared;
-            Some(Open {
-                rate_hz: mean_rate(&run.time),
-                band_hz: prepared.band_hz?,
-                cutoff_hz: prepared.cutoff_hz.filter(|cutoff| {
-                    let harmonics = prepared
-                        .period
-                        .map_or(f64::INFINITY, |period| cutoff * period);
-                    harmonics > MANY_HARMONICS
-                })?,
-            })
+            let cutoff = prepared.cutoff_hz.filter(|cutoff| {
+                let harmonics = prepared
+                    .period
+                    .map_or(f64::INFINITY, |period| cutoff * period);
+                harmonics > MANY_HARMONICS
+            });
+            Some((mean_rate(&run.time), prepared.band_hz?, cutoff?))
         });
-        Ok(found)
+        Ok(found.map(|(rate_hz, band_hz, cutoff_hz)| {
+            let as_series = Preparation {
+                smoothing: Smoothing::Fourier { period: None },
+                cutoff_hz: Some(cutoff_hz),
+                ..preparation
+            };
+            let runs = self.runs_with(coordinates, drives, &as_series).ok();
+            let longest = runs.and_then(|runs| runs.into_iter().max_by_key(Run::samples));
+            Open {
+                rate_hz,
+                band_hz,
+                cutoff_hz,
+                period: longest.and_then(|run| run.prepared.period),
+            }
+        }))
     }
 }
 

@@ -6,10 +6,14 @@
 //! time, both through one low-pass at the band of the motion, and held against the last fifth. A cut-off that is too low leaves
 //! of the forces what the model could explain, one that is too high hides it in noise. Octaves above the band count as far as
 //! the model explains anything of them. The figure is the geometric mean over the drives of what is left: the likelihood of
-//! errors whose size is not known, which knows no units.
+//! errors whose size is not known, which knows no units. A motion that repeats itself may also be a Fourier series, whose
+//! harmonics are tried in the same way: it averages over the periods what a low-pass lets through. Local polynomials are no
+//! candidates: at the same cut-off they leave as much as the low-pass, on all recordings that were looked at.
 
 use modelmill_codegen::{Evaluator, States};
-use modelmill_identify::{LowPass, Note, Open, PASSED_BY_DECIMATION, Recording as Raw, Run};
+use modelmill_identify::{
+    LowPass, Note, Open, PASSED_BY_DECIMATION, Preparation, Recording as Raw, Run, Smoothing,
+};
 use nalgebra::{DMatrix, DVector};
 
 use super::free;
@@ -20,6 +24,10 @@ use crate::text::table::{percent, significant};
 
 /// Ratio of neighbouring cut-offs.
 const RATIO: f64 = 1.6;
+/// Ratio of neighbouring numbers of harmonics.
+const FEWER: f64 = 1.35;
+/// Harmonics of a series, at most.
+const MOST_HARMONICS: usize = 100;
 /// The highest cut-off, in parts of the sampling rate: beyond, differences take more than the filter leaves.
 const HIGHEST: f64 = 0.2;
 /// The same in parts of the band of the forces: noise above says nothing of them, and makes the model's forces rough.
@@ -84,6 +92,100 @@ struct Left {
     relative: f64,
 }
 
+/// A way to smooth positions.
+#[derive(Clone, Copy)]
+struct Smoother {
+    /// Hz.
+    cutoff: f64,
+    /// The period of a Fourier series, s; none of a low-pass.
+    period: Option<f64>,
+}
+
+impl Smoother {
+    fn low_pass(cutoff: f64) -> Self {
+        Self {
+            cutoff,
+            period: None,
+        }
+    }
+
+    fn series(period: f64, harmonics: usize) -> Self {
+        Self {
+            // Rounding must not take the last one.
+            cutoff: (harmonics as f64 + 1e-6) / period,
+            period: Some(period),
+        }
+    }
+
+    fn harmonics(self) -> Option<usize> {
+        Some(whole(self.cutoff * self.period?))
+    }
+
+    fn goes_into(self, preparation: &mut Preparation) {
+        preparation.cutoff_hz = Some(self.cutoff);
+        if self.period.is_some() {
+            preparation.smoothing = Smoothing::Fourier {
+                period: self.period,
+            };
+        }
+    }
+
+    /// Where it is, beside others of its kind.
+    fn place(self) -> String {
+        match self.harmonics() {
+            Some(1) => "1 harmonic".to_owned(),
+            Some(n) => format!("{n} harmonics"),
+            None => format!("{} Hz", significant(self.cutoff, 3)),
+        }
+    }
+
+    fn describe(self) -> String {
+        match self.period {
+            Some(period) => format!(
+                "is taken for a Fourier series of period {} s with {}",
+                significant(period, 5),
+                self.place()
+            ),
+            None => format!("is smoothed at {}", self.place()),
+        }
+    }
+}
+
+/// Smoothers of one kind that were tried, the one that passes most first.
+struct Tried {
+    all: Vec<(Smoother, Left)>,
+    /// Which is the smoothest of those that leave nearly the least.
+    best: usize,
+}
+
+impl Tried {
+    fn best(&self) -> (Smoother, Left) {
+        self.all[self.best]
+    }
+
+    /// What the neighbours of the best would cost, as words to be joined.
+    fn neighbours(&self) -> impl Iterator<Item = String> {
+        let beside = [self.best.checked_sub(1), Some(self.best + 1)];
+        beside.into_iter().flatten().filter_map(|at| {
+            let (smoother, other) = self.all.get(at)?;
+            let cost = cost(other.figure - self.best().1.figure);
+            Some(format!("{cost} at {}", smoother.place()))
+        })
+    }
+}
+
+/// How much more is left, of the difference of two figures.
+fn cost(difference: f64) -> String {
+    let more = difference.exp() - 1.0;
+    if more.abs() < 1e-3 {
+        "as much".to_owned()
+    } else if more < 0.0 {
+        format!("{} less", percent(Some(-more)))
+    } else {
+        format!("{} more", percent(Some(more)))
+    }
+}
+
 struct Search<'a> {
     model: &'a Model,
     raw: &'a Raw,
@@ -97,6 +199,7 @@ impl Search<'_> {
             rate_hz,
             band_hz,
             cutoff_hz,
+            period,
         } = self.open;
         let highest = (HIGHEST * rate_hz).min(FARTHEST * band_hz);
         let lowest = (LOWEST * band_hz).min(cutoff_hz);
@@ -107,50 +210,46 @@ impl Search<'_> {
         while ladder[ladder.len() - 1] / RATIO >= lowest {
             ladder.push(ladder[ladder.len() - 1] / RATIO);
         }
+        let ladder: Vec<Smoother> = ladder.into_iter().map(Smoother::low_pass).collect();
         // The lowest cut-off drops most samples; what it leaves is looked at for all.
         let runs = self.runs(ladder[ladder.len() - 1])?;
         let looked_at = self.windows(&runs);
-        let mut judged: Vec<(f64, Left)> = Vec::new();
-        let mut least = f64::INFINITY;
-        for cutoff in ladder {
-            let Some(left) = self.left(cutoff, band_hz, &looked_at) else {
-                continue;
-            };
-            judged.push((cutoff, left));
-            least = least.min(left.figure);
-            if left.figure > least + HOPELESS.ln() && judged.len() > 3 {
-                break;
+        let filtered = self.tried(&ladder, &looked_at)?;
+        let series = period.and_then(|period| {
+            let ladder = series_up_to(filtered.best().0.cutoff, period);
+            self.tried(&ladder, &looked_at)
+        });
+        let (low_pass, by_filter) = filtered.best();
+        let is_better = |series: &Tried| series.best().1.figure < by_filter.figure - BETTER;
+        let (tried, other) = match series {
+            Some(series) if is_better(&series) => {
+                let more = cost(by_filter.figure - series.best().1.figure);
+                (
+                    series,
+                    Some(format!("{more} by a low-pass at {}", low_pass.place())),
+                )
             }
-        }
-        let best = judged
-            .iter()
-            .rposition(|(_, left)| left.figure <= least + BETTER)?;
-        let (cutoff, left) = judged[best];
-        let (decimate, left) = self.decimation(cutoff, &looked_at).unwrap_or((1, left));
+            Some(series) => {
+                let (smoother, left) = series.best();
+                let more = cost(left.figure - by_filter.figure);
+                (
+                    filtered,
+                    Some(format!(
+                        "{more} by a Fourier series of {}",
+                        smoother.place()
+                    )),
+                )
+            }
+            None => (filtered, None),
+        };
+        let (smoother, left) = tried.best();
+        let (decimate, left) = self.decimation(smoother, &looked_at).unwrap_or((1, left));
         let mut reading = self.reading.clone();
-        reading.preparation.cutoff_hz = Some(cutoff);
+        smoother.goes_into(&mut reading.preparation);
         reading.preparation.decimate = decimate;
         reading.preparation.chosen = true;
-        let neighbours: Vec<String> = [best.checked_sub(1), Some(best + 1)]
-            .into_iter()
-            .filter_map(|at| {
-                let (cutoff, other) = judged.get(at?)?;
-                let more = (other.figure - judged[best].1.figure).exp() - 1.0;
-                let cost = if more.abs() < 1e-3 {
-                    "as much".to_owned()
-                } else if more < 0.0 {
-                    format!("{} less", percent(Some(-more)))
-                } else {
-                    format!("{} more", percent(Some(more)))
-                };
-                Some(format!("{cost} at {} Hz", significant(*cutoff, 3)))
-            })
-            .collect();
-        let neighbours = if neighbours.is_empty() {
-            String::new()
-        } else {
-            format!(", {}", neighbours.join(" and "))
-        };
+        let others: Vec<String> = tried.neighbours().chain(other).collect();
+        let others: String = others.iter().map(|other| format!(", {other}")).collect();
         let every = if decimate > 1 {
             format!(
                 ", and one in {decimate} samples kept after the parallel filter on forces and regressor"
@@ -159,24 +258,43 @@ impl Search<'_> {
             String::new()
         };
         let says = format!(
-            "{} is smoothed at {} Hz{every}, since that leaves least of the forces on held-out time: {} below {} Hz (geometric \
-             mean over the drives){neighbours}; options `cutoff_hz` and `decimate` say otherwise.",
+            "{} {}{every}, since that leaves least of the forces on held-out time: {} below {} Hz (geometric mean over the \
+             drives){others}; options `cutoff_hz`, `smoothing` and `decimate` say otherwise.",
             self.raw.file(),
-            significant(cutoff, 3),
+            smoother.describe(),
             percent(Some(left.relative)),
             significant(band_hz, 3),
         );
         Some((reading, Note::info(says)))
     }
 
+    /// Smoothers that are tried one after the other, the one that passes most first, until nothing is to be hoped for.
+    fn tried(&self, ladder: &[Smoother], looked_at: &[Window]) -> Option<Tried> {
+        let mut all: Vec<(Smoother, Left)> = Vec::new();
+        let mut least = f64::INFINITY;
+        for smoother in ladder {
+            let Some(left) = self.left(*smoother, self.open.band_hz, looked_at) else {
+                continue;
+            };
+            all.push((*smoother, left));
+            least = least.min(left.figure);
+            if left.figure > least + HOPELESS.ln() && all.len() > 3 {
+                break;
+            }
+        }
+        let is_good = |(_, left): &(Smoother, Left)| left.figure <= least + BETTER;
+        let best = all.iter().rposition(is_good)?;
+        Some(Tried { all, best })
+    }
+
     /// The factor of decimation, and what is left with it on held-out time.
-    fn decimation(&self, cutoff: f64, looked_at: &[Window]) -> Option<(usize, Left)> {
+    fn decimation(&self, smoother: Smoother, looked_at: &[Window]) -> Option<(usize, Left)> {
         let mut best: Option<(usize, Left)> = None;
         for part in PARALLEL {
             let passed = part * self.open.band_hz;
             let factor = whole(PASSED_BY_DECIMATION * self.open.rate_hz / passed).max(1);
             let passed = if factor == 1 { f64::INFINITY } else { passed };
-            let left = self.left(cutoff, passed, looked_at)?;
+            let left = self.left(smoother, passed, looked_at)?;
             if best.is_none_or(|(_, least)| left.figure < least.figure - BETTER) {
                 best = Some((factor, left));
             }
@@ -187,10 +305,10 @@ impl Search<'_> {
         best
     }
 
-    /// The runs that a cut-off gives.
-    fn runs(&self, cutoff: f64) -> Option<Vec<Run>> {
+    /// The runs that a smoother gives.
+    fn runs(&self, smoother: Smoother) -> Option<Vec<Run>> {
         let mut preparation = self.reading.preparation.clone();
-        preparation.cutoff_hz = Some(cutoff);
+        smoother.goes_into(&mut preparation);
         // What the band is was found already, and costs spectra of all positions.
         preparation.band_hz = Some(self.open.band_hz);
         let mut runs = free::runs(self.model, self.raw, &preparation).ok()?;
@@ -238,9 +356,9 @@ impl Search<'_> {
         (FINE * self.highest()).min(self.open.rate_hz)
     }
 
-    /// What is left on held-out time by a cut-off, where rows below `passed`, Hz, are fitted.
-    fn left(&self, cutoff: f64, passed: f64, windows: &[Window]) -> Option<Left> {
-        let runs = self.runs(cutoff)?;
+    /// What is left on held-out time by a smoother, where rows below `passed`, Hz, are fitted.
+    fn left(&self, smoother: Smoother, passed: f64, windows: &[Window]) -> Option<Left> {
+        let runs = self.runs(smoother)?;
         let every = whole(self.open.rate_hz / self.fine()).max(1);
         let rate = self.open.rate_hz / every as f64;
         let slack = 1.0 / self.open.rate_hz;
@@ -400,6 +518,17 @@ impl Search<'_> {
         }
         more.iter().all(|x| x.is_finite()).then_some(more)
     }
+}
+
+/// Series up to a frequency, Hz, of ever fewer harmonics.
+fn series_up_to(highest: f64, period: f64) -> Vec<Smoother> {
+    let mut harmonics = whole(highest * period).clamp(1, MOST_HARMONICS);
+    let mut ladder = Vec::new();
+    while harmonics > 0 {
+        ladder.push(Smoother::series(period, harmonics));
+        harmonics = whole(harmonics as f64 / FEWER);
+    }
+    ladder
 }
 
 /// A stretch of time, s.
