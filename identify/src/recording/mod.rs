@@ -165,7 +165,9 @@ impl Recording {
             let column = Column {
                 values: column.values[start..end].to_vec(),
                 lost: column.lost.get(start..end).unwrap_or(&[]).to_vec(),
-                ..column.clone()
+                text: column.text.clone(),
+                not_finite: column.not_finite.clone(),
+                as_recorded: None,
             };
             (name.clone(), column)
         });

@@ -83,11 +83,32 @@ impl Recording {
                 for (lost, spike) in column.lost.iter_mut().zip(&spikes) {
                     *lost |= spike;
                 }
+                column.as_recorded = Some(column.values.clone());
                 column.join();
             }
         }
         notes.extend(self.take_jumps_out(coordinates));
         self.notes.extend(notes);
+    }
+
+    /// The recording with the faults of its sensors left in; `None` if none were taken out. What was not measured stays lost.
+    pub fn with_faults(&self) -> Option<Self> {
+        let is_mended = |column: &Column| column.as_recorded.is_some();
+        if !self.columns.values().any(is_mended) {
+            return None;
+        }
+        let mut recording = self.clone();
+        for column in recording.columns.values_mut() {
+            let Some(recorded) = column.as_recorded.take() else {
+                continue;
+            };
+            let values = column.values.iter().zip(&recorded);
+            for (lost, (value, recorded)) in column.lost.iter_mut().zip(values) {
+                *lost &= value.total_cmp(recorded).is_eq();
+            }
+            column.values = recorded;
+        }
+        Some(recording)
     }
 
     /// Takes jumps out of positions, and says which.
@@ -107,6 +128,7 @@ impl Recording {
             if jumps.is_empty() {
                 continue;
             }
+            column.as_recorded = Some(column.values.clone());
             let mut off = 0.0;
             let mut next = 0;
             for i in 0..column.values.len() {
@@ -329,6 +351,7 @@ mod tests {
         let sound = recording(q, |i| force(i).to_string());
         assert_eq!(sound.notes(), []);
         assert_eq!(sound.lost("motor"), None);
+        assert_eq!(sound.with_faults(), None);
         // A coarse encoder makes steps all the time.
         let coarse = recording(|i| (q(i) * 200.0).round() / 200.0, |i| force(i).to_string());
         assert_eq!(coarse.notes(), []);
@@ -346,6 +369,10 @@ mod tests {
         let at: Vec<usize> = (0..1000).filter(|i| lost[*i]).collect();
         assert_eq!(at, [300, 301, 700]);
         assert!((found.column("motor").unwrap()[700] - force(700)).abs() < 0.5);
+        let faulty = found.with_faults().unwrap();
+        assert!((faulty.column("motor").unwrap()[700] - 1e6).abs() < 1e-9);
+        let lost = faulty.lost("motor").unwrap();
+        assert!(lost[300] && lost[301] && !lost[700]);
         let says: Vec<&str> = found.notes().iter().map(|n| n.says.as_str()).collect();
         assert_eq!(says.len(), 2, "{says:?}");
         assert!(says[0].contains("2 of 1000 samples") && says[0].contains("line 302"));

@@ -9,15 +9,27 @@ const CLEAR: f64 = 0.8;
 /// Factors between units of force are powers of 1000; nominal values may be off by this factor.
 const TOLERANCE: f64 = 4.0;
 
-/// What is odd about the force of a drive.
+/// Forces that are so many times as small may be those of motors before their gears; nearer, nominal values may be wrong.
+const GEARS: std::ops::Range<f64> = 12.0..1000.0 / TOLERANCE;
+
+/// How a column of forces may have been misread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Oddity {
+enum Misread {
     /// It points the other way.
     Turned,
     /// Measured in thousands of the unit.
     TooSmall,
     /// Measured in thousandths of the unit.
     TooLarge,
+}
+
+/// What is odd about the force of a drive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Oddity {
+    /// Sign or unit is another one.
+    Misread(Misread),
+    /// As small as that of a motor before its gear, or as its current, by this factor.
+    BeforeGear(f64),
 }
 
 /// How a measured force is related to the nominal one.
@@ -31,11 +43,13 @@ fn oddity(measured: &[f64], nominal: &[f64]) -> Option<Oddity> {
     }
     let about = |factor: f64| (factor / TOLERANCE..factor * TOLERANCE).contains(&ratio);
     if about(1e-3) {
-        Some(Oddity::TooSmall)
+        Some(Oddity::Misread(Misread::TooSmall))
     } else if about(1e3) {
-        Some(Oddity::TooLarge)
+        Some(Oddity::Misread(Misread::TooLarge))
+    } else if GEARS.contains(&ratio.recip()) {
+        Some(Oddity::BeforeGear(correlation.signum() / ratio))
     } else if correlation < 0.0 && about(1.0) {
-        Some(Oddity::Turned)
+        Some(Oddity::Misread(Misread::Turned))
     } else {
         None
     }
@@ -52,20 +66,49 @@ pub(crate) fn oddities(
     let found: Vec<(&Drive, Oddity)> = (mechanism.drives.iter().zip(measured).zip(nominal))
         .filter_map(|((drive, measured), nominal)| Some((drive, oddity(measured, nominal)?)))
         .collect();
-    [Oddity::Turned, Oddity::TooSmall, Oddity::TooLarge]
+    let mut says: Vec<String> = [Misread::Turned, Misread::TooSmall, Misread::TooLarge]
         .into_iter()
         .filter_map(|which| {
             let drives: Vec<&Drive> = found
                 .iter()
-                .filter(|(_, oddity)| *oddity == which)
+                .filter(|(_, oddity)| *oddity == Oddity::Misread(which))
                 .map(|(drive, _)| *drive)
                 .collect();
             (!drives.is_empty()).then(|| says(mechanism, &drives, which, file))
         })
-        .collect()
+        .collect();
+    let before_gears = found.iter().filter_map(|(drive, oddity)| match oddity {
+        Oddity::BeforeGear(factor) => Some((*drive, *factor)),
+        _ => None,
+    });
+    let before_gears: Vec<(&Drive, f64)> = before_gears.collect();
+    if !before_gears.is_empty() {
+        says.push(asks_what_they_are(&before_gears, file));
+    }
+    says
 }
 
-fn says(mechanism: &Mechanism, drives: &[&Drive], which: Oddity, file: &str) -> String {
+/// Asks what the columns of drives are whose forces are so many times as small as the nominal ones.
+fn asks_what_they_are(drives: &[(&Drive, f64)], file: &str) -> String {
+    let each: Vec<String> = drives
+        .iter()
+        .map(|(drive, factor)| format!("`{}` ({:.0} times)", drive.name, factor.abs()))
+        .collect();
+    let entries: Vec<String> = drives
+        .iter()
+        .map(|(drive, factor)| format!("`{} = {{ ratio = {factor:.0} }}`", drive.name))
+        .collect();
+    format!(
+        "Beside what the nominal values give, forces in {file} are smaller by what a gear makes: {}. If a column is the \
+         motor's torque before its gear, say so under `[recording.torque]` of the model file with the true ratio, as in \
+         {}; if it is a current, with its `constant` in N m per ampere (or N per ampere) too. Else all base parameters come \
+         out so many times too small.",
+        each.join(", "),
+        entries.join(", "),
+    )
+}
+
+fn says(mechanism: &Mechanism, drives: &[&Drive], which: Misread, file: &str) -> String {
     let names: Vec<String> = drives.iter().map(|d| format!("`{}`", d.name)).collect();
     let (forces, are, they_are) = match drives {
         [_] => ("force", "is", "it is"),
@@ -76,21 +119,21 @@ fn says(mechanism: &Mechanism, drives: &[&Drive], which: Oddity, file: &str) -> 
         .map(|drive| {
             let name = &drive.name;
             match which {
-                Oddity::Turned => format!("option `columns` = `{name}=-{name}`"),
-                Oddity::TooSmall => {
+                Misread::Turned => format!("option `columns` = `{name}=-{name}`"),
+                Misread::TooSmall => {
                     format!(
                         "option `columns` = `{name}={name} [k{}]`",
                         drive.kind.force_unit(&mechanism.coordinates)
                     )
                 }
-                Oddity::TooLarge => format!("option `columns` = `{name}={name}/1000`"),
+                Misread::TooLarge => format!("option `columns` = `{name}={name}/1000`"),
             }
         })
         .collect();
     let what = match which {
-        Oddity::Turned => format!("of the opposite sign; if {they_are} counted the other way"),
-        Oddity::TooSmall => format!("about 1000 times as small; if {they_are} in kN or kN m"),
-        Oddity::TooLarge => format!("about 1000 times as large; if {they_are} in mN or mN m"),
+        Misread::Turned => format!("of the opposite sign; if {they_are} counted the other way"),
+        Misread::TooSmall => format!("about 1000 times as small; if {they_are} in kN or kN m"),
+        Misread::TooLarge => format!("about 1000 times as large; if {they_are} in mN or mN m"),
     };
     format!(
         "Beside what the nominal values give, the {forces} of {} in {file} {are} {what}, say {}.",
@@ -116,9 +159,14 @@ mod tests {
             oddity(&measured, &nominal)
         };
         assert_eq!(of(1.3, 0.1), None);
-        assert_eq!(of(-0.8, 0.1), Some(Oddity::Turned));
-        assert_eq!(of(1.4e-3, 0.1), Some(Oddity::TooSmall));
-        assert_eq!(of(-7e2, 0.1), Some(Oddity::TooLarge));
+        assert_eq!(of(-0.8, 0.1), Some(Oddity::Misread(Misread::Turned)));
+        assert_eq!(of(1.4e-3, 0.1), Some(Oddity::Misread(Misread::TooSmall)));
+        assert_eq!(of(-7e2, 0.1), Some(Oddity::Misread(Misread::TooLarge)));
+        let Some(Oddity::BeforeGear(ratio)) = of(-1.0 / 101.0, 0.1) else {
+            panic!("a gear");
+        };
+        assert!((ratio / -101.0 - 1.0).abs() < 0.05, "{ratio}");
+        assert_eq!(of(0.12, 0.1), None);
         // Ten times may be a gear, and forces that hardly resemble the nominal ones tell nothing.
         assert_eq!(of(10.0, 0.1), None);
         assert_eq!(of(-1.0, 3.0), None);

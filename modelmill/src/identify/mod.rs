@@ -1,5 +1,6 @@
 //! `identify`: base parameters from recordings by least squares, with what they are worth.
 
+mod influence;
 mod instruments;
 mod options;
 mod refine;
@@ -70,6 +71,7 @@ impl Model {
         check: &[&Recording],
         options: &Estimation,
     ) -> Outcome<Identification> {
+        let recordings = fit;
         let [mut fit, check] = recording::stretches(self, fit, check);
         if let Some(part) = options.standstill {
             standstill::leave_out(self, &mut fit, part)?;
@@ -79,7 +81,13 @@ impl Model {
             weights: settled(self, &fit, &instruments, options.weights),
             ..options.clone()
         };
-        let found = identify(self, &fit, &instruments, &check, &options)?;
+        let mut found = identify(self, &fit, &instruments, &check, &options)?;
+        if instruments.is_empty()
+            && let Some(note) = influence::of_faults(self, recordings, &found.found, &options)
+        {
+            found.fit.data.push(note.clone());
+            found.notes.push(note);
+        }
         for note in &found.notes {
             self.host().note(note);
         }

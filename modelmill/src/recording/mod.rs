@@ -332,6 +332,20 @@ impl Recording {
         self.stretches.iter().flat_map(Stretch::notes)
     }
 
+    /// The stretches with the faults of its sensors left in; `None` where none were taken out, or they cannot be prepared then.
+    pub(crate) fn with_faults(&self, model: &Model) -> Option<Vec<Stretch>> {
+        let faulty = self.raw.with_faults()?;
+        let delay = model.derivation.mechanism.force_delay;
+        let mut stretches = prepare(model, &faulty, &self.reading, delay).ok()?;
+        // What else was left out of them stays so.
+        for (faulty, sound) in stretches.iter_mut().zip(&self.stretches) {
+            if faulty.samples() == sound.samples() {
+                faulty.weights.clone_from(&sound.weights);
+            }
+        }
+        Some(stretches)
+    }
+
     /// The stretches prepared once more, for another model of the same machine, whose forces may act later.
     pub(crate) fn prepared_for(&self, model: &Model) -> Outcome<Vec<Stretch>> {
         prepared(model, &self.raw, &self.reading)

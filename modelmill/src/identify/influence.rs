@@ -1,0 +1,60 @@
+//! What faults of sensors would have done to a fit, had they been left in: recordings go in, a sentence comes out.
+
+use modelmill_identify::{Note, ParameterInfo};
+
+use super::options::Estimation;
+use super::regression::{self, Identified};
+use super::standstill;
+use crate::model::Model;
+use crate::recording::Recording;
+use crate::stretch::Stretch;
+use crate::text::table::{number, percent};
+
+/// The base parameter that faults move most, in its deviations, by fitting once more with the faults left in; `None` where no
+/// fault was taken out, or no fit comes of it.
+pub(super) fn of_faults(
+    model: &Model,
+    recordings: &[&Recording],
+    found: &Identified,
+    options: &Estimation,
+) -> Option<Note> {
+    let mut files = Vec::new();
+    let mut data: Vec<Stretch> = Vec::new();
+    for one in recordings {
+        match one.with_faults(model) {
+            Some(faulty) => {
+                files.push(one.file());
+                data.extend(faulty);
+            }
+            None => data.extend(one.stretches.iter().cloned()),
+        }
+    }
+    if files.is_empty() {
+        return None;
+    }
+    if let Some(part) = options.standstill {
+        standstill::leave_out(model, &mut data, part).ok()?;
+    }
+    let faulty = regression::identify(model, &data, &[], options).ok()?;
+    let infos = model.infos();
+    let pairs = found.solution.values.iter().zip(&faulty.solution.values);
+    let moved = pairs
+        .zip(&found.deviations.std)
+        .zip(&found.unknown)
+        .filter(|((_, std), _)| std.is_finite() && **std > 0.0);
+    let most = moved.max_by(|(one, _), (other, _)| {
+        let deviations = |((a, b), std): &((&f64, &f64), &f64)| (**b - **a).abs() / **std;
+        deviations(one).total_cmp(&deviations(other))
+    });
+    let (((sound, faulty), std), k) = most?;
+    let ParameterInfo { name, unit, .. } = &infos[*k];
+    Some(Note::info(format!(
+        "Left in, the faults of sensors in {} would have moved {name} from {} to {} {unit}, by {} ({} standard deviations), \
+         and no base parameter by more of its deviations.",
+        files.join(", "),
+        number(*sound),
+        number(*faulty),
+        percent(Some(((faulty - sound) / sound).abs())),
+        number(((faulty - sound) / std).abs()),
+    )))
+}
