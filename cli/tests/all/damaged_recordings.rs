@@ -150,6 +150,19 @@ fn faults_of_sensors_are_named_and_treated() {
         off < 1.0 && says.contains("1 spike that no drive makes"),
         "{says}"
     );
+    // Spikes of a million newtons would have moved parameters by many of their deviations.
+    assert!(says.contains("Left in, the faults of sensors in"), "{says}");
+    let (_, says) = identified(&write("sound.csv", &all), &[]);
+    assert!(!says.contains("Left in"), "{says}");
+    // A motor's force before a gear of 60 is another quantity.
+    let geared: Vec<[f64; 5]> = (all.iter())
+        .map(|[t, a, b, left, right]| [*t, *a, *b, left / 60.0, right / -60.0])
+        .collect();
+    let (_, says) = identified(&write("geared.csv", &geared), &[]);
+    assert!(
+        says.contains("[recording.torque]") && says.contains("spindle_right = { ratio = -60 }"),
+        "{says}"
+    );
     let mut clipped = all;
     let mut random = random();
     for row in &mut clipped {

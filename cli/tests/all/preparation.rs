@@ -69,3 +69,53 @@ fn nothing_but_the_noise_of_the_forces_is_left() {
         }
     }
 }
+
+/// A motion that repeats itself averages over its periods what an encoder of 10 mrad does to it, though what is left is no
+/// white noise; a low-pass leaves more than ten times as much.
+#[test]
+fn a_series_is_taken_where_forces_tell_that_it_leaves_less() {
+    let path = workspace("../shared/data/spidermill-cases/null/fit.csv");
+    let Ok(text) = std::fs::read_to_string(path) else {
+        println!(
+            "Series are not tested: there is no ../shared/data/spidermill-cases beside the workspace."
+        );
+        return;
+    };
+    let mut coarse = String::new();
+    for (i, line) in text.lines().enumerate() {
+        let fields = line
+            .split(',')
+            .enumerate()
+            .map(|(k, field)| match field.parse::<f64>() {
+                Ok(q) if i > 0 && (1..=2).contains(&k) => ((q / 0.01).round() * 0.01).to_string(),
+                _ => field.to_owned(),
+            });
+        let fields: Vec<String> = fields.collect();
+        writeln!(coarse, "{}", fields.join(",")).expect("text grows");
+    }
+    let path = scratch("coarse-periodic.csv");
+    std::fs::write(&path, coarse).expect("writable");
+    let off = |more: &[&str]| {
+        let spidermill = model("spidermill.toml");
+        let mut args = vec!["identify", &spidermill, "--data", &path, "--json"];
+        args.extend(more);
+        let found = json(&args);
+        let parameters = found["parameters"].as_array().expect("parameters");
+        let off = parameters
+            .iter()
+            .map(|p| (number(p, "/value") / number(p, "/nominal") - 1.0).abs())
+            .fold(0.0, f64::max);
+        (off, found["data"].to_string())
+    };
+    let (series, says) = off(&[]);
+    assert!(
+        says.contains("is taken for a Fourier series of period 7.29"),
+        "{says}"
+    );
+    let (filtered, _) = off(&["--smoothing", "butterworth"]);
+    println!("a series: {series:.4}, a low-pass: {filtered:.4}");
+    assert!(
+        series < 0.01 && 10.0 * series < filtered,
+        "{series} {filtered}"
+    );
+}

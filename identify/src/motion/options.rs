@@ -17,8 +17,8 @@ pub enum DerivativeSource {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Smoothing {
-    /// A Fourier series where the run is periodic and the series leaves nothing but noise, unless a
-    /// cut-off is given; Butterworth's low-pass otherwise.
+    /// A Fourier series where the run is periodic and the series leaves nothing but noise, or less of the forces on held-out
+    /// time, unless a cut-off is given; Butterworth's low-pass otherwise.
     #[default]
     Automatic,
     /// Butterworth's low-pass run both ways, then central differences: the field's standard.

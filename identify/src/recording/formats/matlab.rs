@@ -1,7 +1,8 @@
 //! Recordings as MATLAB files of format 5 (`save -v7` and before): vectors and matrices of numbers become columns.
 //!
 //! A vector `q1` is the column `q1`; the columns of a matrix `q` are `q_1`, `q_2` and so on. All must have the same
-//! number of samples; what has another length, and what is no real numeric array, is left aside and said.
+//! number of samples; what has another length, and what is no numeric array, is left aside and said. Columns of complex
+//! numbers are listed, and refused where they are asked for.
 
 use std::io::{BufReader, Read, Seek};
 
@@ -52,7 +53,11 @@ impl Format for Matlab5 {
         let columns = Columns::new(&open(&mut stream)?)?;
         let info = |column: &Column| ColumnInfo {
             name: column.name.clone(),
-            kind: "number".to_owned(),
+            kind: if column.is_complex {
+                "complex number".to_owned()
+            } else {
+                "number".to_owned()
+            },
         };
         Ok(vec![TableInfo {
             name: String::new(),
@@ -63,12 +68,8 @@ impl Format for Matlab5 {
                 stream.rewind().ok()?;
                 read(&mut stream, "", &ReadOptions::only(name)).ok()
             }),
-            remark: (!columns.others.is_empty()).then(|| {
-                format!(
-                    "left aside, of another length or not real: {}",
-                    list(&columns.others)
-                )
-            }),
+            remark: (!columns.others.is_empty())
+                .then(|| format!("left aside, of another length: {}", list(&columns.others))),
         }])
     }
 }
@@ -79,7 +80,7 @@ fn read(stream: impl Read + Seek, file: &str, options: &ReadOptions) -> Result<R
     let mut intake = Intake::new(columns.names(), options)?;
     if !columns.others.is_empty() {
         intake.note(Note::info(format!(
-            "{} of {file} {} not of as many samples as the others, or not real, and left aside.",
+            "{} of {file} {} not of as many samples as the others, and left aside.",
             list(&columns.others),
             if columns.others.len() == 1 {
                 "is"
@@ -90,7 +91,7 @@ fn read(stream: impl Read + Seek, file: &str, options: &ReadOptions) -> Result<R
     }
     let mut wanted = vec![false; arrays.found.len()];
     for (place, column) in columns.sound.iter().enumerate() {
-        wanted[column.array] |= intake.reads(place);
+        wanted[column.array] |= intake.reads(place) && !column.is_complex;
     }
     // An array is read as a whole, and its numbers are kept twice until all are taken in.
     let sizes = arrays
@@ -125,8 +126,20 @@ fn read(stream: impl Read + Seek, file: &str, options: &ReadOptions) -> Result<R
     let mut sample = Vec::new();
     for k in 0..columns.samples {
         sample.clear();
-        sample.extend((0..columns.sound.len()).map(|place| Field::finite(value(place, k))));
-        let text = |place: usize| value(place, k).to_string();
+        sample.extend((0..columns.sound.len()).map(|place| {
+            if columns.sound[place].is_complex {
+                Field::Text
+            } else {
+                Field::finite(value(place, k))
+            }
+        }));
+        let text = |place: usize| {
+            if columns.sound[place].is_complex {
+                "a complex number".to_owned()
+            } else {
+                value(place, k).to_string()
+            }
+        };
         if intake.take(k as u64 + 1, &sample, &text)? == Flow::Stop {
             break;
         }
@@ -151,6 +164,7 @@ struct Column {
     array: usize,
     first: usize,
     step: usize,
+    is_complex: bool,
 }
 
 impl Columns {
@@ -193,6 +207,7 @@ impl Columns {
                     array: i,
                     first: if is_upright { j * rows } else { j },
                     step: if is_upright { 1 } else { rows },
+                    is_complex: array.is_complex,
                 });
             }
         }

@@ -28,8 +28,10 @@ pub(super) struct Array {
     pub(super) name: String,
     /// Rows, columns and whatever further sides it has.
     pub(super) size: Vec<usize>,
-    /// Whether its numbers are real and as many as its size says.
+    /// Whether its numbers are as many as its size says.
     pub(super) is_sound: bool,
+    /// Whether its numbers have imaginary parts, which stand behind the real ones.
+    pub(super) is_complex: bool,
     /// Where its element begins in the file, and how long that is.
     at: u64,
     length: u64,
@@ -249,7 +251,8 @@ impl<'a> Element<'a> {
         let bytes = numbers.and_then(|n| n.checked_mul(width(data.kind)?));
         Ok(Some(Array {
             name: String::from_utf8_lossy(&name).into_owned(),
-            is_sound: !is_complex && bytes == Some(data.length as usize),
+            is_sound: bytes == Some(data.length as usize),
+            is_complex,
             size,
             at: place.at,
             length: place.length,
