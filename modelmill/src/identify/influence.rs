@@ -8,7 +8,7 @@ use super::standstill;
 use crate::model::Model;
 use crate::recording::Recording;
 use crate::stretch::Stretch;
-use crate::text::table::{number, percent};
+use crate::text::table::{number, significant};
 
 /// The base parameter that faults move most, in its deviations, by fitting once more with the faults left in; `None` where no
 /// fault was taken out, or no fit comes of it.
@@ -47,14 +47,23 @@ pub(super) fn of_faults(
         deviations(one).total_cmp(&deviations(other))
     });
     let (((sound, faulty), std), k) = most?;
-    let ParameterInfo { name, unit, .. } = &infos[*k];
-    Some(Note::info(format!(
-        "Left in, the faults of sensors in {} would have moved {name} from {} to {} {unit}, by {} ({} standard deviations), \
-         and no base parameter by more of its deviations.",
-        files.join(", "),
-        number(*sound),
-        number(*faulty),
-        percent(Some(((faulty - sound) / sound).abs())),
-        number(((faulty - sound) / std).abs()),
-    )))
+    let deviations = (faulty - sound).abs() / std;
+    let files = files.join(", ");
+    let says = if deviations < 1.0 {
+        format!(
+            "Left in, the faults of sensors in {files} would have moved no base parameter by more than {} of its standard \
+             deviations.",
+            significant(deviations, 2)
+        )
+    } else {
+        let ParameterInfo { name, unit, .. } = &infos[*k];
+        format!(
+            "Left in, the faults of sensors in {files} would have moved {name} from {} to {} {unit} ({} standard deviations), \
+             and no base parameter by more of its deviations.",
+            number(*sound),
+            number(*faulty),
+            significant(deviations, 3)
+        )
+    };
+    Some(Note::info(says))
 }
