@@ -79,7 +79,7 @@ pub(crate) fn oddities(
         .collect();
     let before_gears = found.iter().filter_map(|(drive, oddity)| match oddity {
         Oddity::BeforeGear(factor) => Some((*drive, *factor)),
-        _ => None,
+        Oddity::Misread(_) => None,
     });
     let before_gears: Vec<(&Drive, f64)> = before_gears.collect();
     if !before_gears.is_empty() {

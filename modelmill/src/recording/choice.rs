@@ -248,8 +248,9 @@ impl Search<'_> {
         smoother.goes_into(&mut reading.preparation);
         reading.preparation.decimate = decimate;
         reading.preparation.chosen = true;
-        let others: Vec<String> = tried.neighbours().chain(other).collect();
-        let others: String = others.iter().map(|other| format!(", {other}")).collect();
+        let mut others = vec![String::new()];
+        others.extend(tried.neighbours().chain(other));
+        let others = others.join(", ");
         let every = if decimate > 1 {
             format!(
                 ", and one in {decimate} samples kept after the parallel filter on forces and regressor"
