@@ -2,6 +2,8 @@
 
 use modelmill_identify::Note;
 
+pub use modelmill_reduction::{ImportOptions as Options, ImportedJoint};
+
 use crate::error::{Error, Outcome};
 use crate::host::Host;
 
@@ -10,26 +12,26 @@ use crate::host::Host;
 pub struct Imported {
     /// The text of the model file.
     pub model: String,
-    /// How many joints move.
-    pub joints: usize,
+    /// Joints of the description that move, with the coordinates of the model.
+    pub joints: Vec<ImportedJoint>,
     /// What was left out or rounded.
     pub notes: Vec<Note>,
 }
 
 impl Host {
-    /// Makes a model file of a URDF's text: links behind fixed joints join the body that carries them, every body gets its
-    /// ten linear parameters, gravity is along -z. `name` is what messages call the file.
+    /// Makes a model file of the text of a URDF, MJCF or SDF: links behind fixed joints join the body that carries them, every
+    /// body gets its ten linear parameters. `name` is what messages call the file.
     ///
-    /// Fails when the text is no URDF, or describes what a model file cannot.
-    pub fn import(&self, name: &str, text: &str) -> Outcome<Imported> {
-        let imported = modelmill_reduction::import_urdf(text)
+    /// Fails when the text is none of these formats, or describes what a model file cannot.
+    pub fn import(&self, name: &str, text: &str, options: &Options) -> Outcome<Imported> {
+        let imported = modelmill_reduction::import(text, options)
             .map_err(|error| Error::input(format!("{name}: {error}")))?;
         let notes: Vec<Note> = imported.remarks.into_iter().map(Note::warning).collect();
         for note in &notes {
             self.note(note);
         }
         Ok(Imported {
-            joints: imported.model.matches("[[frame]]").count(),
+            joints: imported.joints,
             model: imported.model,
             notes,
         })

@@ -9,10 +9,11 @@
 //! 3. symmetry: what shares a symbol - `draft`;
 //! 4. drives - `drive`.
 //!
-//! Beside it, [`import_urdf`] makes a model file of a robot description of ROS.
+//! Beside it, [`import`](fn@import) makes a model file of a robot description of other programs.
 
 mod draft;
 mod drive;
+mod import;
 mod names;
 mod part;
 mod plan;
@@ -23,14 +24,14 @@ mod reduce_drives;
 mod reduce_parts;
 mod report;
 mod samples;
-mod urdf;
-mod urdf_file;
-mod urdf_geometry;
 mod write;
 
+pub use import::{
+    ImportError, Imported, ImportedJoint, LARGEST_DESCRIPTION, Options as ImportOptions, import,
+};
 pub use plan::{Plan, plan, plan_file, plan_file_with};
 pub use plan_for::plan_for;
 pub use reduce::{Reduction, reduce};
 pub use report::{Finding, Report, Size};
 pub use samples::sampled_forces;
-pub use urdf::{Imported, LARGEST_URDF, UrdfError, import_urdf};
+

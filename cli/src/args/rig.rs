@@ -23,8 +23,18 @@ pub(crate) struct ReduceArgs {
 /// `import`.
 #[derive(Debug, Args)]
 pub(crate) struct ImportArgs {
-    /// Robot description (URDF)
-    pub(crate) urdf: PathBuf,
+    /// Robot description (URDF, MJCF or SDF)
+    pub(crate) description: PathBuf,
+    /// The root of a URDF hangs on nothing, as that of a walking robot
+    #[arg(long)]
+    pub(crate) floating: bool,
+    /// Closures and drives of a URDF with loops, as the collection example-parallel-robots has them; a `robot.yaml` beside the
+    /// URDF if not given
+    #[arg(long, value_name = "ROBOT.yaml")]
+    pub(crate) closures: Option<PathBuf>,
+    /// Take angles within 1e-4 rad of multiples of pi/12, such as 1.5708, for these
+    #[arg(long)]
+    pub(crate) round_angles: bool,
     /// Write the model to this file
     #[arg(long, value_name = "MODEL.toml")]
     pub(crate) out: PathBuf,

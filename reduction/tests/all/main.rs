@@ -4,3 +4,4 @@ mod approximations;
 mod faulty;
 mod spidermill;
 mod urdf;
+mod zoo;

@@ -2,7 +2,7 @@
 
 use modelmill_boundary::files::Memory;
 use modelmill_codegen::{Derivation, Evaluator, States};
-use modelmill_reduction::import_urdf;
+use modelmill_reduction::{ImportOptions, import};
 use modelmill_rig::{State, Tracker, forces};
 
 /// An arm with a joint along a slanted axis, a prismatic one, a tool behind a fixed joint, and roundings as CAD
@@ -158,7 +158,11 @@ fn derived(text: &str) -> Derivation {
 
 #[test]
 fn an_imported_arm_has_the_forces_of_its_rig() {
-    let imported = import_urdf(ARM).unwrap_or_else(|error| panic!("{error}"));
+    let options = ImportOptions {
+        round_angles: true,
+        ..ImportOptions::default()
+    };
+    let imported = import(ARM, &options).unwrap_or_else(|error| panic!("{error}"));
     println!("{}\n{:?}", imported.model, imported.remarks);
     let derivation = derived(&imported.model);
     let names: Vec<&str> = derivation
@@ -221,7 +225,7 @@ fn an_imported_arm_has_the_forces_of_its_rig() {
 
 #[test]
 fn what_makes_no_model_is_said() {
-    let says = |text: &str| import_urdf(text).expect_err("a fault").to_string();
+    let says = |text: &str| import(text, &ImportOptions::default()).expect_err("a fault").to_string();
     assert!(says("").contains("no URDF"));
     assert!(says("schema = 1").contains("no URDF"));
     assert!(says("<robot name='r'><link name='a'/></robot>").contains("no joint that moves"));
@@ -271,7 +275,7 @@ fn unfinished_descriptions_give_an_answer() {
         });
     let mut sound = 0;
     for unfinished in without.chain(cut).chain(odd) {
-        match import_urdf(&unfinished) {
+        match import(&unfinished, &ImportOptions::default()) {
             Ok(imported) => {
                 sound += 1;
                 assert!(imported.model.contains("[[frame]]"));

@@ -1,0 +1,154 @@
+//! The frames of a model in numbers: where they are, and how points of them move with the variables.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+use super::placed::{Placed, about};
+
+/// One elementary motion of a frame: `ratio*variable + offset` about or along an axis of the frame.
+#[derive(Clone, Copy)]
+pub(crate) struct Move {
+    pub(crate) is_turn: bool,
+    /// Of unit length, in the axes reached so far.
+    pub(crate) axis: Vector3<f64>,
+    pub(crate) variable: Option<usize>,
+    pub(crate) ratio: f64,
+    pub(crate) offset: f64,
+}
+
+/// A frame: a place in its parent, then its motions.
+pub(crate) struct Node {
+    /// None is the base.
+    pub(crate) on: Option<usize>,
+    pub(crate) at: Placed,
+    pub(crate) moves: Vec<Move>,
+}
+
+/// Two points that coincide, each of a frame.
+#[derive(Clone, Copy)]
+pub(crate) struct Pair {
+    pub(crate) ends: [(Option<usize>, Vector3<f64>); 2],
+    /// Index of the closure.
+    pub(crate) closure: usize,
+}
+
+/// A frame at a pose: where it is, and its motions' axes and origins in the base.
+struct Posed {
+    at: Placed,
+    moves: Vec<(Vector3<f64>, Vector3<f64>)>,
+}
+
+pub(crate) struct Chain {
+    /// Parents stand before their children.
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) n_variables: usize,
+}
+
+impl Chain {
+    fn pose(&self, values: &[f64]) -> Vec<Posed> {
+        let mut out: Vec<Posed> = Vec::with_capacity(self.nodes.len());
+        for node in &self.nodes {
+            let mut at = node
+                .on
+                .map_or(Placed::identity(), |on| out[on].at)
+                .then(&node.at);
+            let mut moves = Vec::new();
+            for motion in &node.moves {
+                let value = motion.variable.map_or(0.0, |v| motion.ratio * values[v]) + motion.offset;
+                moves.push((at.r * motion.axis, at.p));
+                at = at.then(&if motion.is_turn {
+                    Placed {
+                        p: Vector3::zeros(),
+                        r: about(&motion.axis, value),
+                    }
+                } else {
+                    Placed {
+                        p: motion.axis * value,
+                        r: Matrix3::identity(),
+                    }
+                });
+            }
+            out.push(Posed { at, moves });
+        }
+        out
+    }
+
+    /// Gaps of all pairs, their derivatives by the variables, and the size of the mechanism.
+    pub(crate) fn gaps(&self, pairs: &[Pair], values: &[f64]) -> (DVector<f64>, DMatrix<f64>, f64) {
+        let posed = self.pose(values);
+        let mut gaps = DVector::zeros(3 * pairs.len());
+        let mut rows = DMatrix::zeros(3 * pairs.len(), self.n_variables);
+        let mut size = 1e-3_f64;
+        for (k, pair) in pairs.iter().enumerate() {
+            for ((frame, local), sign) in pair.ends.iter().zip([1.0, -1.0]) {
+                let place = frame.map_or(Placed::identity(), |frame| posed[frame].at);
+                let point = place.p + place.r * local;
+                size = size.max(point.amax());
+                let mut block = gaps.fixed_rows_mut::<3>(3 * k);
+                block += sign * point;
+                let mut here = *frame;
+                while let Some(frame) = here {
+                    let node = &self.nodes[frame];
+                    for (motion, (axis, origin)) in node.moves.iter().zip(&posed[frame].moves) {
+                        let Some(variable) = motion.variable else {
+                            continue;
+                        };
+                        let rate = if motion.is_turn {
+                            axis.cross(&(point - origin))
+                        } else {
+                            *axis
+                        };
+                        let mut block = rows.fixed_view_mut::<3, 1>(3 * k, variable);
+                        block += sign * motion.ratio * rate;
+                    }
+                    here = node.on;
+                }
+            }
+        }
+        (gaps, rows, size)
+    }
+
+    /// Moves the variables until the pairs coincide as well as they can; the largest gap that is left, of the size.
+    pub(crate) fn close(&self, pairs: &[Pair], values: &mut [f64]) -> f64 {
+        /// Steps are no longer than this, rad or m.
+        const LONGEST_STEP: f64 = 0.2;
+        let mut left = f64::INFINITY;
+        for _ in 0..300 {
+            let (gaps, rows, size) = self.gaps(pairs, values);
+            let now = gaps.amax() / size;
+            let is_idle = now >= 0.5 * left && now < 1e-12;
+            left = now;
+            if now < 1e-15 || is_idle {
+                break;
+            }
+            let svd = rows.svd(true, true);
+            let cut = 1e-7 * svd.singular_values.max();
+            let Ok(step) = svd.solve(&gaps, cut) else {
+                break;
+            };
+            let scale = (LONGEST_STEP / step.amax()).min(1.0);
+            if !scale.is_finite() {
+                break;
+            }
+            for (value, step) in values.iter_mut().zip(step.iter()) {
+                *value -= scale * step;
+            }
+        }
+        left
+    }
+}
+
+/// Number of singular values above a share of the largest, and the least of these as a share.
+pub(crate) fn rank(matrix: &DMatrix<f64>, share: f64) -> (usize, f64) {
+    if matrix.is_empty() {
+        return (0, 1.0);
+    }
+    let values = matrix.clone().singular_values();
+    let largest = values.max();
+    let kept: Vec<f64> = values
+        .iter()
+        .copied()
+        .filter(|value| *value > share * largest && *value > 0.0)
+        .collect();
+    let least = kept.iter().fold(f64::INFINITY, |m, x| m.min(*x));
+    (kept.len(), least / largest)
+}

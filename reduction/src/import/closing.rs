@@ -1,0 +1,160 @@
+//! Loops of a description: which points have to coincide, which variables follow from them, and a pose at which they close.
+
+use nalgebra::DMatrix;
+
+use super::chain::{Chain, Pair, rank};
+
+/// Gaps, relative to the size, up to which loops close.
+const CLOSED: f64 = 1e-9;
+/// Gaps up to which they close by the digits of the description.
+const NEARLY: f64 = 1e-6;
+/// Singular values below this share of the largest say nothing.
+const NOTHING: f64 = 1e-7;
+/// A pose whose passive variables are settled worse than this is no pose to start from.
+const WELL_SETTLED: f64 = 1e-3;
+
+/// How loops close.
+pub(crate) struct Closed {
+    /// The pairs that say something.
+    pub(crate) pairs: Vec<Pair>,
+    /// Which variables follow from the loops.
+    pub(crate) passive: Vec<bool>,
+    /// Values at a pose at which the loops close.
+    pub(crate) values: Vec<f64>,
+    /// The pose is not the nearest to that of the description.
+    pub(crate) is_moved: bool,
+    /// The largest gap, relative to the size, where it is above rounding.
+    pub(crate) gap: Option<f64>,
+}
+
+/// Closes loops from `start`. `order` has the variables with those first that should stay independent.
+pub(crate) fn close(chain: &Chain, pairs: &[Pair], start: &[f64], order: &[usize]) -> Result<Closed, String> {
+    let mut noise = Noise(1);
+    let mut poses: Vec<(Vec<f64>, f64)> = Vec::new();
+    let mut least = f64::INFINITY;
+    // The pose of the description first, then poses around it and farther away.
+    for attempt in 0..60 {
+        let spread = match attempt {
+            0 => 0.0,
+            1..=20 => 0.1,
+            21..=40 => 0.4,
+            _ => 1.5,
+        };
+        let mut values: Vec<f64> = start.iter().map(|x| x + spread * noise.next()).collect();
+        let gap = chain.close(pairs, &mut values);
+        least = least.min(gap);
+        if gap < NEARLY {
+            poses.push((values, gap));
+        }
+        if poses.len() == 6 {
+            break;
+        }
+    }
+    if poses.is_empty() {
+        return Err(format!(
+            "its loops do not close: from the pose of the file and 60 around it, gaps of {least:.1e} of its size remain"
+        ));
+    }
+    // The rank at poses in general.
+    let ranks: Vec<usize> = poses
+        .iter()
+        .map(|(values, _)| rank(&chain.gaps(pairs, values).1, NOTHING).0)
+        .collect();
+    let wanted = ranks.iter().copied().max().unwrap_or(0);
+    let general = (0..poses.len())
+        .filter(|k| ranks[*k] == wanted)
+        .max_by(|a, b| {
+            let share = |k: usize| rank(&chain.gaps(pairs, &poses[k].0).1, NOTHING).1;
+            share(*a).total_cmp(&share(*b))
+        })
+        .unwrap_or(0);
+    let pairs = telling(chain, pairs, &poses[general].0);
+    let (_, rows, _) = chain.gaps(&pairs, &poses[general].0);
+    let passive = follow(&rows, order, wanted);
+    let settled = |values: &[f64]| {
+        let (_, rows, _) = chain.gaps(&pairs, values);
+        let columns: Vec<_> = (0..passive.len())
+            .filter(|k| passive[*k])
+            .map(|k| rows.column(k).into_owned())
+            .collect();
+        match rank(&DMatrix::from_columns(&columns), NOTHING) {
+            (n, share) if n == columns.len() => share,
+            _ => 0.0,
+        }
+    };
+    let mut best = 0;
+    if wanted > 0 && settled(&poses[0].0) < WELL_SETTLED {
+        for k in 1..poses.len() {
+            if settled(&poses[k].0) > 3.0 * settled(&poses[best].0) {
+                best = k;
+            }
+        }
+    }
+    let (mut values, _) = poses.swap_remove(best);
+    let gap = chain.close(&pairs, &mut values);
+    Ok(Closed {
+        pairs,
+        passive,
+        values,
+        is_moved: best != 0,
+        gap: (gap > CLOSED).then_some(gap),
+    })
+}
+
+/// The pairs that say something that those before do not.
+fn telling(chain: &Chain, pairs: &[Pair], values: &[f64]) -> Vec<Pair> {
+    let mut kept: Vec<Pair> = Vec::new();
+    let mut n = 0;
+    for pair in pairs {
+        kept.push(*pair);
+        let (now, _) = rank(&chain.gaps(&kept, values).1, NOTHING);
+        if now == n {
+            kept.pop();
+        }
+        n = now;
+    }
+    kept
+}
+
+/// Which variables follow: as many as the rank, from the end of the order.
+fn follow(rows: &DMatrix<f64>, order: &[usize], wanted: usize) -> Vec<bool> {
+    let mut passive = vec![false; rows.ncols()];
+    // Columns of unit length, each made orthogonal to those chosen.
+    let scale = rows.amax().max(f64::MIN_POSITIVE);
+    for least in [1e-2, 1e-4, 1e-6] {
+        let mut chosen: Vec<nalgebra::DVector<f64>> = Vec::new();
+        passive.fill(false);
+        for k in order.iter().rev() {
+            let column = rows.column(*k) / scale;
+            let length = column.norm();
+            let mut rest = column.into_owned();
+            for _ in 0..2 {
+                for direction in &chosen {
+                    let along = direction.dot(&rest);
+                    rest -= direction * along;
+                }
+            }
+            if chosen.len() < wanted && rest.norm() > least * length.max(1e-6) {
+                chosen.push(rest.normalize());
+                passive[*k] = true;
+            }
+        }
+        if chosen.len() == wanted {
+            break;
+        }
+    }
+    passive
+}
+
+/// Numbers between -1 and 1 in an order without meaning, the same on every machine.
+struct Noise(u64);
+
+impl Noise {
+    fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}

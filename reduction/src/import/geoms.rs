@@ -1,0 +1,116 @@
+//! Mass and inertia of simple shapes of one density, about their own centres.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::description::Inertial;
+use super::placed::Placed;
+
+/// A shape: volume, and the moments of inertia for a mass of one.
+pub(crate) struct Shape {
+    volume: f64,
+    moments: [f64; 3],
+}
+
+impl Shape {
+    /// A shape as MuJoCo names and sizes it; `half` is half the length where both ends are given. None has no mass (a plane).
+    pub(crate) fn new(kind: &str, size: &[f64], half: Option<f64>) -> Result<Option<Self>, String> {
+        let at = |k: usize| {
+            size.get(k)
+                .copied()
+                .filter(|x| *x > 0.0)
+                .ok_or_else(|| format!("a {kind} needs more positive numbers in `size`"))
+        };
+        let shape = match kind {
+            "plane" | "hfield" => return Ok(None),
+            "sphere" => {
+                let r = at(0)?;
+                Self {
+                    volume: 4.0 / 3.0 * PI * r.powi(3),
+                    moments: [0.4 * r * r; 3],
+                }
+            }
+            "ellipsoid" => {
+                let [a, b, c] = [at(0)?, at(1)?, at(2)?];
+                Self {
+                    volume: 4.0 / 3.0 * PI * a * b * c,
+                    moments: [b * b + c * c, a * a + c * c, a * a + b * b].map(|sum| sum / 5.0),
+                }
+            }
+            "box" => {
+                let [a, b, c] = match half {
+                    Some(half) => [at(0)?, at(0)?, half],
+                    None => [at(0)?, at(1)?, at(2)?],
+                };
+                Self {
+                    volume: 8.0 * a * b * c,
+                    moments: [b * b + c * c, a * a + c * c, a * a + b * b].map(|sum| sum / 3.0),
+                }
+            }
+            "cylinder" => {
+                let (r, h) = (at(0)?, half.map_or_else(|| at(1), Ok)?);
+                let across = r * r / 4.0 + h * h / 3.0;
+                Self {
+                    volume: 2.0 * PI * r * r * h,
+                    moments: [across, across, r * r / 2.0],
+                }
+            }
+            "capsule" => {
+                let (r, h) = (at(0)?, half.map_or_else(|| at(1), Ok)?);
+                let (middle, caps) = (2.0 * PI * r * r * h, 4.0 / 3.0 * PI * r.powi(3));
+                let volume = middle + caps;
+                // Each cap's centre lies 3/8 r beyond the end of the cylinder.
+                let of_caps = 0.4 * r * r + h * h + 0.75 * h * r;
+                let across = (middle * (r * r / 4.0 + h * h / 3.0) + caps * of_caps) / volume;
+                let along = (middle * r * r / 2.0 + caps * 0.4 * r * r) / volume;
+                Self {
+                    volume,
+                    moments: [across, across, along],
+                }
+            }
+            other => {
+                return Err(format!(
+                    "mass and inertia of a {other} are not worked out here: give the body an <inertial>, as MuJoCo writes it \
+                     (mj_saveLastXML)"
+                ));
+            }
+        };
+        Ok(Some(shape))
+    }
+
+    /// The shape with a mass, or else a density.
+    pub(crate) fn inertial(&self, mass: Option<f64>, density: f64, at: Placed) -> Inertial {
+        let mass = mass.unwrap_or(density * self.volume);
+        let moments = Vector3::from(self.moments) * mass;
+        Inertial {
+            mass,
+            at,
+            inertia: Matrix3::from_diagonal(&moments),
+        }
+    }
+}
+
+/// Several bodies as one.
+pub(crate) fn together(parts: &[Inertial]) -> Inertial {
+    let mass: f64 = parts.iter().map(|part| part.mass).sum();
+    if mass <= 0.0 {
+        return Inertial::default();
+    }
+    let moment: Vector3<f64> = parts.iter().map(|part| part.mass * part.at.p).sum();
+    let centre = moment / mass;
+    let mut inertia = Matrix3::zeros();
+    for part in parts {
+        let c = part.at.p - centre;
+        inertia += part.at.r * part.inertia * part.at.r.transpose()
+            + part.mass * (Matrix3::identity() * c.norm_squared() - c * c.transpose());
+    }
+    Inertial {
+        mass,
+        at: Placed {
+            p: centre,
+            r: Matrix3::identity(),
+        },
+        inertia,
+    }
+}

@@ -1,0 +1,767 @@
+//! Reads MJCF, MuJoCo's format: bodies with joints, default classes, equalities and what acts on joints.
+//!
+//! Source of names and defaults: MuJoCo's XML reference (mujoco.readthedocs.io/en/stable/XMLreference.html).
+
+use std::f64::consts::PI;
+
+use nalgebra::{Matrix3, Vector3};
+use roxmltree::{Document, Node};
+
+use super::description::{Closure, Coupling, Description, Holds, Inertial, Joint, Kind, Link};
+use super::geoms;
+use super::mjcf_defaults::Defaults;
+use super::placed::{Placed, about, of_quaternion};
+use super::xml::{at, children, exactly, line, numbers, symmetric, vector, word};
+
+/// Sections that say nothing of how a robot moves.
+const NO_DYNAMICS: [&str; 12] = [
+    "asset", "visual", "statistic", "contact", "sensor", "custom", "size", "extension", "keyframe", "default", "compiler",
+    "option",
+];
+
+/// What the file says of itself.
+struct Compiler {
+    /// Angles are in degrees.
+    is_degree: bool,
+    /// Sequence of turns of Euler angles; capitals turn about fixed axes.
+    euler: String,
+    /// Ranges count where `limited` is not said.
+    has_auto_limits: bool,
+    /// Inertia comes from shapes: always, never, or where there is no other.
+    from_geoms: Option<bool>,
+    least_mass: f64,
+    least_inertia: f64,
+}
+
+struct Reader<'a, 'i> {
+    compiler: Compiler,
+    defaults: Defaults<'a, 'i>,
+    out: Description,
+    /// Places of the bodies at the pose of the file, in the world.
+    world: Vec<Placed>,
+    sites: Vec<(String, Option<usize>, Placed)>,
+}
+
+/// Where elements of a body stand.
+#[derive(Clone, Copy)]
+struct Inside<'a> {
+    link: Option<usize>,
+    class: Option<&'a str>,
+}
+
+/// Reads a description, or says in one line what is wrong and where.
+pub(crate) fn read(document: &Document) -> Result<Description, String> {
+    let root = document.root_element();
+    let mut reader = Reader {
+        compiler: compiler(&root)?,
+        defaults: Defaults::read(&root)?,
+        out: Description {
+            name: root.attribute("model").unwrap_or("robot").to_owned(),
+            format: "MJCF",
+            gravity: Some(Vector3::new(0.0, 0.0, -9.81)),
+            ..Description::default()
+        },
+        world: Vec::new(),
+        sites: Vec::new(),
+    };
+    for option in children(&root, "option") {
+        if let Some(text) = option.attribute("gravity") {
+            reader.out.gravity = Some(vector(exactly(&option, "gravity", text)?));
+        }
+    }
+    for node in root.descendants() {
+        let tag = node.tag_name().name();
+        if ["include", "attach", "replicate", "composite", "flexcomp"].contains(&tag) {
+            return Err(at(
+                &node,
+                "this is not expanded here; MuJoCo writes one whole file of it (mj_saveLastXML)",
+            ));
+        }
+    }
+    for body in children(&root, "worldbody") {
+        let inside = Inside {
+            link: None,
+            class: None,
+        };
+        reader.inside(&body, inside, Placed::identity())?;
+    }
+    for equalities in children(&root, "equality") {
+        for node in equalities.children().filter(Node::is_element) {
+            reader.equality(&node)?;
+        }
+    }
+    reader.actuators(&root)?;
+    reader.keyframe(&root)?;
+    for node in root.children().filter(Node::is_element) {
+        let tag = node.tag_name().name();
+        if !NO_DYNAMICS.contains(&tag)
+            && !["worldbody", "equality", "actuator", "tendon"].contains(&tag)
+        {
+            reader
+                .out
+                .remarks
+                .push(at(&node, "this section is not read"));
+        }
+    }
+    Ok(reader.out)
+}
+
+fn compiler(root: &Node) -> Result<Compiler, String> {
+    let mut out = Compiler {
+        is_degree: true,
+        euler: "xyz".to_owned(),
+        has_auto_limits: true,
+        from_geoms: None,
+        least_mass: 0.0,
+        least_inertia: 0.0,
+    };
+    for node in children(root, "compiler") {
+        if let Some(angle) = node.attribute("angle") {
+            out.is_degree = angle != "radian";
+        }
+        if let Some(sequence) = node.attribute("eulerseq") {
+            let is_fine = sequence.len() == 3
+                && sequence.chars().all(|c| "xyzXYZ".contains(c))
+                && (sequence == sequence.to_lowercase() || sequence == sequence.to_uppercase());
+            if !is_fine {
+                return Err(at(&node, "expected three of x, y and z in `eulerseq`"));
+            }
+            out.euler = sequence.to_owned();
+        }
+        if let Some(auto) = node.attribute("autolimits") {
+            out.has_auto_limits = auto != "false";
+        }
+        match node.attribute("inertiafromgeom") {
+            Some("true") => out.from_geoms = Some(true),
+            Some("false") => out.from_geoms = Some(false),
+            _ => {}
+        }
+        for (key, value) in [
+            ("boundmass", &mut out.least_mass),
+            ("boundinertia", &mut out.least_inertia),
+        ] {
+            if let Some(text) = node.attribute(key) {
+                [*value] = exactly(&node, key, text)?;
+            }
+        }
+        if node.attribute("coordinate") == Some("global") {
+            return Err(at(
+                &node,
+                "global coordinates left MuJoCo with version 2.3.3; write the file anew with an older one",
+            ));
+        }
+        for (key, unused) in [("settotalmass", "-1"), ("balanceinertia", "false")] {
+            if node.attribute(key).is_some_and(|value| value != unused) {
+                return Err(at(
+                    &node,
+                    &format!("`{key}` is not read; let MuJoCo write the file with masses in place (mj_saveLastXML)"),
+                ));
+            }
+        }
+    }
+    Ok(out)
+}
+
+impl<'a, 'i> Reader<'a, 'i> {
+    /// An angle of the file in rad.
+    fn angle(&self, value: f64) -> f64 {
+        if self.compiler.is_degree {
+            value * PI / 180.0
+        } else {
+            value
+        }
+    }
+
+    fn text(&self, node: &Node<'a, 'i>, class: Option<&str>, key: &str) -> Result<Option<&'a str>, String> {
+        self.defaults.attribute(node, class, key)
+    }
+
+    fn numbers<const N: usize>(
+        &self,
+        node: &Node<'a, 'i>,
+        class: Option<&str>,
+        key: &str,
+    ) -> Result<Option<[f64; N]>, String> {
+        let text = self.text(node, class, key)?;
+        text.map(|text| exactly(node, key, text)).transpose()
+    }
+
+    /// The first number of an attribute; further ones are said.
+    fn first(
+        &mut self,
+        node: &Node<'a, 'i>,
+        class: Option<&str>,
+        key: &str,
+    ) -> Result<f64, String> {
+        let Some(text) = self.text(node, class, key)? else {
+            return Ok(0.0);
+        };
+        let all = numbers(node, key, text)?;
+        if all.iter().skip(1).any(|x| *x != 0.0) {
+            self.out.remarks.push(at(
+                node,
+                &format!("of `{key}` the first number counts; further ones are not read"),
+            ));
+        }
+        Ok(all.first().copied().unwrap_or(0.0))
+    }
+
+    /// Position and orientation of an element.
+    fn placed(&self, node: &Node<'a, 'i>, class: Option<&str>) -> Result<Placed, String> {
+        let mut out = Placed::identity();
+        if let Some(pos) = self.numbers(node, class, "pos")? {
+            out.p = vector(pos);
+        }
+        let fault = |key: &str| at(node, &format!("`{key}` has no direction"));
+        if let Some(quat) = self.numbers(node, class, "quat")? {
+            out.r = of_quaternion(quat).ok_or_else(|| fault("quat"))?;
+        }
+        if let Some([x, y, z, angle]) = self.numbers(node, class, "axisangle")? {
+            let axis = Vector3::new(x, y, z)
+                .try_normalize(1e-12)
+                .ok_or_else(|| fault("axisangle"))?;
+            out.r = about(&axis, self.angle(angle));
+        }
+        if let Some([a, b, c, d, e, f]) = self.numbers(node, class, "xyaxes")? {
+            let x = Vector3::new(a, b, c)
+                .try_normalize(1e-12)
+                .ok_or_else(|| fault("xyaxes"))?;
+            let y = Vector3::new(d, e, f);
+            let y = (y - x * x.dot(&y))
+                .try_normalize(1e-12)
+                .ok_or_else(|| fault("xyaxes"))?;
+            out.r = Matrix3::from_columns(&[x, y, x.cross(&y)]);
+        }
+        if let Some(z) = self.numbers(node, class, "zaxis")? {
+            let z = vector(z).try_normalize(1e-12).ok_or_else(|| fault("zaxis"))?;
+            let axis = Vector3::z().cross(&z);
+            let angle = axis.norm().atan2(z.z);
+            let axis = axis.try_normalize(1e-12).unwrap_or_else(Vector3::x);
+            out.r = about(&axis, angle);
+        }
+        if let Some(angles) = self.numbers::<3>(node, class, "euler")? {
+            out.r = Matrix3::identity();
+            for (letter, angle) in self.compiler.euler.chars().zip(angles) {
+                let axis = match letter.to_ascii_lowercase() {
+                    'x' => Vector3::x(),
+                    'y' => Vector3::y(),
+                    _ => Vector3::z(),
+                };
+                let turn = about(&axis, self.angle(angle));
+                out.r = if letter.is_ascii_lowercase() {
+                    out.r * turn
+                } else {
+                    turn * out.r
+                };
+            }
+        }
+        Ok(out)
+    }
+
+    /// Reads what stands in a body, in a frame of it at `at`.
+    fn inside(&mut self, node: &Node<'a, 'i>, inside: Inside<'a>, place: Placed) -> Result<(), String> {
+        for child in node.children().filter(Node::is_element) {
+            let class = child.attribute("childclass").or(inside.class);
+            match child.tag_name().name() {
+                "body" => self.body(&child, Inside { class, ..inside }, place)?,
+                "frame" => {
+                    let place = place.then(&self.placed(&child, class)?);
+                    self.inside(&child, Inside { class, ..inside }, place)?;
+                }
+                "site" => {
+                    if let Some(name) = child.attribute("name") {
+                        let at = place.then(&self.placed(&child, class)?);
+                        self.sites.push((name.to_owned(), inside.link, at));
+                    }
+                }
+                "joint" | "freejoint" if inside.link.is_none() => {
+                    return Err(at(&child, "the world has no joint"));
+                }
+                "joint" => self.joint(&child, inside, place)?,
+                "freejoint" => self.free(&child, inside)?,
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn body(&mut self, node: &Node<'a, 'i>, around: Inside<'a>, place: Placed) -> Result<(), String> {
+        let placed = place.then(&self.placed(node, None)?);
+        let own = self.out.links.len();
+        let name = node
+            .attribute("name")
+            .map_or_else(|| format!("body{}", own + 1), str::to_owned);
+        if self.out.links.iter().any(|link| link.name == name) {
+            return Err(at(node, &format!("two bodies are called `{name}`")));
+        }
+        let parent = around.link.map_or(Placed::identity(), |link| self.world[link]);
+        self.world.push(parent.then(&placed));
+        let inertial = self.inertial(node, around.class)?;
+        if node.attribute("mocap") == Some("true") {
+            self.out
+                .remarks
+                .push(at(node, "a body that is moved from outside; here it stands still"));
+        }
+        if node.attribute("gravcomp").is_some_and(|text| text.trim() != "0") {
+            self.out.remarks.push(at(
+                node,
+                "`gravcomp` is no mechanics of the body and is left out: weight counts in full",
+            ));
+        }
+        self.out.links.push(Link {
+            name,
+            parent: around.link,
+            at: placed,
+            joints: Vec::new(),
+            inertial,
+        });
+        let inside = Inside {
+            link: Some(own),
+            class: around.class,
+        };
+        self.inside(node, inside, Placed::identity())
+    }
+
+    fn inertial(&mut self, node: &Node<'a, 'i>, class: Option<&'a str>) -> Result<Inertial, String> {
+        let given = node
+            .children()
+            .find(|child| child.tag_name().name() == "inertial");
+        let mut found = match (given, self.compiler.from_geoms) {
+            (Some(given), None | Some(false)) => {
+                let mut placed = self.placed(&given, None)?;
+                let [mass] = exactly(&given, "mass", &word(&given, "mass")?)?;
+                let inertia = if let Some(full) = given.attribute("fullinertia") {
+                    if given.attribute("diaginertia").is_some() {
+                        return Err(at(&given, "expected `fullinertia` or `diaginertia`, not both"));
+                    }
+                    placed.r = Matrix3::identity();
+                    symmetric(exactly(&given, "fullinertia", full)?)
+                } else if let Some(text) = given.attribute("diaginertia") {
+                    Matrix3::from_diagonal(&vector(exactly(&given, "diaginertia", text)?))
+                } else {
+                    return Err(at(&given, "it needs `diaginertia` or `fullinertia`"));
+                };
+                Inertial {
+                    mass,
+                    at: placed,
+                    inertia,
+                }
+            }
+            (_, Some(false)) => Inertial::default(),
+            _ => self.of_geoms(node, class)?,
+        };
+        // MuJoCo takes principal moments here.
+        found.mass = found.mass.max(self.compiler.least_mass);
+        if self.compiler.least_inertia > 0.0 {
+            let mut moments = found.inertia.symmetric_eigen();
+            let least = self.compiler.least_inertia;
+            if moments.eigenvalues.min() < least {
+                moments.eigenvalues = moments.eigenvalues.map(|moment| moment.max(least));
+                found.inertia = moments.recompose();
+            }
+        }
+        Ok(found)
+    }
+
+    /// Mass and inertia of the shapes of a body, also of those in its frames.
+    fn of_geoms(&mut self, node: &Node<'a, 'i>, class: Option<&'a str>) -> Result<Inertial, String> {
+        let mut shapes = Vec::new();
+        let mut waiting = vec![(*node, class, Placed::identity())];
+        while let Some((node, class, place)) = waiting.pop() {
+            for child in node.children().filter(Node::is_element) {
+                let class = child.attribute("childclass").or(class);
+                match child.tag_name().name() {
+                    "frame" => waiting.push((child, class, place.then(&self.placed(&child, class)?))),
+                    "geom" => shapes.extend(self.geom(&child, class, place)?),
+                    _ => {}
+                }
+            }
+        }
+        Ok(geoms::together(&shapes))
+    }
+
+    fn geom(
+        &mut self,
+        node: &Node<'a, 'i>,
+        class: Option<&'a str>,
+        place: Placed,
+    ) -> Result<Option<Inertial>, String> {
+        let mass = self.numbers::<1>(node, class, "mass")?.map(|[mass]| mass);
+        let [density] = self.numbers(node, class, "density")?.unwrap_or([1000.0]);
+        if mass == Some(0.0) || (mass.is_none() && density == 0.0) {
+            return Ok(None);
+        }
+        let kind = self.text(node, class, "type")?.unwrap_or("sphere");
+        let mut placed = self.placed(node, class)?;
+        let size = match self.text(node, class, "size")? {
+            Some(text) => numbers(node, "size", text)?,
+            None => Vec::new(),
+        };
+        let mut half = None;
+        if let Some([a, b, c, d, e, f]) = self.numbers(node, class, "fromto")? {
+            let (from, to) = (Vector3::new(a, b, c), Vector3::new(d, e, f));
+            placed.p = 0.5 * (from + to);
+            let z = (to - from)
+                .try_normalize(1e-12)
+                .ok_or_else(|| at(node, "`fromto` has no length"))?;
+            half = Some(0.5 * (to - from).norm());
+            let axis = Vector3::z().cross(&z);
+            let angle = axis.norm().atan2(z.z);
+            placed.r = about(&axis.try_normalize(1e-12).unwrap_or_else(Vector3::x), angle);
+        }
+        let shape = geoms::Shape::new(kind, &size, half).map_err(|fault| at(node, &fault))?;
+        Ok(shape.map(|shape| shape.inertial(mass, density, place.then(&placed))))
+    }
+
+    fn free(&mut self, node: &Node<'a, 'i>, inside: Inside<'a>) -> Result<(), String> {
+        let name = node.attribute("name").unwrap_or("root").to_owned();
+        let Some(link) = inside.link else {
+            return Ok(());
+        };
+        if self.out.links[link].parent.is_some() {
+            return Err(at(node, "a free joint belongs to a body of the world"));
+        }
+        self.out.links[link]
+            .joints
+            .push(Joint::new(name, Kind::Free, line(node)));
+        Ok(())
+    }
+
+    fn joint(&mut self, node: &Node<'a, 'i>, inside: Inside<'a>, place: Placed) -> Result<(), String> {
+        let (Some(link), class) = (inside.link, inside.class) else {
+            return Ok(());
+        };
+        let kind = match self.text(node, class, "type")?.unwrap_or("hinge") {
+            "hinge" => Kind::Turn,
+            "slide" => Kind::Slide,
+            "ball" => Kind::Ball,
+            "free" => return self.free(node, inside),
+            other => return Err(at(node, &format!("no joint is of the type `{other}`"))),
+        };
+        let n = self.out.links[link].joints.len();
+        let name = node.attribute("name").map_or_else(
+            || {
+                let suffix = if n == 0 { String::new() } else { format!("{}", n + 1) };
+                format!("{}_joint{suffix}", self.out.links[link].name)
+            },
+            str::to_owned,
+        );
+        let mut joint = Joint::new(name, kind, line(node));
+        joint.is_driven = false;
+        if let Some(pos) = self.numbers(node, class, "pos")? {
+            joint.anchor = vector(pos);
+        }
+        joint.anchor = place.p + place.r * joint.anchor;
+        if let Some(axis) = self.numbers(node, class, "axis")? {
+            joint.axis = vector(axis);
+        }
+        joint.axis = place.r * joint.axis;
+        if joint.axis.norm() == 0.0 {
+            return Err(at(node, "the axis has no direction"));
+        }
+        let in_unit = |reader: &Self, value: f64| {
+            if kind == Kind::Slide {
+                value
+            } else {
+                reader.angle(value)
+            }
+        };
+        if matches!(kind, Kind::Turn | Kind::Slide) {
+            let zero = self.first(node, class, "ref")?;
+            joint.zero = in_unit(self, zero);
+        }
+        let limited = self.text(node, class, "limited")?.unwrap_or("auto");
+        if let Some(range) = self.numbers::<2>(node, class, "range")? {
+            let counts = limited == "true" || (limited == "auto" && self.compiler.has_auto_limits);
+            if counts && kind == Kind::Ball {
+                self.out
+                    .remarks
+                    .push(at(node, "the range of a ball joint is a cone, which models do not have"));
+            } else if counts {
+                joint.range = Some(range.map(|x| in_unit(self, x)));
+            }
+        }
+        if let Some(range) = self.numbers::<2>(node, class, "actuatorfrcrange")?
+            && self.text(node, class, "actuatorfrclimited")? != Some("false")
+        {
+            joint.force = Some(range);
+        }
+        joint.damping = self.first(node, class, "damping")?;
+        joint.friction = self.first(node, class, "frictionloss")?;
+        joint.armature = self.first(node, class, "armature")?;
+        joint.stiffness = self.first(node, class, "stiffness")?;
+        let rest = self.first(node, class, "springref")?;
+        joint.rest = in_unit(self, rest);
+        self.out.links[link].joints.push(joint);
+        Ok(())
+    }
+
+    fn link(&self, node: &Node, name: &str) -> Result<Option<usize>, String> {
+        if name == "world" {
+            return Ok(None);
+        }
+        let found = self.out.links.iter().position(|link| link.name == name);
+        found
+            .map(Some)
+            .ok_or_else(|| at(node, &format!("no body is called `{name}`")))
+    }
+
+    fn site(&self, node: &Node, name: &str) -> Result<(Option<usize>, Placed), String> {
+        let found = self.sites.iter().find(|(site, _, _)| site == name);
+        found
+            .map(|(_, link, placed)| (*link, *placed))
+            .ok_or_else(|| at(node, &format!("no site is called `{name}`")))
+    }
+
+    fn equality(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
+        if self.text(node, None, "active")? == Some("false") {
+            self.out
+                .remarks
+                .push(at(node, "this equality is not active and is left out"));
+            return Ok(());
+        }
+        let tag = node.tag_name().name();
+        let name = node.attribute("name").map_or_else(
+            || format!("{tag}_{}", self.out.closures.len() + 1),
+            str::to_owned,
+        );
+        match tag {
+            "connect" | "weld" => {
+                let holds = if tag == "connect" {
+                    Holds::Origins
+                } else {
+                    Holds::Frames
+                };
+                let ends = if node.attribute("site1").is_some() {
+                    let [one, other] = [word(node, "site1")?, word(node, "site2")?];
+                    [self.site(node, &one)?, self.site(node, &other)?]
+                } else {
+                    self.bodies(node, tag)?
+                };
+                self.out.closures.push(Closure {
+                    name,
+                    line: line(node),
+                    ends,
+                    holds,
+                });
+            }
+            "joint" => self.coupling(node)?,
+            other => {
+                return Err(at(
+                    node,
+                    &format!("models do not have the equality `{other}`; they have connect, weld and joint"),
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// The two ends of a closure between bodies: the second follows from the pose of the file.
+    fn bodies(&self, node: &Node<'a, 'i>, tag: &str) -> Result<[(Option<usize>, Placed); 2], String> {
+        let one = self.link(node, &word(node, "body1")?)?;
+        let other = self.link(node, node.attribute("body2").unwrap_or("world"))?;
+        let in_world = |link: Option<usize>| link.map_or(Placed::identity(), |link| self.world[link]);
+        let anchor = match node.attribute("anchor") {
+            Some(text) => vector(exactly(node, "anchor", text)?),
+            None if tag == "weld" => Vector3::zeros(),
+            None => return Err(at(node, "it needs `anchor`")),
+        };
+        if tag == "weld" {
+            // The anchor is a point of the second body; where it is not given, its origin.
+            let pose: Option<[f64; 7]> = match node.attribute("relpose") {
+                Some(text) => Some(exactly(node, "relpose", text)?),
+                None => None,
+            };
+            let relative = match pose {
+                Some([x, y, z, q @ ..]) if q != [0.0; 4] => Placed {
+                    p: Vector3::new(x, y, z),
+                    r: of_quaternion(q).ok_or_else(|| at(node, "`relpose` has no direction"))?,
+                },
+                _ => in_world(one).inverse().then(&in_world(other)),
+            };
+            let shift = Placed {
+                p: anchor,
+                r: Matrix3::identity(),
+            };
+            return Ok([(one, relative.then(&shift)), (other, shift)]);
+        }
+        let first = Placed {
+            p: anchor,
+            r: Matrix3::identity(),
+        };
+        let second = in_world(other).inverse().then(&in_world(one)).then(&first);
+        Ok([(one, first), (other, second)])
+    }
+
+    fn coupling(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
+        let joint = word(node, "joint1")?;
+        let of = node.attribute("joint2").map(str::to_owned);
+        let given = match self.text(node, None, "polycoef")? {
+            Some(text) => numbers(node, "polycoef", text)?,
+            None => vec![0.0, 1.0],
+        };
+        let coefficient = |k: usize| given.get(k).copied().unwrap_or(0.0);
+        if of.is_some() && (2..5).any(|k| coefficient(k) != 0.0) {
+            return Err(at(
+                node,
+                "a coupling by a polynomial of higher degree; models have constant ratios",
+            ));
+        }
+        let zero = |name: &str| {
+            let mut joints = self.out.links.iter().flat_map(|link| &link.joints);
+            joints
+                .find(|joint| joint.name == name)
+                .map(|joint| joint.zero)
+                .ok_or_else(|| at(node, &format!("no joint is called `{name}`")))
+        };
+        let ratio = if of.is_some() { coefficient(1) } else { 0.0 };
+        let reference = of.as_deref().map_or(Ok(0.0), zero)?;
+        let offset = zero(&joint)? + coefficient(0) - ratio * reference;
+        self.out.couplings.push(Coupling {
+            line: line(node),
+            joint,
+            of,
+            ratio,
+            offset,
+        });
+        Ok(())
+    }
+
+    /// Which joints are driven, and by how much.
+    fn actuators(&mut self, root: &Node<'a, 'i>) -> Result<(), String> {
+        let mut n = 0;
+        for node in children(root, "actuator").flat_map(|section| {
+            section.children().filter(Node::is_element).collect::<Vec<_>>()
+        }) {
+            n += 1;
+            let gear = match self.text(&node, None, "gear")? {
+                Some(text) => numbers(&node, "gear", text)?.first().copied().unwrap_or(1.0),
+                None => 1.0,
+            };
+            if let Some(name) = node.attribute("joint").or(node.attribute("jointinparent")) {
+                self.drive(&node, name, gear)?;
+            } else if let Some(name) = node.attribute("tendon") {
+                let tendon = children(root, "tendon")
+                    .flat_map(|section| section.children().collect::<Vec<_>>())
+                    .find(|tendon| tendon.attribute("name") == Some(name))
+                    .ok_or_else(|| at(&node, &format!("no tendon is called `{name}`")))?;
+                if tendon.tag_name().name() != "fixed" {
+                    self.out.remarks.push(at(
+                        &node,
+                        "it pulls a spatial tendon, which models do not have: joints that it moves need drives by hand",
+                    ));
+                    continue;
+                }
+                self.out.remarks.push(at(
+                    &node,
+                    &format!("it drives the joints of the tendon `{name}` together; here each has a force of its own"),
+                ));
+                for joint in children(&tendon, "joint") {
+                    let gear = gear * super::xml::number(&joint, "coef")?;
+                    let name = word(&joint, "joint")?;
+                    self.drive(&joint, &name, gear)?;
+                }
+            } else {
+                self.out.remarks.push(at(
+                    &node,
+                    "it acts on no joint and no fixed tendon and is left out",
+                ));
+            }
+        }
+        for tendon in children(root, "tendon").flat_map(|section| {
+            section.children().filter(Node::is_element).collect::<Vec<_>>()
+        }) {
+            let mut bends = Vec::new();
+            for key in ["stiffness", "damping", "frictionloss", "armature"] {
+                if self
+                    .text(&tendon, None, key)?
+                    .is_some_and(|text| text.trim() != "0")
+                {
+                    bends.push(key);
+                }
+            }
+            if !bends.is_empty() {
+                self.out.remarks.push(at(
+                    &tendon,
+                    &format!("{} of this tendon: left out", bends.join(", ")),
+                ));
+            }
+            if tendon.attribute("range").is_some() {
+                self.out.remarks.push(at(
+                    &tendon,
+                    "a range of a tendon is no equality and is left out",
+                ));
+            }
+        }
+        if n == 0 {
+            let joints = self.out.links.iter_mut().flat_map(|link| &mut link.joints);
+            for joint in joints.filter(|joint| joint.kind != Kind::Free) {
+                joint.is_driven = true;
+            }
+            self.out.remarks.push(
+                "the file has no actuators; every joint has a drive here".to_owned(),
+            );
+        }
+        Ok(())
+    }
+
+    /// Gives a joint its drive.
+    fn drive(&mut self, node: &Node<'a, 'i>, name: &str, gear: f64) -> Result<(), String> {
+        let mut range = None;
+        if let Some([low, high]) = self.numbers(node, None, "forcerange")?
+            && low < high
+            && self.text(node, None, "forcelimited")? != Some("false")
+        {
+            range = Some([low, high]);
+        } else if node.tag_name().name() == "motor"
+            && let Some([low, high]) = self.numbers(node, None, "ctrlrange")?
+            && self.text(node, None, "ctrllimited")? != Some("false")
+        {
+            range = Some([low, high]);
+        }
+        let armature = self.numbers::<1>(node, None, "armature")?.map_or(0.0, |[x]| x);
+        let joint = self
+            .out
+            .links
+            .iter_mut()
+            .flat_map(|link| &mut link.joints)
+            .find(|joint| joint.name == name)
+            .ok_or_else(|| at(node, &format!("no joint is called `{name}`")))?;
+        joint.is_driven = joint.kind != Kind::Free;
+        joint.armature += armature * gear * gear;
+        if joint.force.is_none() {
+            joint.force = range.map(|[low, high]| {
+                let ends = [low * gear, high * gear];
+                [ends[0].min(ends[1]), ends[0].max(ends[1])]
+            });
+        }
+        if gear != 1.0 && node.tag_name().name() != "joint" {
+            self.out.remarks.push(at(
+                node,
+                &format!("its gear is {gear}: the force of the drive here is that at the joint `{name}`"),
+            ));
+        }
+        Ok(())
+    }
+
+    /// The first pose of the file that its author kept, to close loops from.
+    fn keyframe(&mut self, root: &Node<'a, 'i>) -> Result<(), String> {
+        let mut keys = children(root, "keyframe").flat_map(|section| section.children().collect::<Vec<_>>());
+        let Some((key, text)) = keys.find_map(|key| key.attribute("qpos").map(|text| (key, text))) else {
+            return Ok(());
+        };
+        let mut values = numbers(&key, "qpos", text)?.into_iter();
+        for joint in self.out.links.iter().flat_map(|link| &link.joints) {
+            let n = match joint.kind {
+                Kind::Turn | Kind::Slide => 1,
+                Kind::Ball => 4,
+                Kind::Free => 7,
+            };
+            let own: Vec<f64> = values.by_ref().take(n).collect();
+            if let [value] = own[..] {
+                self.out.pose.push((joint.name.clone(), value));
+            }
+        }
+        Ok(())
+    }
+}

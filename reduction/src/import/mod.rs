@@ -1,0 +1,122 @@
+//! Robot descriptions of other programs as a starting point: URDF, MJCF or SDF goes in, the text of a model file comes out,
+//! with what was left out or rounded.
+//!
+//! `urdf`, `mjcf` and `sdf` read a format each into a `description`; `couplings` says what follows what, `model_text` makes
+//! frames, bodies and forces of it, and `closing` finds out which coordinates the loops settle, on the frames in numbers
+//! (`chain`).
+
+mod chain;
+mod closing;
+mod closures_file;
+mod couplings;
+mod description;
+mod geoms;
+mod mjcf;
+mod mjcf_defaults;
+mod model_text;
+mod placed;
+mod sdf;
+mod urdf;
+mod xml;
+
+use std::fmt;
+
+use modelmill_boundary::files::Memory;
+use roxmltree::Document;
+
+/// A model file made from a robot description.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Imported {
+    /// The text of the model file.
+    pub model: String,
+    /// What was left out, rounded or made up; one sentence each.
+    pub remarks: Vec<String>,
+    /// Joints of the description, with the coordinates of the model that move them.
+    pub joints: Vec<ImportedJoint>,
+}
+
+/// A joint of the description in the model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImportedJoint {
+    /// As the description has it.
+    pub name: String,
+    /// One for joints that turn or slide, three angles for ball joints, position and quaternion for free ones.
+    pub coordinates: Vec<String>,
+    /// A joint of one coordinate is `ratio*coordinate + offset`.
+    pub ratio: f64,
+    /// See `ratio`, rad or m.
+    pub offset: f64,
+    /// Axes of a ball joint's angles, `wxyz` for free joints, else empty.
+    pub axes: String,
+}
+
+/// What a description does not say.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Options<'a> {
+    /// The root of a URDF hangs on nothing, rather than on the world.
+    pub floating: bool,
+    /// Angles within 1e-4 of multiples of a twelfth of pi are taken for these.
+    pub round_angles: bool,
+    /// Text of a file with closures and drives beside a URDF, as the collection example-parallel-robots has it.
+    pub closures: Option<&'a str>,
+}
+
+/// Why a robot description makes no model.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ImportError(String);
+
+impl fmt::Display for ImportError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for ImportError {}
+
+/// The longest text that is looked at, bytes.
+pub const LARGEST_DESCRIPTION: usize = 16 << 20;
+
+/// Makes a model file of a robot description; its root element says the format.
+///
+/// Fails when the text is none of URDF, MJCF and SDF, or holds what models cannot say; the message names element and line.
+pub fn import(text: &str, options: &Options) -> Result<Imported, ImportError> {
+    if text.len() > LARGEST_DESCRIPTION {
+        return Err(ImportError(
+            "this file is too large for a robot description".to_owned(),
+        ));
+    }
+    let document = Document::parse(text).map_err(|error| {
+        ImportError(format!(
+            "this is no URDF, MJCF or SDF that can be read ({error}); expected XML with macros (xacro) expanded"
+        ))
+    })?;
+    let read = match document.root_element().tag_name().name() {
+        "robot" => urdf::read(&document, options.closures, options.floating),
+        "mujoco" => mjcf::read(&document),
+        "sdf" => sdf::read(&document),
+        other => Err(xml::at(
+            &document.root_element(),
+            &format!("expected <robot> (URDF), <mujoco> (MJCF) or <sdf>, found <{other}>"),
+        )),
+    };
+    let description = read.map_err(ImportError)?;
+    let is_urdf = description.format == "URDF";
+    if !is_urdf && (options.floating || options.closures.is_some()) {
+        return Err(ImportError(format!(
+            "a free root and a file of closures are for URDF; {} says both itself",
+            description.format
+        )));
+    }
+    let imported = model_text::model(description, options).map_err(ImportError)?;
+    match modelmill_spec::load(
+        "the model made from it",
+        &imported.model,
+        &Memory::default(),
+    ) {
+        Ok(_) => Ok(imported),
+        Err(failure) => Err(ImportError(format!(
+            "this description makes no sound model:\n{}",
+            failure.render(false)
+        ))),
+    }
+}

@@ -1,0 +1,116 @@
+//! Places, angles and axes as robot descriptions have them and as model files want them.
+
+use nalgebra::{Matrix3, Quaternion, Rotation3, Unit, UnitQuaternion, Vector3};
+
+/// Where something is in a frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Placed {
+    pub(crate) p: Vector3<f64>,
+    pub(crate) r: Matrix3<f64>,
+}
+
+impl Placed {
+    pub(crate) fn identity() -> Self {
+        Self {
+            p: Vector3::zeros(),
+            r: Matrix3::identity(),
+        }
+    }
+
+    /// From a position and roll, pitch and yaw.
+    pub(crate) fn of(xyz: [f64; 3], rpy: [f64; 3]) -> Self {
+        Self {
+            p: Vector3::from(xyz),
+            r: rotation(rpy),
+        }
+    }
+
+    pub(crate) fn then(&self, next: &Self) -> Self {
+        Self {
+            p: self.p + self.r * next.p,
+            r: self.r * next.r,
+        }
+    }
+
+    pub(crate) fn inverse(&self) -> Self {
+        let r = self.r.transpose();
+        Self {
+            p: -(r * self.p),
+            r,
+        }
+    }
+}
+
+/// A turn about an axis of unit length.
+pub(crate) fn about(axis: &Vector3<f64>, angle: f64) -> Matrix3<f64> {
+    Rotation3::from_axis_angle(&Unit::new_unchecked(*axis), angle).into_inner()
+}
+
+/// `Rz(yaw) Ry(pitch) Rx(roll)`.
+pub(crate) fn rotation([roll, pitch, yaw]: [f64; 3]) -> Matrix3<f64> {
+    about(&Vector3::z(), yaw) * about(&Vector3::y(), pitch) * about(&Vector3::x(), roll)
+}
+
+/// The rotation of a quaternion w, x, y, z of any length; none where it is zero.
+pub(crate) fn of_quaternion([w, x, y, z]: [f64; 4]) -> Option<Matrix3<f64>> {
+    let quaternion = Quaternion::new(w, x, y, z);
+    let length = quaternion.norm();
+    (length > 1e-12 && length.is_finite()).then(|| {
+        UnitQuaternion::from_quaternion(quaternion)
+            .to_rotation_matrix()
+            .into_inner()
+    })
+}
+
+/// Roll, pitch and yaw of a rotation, to the last digits also where pitch is near a right angle.
+pub(crate) fn roll_pitch_yaw(r: &Matrix3<f64>) -> [f64; 3] {
+    let pitch = (-r[(2, 0)]).atan2(r[(0, 0)].hypot(r[(1, 0)]));
+    // Where only the sum of roll and yaw counts, what stands in the entries is rounding.
+    let roll = if r[(2, 1)].hypot(r[(2, 2)]) < 1e-14 {
+        0.0
+    } else {
+        r[(2, 1)].atan2(r[(2, 2)])
+    };
+    let (sin, cos) = roll.sin_cos();
+    let yaw = (sin * r[(0, 2)] - cos * r[(0, 1)]).atan2(cos * r[(1, 1)] - sin * r[(1, 2)]);
+    [roll, pitch, yaw]
+}
+
+/// A multiple of a twelfth of pi as an expression.
+pub(crate) fn twelfths(n: f64) -> String {
+    #[allow(clippy::cast_possible_truncation, reason = "at most 48")]
+    let n = n as i64;
+    let common = (1..=12)
+        .rev()
+        .find(|d| n % d == 0 && 12 % d == 0)
+        .unwrap_or(1);
+    match (n / common, 12 / common) {
+        (0, _) => "0".to_owned(),
+        (1, 1) => "pi".to_owned(),
+        (-1, 1) => "-pi".to_owned(),
+        (n, 1) => format!("{n}*pi"),
+        (1, d) => format!("pi/{d}"),
+        (-1, d) => format!("-pi/{d}"),
+        (n, d) => format!("{n}*pi/{d}"),
+    }
+}
+
+/// The name of an axis, or z and the rotation that turns z into it.
+pub(crate) fn axis(direction: &Vector3<f64>) -> Option<(&'static str, Matrix3<f64>)> {
+    let length = direction.norm();
+    if !(length > 0.0 && length.is_finite()) {
+        return None;
+    }
+    let unit = direction / length;
+    for (k, names) in [["x", "-x"], ["y", "-y"], ["z", "-z"]]
+        .into_iter()
+        .enumerate()
+    {
+        let others = unit[(k + 1) % 3].hypot(unit[(k + 2) % 3]);
+        if others < 1e-13 {
+            return Some((names[usize::from(unit[k] < 0.0)], Matrix3::identity()));
+        }
+    }
+    let turned = Rotation3::rotation_between(&Vector3::z(), &unit)?;
+    Some(("z", turned.into_inner()))
+}

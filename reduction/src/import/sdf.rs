@@ -1,0 +1,495 @@
+//! Reads SDF: links and joints with poses that refer to each other, as a tree with closures.
+//!
+//! Source of names, defaults and frames: the specification (sdformat.org/spec) and its tutorial "Pose Frame Semantics".
+
+use nalgebra::{Matrix3, Vector3};
+use roxmltree::{Document, Node};
+
+use super::description::{Closure, Coupling, Description, Holds, Inertial, Joint, Kind, Link};
+use super::placed::{Placed, of_quaternion, rotation};
+use super::xml::{at, child, children, exactly, line, required, symmetric, vector, word};
+
+/// Values beyond this stand for "no limit".
+const NO_LIMIT: f64 = 1e15;
+/// Poses that refer to each other are followed this far.
+const LONGEST_CHAIN: usize = 1000;
+
+/// A frame that poses may refer to.
+struct Frame<'a, 'i> {
+    name: String,
+    node: Node<'a, 'i>,
+    /// What the pose is relative to unless the file says otherwise.
+    usually: String,
+}
+
+/// A joint between two links.
+struct Between {
+    parent: Option<usize>,
+    child: Option<usize>,
+    joints: Vec<Joint>,
+    /// Of the joint, in the model.
+    place: Placed,
+    name: String,
+    line: u32,
+    kind: String,
+}
+
+/// Reads a description, or says in one line what is wrong and where.
+pub(crate) fn read(document: &Document) -> Result<Description, String> {
+    let root = document.root_element();
+    let version: f64 = root
+        .attribute("version")
+        .and_then(|text| text.trim().parse().ok())
+        .unwrap_or(1.7);
+    let world = child(&root, "world");
+    let mut models = children(&root, "model")
+        .chain(world.iter().flat_map(|world| children(world, "model")));
+    let model = models
+        .next()
+        .ok_or_else(|| at(&root, "it needs a <model>"))?;
+    if let Some(other) = models.next() {
+        return Err(at(
+            &other,
+            "a second model in one file; keep the one that is wanted",
+        ));
+    }
+    let mut out = Description {
+        name: model.attribute("name").unwrap_or("robot").to_owned(),
+        format: "SDF",
+        ..Description::default()
+    };
+    if let Some(node) = world.and_then(|world| child(&world, "gravity")) {
+        out.gravity = Some(vector(exactly(&node, "gravity", node.text().unwrap_or(""))?));
+    }
+    if let Some(inner) = model
+        .children()
+        .find(|node| ["model", "include"].contains(&node.tag_name().name()))
+    {
+        return Err(at(
+            &inner,
+            "models inside of models are not expanded here; `gz sdf -p` prints one flat model",
+        ));
+    }
+    if text_of(&model, "static").is_some_and(|text| ["true", "1"].contains(&text)) {
+        return Err(at(&model, "it is static: nothing moves"));
+    }
+    let frames = frames(&model)?;
+    let links: Vec<Node> = children(&model, "link").collect();
+    let mut places = Vec::new();
+    for node in &links {
+        places.push(in_model(&frames, &word(node, "name")?, node, 0)?);
+    }
+    let mut joints = Vec::new();
+    for node in children(&model, "joint") {
+        joints.push(joint(&node, &links, &frames, version, &mut out)?);
+    }
+    let own = match child(&model, "pose") {
+        Some(pose) => pose_of(&pose)?,
+        None => Placed::identity(),
+    };
+    let base = model
+        .attribute("canonical_link")
+        .and_then(|name| links.iter().position(|node| node.attribute("name") == Some(name)))
+        .unwrap_or(0);
+    tree(&mut out, &links, &places, joints, &own, base)?;
+    Ok(out)
+}
+
+fn text_of<'a>(node: &Node<'a, '_>, tag: &str) -> Option<&'a str> {
+    child(node, tag).and_then(|node| node.text()).map(str::trim)
+}
+
+fn number_of(node: &Node, tag: &str) -> Result<Option<f64>, String> {
+    let Some(inner) = child(node, tag) else {
+        return Ok(None);
+    };
+    exactly(&inner, tag, inner.text().unwrap_or("")).map(|[x]| Some(x))
+}
+
+/// All frames of a model by name.
+fn frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<Frame<'a, 'i>>, String> {
+    let mut out: Vec<Frame> = Vec::new();
+    for node in model.children().filter(Node::is_element) {
+        let usually = match node.tag_name().name() {
+            "link" => "__model__".to_owned(),
+            "joint" => text_of(&node, "child").unwrap_or("__model__").to_owned(),
+            "frame" => node.attribute("attached_to").unwrap_or("__model__").to_owned(),
+            _ => continue,
+        };
+        let name = word(&node, "name")?;
+        if out.iter().any(|frame| frame.name == name && frame.node.tag_name() == node.tag_name()) {
+            return Err(at(&node, "this name is there twice"));
+        }
+        out.push(Frame {
+            name,
+            node,
+            usually,
+        });
+    }
+    Ok(out)
+}
+
+/// Where a frame is in the model.
+fn in_model(frames: &[Frame], name: &str, from: &Node, depth: usize) -> Result<Placed, String> {
+    if name == "__model__" || name.is_empty() || name == "world" {
+        return Ok(Placed::identity());
+    }
+    if depth > LONGEST_CHAIN {
+        return Err(at(from, "its pose refers to itself by way of others"));
+    }
+    let frame = frames
+        .iter()
+        .find(|frame| frame.name == name)
+        .ok_or_else(|| at(from, &format!("no frame is called `{name}`")))?;
+    let pose = child(&frame.node, "pose");
+    let relative = pose
+        .and_then(|pose| pose.attribute("relative_to").or(pose.attribute("frame")))
+        .filter(|name| !name.is_empty())
+        .unwrap_or(&frame.usually);
+    let placed = pose.map_or(Ok(Placed::identity()), |pose| pose_of(&pose))?;
+    Ok(in_model(frames, relative, &frame.node, depth + 1)?.then(&placed))
+}
+
+/// The numbers of a `<pose>`.
+fn pose_of(node: &Node) -> Result<Placed, String> {
+    let text = node.text().unwrap_or("").trim();
+    if text.is_empty() {
+        return Ok(Placed::identity());
+    }
+    if node.attribute("rotation_format") == Some("quat_xyzw") {
+        let [px, py, pz, x, y, z, w] = exactly(node, "pose", text)?;
+        return Ok(Placed {
+            p: Vector3::new(px, py, pz),
+            r: of_quaternion([w, x, y, z]).ok_or_else(|| at(node, "the quaternion is zero"))?,
+        });
+    }
+    let [px, py, pz, angles @ ..] = exactly::<6>(node, "pose", text)?;
+    let is_degree = node.attribute("degrees") == Some("true");
+    Ok(Placed {
+        p: Vector3::new(px, py, pz),
+        r: rotation(angles.map(|angle: f64| if is_degree { angle.to_radians() } else { angle })),
+    })
+}
+
+fn inertial(node: &Node) -> Result<Inertial, String> {
+    let given = child(node, "inertial");
+    let mut out = Inertial {
+        mass: 1.0,
+        at: Placed::identity(),
+        inertia: Matrix3::identity(),
+    };
+    let Some(given) = given else {
+        return Ok(out);
+    };
+    if let Some(auto) = given.attribute("auto")
+        && auto == "true"
+    {
+        return Err(at(
+            &given,
+            "mass and inertia from shapes are not worked out here; write them into the file",
+        ));
+    }
+    out.mass = number_of(&given, "mass")?.unwrap_or(1.0);
+    if let Some(pose) = child(&given, "pose") {
+        if pose.attribute("relative_to").is_some_and(|name| !name.is_empty()) {
+            return Err(at(&pose, "the pose of an inertial is that in its link; delete `relative_to`"));
+        }
+        out.at = pose_of(&pose)?;
+    }
+    if let Some(inertia) = child(&given, "inertia") {
+        let mut entries = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
+        for (entry, key) in entries
+            .iter_mut()
+            .zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"])
+        {
+            *entry = number_of(&inertia, key)?.unwrap_or(*entry);
+        }
+        out.inertia = symmetric(entries);
+    }
+    Ok(out)
+}
+
+fn joint(
+    node: &Node,
+    links: &[Node],
+    frames: &[Frame],
+    version: f64,
+    out: &mut Description,
+) -> Result<Between, String> {
+    let name = word(node, "name")?;
+    let end = |tag: &str| -> Result<Option<usize>, String> {
+        let inner = required(node, tag)?;
+        let mut name = inner.text().unwrap_or("").trim().to_owned();
+        // A frame stands for the link that it is attached to.
+        for _ in 0..LONGEST_CHAIN {
+            if name == "world" {
+                return Ok(None);
+            }
+            if let Some(k) = links.iter().position(|link| link.attribute("name") == Some(&name)) {
+                return Ok(Some(k));
+            }
+            let frame = frames
+                .iter()
+                .find(|frame| frame.name == name)
+                .ok_or_else(|| at(&inner, &format!("no link is called `{name}`")))?;
+            if frame.usually == "__model__" {
+                return Ok(links.first().map(|_| 0));
+            }
+            name.clone_from(&frame.usually);
+        }
+        Err(at(&inner, "its frame is attached to itself by way of others"))
+    };
+    let kind = word(node, "type")?;
+    let wanted: &[(&str, Kind)] = match kind.as_str() {
+        "fixed" => &[],
+        "revolute" | "continuous" => &[("axis", Kind::Turn)],
+        "prismatic" => &[("axis", Kind::Slide)],
+        "ball" => &[("", Kind::Ball)],
+        "universal" | "revolute2" => &[("axis", Kind::Turn), ("axis2", Kind::Turn)],
+        other => {
+            return Err(at(
+                node,
+                &format!("models have no joint of the type {other}; write it as several of revolute, prismatic, ball and fixed"),
+            ));
+        }
+    };
+    let place = in_model(frames, &name_in(frames, node, &name)?, node, 0)?;
+    let (parent, child_link) = (end("parent")?, end("child")?);
+    let mut joints = Vec::new();
+    for (k, (tag, kind)) in wanted.iter().enumerate() {
+        let suffix = if k == 0 { "" } else { "_2" };
+        let mut joint = Joint::new(format!("{name}{suffix}"), *kind, line(node));
+        if let Some(axis) = child(node, tag) {
+            read_axis(&mut joint, &axis, frames, version, &place, out)?;
+        } else if *kind != Kind::Ball {
+            return Err(at(node, &format!("it needs <{tag}>")));
+        }
+        joints.push(joint);
+    }
+    if let Some(physics) = child(node, "sensor").or(child(node, "physics")) {
+        out.remarks.push(at(&physics, "not read"));
+    }
+    Ok(Between {
+        parent,
+        child: child_link,
+        joints,
+        place,
+        name,
+        line: line(node),
+        kind,
+    })
+}
+
+/// The name under which a joint's own frame is found; links and joints may share names in old files.
+fn name_in(frames: &[Frame], node: &Node, name: &str) -> Result<String, String> {
+    if frames.iter().filter(|frame| frame.name == name).count() > 1 {
+        return Err(at(
+            node,
+            "a joint and a link or frame have this name, so that poses cannot tell them apart; rename one",
+        ));
+    }
+    Ok(name.to_owned())
+}
+
+/// Axis (in the axes of the model), limits and losses of one degree of freedom.
+fn read_axis(
+    joint: &mut Joint,
+    node: &Node,
+    frames: &[Frame],
+    version: f64,
+    place: &Placed,
+    out: &mut Description,
+) -> Result<(), String> {
+    let (xyz, turned) = match child(node, "xyz") {
+        Some(xyz) => {
+            let given = xyz.attribute("expressed_in").filter(|name| !name.is_empty());
+            let turned = match given {
+                Some(name) => in_model(frames, name, node, 0)?.r,
+                None => place.r,
+            };
+            (vector(exactly(&xyz, "xyz", xyz.text().unwrap_or(""))?), turned)
+        }
+        None => (Vector3::z(), place.r),
+    };
+    let in_model_frame = match text_of(node, "use_parent_model_frame") {
+        Some(text) => ["1", "true"].contains(&text),
+        None => version < 1.45,
+    };
+    joint.axis = if in_model_frame { xyz } else { turned * xyz };
+    if joint.axis.norm() == 0.0 {
+        return Err(at(node, "the axis has no direction"));
+    }
+    if let Some(limit) = child(node, "limit") {
+        let low = number_of(&limit, "lower")?.filter(|x| *x > -NO_LIMIT);
+        let high = number_of(&limit, "upper")?.filter(|x| *x < NO_LIMIT);
+        if let (Some(low), Some(high)) = (low, high) {
+            joint.range = (low < high).then_some([low, high]);
+        }
+        joint.rate = number_of(&limit, "velocity")?.filter(|x| *x > 0.0 && *x < NO_LIMIT);
+        let force = number_of(&limit, "effort")?.filter(|x| *x >= 0.0 && *x < NO_LIMIT);
+        joint.is_driven = force != Some(0.0);
+        joint.force = force.filter(|x| *x > 0.0).map(|x| [-x, x]);
+    }
+    if let Some(dynamics) = child(node, "dynamics") {
+        joint.damping = number_of(&dynamics, "damping")?.unwrap_or(0.0);
+        joint.friction = number_of(&dynamics, "friction")?.unwrap_or(0.0);
+        joint.stiffness = number_of(&dynamics, "spring_stiffness")?.unwrap_or(0.0);
+        joint.rest = number_of(&dynamics, "spring_reference")?.unwrap_or(0.0);
+    }
+    // Drake's elements stand in the joint, not in the axis.
+    if let Some(parent) = node.parent()
+        && let Some(rotor) = number_of(&parent, "rotor_inertia")?
+    {
+        let gear = number_of(&parent, "gear_ratio")?.unwrap_or(1.0);
+        joint.armature = rotor * gear * gear;
+    }
+    if let Some(mimic) = child(node, "mimic") {
+        let mut of = word(&mimic, "joint")?;
+        if mimic.attribute("axis") == Some("axis2") {
+            of.push_str("_2");
+        }
+        let ratio = number_of(&mimic, "multiplier")?.unwrap_or(1.0);
+        let reference = number_of(&mimic, "reference")?.unwrap_or(0.0);
+        out.couplings.push(Coupling {
+            line: line(&mimic),
+            joint: joint.name.clone(),
+            of: Some(of),
+            ratio,
+            offset: number_of(&mimic, "offset")?.unwrap_or(0.0) - ratio * reference,
+        });
+    }
+    Ok(())
+}
+
+/// Makes a tree of links and joints: what closes a ring becomes a closure, ball joints first.
+fn tree(
+    out: &mut Description,
+    nodes: &[Node],
+    places: &[Placed],
+    joints: Vec<Between>,
+    own: &Placed,
+    base: usize,
+) -> Result<(), String> {
+    // Which joints belong to the tree: the world is the last part.
+    let n = nodes.len();
+    let part = |link: Option<usize>| link.unwrap_or(n);
+    let mut group: Vec<usize> = (0..=n).collect();
+    let mut order: Vec<usize> = (0..joints.len()).collect();
+    order.sort_by_key(|k| joints[*k].kind == "ball");
+    let mut in_tree = vec![false; joints.len()];
+    for k in order {
+        let [one, other] = [part(joints[k].parent), part(joints[k].child)].map(|p| group[p]);
+        if one != other {
+            in_tree[k] = true;
+            for member in &mut group {
+                if *member == other {
+                    *member = one;
+                }
+            }
+        }
+    }
+    // Links in the order in which they are reached: from the world, then from the base, then from what is left.
+    let mut index: Vec<Option<usize>> = vec![None; n];
+    let starts = [None, Some(base)]
+        .into_iter()
+        .chain((0..n).map(Some));
+    for start in starts {
+        if let Some(link) = start {
+            if index[link].is_some() {
+                continue;
+            }
+            let suffix = if link == base { String::new() } else { format!("_{}", nodes[link].attribute("name").unwrap_or_default()) };
+            index[link] = Some(out.links.len());
+            out.links.push(Link {
+                name: word(&nodes[link], "name")?,
+                parent: None,
+                at: own.then(&places[link]),
+                joints: vec![Joint::new(format!("base{suffix}"), Kind::Free, line(&nodes[link]))],
+                inertial: inertial(&nodes[link])?,
+            });
+        }
+        let mut waiting = vec![start];
+        while let Some(here) = waiting.pop() {
+            for (k, between) in joints.iter().enumerate().filter(|(k, _)| in_tree[*k]) {
+                let is_forward = between.parent == here;
+                let there = if is_forward { between.child } else { between.parent };
+                if !(is_forward || between.child == here) {
+                    continue;
+                }
+                let Some(link) = there.filter(|link| index[*link].is_none()) else {
+                    continue;
+                };
+                let _ = k;
+                let carrier = here.map_or_else(|| own.inverse(), |link| places[link]);
+                let to_link = places[link].inverse();
+                let mut moving = between.joints.clone();
+                for joint in &mut moving {
+                    joint.anchor = to_link.then(&between.place).p;
+                    joint.axis = to_link.r * joint.axis;
+                    if !is_forward {
+                        joint.axis = -joint.axis;
+                    }
+                }
+                if !is_forward {
+                    if moving.iter().any(|joint| joint.kind == Kind::Ball) {
+                        out.remarks.push(format!(
+                            "line {}: the ball joint `{}` is passed from child to parent: its angles are those of the parent",
+                            between.line, between.name
+                        ));
+                    }
+                    moving.reverse();
+                }
+                index[link] = Some(out.links.len());
+                out.links.push(Link {
+                    name: word(&nodes[link], "name")?,
+                    parent: here.and_then(|link| index[link]),
+                    at: carrier.inverse().then(&places[link]),
+                    joints: moving,
+                    inertial: inertial(&nodes[link])?,
+                });
+                waiting.push(Some(link));
+            }
+        }
+    }
+    for between in joints.iter().zip(&in_tree).filter(|(_, is)| !**is).map(|(b, _)| b) {
+        let holds = match between.kind.as_str() {
+            "ball" => Holds::Origins,
+            "revolute" | "continuous" => Holds::Axes,
+            "fixed" => Holds::Frames,
+            other => {
+                return Err(format!(
+                    "line {}: the joint `{}` closes a loop and is {other}; loops are closed by ball, revolute and fixed joints",
+                    between.line, between.name
+                ));
+            }
+        };
+        let mut place = between.place;
+        if let (Holds::Axes, Some(joint)) = (holds, between.joints.first()) {
+            let turned = nalgebra::Rotation3::rotation_between(&Vector3::x(), &joint.axis);
+            // Against x it is half a turn about any axis across.
+            place.r = turned.map_or_else(
+                || Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0)),
+                nalgebra::Rotation3::into_inner,
+            );
+        }
+        let end = |link: Option<usize>| match link {
+            Some(link) => (index[link], places[link].inverse().then(&place)),
+            None => (None, own.then(&place)),
+        };
+        for joint in &between.joints {
+            if joint.damping != 0.0 || joint.friction != 0.0 || joint.stiffness != 0.0 {
+                out.remarks.push(format!(
+                    "line {}: damping, friction and springs of `{}`, which closes a loop, are left out",
+                    between.line, between.name
+                ));
+            }
+        }
+        out.closures.push(Closure {
+            name: between.name.clone(),
+            line: between.line,
+            ends: [end(between.parent), end(between.child)],
+            holds,
+        });
+    }
+    Ok(())
+}

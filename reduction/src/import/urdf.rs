@@ -1,0 +1,329 @@
+//! Reads URDF: links and joints with the defaults of the format, mimic joints, and closures of a file beside it.
+//!
+//! Source of names and defaults: the URDF specification of ROS (wiki.ros.org/urdf/XML).
+
+use roxmltree::{Document, Node};
+
+use super::closures_file::{self, Closures};
+use super::description::{Closure, Coupling, Description, Holds, Inertial, Joint, Kind, Link};
+use super::placed::Placed;
+use super::xml::{at, child, children, line, number, required, symmetric, three, vector, word};
+
+/// A joint between two links, as the file has it.
+struct Between {
+    parent: String,
+    child: String,
+    origin: Placed,
+    /// None is fixed.
+    joint: Option<Joint>,
+    name: String,
+    line: u32,
+}
+
+/// Reads a description, or says in one line what is wrong and where. `closures` is the text of a `robot.yaml`.
+pub(crate) fn read(
+    document: &Document,
+    closures: Option<&str>,
+    is_floating: bool,
+) -> Result<Description, String> {
+    let robot = document.root_element();
+    let mut out = Description {
+        name: robot.attribute("name").unwrap_or("robot").to_owned(),
+        format: "URDF",
+        ..Description::default()
+    };
+    let links: Vec<Node> = children(&robot, "link").collect();
+    let mut joints = Vec::new();
+    for node in children(&robot, "joint") {
+        joints.push(joint(&node, &mut out)?);
+    }
+    for node in children(&robot, "transmission") {
+        for reduction in node.descendants().filter(|node| {
+            node.tag_name().name() == "mechanicalReduction"
+                && node.text().is_some_and(|text| text.trim().parse() != Ok(1.0))
+        }) {
+            out.remarks.push(format!(
+                "line {}: the reduction {} of the transmission `{}` is not read: forces are those at the joints",
+                line(&reduction),
+                reduction.text().unwrap_or_default().trim(),
+                node.attribute("name").unwrap_or_default()
+            ));
+        }
+    }
+    if let Some(node) = robot
+        .children()
+        .find(|node| node.tag_name().name() == "loop_joint")
+    {
+        return Err(at(
+            &node,
+            "a proposal for closed chains that was never settled; write the closure into a robot.yaml beside the file",
+        ));
+    }
+    check_names(&links, &joints)?;
+    let root = root(&links, &joints)?;
+    let mut order = vec![(root, None)];
+    let mut k = 0;
+    while k < order.len() {
+        let (node, between): (Node, Option<usize>) = order[k];
+        let name = word(&node, "name")?;
+        let mut link = Link {
+            name: name.clone(),
+            parent: None,
+            at: Placed::identity(),
+            joints: Vec::new(),
+            inertial: inertial(&node)?,
+        };
+        if let Some(j) = between {
+            let joint = &joints[j];
+            link.parent = out.links.iter().position(|link| link.name == joint.parent);
+            link.at = joint.origin;
+            link.joints.extend(joint.joint.clone());
+            if joint.joint.as_ref().is_some_and(|j| j.kind == Kind::Free)
+                && joint.parent != word(&root, "name")?
+            {
+                return Err(format!(
+                    "line {}: the joint `{}` is floating on a link that is not the root; a free body hangs on nothing",
+                    joint.line, joint.name
+                ));
+            }
+        } else if is_floating {
+            link.joints
+                .push(Joint::new("root_joint".to_owned(), Kind::Free, line(&node)));
+        }
+        out.links.push(link);
+        for (j, joint) in joints.iter().enumerate() {
+            if joint.parent != name {
+                continue;
+            }
+            if order
+                .iter()
+                .any(|(node, _)| node.attribute("name") == Some(joint.child.as_str()))
+            {
+                return Err(format!(
+                    "line {}: the link `{}` hangs on two joints; URDF describes trees only",
+                    joint.line, joint.child
+                ));
+            }
+            if let Some(node) = links
+                .iter()
+                .find(|node| node.attribute("name") == Some(joint.child.as_str()))
+            {
+                order.push((*node, Some(j)));
+            }
+        }
+        k += 1;
+    }
+    if let Some(node) = links.iter().find(|node| {
+        out.links
+            .iter()
+            .all(|link| Some(link.name.as_str()) != node.attribute("name"))
+    }) {
+        return Err(at(
+            node,
+            "it is in a ring of joints that the root does not reach",
+        ));
+    }
+    if let Some(text) = closures {
+        close(&mut out, &joints, closures_file::read(text)?)?;
+    }
+    Ok(out)
+}
+
+fn check_names(links: &[Node], joints: &[Between]) -> Result<(), String> {
+    for (i, node) in links.iter().enumerate() {
+        let name = word(node, "name")?;
+        if links[..i]
+            .iter()
+            .any(|other| other.attribute("name") == Some(name.as_str()))
+        {
+            return Err(at(
+                node,
+                &format!("two links are called `{name}`; rename one"),
+            ));
+        }
+    }
+    for (i, joint) in joints.iter().enumerate() {
+        if joints[..i].iter().any(|other| other.name == joint.name) {
+            return Err(format!(
+                "line {}: two joints are called `{}`; rename one",
+                joint.line, joint.name
+            ));
+        }
+        for end in [&joint.parent, &joint.child] {
+            if links
+                .iter()
+                .all(|node| node.attribute("name") != Some(end.as_str()))
+            {
+                return Err(format!(
+                    "line {}: the joint `{}` names the link `{end}`, which does not exist",
+                    joint.line, joint.name
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The link that no joint moves; all others must hang on it.
+fn root<'a, 'i>(links: &[Node<'a, 'i>], joints: &[Between]) -> Result<Node<'a, 'i>, String> {
+    let is_child = |node: &&Node| {
+        joints
+            .iter()
+            .any(|joint| node.attribute("name") == Some(joint.child.as_str()))
+    };
+    let mut roots = links.iter().filter(|node| !is_child(node));
+    match (roots.next(), roots.next()) {
+        (Some(root), None) => Ok(*root),
+        (None, _) => Err("no link is the root: every link hangs on another".to_owned()),
+        (Some(one), Some(two)) => Err(at(
+            two,
+            &format!(
+                "this link and `{}` hang on nothing; join them to one robot",
+                one.attribute("name").unwrap_or_default()
+            ),
+        )),
+    }
+}
+
+fn inertial(node: &Node) -> Result<Inertial, String> {
+    let Some(inertial) = child(node, "inertial") else {
+        return Ok(Inertial::default());
+    };
+    let mass = number(&required(&inertial, "mass")?, "value")?;
+    let inertia = required(&inertial, "inertia")?;
+    let mut entries = [0.0; 6];
+    for (entry, key) in entries
+        .iter_mut()
+        .zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"])
+    {
+        *entry = number(&inertia, key)?;
+    }
+    Ok(Inertial {
+        mass,
+        at: origin(&inertial)?,
+        inertia: symmetric(entries),
+    })
+}
+
+fn joint(node: &Node, out: &mut Description) -> Result<Between, String> {
+    let name = word(node, "name")?;
+    let kind = match word(node, "type")?.as_str() {
+        "fixed" => None,
+        "revolute" | "continuous" => Some(Kind::Turn),
+        "prismatic" => Some(Kind::Slide),
+        "floating" => Some(Kind::Free),
+        "spherical" | "ball" => Some(Kind::Ball),
+        other => {
+            return Err(at(
+                node,
+                &format!(
+                    "this joint is {other}; models have revolute, continuous, prismatic, floating and fixed joints: write it \
+                     as several of these"
+                ),
+            ));
+        }
+    };
+    let (limit, dynamics) = (child(node, "limit"), child(node, "dynamics"));
+    let given = |of: Option<Node>, key: &str| match of {
+        Some(node) if node.has_attribute(key) => number(&node, key).map(Some),
+        _ => Ok(None),
+    };
+    let mut moving = None;
+    if let Some(kind) = kind {
+        let mut joint = Joint::new(name.clone(), kind, line(node));
+        joint.axis = match child(node, "axis") {
+            Some(axis) => vector(three(&axis, "xyz")?),
+            None => vector([1.0, 0.0, 0.0]),
+        };
+        if joint.axis.norm() == 0.0 && matches!(kind, Kind::Turn | Kind::Slide) {
+            return Err(at(node, "the axis has no direction"));
+        }
+        let (lower, upper) = (given(limit, "lower")?, given(limit, "upper")?);
+        if word(node, "type")? != "continuous" && (lower.is_some() || upper.is_some()) {
+            // An absent bound is zero, says the format.
+            let range = [lower.unwrap_or(0.0), upper.unwrap_or(0.0)];
+            joint.range = (range[0] < range[1]).then_some(range);
+        }
+        joint.rate = given(limit, "velocity")?.filter(|rate| *rate > 0.0);
+        joint.force = given(limit, "effort")?
+            .filter(|force| *force > 0.0)
+            .map(|force| [-force, force]);
+        joint.damping = given(dynamics, "damping")?.unwrap_or(0.0);
+        joint.friction = given(dynamics, "friction")?.unwrap_or(0.0);
+        moving = Some(joint);
+    }
+    if let Some(mimic) = child(node, "mimic") {
+        out.couplings.push(Coupling {
+            line: line(&mimic),
+            joint: name.clone(),
+            of: Some(word(&mimic, "joint")?),
+            ratio: given(Some(mimic), "multiplier")?.unwrap_or(1.0),
+            offset: given(Some(mimic), "offset")?.unwrap_or(0.0),
+        });
+    }
+    Ok(Between {
+        parent: word(&required(node, "parent")?, "link")?,
+        child: word(&required(node, "child")?, "link")?,
+        origin: origin(node)?,
+        joint: moving,
+        name,
+        line: line(node),
+    })
+}
+
+/// The `<origin>` of an element; without one it is where the element is.
+fn origin(of: &Node) -> Result<Placed, String> {
+    let Some(node) = child(of, "origin") else {
+        return Ok(Placed::identity());
+    };
+    let or_zeros = |key: &str| {
+        if node.has_attribute(key) {
+            three(&node, key)
+        } else {
+            Ok([0.0; 3])
+        }
+    };
+    Ok(Placed::of(or_zeros("xyz")?, or_zeros("rpy")?))
+}
+
+/// Puts in what a file of closures says: frames that coincide and joints that are driven.
+fn close(out: &mut Description, joints: &[Between], file: Closures) -> Result<(), String> {
+    let place = |name: &str| -> Result<Option<usize>, String> {
+        let joint = joints.iter().find(|joint| joint.name == name);
+        let link = joint.map_or(name, |joint| joint.child.as_str());
+        let index = out.links.iter().position(|link_| link_.name == link);
+        index.map(Some).ok_or_else(|| {
+            format!("the file of closures names `{name}`, which is neither a link nor a joint")
+        })
+    };
+    for closure in file.closures {
+        let [one, other] = &closure.ends;
+        let ends = [place(one)?, place(other)?].map(|link| (link, Placed::identity()));
+        out.closures.push(Closure {
+            name: format!("{one}_{other}"),
+            line: closure.line,
+            ends,
+            holds: if closure.is_full {
+                Holds::Frames
+            } else {
+                Holds::Origins
+            },
+        });
+    }
+    for name in &file.drives {
+        if joints
+            .iter()
+            .all(|joint| &joint.name != name || joint.joint.is_none())
+        {
+            return Err(format!(
+                "the file of closures drives `{name}`, which is no joint that moves"
+            ));
+        }
+    }
+    if !file.drives.is_empty() {
+        for joint in out.links.iter_mut().flat_map(|link| &mut link.joints) {
+            joint.is_driven &= file.drives.contains(&joint.name);
+        }
+    }
+    Ok(())
+}

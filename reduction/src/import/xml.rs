@@ -1,0 +1,81 @@
+//! Elements and attributes of XML, with places in messages.
+
+use nalgebra::{Matrix3, Vector3};
+use roxmltree::Node;
+
+pub(crate) fn child<'a, 'i>(of: &Node<'a, 'i>, tag: &str) -> Option<Node<'a, 'i>> {
+    of.children().find(|node| node.has_tag_name(tag) || node.tag_name().name() == tag)
+}
+
+pub(crate) fn children<'a, 'i>(
+    of: &Node<'a, 'i>,
+    tag: &'static str,
+) -> impl Iterator<Item = Node<'a, 'i>> + use<'a, 'i> {
+    of.children()
+        .filter(move |node| node.tag_name().name() == tag)
+}
+
+pub(crate) fn required<'a, 'i>(of: &Node<'a, 'i>, tag: &str) -> Result<Node<'a, 'i>, String> {
+    child(of, tag).ok_or_else(|| at(of, &format!("it needs <{tag}>")))
+}
+
+pub(crate) fn word(of: &Node, key: &str) -> Result<String, String> {
+    let text = of.attribute(key);
+    text.map(str::to_owned)
+        .ok_or_else(|| at(of, &format!("it needs the attribute `{key}`")))
+}
+
+/// Finite numbers between blanks.
+pub(crate) fn numbers(of: &Node, key: &str, text: &str) -> Result<Vec<f64>, String> {
+    let parsed: Option<Vec<f64>> = text
+        .split_whitespace()
+        .map(|part| part.parse().ok().filter(|x: &f64| x.is_finite()))
+        .collect();
+    parsed.ok_or_else(|| at(of, &format!("expected finite numbers in `{key}`")))
+}
+
+pub(crate) fn exactly<const N: usize>(
+    of: &Node,
+    key: &str,
+    text: &str,
+) -> Result<[f64; N], String> {
+    let found = numbers(of, key, text)?;
+    let n = found.len();
+    found
+        .try_into()
+        .map_err(|_| at(of, &format!("expected {N} numbers in `{key}`, found {n}")))
+}
+
+pub(crate) fn number(of: &Node, key: &str) -> Result<f64, String> {
+    let text = word(of, key)?;
+    exactly(of, key, &text).map(|[x]| x)
+}
+
+pub(crate) fn three(of: &Node, key: &str) -> Result<[f64; 3], String> {
+    exactly(of, key, &word(of, key)?)
+}
+
+/// A symmetric matrix of its entries xx, yy, zz, xy, xz, yz.
+pub(crate) fn symmetric([xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Matrix3<f64> {
+    Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+}
+
+pub(crate) fn vector(of: [f64; 3]) -> Vector3<f64> {
+    Vector3::from(of)
+}
+
+pub(crate) fn line(node: &Node) -> u32 {
+    node.document().text_pos_at(node.range().start).row
+}
+
+/// A fault with the place of its element.
+pub(crate) fn at(node: &Node, fault: &str) -> String {
+    let name = node
+        .attribute("name")
+        .map_or_else(String::new, |name| format!(" `{name}`"));
+    format!(
+        "line {}, <{}>{name}: {fault}",
+        line(node),
+        node.tag_name().name()
+    )
+}
