@@ -13,6 +13,9 @@ const NOTHING: f64 = 1e-7;
 /// A pose whose passive variables are settled worse than this is no pose to start from.
 const WELL_SETTLED: f64 = 1e-3;
 
+/// Poses that are tried.
+const ATTEMPTS: usize = 200;
+
 /// How loops close.
 pub(crate) struct Closed {
     /// The pairs that say something.
@@ -28,48 +31,78 @@ pub(crate) struct Closed {
 }
 
 /// Closes loops from `start`. `order` has the variables with those first that should stay independent.
-pub(crate) fn close(chain: &Chain, pairs: &[Pair], start: &[f64], order: &[usize]) -> Result<Closed, String> {
+/// A pose within `ranges` is preferred.
+pub(crate) fn close(
+    chain: &Chain,
+    pairs: &[Pair],
+    start: &[f64],
+    ranges: &[Option<[f64; 2]>],
+    order: &[usize],
+) -> Result<Closed, String> {
     let mut noise = Noise(1);
-    let mut poses: Vec<(Vec<f64>, f64)> = Vec::new();
+    let (mut poses, mut outside): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
     let mut least = f64::INFINITY;
     // The pose of the description first, then poses around it and farther away.
-    for attempt in 0..60 {
+    for attempt in 0..ATTEMPTS {
         let spread = match attempt {
             0 => 0.0,
             1..=20 => 0.1,
             21..=40 => 0.4,
             _ => 1.5,
         };
-        let mut values: Vec<f64> = start.iter().map(|x| x + spread * noise.next()).collect();
+        let mut values: Vec<f64> = start
+            .iter()
+            .zip(ranges)
+            .map(|(x, range)| {
+                let moved = x + spread * noise.next();
+                match range {
+                    Some([low, high]) if attempt > 40 => low + (high - low) * (0.5 + 0.5 * noise.next()),
+                    Some([low, high]) if attempt > 0 => moved.clamp(*low, *high),
+                    _ => moved,
+                }
+            })
+            .collect();
         let gap = chain.close(pairs, &mut values);
         least = least.min(gap);
         if gap < NEARLY {
-            poses.push((values, gap));
+            let is_inside = values
+                .iter()
+                .zip(ranges)
+                .all(|(x, range)| range.is_none_or(|[low, high]| (low..=high).contains(x)));
+            if is_inside {
+                poses.push(values);
+            } else {
+                outside.push(values);
+            }
         }
         if poses.len() == 6 {
             break;
         }
     }
     if poses.is_empty() {
+        outside.truncate(6);
+        poses = outside;
+    }
+    if poses.is_empty() {
         return Err(format!(
-            "its loops do not close: from the pose of the file and 60 around it, gaps of {least:.1e} of its size remain"
+            "its loops do not close: from the pose of the file and {ATTEMPTS} others, gaps of {least:.1e} of its size remain"
         ));
     }
     // The rank at poses in general.
     let ranks: Vec<usize> = poses
         .iter()
-        .map(|(values, _)| rank(&chain.gaps(pairs, values).1, NOTHING).0)
+        .map(|values| rank(&chain.gaps(pairs, values).1, NOTHING).0)
         .collect();
     let wanted = ranks.iter().copied().max().unwrap_or(0);
     let general = (0..poses.len())
         .filter(|k| ranks[*k] == wanted)
         .max_by(|a, b| {
-            let share = |k: usize| rank(&chain.gaps(pairs, &poses[k].0).1, NOTHING).1;
+            let share = |k: usize| rank(&chain.gaps(pairs, &poses[k]).1, NOTHING).1;
             share(*a).total_cmp(&share(*b))
         })
         .unwrap_or(0);
-    let pairs = telling(chain, pairs, &poses[general].0);
-    let (_, rows, _) = chain.gaps(&pairs, &poses[general].0);
+    let pairs = telling(chain, pairs, &poses[general]);
+    let (_, rows, _) = chain.gaps(&pairs, &poses[general]);
     let passive = follow(&rows, order, wanted);
     let settled = |values: &[f64]| {
         let (_, rows, _) = chain.gaps(&pairs, values);
@@ -83,14 +116,14 @@ pub(crate) fn close(chain: &Chain, pairs: &[Pair], start: &[f64], order: &[usize
         }
     };
     let mut best = 0;
-    if wanted > 0 && settled(&poses[0].0) < WELL_SETTLED {
+    if wanted > 0 && settled(&poses[0]) < WELL_SETTLED {
         for k in 1..poses.len() {
-            if settled(&poses[k].0) > 3.0 * settled(&poses[best].0) {
+            if settled(&poses[k]) > 3.0 * settled(&poses[best]) {
                 best = k;
             }
         }
     }
-    let (mut values, _) = poses.swap_remove(best);
+    let mut values = poses.swap_remove(best);
     let gap = chain.close(&pairs, &mut values);
     Ok(Closed {
         pairs,

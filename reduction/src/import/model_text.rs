@@ -519,11 +519,10 @@ impl Build<'_> {
 
     /// Closes the loops; none where there are none.
     fn close(&mut self, description: &Description) -> Result<Option<Closed>, String> {
-        for (k, coordinate) in self.coordinates.iter_mut().enumerate() {
+        for coordinate in &mut self.coordinates {
             let Some(variable) = coordinate.variable else {
                 continue;
             };
-            let _ = k;
             // Without loops the middle of the range, where zero is outside.
             coordinate.nominal = match self.acts[variable].range {
                 Some([low, high]) if low < high && !(low..=high).contains(&0.0) => 0.5 * (low + high),
@@ -557,10 +556,25 @@ impl Build<'_> {
         }
         let mut order: Vec<usize> = (0..self.chain.n_variables).collect();
         order.sort_by_key(|k| self.reluctance[*k]);
-        let closed = closing::close(&self.chain, &pairs, &self.start, &order)?;
+        let ranges: Vec<Option<[f64; 2]>> = self
+            .acts
+            .iter()
+            .map(|acts| acts.range.filter(|[low, high]| low < high))
+            .collect();
+        let closed = closing::close(&self.chain, &pairs, &self.start, &ranges, &order)?;
         for coordinate in &mut self.coordinates {
-            if let Some(variable) = coordinate.variable {
-                coordinate.nominal = closed.values[variable];
+            let Some(variable) = coordinate.variable else {
+                continue;
+            };
+            coordinate.nominal = closed.values[variable];
+            if let Some([low, high]) = ranges[variable]
+                && !(low..=high).contains(&coordinate.nominal)
+            {
+                self.acts[variable].range = None;
+                self.remarks.push(format!(
+                    "the loops close nowhere within all limits that was found: the range of `{}`, {low} to {high}, is left out",
+                    coordinate.name
+                ));
             }
         }
         if closed.is_moved {
