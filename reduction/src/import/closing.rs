@@ -13,6 +13,8 @@ const NOTHING: f64 = 1e-7;
 /// A pose whose passive variables are settled worse than this is no pose to start from.
 const WELL_SETTLED: f64 = 1e-3;
 
+/// A value this little beyond its range is on its edge, rad or m.
+pub(crate) const INSIDE: f64 = 1e-9;
 /// Poses that are tried.
 const ATTEMPTS: usize = 200;
 
@@ -68,7 +70,7 @@ pub(crate) fn close(
             let is_inside = values
                 .iter()
                 .zip(ranges)
-                .all(|(x, range)| range.is_none_or(|[low, high]| (low..=high).contains(x)));
+                .all(|(x, range)| range.is_none_or(|[low, high]| (low - INSIDE..=high + INSIDE).contains(x)));
             if is_inside {
                 poses.push(values);
             } else {

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use nalgebra::{Matrix3, Vector3};
 
 use super::chain::{Chain, Move, Node, Pair};
-use super::closing::{self, Closed};
+use super::closing::{self, Closed, INSIDE};
 use super::couplings::{self, Couplings};
 use super::description::{Closure, Description, Holds, Joint, Kind, Link};
 use super::placed::{Placed, axis, roll_pitch_yaw, twelfths};
@@ -63,6 +63,8 @@ struct Build<'a> {
     names: Vec<String>,
     remarks: Vec<String>,
     constants: String,
+    /// Constants that are angles, with their values.
+    angles: Vec<(String, f64)>,
     frames: String,
     frame_names: Vec<String>,
     chain: Chain,
@@ -88,6 +90,7 @@ pub(crate) fn model(mut description: Description, options: &Options) -> Result<I
         names: vec!["base".to_owned(), "g".to_owned()],
         remarks: std::mem::take(&mut description.remarks),
         constants: String::new(),
+        angles: Vec::new(),
         frames: String::new(),
         frame_names: Vec::new(),
         chain: Chain {
@@ -192,7 +195,7 @@ impl Build<'_> {
             (true, _) => text = offset,
             (false, "0") => {}
             (false, offset) if offset.starts_with('-') => {
-                let _ = write!(text, " - {}", &offset[1..]);
+                let _ = write!(text, " {offset}");
             }
             (false, offset) => {
                 let _ = write!(text, " + {offset}");
@@ -567,14 +570,17 @@ impl Build<'_> {
                 continue;
             };
             coordinate.nominal = closed.values[variable];
-            if let Some([low, high]) = ranges[variable]
-                && !(low..=high).contains(&coordinate.nominal)
-            {
+            let Some([low, high]) = ranges[variable] else {
+                continue;
+            };
+            if !(low - INSIDE..=high + INSIDE).contains(&coordinate.nominal) {
                 self.acts[variable].range = None;
                 self.remarks.push(format!(
-                    "the loops close nowhere within all limits that was found: the range of `{}`, {low} to {high}, is left out",
+                    "no pose was found at which the loops close within all limits: the range of `{}`, {low} to {high}, is left out",
                     coordinate.name
                 ));
+            } else {
+                coordinate.nominal = coordinate.nominal.clamp(low, high);
             }
         }
         if closed.is_moved {
@@ -646,7 +652,7 @@ impl Build<'_> {
         let _ = writeln!(
             self.constants,
             "{name} = {{ value = {}, unit = \"m\" }}",
-            float(rounded(value))
+            float(rounded((value * 1e13).round() / 1e13))
         );
         format!("\"{name}\"")
     }
@@ -684,12 +690,28 @@ impl Build<'_> {
                 format!("\"{text}\"")
             };
         }
+        // Angles that differ by known ones, such as those of fingers that face each other, are so in symbols too.
+        for (known, of) in &self.angles {
+            for (sign, minus) in [(1.0, ""), (-1.0, "-")] {
+                let rest = value - sign * of;
+                let n = (rest / twelfth).round();
+                if (rest - n * twelfth).abs() < ROUNDING && n.abs() <= 48.0 {
+                    let more = twelfths(n);
+                    return match more.strip_prefix('-') {
+                        _ if more == "0" => format!("\"{minus}{known}\""),
+                        Some(less) => format!("\"{minus}{known} - {less}\""),
+                        None => format!("\"{minus}{known} + {more}\""),
+                    };
+                }
+            }
+        }
         let name = self.name(name);
         let _ = writeln!(
             self.constants,
             "{name} = {{ value = {}, unit = \"rad\" }}",
             float(rounded(value))
         );
+        self.angles.push((name.clone(), rounded(value)));
         format!("\"{name}\"")
     }
 

@@ -246,44 +246,65 @@ fn deviations(derivation: &Derivation, imported: &Imported, reference: &Referenc
         .map(|coordinate| coordinate.name.as_str())
         .collect();
     let moved: Vec<[Vec<f64>; 3]> = active.iter().map(|name| motion(name)).collect();
-    let slices = |k: usize| moved.iter().map(|m| m[k].as_slice()).collect();
+    let evaluator = Evaluator::new(derivation);
+    // Each state of a mechanism with loops is reached in steps from the nominal pose, and left again: which way loops are
+    // assembled follows from where they come from.
+    let m = active.len();
+    let nominal: Vec<f64> = mechanism
+        .coordinates
+        .iter()
+        .filter(|coordinate| !coordinate.passive)
+        .map(|coordinate| coordinate.nominal)
+        .collect();
+    let steps = if passive.is_empty() { 0 } else { 40 };
+    let mut path: Vec<[Vec<f64>; 3]> = vec![[Vec::new(), Vec::new(), Vec::new()]; m];
+    let mut push = |j: usize, q: f64, qd: f64, qdd: f64| {
+        for (column, x) in path[j].iter_mut().zip([q, qd, qdd]) {
+            column.push(x);
+        }
+    };
+    for i in 0..n {
+        for j in 0..m {
+            let [to, qd, qdd] = [0, 1, 2].map(|k| moved[j][k][i]);
+            let at = |share: f64| nominal[j] + share * (to - nominal[j]);
+            for step in 0..steps {
+                push(j, at(f64::from(step) / f64::from(steps)), 0.0, 0.0);
+            }
+            push(j, to, qd, qdd);
+            for k in 0..m {
+                push(j, to, f64::from(u8::from(k == j)), 0.0);
+            }
+            for step in (0..steps).rev() {
+                push(j, at(f64::from(step) / f64::from(steps)), 0.0, 0.0);
+            }
+        }
+    }
+    let length = 2 * steps as usize + m + 1;
+    let slices = |k: usize| path.iter().map(|m| m[k].as_slice()).collect();
     let states = States {
         q: slices(0),
         qd: slices(1),
         qdd: slices(2),
         load: Vec::new(),
     };
-    let evaluator = Evaluator::new(derivation);
+    let place = |fault: modelmill_codegen::PoseFault| {
+        format!("state {}, step {}: {:?}", fault.sample / length, fault.sample % length, fault.reason)
+    };
     let found = evaluator
         .inverse_dynamics(&states, &derivation.nominal_base_values())
-        .map_err(|fault| format!("{fault:?}"))?;
-    // Rates of all coordinates by unit rates of the active ones.
-    let m = active.len();
-    let repeat = |column: &[f64]| -> Vec<f64> {
-        column.iter().flat_map(|x| std::iter::repeat_n(*x, m)).collect()
-    };
-    let q: Vec<Vec<f64>> = moved.iter().map(|motion| repeat(&motion[0])).collect();
-    let qd: Vec<Vec<f64>> = (0..m)
-        .map(|j| (0..n * m).map(|i| f64::from(u8::from(i % m == j))).collect())
-        .collect();
-    let zeros = vec![vec![0.0; n * m]; m];
-    let unit = States {
-        q: q.iter().map(Vec::as_slice).collect(),
-        qd: qd.iter().map(Vec::as_slice).collect(),
-        qdd: zeros.iter().map(Vec::as_slice).collect(),
-        load: Vec::new(),
-    };
+        .map_err(place)?;
     let of_passive = if passive.is_empty() {
         Vec::new()
     } else {
-        evaluator.passive(&unit).map_err(|fault| format!("{fault:?}"))?
+        evaluator.passive(&states).map_err(place)?
     };
+    let here = |i: usize| i * length + steps as usize;
     let rate = |name: &str, i: usize, j: usize| -> f64 {
         if let Some(k) = active.iter().position(|known| *known == name) {
             return f64::from(u8::from(k == j));
         }
         let k = passive.iter().position(|known| *known == name).expect("a coordinate");
-        of_passive[passive.len() + k][i * m + j]
+        of_passive[passive.len() + k][here(i) + 1 + j]
     };
     let rates = tree_rates(imported, &motion, n);
     let mut map = vec![DMatrix::<f64>::zeros(rates.len(), m); n];
@@ -311,7 +332,7 @@ fn deviations(derivation: &Derivation, imported: &Imported, reference: &Referenc
             let j = active.iter().position(|known| known == name).expect("an active coordinate");
             let expected: f64 = (0..rates.len()).map(|row| map[i][(row, j)] * tau[row][i]).sum();
             largest = largest.max(expected.abs());
-            worst = worst.max((found[d][i] - expected).abs());
+            worst = worst.max((found[d][here(i)] - expected).abs());
         }
     }
     Ok([worst / largest, slip / fastest])
