@@ -47,7 +47,7 @@
 //! | [`report::page`] | a diagnosis as one page |
 //! | [`Host::simulate`] | a full-body rig along a trajectory |
 //! | [`Host::reduce`] | a rig to a planar model |
-//! | [`Host::import`] | a model file from a URDF |
+//! | [`Host::import`] | a model file from a URDF, MJCF or SDF |
 //! | [`Model::interpret`] | physical parameters from base parameters |
 //! | [`Model::excite`] | the motion that tells base parameters, or effects, apart best |
 //!

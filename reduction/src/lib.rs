@@ -34,4 +34,3 @@ pub use plan_for::plan_for;
 pub use reduce::{Reduction, reduce};
 pub use report::{Finding, Report, Size};
 pub use samples::sampled_forces;
-

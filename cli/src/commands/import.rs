@@ -24,7 +24,11 @@ pub(crate) fn run(host: &Host, args: &ImportArgs) -> Outcome {
         None => (is_urdf && beside.is_file()).then_some(beside.as_path()),
     };
     let target = Target::new(&args.out, [file].into_iter().chain(closures))?;
-    let text = read(host, file, "a robot description (URDF, MJCF or SDF, all XML)")?;
+    let text = read(
+        host,
+        file,
+        "a robot description (URDF, MJCF or SDF, all XML)",
+    )?;
     let closing = closures
         .map(|path| read(host, path, "a file of closures (YAML)"))
         .transpose()?;

@@ -53,7 +53,8 @@ impl Chain {
                 .then(&node.at);
             let mut moves = Vec::new();
             for motion in &node.moves {
-                let value = motion.variable.map_or(0.0, |v| motion.ratio * values[v]) + motion.offset;
+                let value =
+                    motion.variable.map_or(0.0, |v| motion.ratio * values[v]) + motion.offset;
                 moves.push((at.r * motion.axis, at.p));
                 at = at.then(&if motion.is_turn {
                     Placed {

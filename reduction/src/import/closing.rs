@@ -58,7 +58,9 @@ pub(crate) fn close(
             .map(|(x, range)| {
                 let moved = x + spread * noise.next();
                 match range {
-                    Some([low, high]) if attempt > 40 => low + (high - low) * (0.5 + 0.5 * noise.next()),
+                    Some([low, high]) if attempt > 40 => {
+                        low + (high - low) * (0.5 + 0.5 * noise.next())
+                    }
                     Some([low, high]) if attempt > 0 => moved.clamp(*low, *high),
                     _ => moved,
                 }
@@ -67,10 +69,9 @@ pub(crate) fn close(
         let gap = chain.close(pairs, &mut values);
         least = least.min(gap);
         if gap < NEARLY {
-            let is_inside = values
-                .iter()
-                .zip(ranges)
-                .all(|(x, range)| range.is_none_or(|[low, high]| (low - INSIDE..=high + INSIDE).contains(x)));
+            let is_inside = values.iter().zip(ranges).all(|(x, range)| {
+                range.is_none_or(|[low, high]| (low - INSIDE..=high + INSIDE).contains(x))
+            });
             if is_inside {
                 poses.push(values);
             } else {

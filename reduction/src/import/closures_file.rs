@@ -79,7 +79,10 @@ pub(crate) fn read(text: &str) -> Result<Closures, String> {
 fn words(text: &str) -> Vec<String> {
     text.split([',', '[', ']', '\n'])
         .map(|word| {
-            let word = word.trim().trim_start_matches("- ").trim_start_matches("- ");
+            let word = word
+                .trim()
+                .trim_start_matches("- ")
+                .trim_start_matches("- ");
             word.trim().trim_matches(['\'', '"']).to_owned()
         })
         .filter(|word| !word.is_empty() && word != "-")

@@ -73,7 +73,11 @@ pub(crate) fn resolve(description: &mut Description) -> Result<Couplings, String
             continue;
         }
         let members: Vec<(usize, Rule)> = (0..n)
-            .filter_map(|k| rules[k].filter(|rule| rule.of == Some(leader)).map(|rule| (k, rule)))
+            .filter_map(|k| {
+                rules[k]
+                    .filter(|rule| rule.of == Some(leader))
+                    .map(|rule| (k, rule))
+            })
             .collect();
         let mut parts = 1;
         for (k, rule) in &members {
@@ -89,7 +93,8 @@ pub(crate) fn resolve(description: &mut Description) -> Result<Couplings, String
                 ));
             }
             if one.kind == Kind::Turn {
-                let (_, denominator) = fraction(rule.ratio).ok_or_else(|| no_fraction(*rule, one))?;
+                let (_, denominator) =
+                    fraction(rule.ratio).ok_or_else(|| no_fraction(*rule, one))?;
                 parts = least_common(parts, denominator);
             }
         }
@@ -97,7 +102,8 @@ pub(crate) fn resolve(description: &mut Description) -> Result<Couplings, String
         out.variables.push(Variable {
             joint: joints[leader].name.clone(),
             parts,
-            is_driven: joints[leader].is_driven || members.iter().any(|(k, _)| joints[*k].is_driven),
+            is_driven: joints[leader].is_driven
+                || members.iter().any(|(k, _)| joints[*k].is_driven),
         });
         for (k, rule) in members {
             let joint = &joints[k];
@@ -129,13 +135,20 @@ pub(crate) fn resolve(description: &mut Description) -> Result<Couplings, String
                 offset: 0.0,
             },
             Some(rule) => {
-                let variable = rule.of.and_then(|of| variable_of[of]).filter(|_| rule.ratio != 0.0);
+                let variable = rule
+                    .of
+                    .and_then(|of| variable_of[of])
+                    .filter(|_| rule.ratio != 0.0);
                 Follows {
                     variable,
                     // Whole numbers again, free of the rounding of the quotient.
                     ratio: variable.map_or(0.0, |v| {
                         let ratio = rule.ratio * parts_of(&out, v);
-                        if joint.kind == Kind::Turn { ratio.round() } else { ratio }
+                        if joint.kind == Kind::Turn {
+                            ratio.round()
+                        } else {
+                            ratio
+                        }
                     }),
                     offset: rule.offset,
                 }
@@ -164,7 +177,11 @@ fn rules(description: &Description, joints: &[Joint]) -> Result<Vec<Option<Rule>
     for coupling in &description.couplings {
         let line = coupling.line;
         let one = index(&coupling.joint, line)?;
-        let of = coupling.of.as_deref().map(|of| index(of, line)).transpose()?;
+        let of = coupling
+            .of
+            .as_deref()
+            .map(|of| index(of, line))
+            .transpose()?;
         if of == Some(one) {
             return Err(format!("line {line}: `{}` follows itself", coupling.joint));
         }
@@ -184,7 +201,10 @@ fn rules(description: &Description, joints: &[Joint]) -> Result<Vec<Option<Rule>
                 line,
             });
         } else {
-            return Err(format!("line {line}: `{}` follows two joints", coupling.joint));
+            return Err(format!(
+                "line {line}: `{}` follows two joints",
+                coupling.joint
+            ));
         }
     }
     for k in 0..joints.len() {
@@ -223,7 +243,10 @@ fn lead_by_driven(joints: &[Joint], rules: &mut [Option<Rule>]) {
         });
         let Some((new, lead)) = found else { continue };
         for (k, slot) in rules.iter_mut().enumerate() {
-            if let Some(rule) = slot.as_mut().filter(|rule| rule.of == Some(old) && k != new) {
+            if let Some(rule) = slot
+                .as_mut()
+                .filter(|rule| rule.of == Some(old) && k != new)
+            {
                 rule.ratio /= lead.ratio;
                 rule.offset -= rule.ratio * lead.offset;
                 rule.of = Some(new);

@@ -15,7 +15,17 @@ use super::xml::{at, children, exactly, line, numbers, symmetric, vector, word};
 
 /// Sections that say nothing of how a robot moves.
 const NO_DYNAMICS: [&str; 12] = [
-    "asset", "visual", "statistic", "contact", "sensor", "custom", "size", "extension", "keyframe", "default", "compiler",
+    "asset",
+    "visual",
+    "statistic",
+    "contact",
+    "sensor",
+    "custom",
+    "size",
+    "extension",
+    "keyframe",
+    "default",
+    "compiler",
     "option",
 ];
 
@@ -154,7 +164,9 @@ fn compiler(root: &Node) -> Result<Compiler, String> {
             if node.attribute(key).is_some_and(|value| value != unused) {
                 return Err(at(
                     &node,
-                    &format!("`{key}` is not read; let MuJoCo write the file with masses in place (mj_saveLastXML)"),
+                    &format!(
+                        "`{key}` is not read; let MuJoCo write the file with masses in place (mj_saveLastXML)"
+                    ),
                 ));
             }
         }
@@ -172,7 +184,12 @@ impl<'a, 'i> Reader<'a, 'i> {
         }
     }
 
-    fn text(&self, node: &Node<'a, 'i>, class: Option<&str>, key: &str) -> Result<Option<&'a str>, String> {
+    fn text(
+        &self,
+        node: &Node<'a, 'i>,
+        class: Option<&str>,
+        key: &str,
+    ) -> Result<Option<&'a str>, String> {
         self.defaults.attribute(node, class, key)
     }
 
@@ -233,7 +250,9 @@ impl<'a, 'i> Reader<'a, 'i> {
             out.r = Matrix3::from_columns(&[x, y, x.cross(&y)]);
         }
         if let Some(z) = self.numbers(node, class, "zaxis")? {
-            let z = vector(z).try_normalize(1e-12).ok_or_else(|| fault("zaxis"))?;
+            let z = vector(z)
+                .try_normalize(1e-12)
+                .ok_or_else(|| fault("zaxis"))?;
             let axis = Vector3::z().cross(&z);
             let angle = axis.norm().atan2(z.z);
             let axis = axis.try_normalize(1e-12).unwrap_or_else(Vector3::x);
@@ -259,7 +278,12 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 
     /// Reads what stands in a body, in a frame of it at `at`.
-    fn inside(&mut self, node: &Node<'a, 'i>, inside: Inside<'a>, place: Placed) -> Result<(), String> {
+    fn inside(
+        &mut self,
+        node: &Node<'a, 'i>,
+        inside: Inside<'a>,
+        place: Placed,
+    ) -> Result<(), String> {
         for child in node.children().filter(Node::is_element) {
             let class = child.attribute("childclass").or(inside.class);
             match child.tag_name().name() {
@@ -285,7 +309,12 @@ impl<'a, 'i> Reader<'a, 'i> {
         Ok(())
     }
 
-    fn body(&mut self, node: &Node<'a, 'i>, around: Inside<'a>, place: Placed) -> Result<(), String> {
+    fn body(
+        &mut self,
+        node: &Node<'a, 'i>,
+        around: Inside<'a>,
+        place: Placed,
+    ) -> Result<(), String> {
         let placed = place.then(&self.placed(node, None)?);
         let own = self.out.links.len();
         let name = node
@@ -294,15 +323,21 @@ impl<'a, 'i> Reader<'a, 'i> {
         if self.out.links.iter().any(|link| link.name == name) {
             return Err(at(node, &format!("two bodies are called `{name}`")));
         }
-        let parent = around.link.map_or(Placed::identity(), |link| self.world[link]);
+        let parent = around
+            .link
+            .map_or(Placed::identity(), |link| self.world[link]);
         self.world.push(parent.then(&placed));
         let inertial = self.inertial(node, around.class)?;
         if node.attribute("mocap") == Some("true") {
-            self.out
-                .remarks
-                .push(at(node, "a body that is moved from outside; here it stands still"));
+            self.out.remarks.push(at(
+                node,
+                "a body that is moved from outside; here it stands still",
+            ));
         }
-        if node.attribute("gravcomp").is_some_and(|text| text.trim() != "0") {
+        if node
+            .attribute("gravcomp")
+            .is_some_and(|text| text.trim() != "0")
+        {
             self.out.remarks.push(at(
                 node,
                 "`gravcomp` is no mechanics of the body and is left out: weight counts in full",
@@ -322,7 +357,11 @@ impl<'a, 'i> Reader<'a, 'i> {
         self.inside(node, inside, Placed::identity())
     }
 
-    fn inertial(&mut self, node: &Node<'a, 'i>, class: Option<&'a str>) -> Result<Inertial, String> {
+    fn inertial(
+        &mut self,
+        node: &Node<'a, 'i>,
+        class: Option<&'a str>,
+    ) -> Result<Inertial, String> {
         let given = node
             .children()
             .find(|child| child.tag_name().name() == "inertial");
@@ -332,7 +371,10 @@ impl<'a, 'i> Reader<'a, 'i> {
                 let [mass] = exactly(&given, "mass", &word(&given, "mass")?)?;
                 let inertia = if let Some(full) = given.attribute("fullinertia") {
                     if given.attribute("diaginertia").is_some() {
-                        return Err(at(&given, "expected `fullinertia` or `diaginertia`, not both"));
+                        return Err(at(
+                            &given,
+                            "expected `fullinertia` or `diaginertia`, not both",
+                        ));
                     }
                     placed.r = Matrix3::identity();
                     symmetric(exactly(&given, "fullinertia", full)?)
@@ -364,14 +406,20 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 
     /// Mass and inertia of the shapes of a body, also of those in its frames.
-    fn of_geoms(&mut self, node: &Node<'a, 'i>, class: Option<&'a str>) -> Result<Inertial, String> {
+    fn of_geoms(
+        &mut self,
+        node: &Node<'a, 'i>,
+        class: Option<&'a str>,
+    ) -> Result<Inertial, String> {
         let mut shapes = Vec::new();
         let mut waiting = vec![(*node, class, Placed::identity())];
         while let Some((node, class, place)) = waiting.pop() {
             for child in node.children().filter(Node::is_element) {
                 let class = child.attribute("childclass").or(class);
                 match child.tag_name().name() {
-                    "frame" => waiting.push((child, class, place.then(&self.placed(&child, class)?))),
+                    "frame" => {
+                        waiting.push((child, class, place.then(&self.placed(&child, class)?)))
+                    }
                     "geom" => shapes.extend(self.geom(&child, class, place)?),
                     _ => {}
                 }
@@ -427,7 +475,12 @@ impl<'a, 'i> Reader<'a, 'i> {
         Ok(())
     }
 
-    fn joint(&mut self, node: &Node<'a, 'i>, inside: Inside<'a>, place: Placed) -> Result<(), String> {
+    fn joint(
+        &mut self,
+        node: &Node<'a, 'i>,
+        inside: Inside<'a>,
+        place: Placed,
+    ) -> Result<(), String> {
         let (Some(link), class) = (inside.link, inside.class) else {
             return Ok(());
         };
@@ -441,7 +494,11 @@ impl<'a, 'i> Reader<'a, 'i> {
         let n = self.out.links[link].joints.len();
         let name = node.attribute("name").map_or_else(
             || {
-                let suffix = if n == 0 { String::new() } else { format!("{}", n + 1) };
+                let suffix = if n == 0 {
+                    String::new()
+                } else {
+                    format!("{}", n + 1)
+                };
                 format!("{}_joint{suffix}", self.out.links[link].name)
             },
             str::to_owned,
@@ -474,9 +531,10 @@ impl<'a, 'i> Reader<'a, 'i> {
         if let Some(range) = self.numbers::<2>(node, class, "range")? {
             let counts = limited == "true" || (limited == "auto" && self.compiler.has_auto_limits);
             if counts && kind == Kind::Ball {
-                self.out
-                    .remarks
-                    .push(at(node, "the range of a ball joint is a cone, which models do not have"));
+                self.out.remarks.push(at(
+                    node,
+                    "the range of a ball joint is a cone, which models do not have",
+                ));
             } else if counts {
                 joint.range = Some(range.map(|x| in_unit(self, x)));
             }
@@ -549,7 +607,9 @@ impl<'a, 'i> Reader<'a, 'i> {
             other => {
                 return Err(at(
                     node,
-                    &format!("models do not have the equality `{other}`; they have connect, weld and joint"),
+                    &format!(
+                        "models do not have the equality `{other}`; they have connect, weld and joint"
+                    ),
                 ));
             }
         }
@@ -557,10 +617,15 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 
     /// The two ends of a closure between bodies: the second follows from the pose of the file.
-    fn bodies(&self, node: &Node<'a, 'i>, tag: &str) -> Result<[(Option<usize>, Placed); 2], String> {
+    fn bodies(
+        &self,
+        node: &Node<'a, 'i>,
+        tag: &str,
+    ) -> Result<[(Option<usize>, Placed); 2], String> {
         let one = self.link(node, &word(node, "body1")?)?;
         let other = self.link(node, node.attribute("body2").unwrap_or("world"))?;
-        let in_world = |link: Option<usize>| link.map_or(Placed::identity(), |link| self.world[link]);
+        let in_world =
+            |link: Option<usize>| link.map_or(Placed::identity(), |link| self.world[link]);
         let anchor = match node.attribute("anchor") {
             Some(text) => vector(exactly(node, "anchor", text)?),
             None if tag == "weld" => Vector3::zeros(),
@@ -631,11 +696,17 @@ impl<'a, 'i> Reader<'a, 'i> {
     fn actuators(&mut self, root: &Node<'a, 'i>) -> Result<(), String> {
         let mut n = 0;
         for node in children(root, "actuator").flat_map(|section| {
-            section.children().filter(Node::is_element).collect::<Vec<_>>()
+            section
+                .children()
+                .filter(Node::is_element)
+                .collect::<Vec<_>>()
         }) {
             n += 1;
             let gear = match self.text(&node, None, "gear")? {
-                Some(text) => numbers(&node, "gear", text)?.first().copied().unwrap_or(1.0),
+                Some(text) => numbers(&node, "gear", text)?
+                    .first()
+                    .copied()
+                    .unwrap_or(1.0),
                 None => 1.0,
             };
             if let Some(name) = node.attribute("joint").or(node.attribute("jointinparent")) {
@@ -669,7 +740,10 @@ impl<'a, 'i> Reader<'a, 'i> {
             }
         }
         for tendon in children(root, "tendon").flat_map(|section| {
-            section.children().filter(Node::is_element).collect::<Vec<_>>()
+            section
+                .children()
+                .filter(Node::is_element)
+                .collect::<Vec<_>>()
         }) {
             let mut bends = Vec::new();
             for key in ["stiffness", "damping", "frictionloss", "armature"] {
@@ -698,9 +772,9 @@ impl<'a, 'i> Reader<'a, 'i> {
             for joint in joints.filter(|joint| joint.kind != Kind::Free) {
                 joint.is_driven = true;
             }
-            self.out.remarks.push(
-                "the file has no actuators; every joint has a drive here".to_owned(),
-            );
+            self.out
+                .remarks
+                .push("the file has no actuators; every joint has a drive here".to_owned());
         }
         Ok(())
     }
@@ -719,7 +793,9 @@ impl<'a, 'i> Reader<'a, 'i> {
         {
             range = Some([low, high]);
         }
-        let armature = self.numbers::<1>(node, None, "armature")?.map_or(0.0, |[x]| x);
+        let armature = self
+            .numbers::<1>(node, None, "armature")?
+            .map_or(0.0, |[x]| x);
         let joint = self
             .out
             .links
@@ -738,7 +814,9 @@ impl<'a, 'i> Reader<'a, 'i> {
         if gear != 1.0 && node.tag_name().name() != "joint" {
             self.out.remarks.push(at(
                 node,
-                &format!("its gear is {gear}: the force of the drive here is that at the joint `{name}`"),
+                &format!(
+                    "its gear is {gear}: the force of the drive here is that at the joint `{name}`"
+                ),
             ));
         }
         Ok(())
@@ -746,8 +824,10 @@ impl<'a, 'i> Reader<'a, 'i> {
 
     /// The first pose of the file that its author kept, to close loops from.
     fn keyframe(&mut self, root: &Node<'a, 'i>) -> Result<(), String> {
-        let mut keys = children(root, "keyframe").flat_map(|section| section.children().collect::<Vec<_>>());
-        let Some((key, text)) = keys.find_map(|key| key.attribute("qpos").map(|text| (key, text))) else {
+        let mut keys =
+            children(root, "keyframe").flat_map(|section| section.children().collect::<Vec<_>>());
+        let Some((key, text)) = keys.find_map(|key| key.attribute("qpos").map(|text| (key, text)))
+        else {
             return Ok(());
         };
         let mut values = numbers(&key, "qpos", text)?.into_iter();

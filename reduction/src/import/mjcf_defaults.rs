@@ -31,7 +31,9 @@ impl<'a, 'i> Defaults<'a, 'i> {
         let name = match (node.attribute("class"), parent) {
             (Some(name), _) => name,
             (None, None) => "main",
-            (None, Some(_)) => return Err(at(&node, "a default class needs the attribute `class`")),
+            (None, Some(_)) => {
+                return Err(at(&node, "a default class needs the attribute `class`"));
+            }
         };
         self.classes.push(Class {
             name: name.to_owned(),
@@ -84,8 +86,20 @@ impl<'a, 'i> Defaults<'a, 'i> {
 /// Elements whose defaults are read.
 fn tag_of(tag: &str) -> &'static str {
     const TAGS: [&str; 14] = [
-        "joint", "geom", "site", "equality", "tendon", "general", "motor", "position", "velocity",
-        "intvelocity", "damper", "cylinder", "muscle", "adhesion",
+        "joint",
+        "geom",
+        "site",
+        "equality",
+        "tendon",
+        "general",
+        "motor",
+        "position",
+        "velocity",
+        "intvelocity",
+        "damper",
+        "cylinder",
+        "muscle",
+        "adhesion",
     ];
     TAGS.into_iter().find(|known| *known == tag).unwrap_or("")
 }

@@ -160,14 +160,21 @@ impl Build<'_> {
         link: &Placed,
         name: &str,
     ) -> Result<(Option<usize>, Placed), String> {
-        let (axis, turned) = axis(&joint.axis)
-            .ok_or_else(|| format!("line {}: the axis of `{}` has no direction", joint.line, joint.name))?;
+        let (axis, turned) = axis(&joint.axis).ok_or_else(|| {
+            format!(
+                "line {}: the axis of `{}` has no direction",
+                joint.line, joint.name
+            )
+        })?;
         let at = Placed {
             p: link.p + link.r * joint.anchor,
             r: link.r * turned,
         };
         let follows = self.couplings.of(&joint.name).ok_or_else(|| {
-            format!("line {}: two joints are called `{}`", joint.line, joint.name)
+            format!(
+                "line {}: two joints are called `{}`",
+                joint.line, joint.name
+            )
         })?;
         let is_turn = joint.kind == Kind::Turn;
         // Ratio, number of the variable and its name.
@@ -247,7 +254,7 @@ impl Build<'_> {
             let frame = self.frame(own, on, at, &shown, "", Vec::new());
             return Ok((Some(frame), back));
         }
-        if let (Some(variable), Some((_, coordinate))) = (follows.variable, &moved) {
+        if let Some((_, coordinate)) = &moved {
             self.joints.push(ImportedJoint {
                 name: joint.name.clone(),
                 coordinates: vec![coordinate.clone()],
@@ -255,7 +262,6 @@ impl Build<'_> {
                 offset: follows.offset,
                 axes: String::new(),
             });
-            let _ = variable;
         }
         let frame = self.frame(own, on, at, &shown, &joint_text, vec![motion]);
         Ok((Some(frame), back))
@@ -290,7 +296,14 @@ impl Build<'_> {
     }
 
     /// Adds up what acts at a joint.
-    fn acts(&mut self, description: &Description, joint: &Joint, variable: usize, ratio: f64, offset: f64) {
+    fn acts(
+        &mut self,
+        description: &Description,
+        joint: &Joint,
+        variable: usize,
+        ratio: f64,
+        offset: f64,
+    ) {
         let acts = &mut self.acts[variable];
         acts.damping += ratio * ratio * joint.damping;
         acts.friction += ratio.abs() * joint.friction;
@@ -304,14 +317,20 @@ impl Build<'_> {
         if let Some(range) = joint.range {
             let mut ends = range.map(|end| (end - offset) / ratio);
             ends.sort_by(f64::total_cmp);
-            acts.range = Some(acts.range.map_or(ends, |old| [old[0].max(ends[0]), old[1].min(ends[1])]));
+            acts.range = Some(
+                acts.range
+                    .map_or(ends, |old| [old[0].max(ends[0]), old[1].min(ends[1])]),
+            );
         }
         let is_leader = self.couplings.variables[variable].joint == joint.name;
         if is_leader {
             acts.rate = joint.rate.map(|rate| rate / ratio.abs());
             acts.force = joint.force.map(|force| force.map(|force| force * ratio));
         }
-        let given = description.pose.iter().find(|(name, _)| name == &joint.name);
+        let given = description
+            .pose
+            .iter()
+            .find(|(name, _)| name == &joint.name);
         match given {
             Some((_, value)) if is_leader => self.start[variable] = (value - offset) / ratio,
             None if is_leader => self.start[variable] = (joint.zero - offset) / ratio,
@@ -369,7 +388,11 @@ impl Build<'_> {
              the second is a right angle",
             joint.line, joint.name
         ));
-        if joint.damping != 0.0 || joint.friction != 0.0 || joint.stiffness != 0.0 || joint.armature != 0.0 {
+        if joint.damping != 0.0
+            || joint.friction != 0.0
+            || joint.stiffness != 0.0
+            || joint.armature != 0.0
+        {
             self.remarks.push(format!(
                 "line {}: damping, friction, spring and armature of the ball joint `{}` are left out",
                 joint.line, joint.name
@@ -463,7 +486,10 @@ impl Build<'_> {
         moves: Vec<Move>,
     ) -> usize {
         let parent = on.map_or("base", |on| self.frame_names[on].as_str());
-        let _ = write!(self.frames, "\n[[frame]]\nname = \"{name}\"\non = \"{parent}\"\n");
+        let _ = write!(
+            self.frames,
+            "\n[[frame]]\nname = \"{name}\"\non = \"{parent}\"\n"
+        );
         if !place.is_empty() || joint.is_empty() {
             let _ = writeln!(self.frames, "transform = {{ {place} }}");
         }
@@ -486,7 +512,9 @@ impl Build<'_> {
             return Ok(());
         }
         let moments = matrix.symmetric_eigenvalues();
-        if moments.min() < -1e-15 * moments.amax() || 2.0 * moments.amax() > moments.sum() * (1.0 + 1e-6) {
+        if moments.min() < -1e-15 * moments.amax()
+            || 2.0 * moments.amax() > moments.sum() * (1.0 + 1e-6)
+        {
             self.remarks.push(format!(
                 "no body has the inertia of `{name}`: its principal moments are {}, {} and {} kg m^2",
                 digits(moments[0], 4),
@@ -528,7 +556,9 @@ impl Build<'_> {
             };
             // Without loops the middle of the range, where zero is outside.
             coordinate.nominal = match self.acts[variable].range {
-                Some([low, high]) if low < high && !(low..=high).contains(&0.0) => 0.5 * (low + high),
+                Some([low, high]) if low < high && !(low..=high).contains(&0.0) => {
+                    0.5 * (low + high)
+                }
                 _ => 0.0,
             };
         }
@@ -608,9 +638,9 @@ impl Build<'_> {
             }
             root.filter(|root| {
                 let name = &self.frame_names[*root];
-                self.frames
-                    .split("\n[[frame]]\n")
-                    .any(|text| text.starts_with(&format!("name = \"{name}\"\n")) && text.contains("{ free = "))
+                self.frames.split("\n[[frame]]\n").any(|text| {
+                    text.starts_with(&format!("name = \"{name}\"\n")) && text.contains("{ free = ")
+                })
             })
         });
         if roots[0] == roots[1] {
@@ -755,8 +785,7 @@ impl Build<'_> {
         }
         text.push_str(&self.constants);
         text.push_str("\n[coordinates]\n");
-        let is_passive =
-            |coordinate: &Coordinate| matches!((closed, coordinate.variable), (Some(closed), Some(v)) if closed.passive[v]);
+        let is_passive = |coordinate: &Coordinate| matches!((closed, coordinate.variable), (Some(closed), Some(v)) if closed.passive[v]);
         for coordinate in &self.coordinates {
             let more = if is_passive(coordinate) {
                 ", passive = true"
@@ -787,14 +816,23 @@ impl Build<'_> {
         let Some(closed) = closed else { return };
         let mut loops = String::new();
         for pair in &closed.pairs {
-            let name = self.name(&format!("{}_closed", description.closures[pair.closure].name));
+            let name = self.name(&format!(
+                "{}_closed",
+                description.closures[pair.closure].name
+            ));
             let mut points = Vec::new();
             for ((frame, at), letter) in pair.ends.iter().zip(["a", "b"]) {
                 let point = self.name(&format!("{name}_{letter}"));
                 let on = frame.map_or("base", |frame| self.frame_names[frame].as_str());
                 let at: Vec<String> = at
                     .iter()
-                    .map(|x| if x.abs() < 1e-12 { "0".to_owned() } else { float(rounded(*x)) })
+                    .map(|x| {
+                        if x.abs() < 1e-12 {
+                            "0".to_owned()
+                        } else {
+                            float(rounded(*x))
+                        }
+                    })
                     .collect();
                 let _ = write!(
                     text,
@@ -895,7 +933,11 @@ impl Build<'_> {
             }
             let mut limits = Vec::new();
             if let Some([low, high]) = acts.range.filter(|[low, high]| low < high) {
-                limits.push(format!("position = [{}, {}]", float(low), float(high)));
+                limits.push(format!(
+                    "position = [{}, {}]",
+                    float(rounded(low)),
+                    float(rounded(high))
+                ));
             }
             if let Some(rate) = acts.rate.filter(|_| !is_passive(coordinate)) {
                 limits.push(format!("rate = {}", float(rate)));

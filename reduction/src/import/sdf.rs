@@ -42,8 +42,8 @@ pub(crate) fn read(document: &Document) -> Result<Description, String> {
         .and_then(|text| text.trim().parse().ok())
         .unwrap_or(1.7);
     let world = child(&root, "world");
-    let mut models = children(&root, "model")
-        .chain(world.iter().flat_map(|world| children(world, "model")));
+    let mut models =
+        children(&root, "model").chain(world.iter().flat_map(|world| children(world, "model")));
     let model = models
         .next()
         .ok_or_else(|| at(&root, "it needs a <model>"))?;
@@ -59,7 +59,11 @@ pub(crate) fn read(document: &Document) -> Result<Description, String> {
         ..Description::default()
     };
     if let Some(node) = world.and_then(|world| child(&world, "gravity")) {
-        out.gravity = Some(vector(exactly(&node, "gravity", node.text().unwrap_or(""))?));
+        out.gravity = Some(vector(exactly(
+            &node,
+            "gravity",
+            node.text().unwrap_or(""),
+        )?));
     }
     if let Some(inner) = model
         .children()
@@ -89,7 +93,11 @@ pub(crate) fn read(document: &Document) -> Result<Description, String> {
     };
     let base = model
         .attribute("canonical_link")
-        .and_then(|name| links.iter().position(|node| node.attribute("name") == Some(name)))
+        .and_then(|name| {
+            links
+                .iter()
+                .position(|node| node.attribute("name") == Some(name))
+        })
         .unwrap_or(0);
     tree(&mut out, &links, &places, joints, &own, base)?;
     Ok(out)
@@ -113,11 +121,17 @@ fn frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<Frame<'a, 'i>>, String> {
         let usually = match node.tag_name().name() {
             "link" => "__model__".to_owned(),
             "joint" => text_of(&node, "child").unwrap_or("__model__").to_owned(),
-            "frame" => node.attribute("attached_to").unwrap_or("__model__").to_owned(),
+            "frame" => node
+                .attribute("attached_to")
+                .unwrap_or("__model__")
+                .to_owned(),
             _ => continue,
         };
         let name = word(&node, "name")?;
-        if out.iter().any(|frame| frame.name == name && frame.node.tag_name() == node.tag_name()) {
+        if out
+            .iter()
+            .any(|frame| frame.name == name && frame.node.tag_name() == node.tag_name())
+        {
             return Err(at(&node, "this name is there twice"));
         }
         out.push(Frame {
@@ -191,8 +205,14 @@ fn inertial(node: &Node) -> Result<Inertial, String> {
     }
     out.mass = number_of(&given, "mass")?.unwrap_or(1.0);
     if let Some(pose) = child(&given, "pose") {
-        if pose.attribute("relative_to").is_some_and(|name| !name.is_empty()) {
-            return Err(at(&pose, "the pose of an inertial is that in its link; delete `relative_to`"));
+        if pose
+            .attribute("relative_to")
+            .is_some_and(|name| !name.is_empty())
+        {
+            return Err(at(
+                &pose,
+                "the pose of an inertial is that in its link; delete `relative_to`",
+            ));
         }
         out.at = pose_of(&pose)?;
     }
@@ -225,7 +245,10 @@ fn joint(
             if name == "world" {
                 return Ok(None);
             }
-            if let Some(k) = links.iter().position(|link| link.attribute("name") == Some(&name)) {
+            if let Some(k) = links
+                .iter()
+                .position(|link| link.attribute("name") == Some(&name))
+            {
                 return Ok(Some(k));
             }
             let frame = frames
@@ -237,7 +260,10 @@ fn joint(
             }
             name.clone_from(&frame.usually);
         }
-        Err(at(&inner, "its frame is attached to itself by way of others"))
+        Err(at(
+            &inner,
+            "its frame is attached to itself by way of others",
+        ))
     };
     let kind = word(node, "type")?;
     let wanted: &[(&str, Kind)] = match kind.as_str() {
@@ -249,7 +275,9 @@ fn joint(
         other => {
             return Err(at(
                 node,
-                &format!("models have no joint of the type {other}; write it as several of revolute, prismatic, ball and fixed"),
+                &format!(
+                    "models have no joint of the type {other}; write it as several of revolute, prismatic, ball and fixed"
+                ),
             ));
         }
     };
@@ -302,12 +330,17 @@ fn read_axis(
 ) -> Result<(), String> {
     let (xyz, turned) = match child(node, "xyz") {
         Some(xyz) => {
-            let given = xyz.attribute("expressed_in").filter(|name| !name.is_empty());
+            let given = xyz
+                .attribute("expressed_in")
+                .filter(|name| !name.is_empty());
             let turned = match given {
                 Some(name) => in_model(frames, name, node, 0)?.r,
                 None => place.r,
             };
-            (vector(exactly(&xyz, "xyz", xyz.text().unwrap_or(""))?), turned)
+            (
+                vector(exactly(&xyz, "xyz", xyz.text().unwrap_or(""))?),
+                turned,
+            )
         }
         None => (Vector3::z(), place.r),
     };
@@ -390,36 +423,45 @@ fn tree(
     }
     // Links in the order in which they are reached: from the world, then from the base, then from what is left.
     let mut index: Vec<Option<usize>> = vec![None; n];
-    let starts = [None, Some(base)]
-        .into_iter()
-        .chain((0..n).map(Some));
+    let starts = [None, Some(base)].into_iter().chain((0..n).map(Some));
     for start in starts {
         if let Some(link) = start {
             if index[link].is_some() {
                 continue;
             }
-            let suffix = if link == base { String::new() } else { format!("_{}", nodes[link].attribute("name").unwrap_or_default()) };
+            let suffix = if link == base {
+                String::new()
+            } else {
+                format!("_{}", nodes[link].attribute("name").unwrap_or_default())
+            };
             index[link] = Some(out.links.len());
             out.links.push(Link {
                 name: word(&nodes[link], "name")?,
                 parent: None,
                 at: own.then(&places[link]),
-                joints: vec![Joint::new(format!("base{suffix}"), Kind::Free, line(&nodes[link]))],
+                joints: vec![Joint::new(
+                    format!("base{suffix}"),
+                    Kind::Free,
+                    line(&nodes[link]),
+                )],
                 inertial: inertial(&nodes[link])?,
             });
         }
         let mut waiting = vec![start];
         while let Some(here) = waiting.pop() {
-            for (k, between) in joints.iter().enumerate().filter(|(k, _)| in_tree[*k]) {
+            for (between, _) in joints.iter().zip(&in_tree).filter(|(_, is)| **is) {
                 let is_forward = between.parent == here;
-                let there = if is_forward { between.child } else { between.parent };
+                let there = if is_forward {
+                    between.child
+                } else {
+                    between.parent
+                };
                 if !(is_forward || between.child == here) {
                     continue;
                 }
                 let Some(link) = there.filter(|link| index[*link].is_none()) else {
                     continue;
                 };
-                let _ = k;
                 let carrier = here.map_or_else(|| own.inverse(), |link| places[link]);
                 let to_link = places[link].inverse();
                 let mut moving = between.joints.clone();
@@ -451,7 +493,12 @@ fn tree(
             }
         }
     }
-    for between in joints.iter().zip(&in_tree).filter(|(_, is)| !**is).map(|(b, _)| b) {
+    for between in joints
+        .iter()
+        .zip(&in_tree)
+        .filter(|(_, is)| !**is)
+        .map(|(b, _)| b)
+    {
         let holds = match between.kind.as_str() {
             "ball" => Holds::Origins,
             "revolute" | "continuous" => Holds::Axes,

@@ -40,7 +40,9 @@ pub(crate) fn read(
     for node in children(&robot, "transmission") {
         for reduction in node.descendants().filter(|node| {
             node.tag_name().name() == "mechanicalReduction"
-                && node.text().is_some_and(|text| text.trim().parse() != Ok(1.0))
+                && node
+                    .text()
+                    .is_some_and(|text| text.trim().parse() != Ok(1.0))
         }) {
             out.remarks.push(format!(
                 "line {}: the reduction {} of the transmission `{}` is not read: forces are those at the joints",

@@ -4,7 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
 
 pub(crate) fn child<'a, 'i>(of: &Node<'a, 'i>, tag: &str) -> Option<Node<'a, 'i>> {
-    of.children().find(|node| node.has_tag_name(tag) || node.tag_name().name() == tag)
+    of.children()
+        .find(|node| node.has_tag_name(tag) || node.tag_name().name() == tag)
 }
 
 pub(crate) fn children<'a, 'i>(

@@ -225,7 +225,11 @@ fn an_imported_arm_has_the_forces_of_its_rig() {
 
 #[test]
 fn what_makes_no_model_is_said() {
-    let says = |text: &str| import(text, &ImportOptions::default()).expect_err("a fault").to_string();
+    let says = |text: &str| {
+        import(text, &ImportOptions::default())
+            .expect_err("a fault")
+            .to_string()
+    };
     assert!(says("").contains("no URDF"));
     assert!(says("schema = 1").contains("no URDF"));
     assert!(says("<robot name='r'><link name='a'/></robot>").contains("no joint that moves"));
