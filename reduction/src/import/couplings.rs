@@ -52,6 +52,10 @@ struct Rule {
 }
 
 /// Resolves all couplings of a description.
+#[allow(
+    clippy::too_many_lines,
+    reason = "one pass over leaders, one over followers"
+)]
 pub(crate) fn resolve(description: &mut Description) -> Result<Couplings, String> {
     let joints: Vec<Joint> = description
         .links

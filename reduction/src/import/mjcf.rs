@@ -136,7 +136,7 @@ fn compiler(root: &Node) -> Result<Compiler, String> {
             if !is_fine {
                 return Err(at(&node, "expected three of x, y and z in `eulerseq`"));
             }
-            out.euler = sequence.to_owned();
+            sequence.clone_into(&mut out.euler);
         }
         if let Some(auto) = node.attribute("autolimits") {
             out.has_auto_limits = auto != "false";
@@ -418,7 +418,7 @@ impl<'a, 'i> Reader<'a, 'i> {
                 let class = child.attribute("childclass").or(class);
                 match child.tag_name().name() {
                     "frame" => {
-                        waiting.push((child, class, place.then(&self.placed(&child, class)?)))
+                        waiting.push((child, class, place.then(&self.placed(&child, class)?)));
                     }
                     "geom" => shapes.extend(self.geom(&child, class, place)?),
                     _ => {}
@@ -638,7 +638,7 @@ impl<'a, 'i> Reader<'a, 'i> {
                 None => None,
             };
             let relative = match pose {
-                Some([x, y, z, q @ ..]) if q != [0.0; 4] => Placed {
+                Some([x, y, z, q @ ..]) if q.iter().any(|x| x.abs() > 0.0) => Placed {
                     p: Vector3::new(x, y, z),
                     r: of_quaternion(q).ok_or_else(|| at(node, "`relpose` has no direction"))?,
                 },
@@ -811,7 +811,7 @@ impl<'a, 'i> Reader<'a, 'i> {
                 [ends[0].min(ends[1]), ends[0].max(ends[1])]
             });
         }
-        if gear != 1.0 && node.tag_name().name() != "joint" {
+        if (gear - 1.0).abs() > 0.0 && node.tag_name().name() != "joint" {
             self.out.remarks.push(at(
                 node,
                 &format!(

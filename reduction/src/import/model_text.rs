@@ -152,6 +152,7 @@ impl Build<'_> {
     }
 
     /// The frame of a joint that turns or slides; also where the link is in it.
+    #[allow(clippy::too_many_lines, reason = "one frame, piece by piece")]
     fn scalar(
         &mut self,
         description: &Description,
@@ -603,14 +604,14 @@ impl Build<'_> {
             let Some([low, high]) = ranges[variable] else {
                 continue;
             };
-            if !(low - INSIDE..=high + INSIDE).contains(&coordinate.nominal) {
+            if (low - INSIDE..=high + INSIDE).contains(&coordinate.nominal) {
+                coordinate.nominal = coordinate.nominal.clamp(low, high);
+            } else {
                 self.acts[variable].range = None;
                 self.remarks.push(format!(
                     "no pose was found at which the loops close within all limits: the range of `{}`, {low} to {high}, is left out",
                     coordinate.name
                 ));
-            } else {
-                coordinate.nominal = coordinate.nominal.clamp(low, high);
             }
         }
         if closed.is_moved {

@@ -99,7 +99,7 @@ pub(crate) fn read(document: &Document) -> Result<Description, String> {
                 .position(|node| node.attribute("name") == Some(name))
         })
         .unwrap_or(0);
-    tree(&mut out, &links, &places, joints, &own, base)?;
+    tree(&mut out, &links, &places, &joints, &own, base)?;
     Ok(out)
 }
 
@@ -395,11 +395,15 @@ fn read_axis(
 }
 
 /// Makes a tree of links and joints: what closes a ring becomes a closure, ball joints first.
+#[allow(
+    clippy::too_many_lines,
+    reason = "tree first, then what closes rings, on the same tables"
+)]
 fn tree(
     out: &mut Description,
     nodes: &[Node],
     places: &[Placed],
-    joints: Vec<Between>,
+    joints: &[Between],
     own: &Placed,
     base: usize,
 ) -> Result<(), String> {

@@ -21,6 +21,7 @@ struct Between {
 }
 
 /// Reads a description, or says in one line what is wrong and where. `closures` is the text of a `robot.yaml`.
+#[allow(clippy::too_many_lines, reason = "elements in their order")]
 pub(crate) fn read(
     document: &Document,
     closures: Option<&str>,
