@@ -246,6 +246,10 @@ fn tree_rates(
 
 /// Largest deviation of the model's forces from those of the tree, projected on the model's independent coordinates; and how
 /// far the model's rates are from those of the reference.
+#[allow(
+    clippy::too_many_lines,
+    reason = "states, then forces, then the map of rates that both are held on"
+)]
 fn deviations(
     derivation: &Derivation,
     imported: &Imported,
@@ -296,7 +300,7 @@ fn deviations(
         .filter(|coordinate| !coordinate.passive)
         .map(|coordinate| coordinate.nominal)
         .collect();
-    let steps = if passive.is_empty() { 0 } else { 40 };
+    let steps: usize = if passive.is_empty() { 0 } else { 40 };
     let mut path: Vec<[Vec<f64>; 3]> = vec![[Vec::new(), Vec::new(), Vec::new()]; m];
     let mut push = |j: usize, q: f64, qd: f64, qdd: f64| {
         for (column, x) in path[j].iter_mut().zip([q, qd, qdd]) {
@@ -308,18 +312,18 @@ fn deviations(
             let [to, qd, qdd] = [0, 1, 2].map(|k| moved[j][k][i]);
             let at = |share: f64| nominal[j] + share * (to - nominal[j]);
             for step in 0..steps {
-                push(j, at(f64::from(step) / f64::from(steps)), 0.0, 0.0);
+                push(j, at(step as f64 / steps as f64), 0.0, 0.0);
             }
             push(j, to, qd, qdd);
             for k in 0..m {
                 push(j, to, f64::from(u8::from(k == j)), 0.0);
             }
             for step in (0..steps).rev() {
-                push(j, at(f64::from(step) / f64::from(steps)), 0.0, 0.0);
+                push(j, at(step as f64 / steps as f64), 0.0, 0.0);
             }
         }
     }
-    let length = 2 * steps as usize + m + 1;
+    let length = 2 * steps + m + 1;
     let slices = |k: usize| path.iter().map(|m| m[k].as_slice()).collect();
     let states = States {
         q: slices(0),
@@ -343,7 +347,7 @@ fn deviations(
     } else {
         evaluator.passive(&states).map_err(place)?
     };
-    let here = |i: usize| i * length + steps as usize;
+    let here = |i: usize| i * length + steps;
     let rate = |name: &str, i: usize, j: usize| -> f64 {
         if let Some(k) = active.iter().position(|known| *known == name) {
             return f64::from(u8::from(k == j));
@@ -472,7 +476,7 @@ robots!(
     aloha_mj,
     anymal_c_mj,
     anymal_c_urdf,
-    #[ignore = "takes more than a minute to derive"]
+    #[ignore = "falls short: its loops follow to another assembly than the reference's; two minutes"]
     cassie_mj,
     #[ignore = "falls short: its loops are planar to 1e-9 only, which counts as one equation more"]
     cassie_v2_sdf,
