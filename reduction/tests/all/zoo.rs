@@ -502,7 +502,7 @@ robots!(
     sawyer_mj,
     schunk_wsg50_sdf,
     shadow_hand_mj,
-    #[ignore = "takes more than a minute to derive"]
+    #[ignore = "not derived to the end yet"]
     toddlerbot_2xc_mj,
     ur5_urdf,
 );
