@@ -507,7 +507,9 @@ impl Build<'_> {
         let (name, mass, matrix) = (&link.name, link.inertial.mass, link.inertial.inertia);
         let placed = at.then(&link.inertial.at);
         if mass < 0.0 {
-            return Err(format!("the mass of `{name}` is negative"));
+            return Err(format!(
+                "the mass of the link `{name}` is no number that a body can have"
+            ));
         }
         if mass == 0.0 && matrix.amax() == 0.0 {
             return Ok(());

@@ -244,7 +244,7 @@ fn what_makes_no_model_is_said() {
     assert!(
         says(&two(&joint("j", "revolute", "a", "c", ""))).contains("`c`, which does not exist")
     );
-    assert!(says(&two(&joint("j", "floating", "a", "b", ""))).contains("`j` is floating"));
+    assert!(says(&two(&joint("j", "planar", "a", "b", ""))).contains("this joint is planar"));
     assert!(
         says(&two(&joint(
             "j",
