@@ -4,12 +4,12 @@ use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use modelmill::Model;
 use modelmill::diagnose::{Named, Separation};
 use modelmill::edit::NewEffect;
 use modelmill::print::Spelling;
 use modelmill::recording::Reading;
 use modelmill::text::table::significant;
+use modelmill::{Host, Model};
 use modelmill_boundary::text::{self, Advised};
 use serde_json::Value;
 
@@ -189,9 +189,14 @@ fn command(model: &str, effect: &NewEffect) -> String {
 
 /// How models are read, as the command line has it: libraries of kinds of one's own, and whether constants stand as numbers.
 fn with_libraries(model: &Model) -> String {
+    libraries(model.host())
+}
+
+/// The same of a host.
+pub(crate) fn libraries(host: &Host) -> String {
     let option = |path: &PathBuf| format!(" --library {}", quoted(&path.display().to_string()));
-    let mut options: String = model.host().libraries().iter().map(option).collect();
-    if model.host().is_at_values() {
+    let mut options: String = host.libraries().iter().map(option).collect();
+    if host.is_at_values() {
         options.push_str(" --at-values");
     }
     options

@@ -10,6 +10,7 @@ pub(crate) mod preparation;
 mod rig;
 pub(crate) mod runs;
 pub(crate) mod separate;
+pub(crate) mod work;
 
 use std::path::PathBuf;
 
@@ -18,6 +19,7 @@ use clap::{Args, Parser, Subcommand};
 use drawing::DrawingArgs;
 use effects::{AddArgs, EffectsArgs};
 use runs::RunsArgs;
+use work::WorkArgs;
 
 pub(crate) use code::{EquationsArgs, EquationsFormat, GenerateArgs};
 pub(crate) use data::{
@@ -156,6 +158,9 @@ pub(crate) enum Command {
         --data recordings/spidermill-mbs/with-rods-fit.csv \\\n      \
         --check recordings/spidermill-mbs/with-rods-check.csv --out report")]
     Report(ReportArgs),
+    /// Open a workbench in the browser: edit the model file, see mechanism, equations, error and findings follow
+    #[command(after_help = work::HELP)]
+    Work(WorkArgs),
     /// Drive a full-body rig along a trajectory and record what its sensors read
     #[command(
         after_help = "The trajectory (CSV) has a column t and one per coordinate of the rig; its rates and \

@@ -1,7 +1,11 @@
 //! Options that say how recordings are read and prepared, shared by all commands that read them.
 
+use std::fmt::Write as _;
+
 use clap::{Args, ValueEnum};
 use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, Preparation, Reading, Smoothing};
+
+use crate::flags::quoted;
 
 /// Order of the low-pass where none is asked for.
 const USUAL_ORDER: usize = 4;
@@ -88,6 +92,55 @@ impl PreparationArgs {
             leave_out_events: self.leave_out_events,
             between: self.between,
         }
+    }
+
+    /// The options that were given, as the command line has them, each with a space before it.
+    pub(crate) fn spelled(&self) -> String {
+        let mut all = String::new();
+        let mut option = |name: &str, value: Option<String>| {
+            if let Some(value) = value {
+                let _ = write!(all, " --{name} {}", quoted(&value));
+            }
+        };
+        for (ours, theirs) in &self.map {
+            option("map", Some(format!("{ours}={theirs}")));
+        }
+        let number = |value: Option<f64>| value.map(|value| value.to_string());
+        option("cutoff", number(self.cutoff));
+        option("order", self.order.map(|order| order.to_string()));
+        option(
+            "trim",
+            self.trim.map(|(start, end)| format!("{start},{end}")),
+        );
+        option(
+            "decimate",
+            (self.decimate > 1).then(|| self.decimate.to_string()),
+        );
+        let choice = |value: Option<clap::builder::PossibleValue>, usual: &str| {
+            let name = value.map(|value| value.get_name().to_owned());
+            name.filter(|name| name != usual)
+        };
+        option(
+            "derivatives",
+            choice(self.derivatives.to_possible_value(), "recorded"),
+        );
+        option(
+            "smoothing",
+            choice(self.smoothing.to_possible_value(), "auto"),
+        );
+        option("period", number(self.period));
+        option("band", number(self.band));
+        option(
+            "between",
+            self.between.map(|(from, to)| format!("{from},{to}")),
+        );
+        if self.skip_bad_samples {
+            all.push_str(" --skip-bad-samples");
+        }
+        if self.leave_out_events {
+            all.push_str(" --leave-out-events");
+        }
+        all
     }
 
     fn preparation(&self) -> Preparation {

@@ -22,6 +22,7 @@ pub(crate) mod report;
 pub(crate) mod runs;
 pub(crate) mod simulate;
 pub(crate) mod tour;
+pub(crate) mod work;
 
 use std::path::{Path, PathBuf};
 

@@ -7,7 +7,8 @@ use modelmill_boundary::text::html as escape;
 use super::document::{Block, Document, Equation, Inline, Line, terms};
 use crate::expr::print::Formula;
 
-const STYLE: &str = include_str!("page.css");
+/// The style of all pages; those of others stand on it.
+pub const STYLE: &str = include_str!("page.css");
 
 /// `picture` is an SVG of the mechanism.
 pub(super) fn render(document: &Document, picture: &str) -> String {

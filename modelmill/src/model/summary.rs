@@ -20,6 +20,11 @@ pub struct Checked {
 }
 
 impl Model {
+    /// What the model consists of.
+    pub fn summary(&self) -> Summary {
+        Summary::new(&self.derivation)
+    }
+
     /// Looks the model over: what it consists of, and its rank in numbers beside the exact one.
     ///
     /// Fails only when whoever watches stops it.
@@ -37,7 +42,7 @@ impl Model {
         }
         Ok(Checked {
             model: self.clone(),
-            summary: Summary::new(&self.derivation),
+            summary: self.summary(),
             rank,
             warnings,
         })

@@ -18,4 +18,4 @@ mod summary;
 pub mod tables;
 
 pub use spelling::{Advised, Spelling, Words, spelled};
-pub use summary::{faults, refusal};
+pub use summary::{faults, refusal, warnings};

@@ -3,7 +3,9 @@
 use modelmill_boundary::text::plain;
 use modelmill_codegen::review::NumericMethod;
 use modelmill_codegen::{Derivation, Method, Reduction, module_name};
-use modelmill_spec::{Diagnostic, DriveKind, Failure, Mechanism, Motion, Severity, Sources};
+use modelmill_spec::{
+    Diagnostic, DriveKind, Failure, Loaded, Mechanism, Motion, Severity, Sources,
+};
 use serde_json::{Value, json};
 
 use crate::model::{Checked, SampledRank, Summary, retained_in_vain};
@@ -15,7 +17,7 @@ impl Checked {
     pub fn json(&self) -> Value {
         let model = &self.model;
         let loaded = &model.loaded;
-        let mut warnings = diagnostics(&loaded.warnings, &loaded.sources);
+        let mut warnings = self::warnings(loaded);
         let in_vain = retained_in_vain(&model.derivation).into_iter();
         warnings.extend(in_vain.map(|(k, says)| {
             let span = loaded.retain.get(k);
@@ -60,6 +62,11 @@ pub fn faults(failure: &Failure) -> Value {
         "valid": false,
         "diagnostics": diagnostics(&failure.diagnostics, &failure.sources),
     })
+}
+
+/// What may not be intended in a file that has a meaning, each as a JSON object.
+pub fn warnings(loaded: &Loaded) -> Vec<Value> {
+    diagnostics(&loaded.warnings, &loaded.sources)
 }
 
 fn diagnostics(found: &[Diagnostic], sources: &Sources) -> Vec<Value> {

@@ -24,15 +24,16 @@ pub(crate) const MOST_RUNS: usize = 6;
 /// Height of a panel.
 const HEIGHT: f64 = 190.0;
 
-struct Curve<'a> {
-    name: &'a str,
-    class: &'a str,
+struct Curve {
+    name: String,
+    class: &'static str,
     span: [f64; 2],
     values: Vec<f64>,
 }
 
-/// Curves of all recordings, those of the check first and open.
-pub(crate) fn section(before: &Version, after: Option<&Version>) -> String {
+/// Measured and calculated forces over time and their errors, of all recordings, those of the check first and open; `names` are
+/// those of both models' curves. The same numbers stand beside them for the script of pages.
+pub fn section(before: &Version, after: Option<&Version>, names: [&str; 2]) -> String {
     let mut order: Vec<usize> = (0..before.runs.len()).collect();
     order.sort_by_key(|k| !before.runs[*k].is_check);
     let shown = order.len().min(MOST_RUNS);
@@ -57,7 +58,7 @@ pub(crate) fn section(before: &Version, after: Option<&Version>) -> String {
             "<details class=\"run\"{open} data-curves=\"run{k}\">\n<summary>{}</summary>",
             escape(&title)
         );
-        html.push_str(&of_run(before, after, *k, most));
+        html.push_str(&of_run(before, after, names, *k, most));
         html.push_str("</details>\n");
     }
     if shown < order.len() {
@@ -70,12 +71,18 @@ pub(crate) fn section(before: &Version, after: Option<&Version>) -> String {
     html
 }
 
-fn of_run(before: &Version, after: Option<&Version>, k: usize, most: usize) -> String {
+fn of_run(
+    before: &Version,
+    after: Option<&Version>,
+    names: [&str; 2],
+    k: usize,
+    most: usize,
+) -> String {
     let mut html = String::new();
     let mut packed = Vec::new();
     for (d, drive) in before.model.drives().iter().enumerate() {
         let unit = force_unit(&before.model, d);
-        for (title, curves) in panels(before, after, k, d, drive) {
+        for (title, curves) in panels(before, after, names, k, d, drive) {
             let title = format!("{title}, {unit}");
             html.push_str(&still(&title, &curves));
             let curves: Vec<_> = curves.iter().map(|curve| pack(curve, most)).collect();
@@ -93,15 +100,16 @@ fn of_run(before: &Version, after: Option<&Version>, k: usize, most: usize) -> S
 }
 
 /// Forces of a drive, and below them their errors.
-fn panels<'a>(
+fn panels(
     before: &Version,
     after: Option<&Version>,
+    names: [&str; 2],
     k: usize,
     d: usize,
     drive: &str,
-) -> [(String, Vec<Curve<'a>>); 2] {
-    let curve = |name, class, run: &Along, values: Vec<f64>| Curve {
-        name,
+) -> [(String, Vec<Curve>); 2] {
+    let curve = |name: &str, class, run: &Along, values: Vec<f64>| Curve {
+        name: name.to_owned(),
         class,
         span: [
             run.time.first().copied().unwrap_or(0.0),
@@ -109,21 +117,18 @@ fn panels<'a>(
         ],
         values,
     };
+    // "model as it is" has an "error as it is".
+    let error = |name: &str| format!("error {}", name.trim_start_matches("model "));
     let run = &before.runs[k];
     let mut forces = vec![
         curve("measured", "c-measured", run, run.measured[d].clone()),
-        curve("model as it is", "c-before", run, run.forces[d].clone()),
+        curve(names[0], "c-before", run, run.forces[d].clone()),
     ];
-    let mut errors = vec![curve("error as it is", "c-before", run, run.error(d))];
+    let mut errors = vec![curve(&error(names[0]), "c-before", run, run.error(d))];
     if let Some(run) = after.and_then(|after| after.runs.get(k)) {
         let values = run.forces[d].clone();
-        forces.push(curve("with the effects", "c-after", run, values));
-        errors.push(curve(
-            "error with the effects",
-            "c-after",
-            run,
-            run.error(d),
-        ));
+        forces.push(curve(names[1], "c-after", run, values));
+        errors.push(curve(&error(names[1]), "c-after", run, run.error(d)));
     }
     [
         (drive.to_owned(), forces),
@@ -132,7 +137,7 @@ fn panels<'a>(
 }
 
 /// The picture without any script.
-fn still(title: &str, curves: &[Curve<'_>]) -> String {
+fn still(title: &str, curves: &[Curve]) -> String {
     let spans: Vec<f64> = curves.iter().flat_map(|c| c.span).collect();
     let time = range(&spans);
     let values = with_room(range(curves.iter().flat_map(|c| &c.values)), 0.05);
@@ -152,8 +157,8 @@ fn still(title: &str, curves: &[Curve<'_>]) -> String {
             format!(
                 "<span class=\"key {}\" data-curve=\"{}\">{}</span>",
                 c.class,
-                attribute(c.name),
-                escape(c.name)
+                attribute(&c.name),
+                escape(&c.name)
             )
         })
         .collect();
@@ -166,7 +171,7 @@ fn still(title: &str, curves: &[Curve<'_>]) -> String {
 }
 
 /// A curve for the script: the number that a step stands for, and the steps.
-fn pack(curve: &Curve<'_>, most: usize) -> serde_json::Value {
+fn pack(curve: &Curve, most: usize) -> serde_json::Value {
     let values = &curve.values;
     let kept: Vec<f64> = thinned(values, most).into_iter().map(|(_, v)| v).collect();
     let [low, high] = range(&kept);
@@ -246,7 +251,7 @@ mod tests {
         values[31_234] = 7.0;
         values[100] = -3.0;
         let curve = Curve {
-            name: "error",
+            name: "error".to_owned(),
             class: "c-before",
             span: [0.0, 10.0],
             values,

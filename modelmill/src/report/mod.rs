@@ -18,8 +18,15 @@ mod units;
 
 use crate::diagnose::{Findings, Version, words};
 
-pub use page::page;
+pub use curves::section as curves;
+pub use page::{SCRIPT, page, style};
 pub use runs::runs_page;
+
+/// The ladder of a diagnosis as a picture: errors of fit and check step by step, beside the noise.
+pub fn ladder(findings: &Findings) -> String {
+    let diagnosis = &findings.diagnosis;
+    ladder::picture(&diagnosis.ladder, diagnosis.noise_floor, findings.judged)
+}
 
 /// Which colour is which model.
 fn keys(with_after: bool) -> &'static str {

@@ -311,7 +311,7 @@
 
   let scrolled = -1e9;
   window.addEventListener('scroll', () => { scrolled = performance.now(); }, { passive: true });
-  const runs = [...document.querySelectorAll('[data-curves]')].map((root) => new Run(root));
+  let runs = [];
   const again = () => runs.forEach((run) => run.draw());
   if (window.ResizeObserver) {
     const observer = new ResizeObserver(again);
@@ -329,33 +329,39 @@
     for (const one of document.querySelectorAll('details[data-folded]')) { one.open = false; delete one.dataset.folded; }
   });
 
-  for (const table of document.querySelectorAll('table.sortable')) {
-    const heads = [...table.querySelectorAll('th')];
-    heads.forEach((head, k) => {
-      const button = document.createElement('button');
-      button.type = 'button';
-      button.append(...head.childNodes);
-      head.append(button);
-      button.addEventListener('click', () => {
-        const falling = head.classList.contains('number') ? head.ariaSort !== 'descending' : head.ariaSort === 'ascending';
-        for (const other of heads) other.removeAttribute('aria-sort');
-        head.setAttribute('aria-sort', falling ? 'descending' : 'ascending');
-        const key = (row) => {
-          const cell = row.cells[k];
-          const value = cell.dataset.value;
-          return value === undefined ? cell.textContent.trim() : Number(value);
-        };
-        const body = table.tBodies[0];
-        const rows = [...body.rows].map((row) => [key(row), row]);
-        rows.sort(([a], [b]) => {
-          if (typeof a === 'number' && typeof b === 'number') return a - b;
-          // What has no number comes first, which is last when falling.
-          if (typeof a !== typeof b) return typeof a === 'string' ? -1 : 1;
-          return a.localeCompare(b);
+  // What stands in an element; what stood in one that is gone is forgotten.
+  window.enliven = (part) => {
+    runs = runs.filter((run) => run.root.isConnected);
+    runs.push(...[...part.querySelectorAll('[data-curves]')].map((root) => new Run(root)));
+    for (const table of part.querySelectorAll('table.sortable')) {
+      const heads = [...table.querySelectorAll('th')];
+      heads.forEach((head, k) => {
+        const button = document.createElement('button');
+        button.type = 'button';
+        button.append(...head.childNodes);
+        head.append(button);
+        button.addEventListener('click', () => {
+          const falling = head.classList.contains('number') ? head.ariaSort !== 'descending' : head.ariaSort === 'ascending';
+          for (const other of heads) other.removeAttribute('aria-sort');
+          head.setAttribute('aria-sort', falling ? 'descending' : 'ascending');
+          const key = (row) => {
+            const cell = row.cells[k];
+            const value = cell.dataset.value;
+            return value === undefined ? cell.textContent.trim() : Number(value);
+          };
+          const body = table.tBodies[0];
+          const rows = [...body.rows].map((row) => [key(row), row]);
+          rows.sort(([a], [b]) => {
+            if (typeof a === 'number' && typeof b === 'number') return a - b;
+            // What has no number comes first, which is last when falling.
+            if (typeof a !== typeof b) return typeof a === 'string' ? -1 : 1;
+            return a.localeCompare(b);
+          });
+          if (falling) rows.reverse();
+          body.append(...rows.map(([, row]) => row));
         });
-        if (falling) rows.reverse();
-        body.append(...rows.map(([, row]) => row));
       });
-    });
-  }
+    }
+  };
+  window.enliven(document);
 })();

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use modelmill_codegen::review::Format;
+use modelmill_codegen::review::{Format, STYLE};
 use modelmill_identify::diagnose::Verdict;
 
 use super::{Findings, curves, keys, ladder, maps, regions, spectrum, tables, words};
@@ -20,7 +20,7 @@ pub fn page(findings: &Findings, spelling: &dyn Spelling) -> Outcome<String> {
     let equations = last.model.equations(Format::Html)?.text;
     let name = &findings.before.model.name;
     let title = format!("{name}: what the model lacks");
-    let mut page = begin(&title, between(&equations, "<style>", "</style>"));
+    let mut page = begin(&title, STYLE);
     let sections = [
         ("ladder", "How the error falls", the_ladder(findings)),
         (
@@ -76,6 +76,15 @@ pub(super) fn begin(title: &str, style: &str) -> String {
         include_str!("page.css"),
     )
 }
+
+/// The style of pages: that of equations, and what pictures and tables need besides.
+pub fn style() -> String {
+    format!("{STYLE}{}", include_str!("page.css"))
+}
+
+/// What makes curves that can be zoomed and tables that can be sorted of a page, once it stands. Who puts parts of a page into
+/// another one later calls `enliven(element)` on them.
+pub const SCRIPT: &str = include_str!("page.js");
 
 /// The page from its last section on.
 pub(super) const END: &str = concat!(
@@ -174,7 +183,11 @@ fn the_curves(findings: &Findings) -> String {
     format!(
         "<p class=\"script-only\">Turn the wheel over a picture to zoom, drag to move, drag with Shift to mark a stretch, double \
          click for the whole. With the keyboard: + and −, arrows, 0. A click on a name hides its curve.</p>\n{}",
-        curves::section(&findings.before, findings.after.as_ref().ok())
+        curves::section(
+            &findings.before,
+            findings.after.as_ref().ok(),
+            ["model as it is", "with the effects"]
+        )
     )
 }
 

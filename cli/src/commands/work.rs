@@ -1,0 +1,190 @@
+//! `work`: the workbench in the browser.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use modelmill::diagnose::Separation;
+use modelmill::edit::NewEffect;
+use modelmill::print::Spelling;
+use modelmill::{Host, Model};
+use modelmill_workbench::{Commands, Options, Step, serve};
+use serde_json::json;
+
+use crate::args::work::WorkArgs;
+use crate::commands;
+use crate::failure::{Failure, Outcome};
+use crate::flags::{Flags, libraries, quoted};
+use crate::terminal;
+
+/// Serves the page until the program is stopped.
+pub(crate) fn run(host: &Host, args: &WorkArgs) -> Outcome {
+    if !args.model.is_file() {
+        // This says what is wrong with the path, and which models are near.
+        commands::load_quietly(host, &args.model)?;
+    }
+    let files = |paths: &[PathBuf]| -> Outcome<Vec<Vec<PathBuf>>> {
+        let runs = paths.iter().map(|path| commands::files_of(path));
+        runs.map(|files| match files.iter().find(|file| !file.exists()) {
+            Some(file) => Err(Failure::Input(format!(
+                "there is no file {}; the path of a recording is expected",
+                file.display()
+            ))),
+            None => Ok(files),
+        })
+        .collect()
+    };
+    let options = Options {
+        model: args.model.clone(),
+        data: files(&args.data)?,
+        check: files(&args.check)?,
+        reading: args.preparation.reading(),
+        port: args.port,
+    };
+    let spelled = Spelled::new(host, args);
+    serve(host, options, Arc::new(spelled), |link| {
+        // Who does not read standard output has the link from nowhere else, but may still ask for it by port and token.
+        let _ = if args.json {
+            terminal::print_json(&json!({ "url": link }))
+        } else {
+            terminal::print(&format!(
+                "The workbench is open:\n  {link}\nCtrl+C ends it."
+            ))
+        };
+    })?;
+    Ok(())
+}
+
+/// The workbench's steps as command lines.
+struct Spelled {
+    flags: Flags,
+    model: String,
+    data: String,
+    check: String,
+    /// How recordings are read.
+    reading: String,
+    /// How models are read.
+    libraries: String,
+}
+
+impl Spelled {
+    fn new(host: &Host, args: &WorkArgs) -> Self {
+        let named = |option: &str, paths: &[PathBuf]| -> String {
+            let path = |path: &PathBuf| format!(" --{option} {}", name(path));
+            paths.iter().map(path).collect()
+        };
+        Self {
+            flags: Flags::new(&args.data, &args.check, &args.preparation.reading()),
+            model: name(&args.model),
+            data: named("data", &args.data),
+            check: named("check", &args.check),
+            reading: args.preparation.spelled(),
+            libraries: libraries(host),
+        }
+    }
+}
+
+fn name(path: &Path) -> String {
+    quoted(&path.display().to_string())
+}
+
+impl Commands for Spelled {
+    fn same(&self, step: Step) -> String {
+        let Self {
+            model,
+            data,
+            check,
+            reading,
+            libraries,
+            ..
+        } = self;
+        match step {
+            Step::Picture => format!("modelmill check {model} --picture picture.svg{libraries}"),
+            Step::Equations => {
+                format!("modelmill equations {model} --format html --out equations.html{libraries}")
+            }
+            Step::Compare => format!("modelmill compare {model}{data}{reading}{libraries}"),
+            Step::Identify => {
+                format!("modelmill identify {model}{data}{check}{reading}{libraries}")
+            }
+            Step::Diagnose => {
+                format!("modelmill diagnose {model}{data}{check}{reading}{libraries}")
+            }
+        }
+    }
+}
+
+impl Spelling for Spelled {
+    fn add(&self, model: &Model, effect: &NewEffect) -> String {
+        self.flags.add(model, effect)
+    }
+
+    fn identify(&self, model: &Model) -> String {
+        self.flags.identify(model)
+    }
+
+    fn separate(&self, model: &Model, separation: &Separation) -> Option<String> {
+        self.flags.separate(model, separation)
+    }
+
+    fn held(&self) -> String {
+        self.flags.held()
+    }
+
+    fn text<'a>(&self, text: &'a str) -> Cow<'a, str> {
+        self.flags.text(text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::args::{Cli, Command};
+
+    /// What the page shows is understood, and asks for the same recordings read in the same way.
+    #[test]
+    fn commands_of_the_page_are_understood() {
+        let line = "modelmill work arm.toml --data a.csv b.csv --check c.csv --map 'q=x [deg]' --trim 5 --smoothing fourier \
+                    --between -1,3 --leave-out-events --library my.toml";
+        let words = |line: &str| -> Vec<String> {
+            let mut words = vec![String::new()];
+            let mut is_quoted = false;
+            for c in line.chars() {
+                match c {
+                    '\'' => is_quoted = !is_quoted,
+                    ' ' if !is_quoted => words.push(String::new()),
+                    c => words.last_mut().unwrap().push(c),
+                }
+            }
+            words.retain(|word| !word.is_empty());
+            words
+        };
+        let cli = Cli::try_parse_from(words(line)).unwrap();
+        let host = Host::new().with_libraries(cli.library);
+        let Command::Work(args) = &cli.command else {
+            panic!("another command");
+        };
+        let spelled = Spelled::new(&host, args);
+        for step in [
+            Step::Picture,
+            Step::Equations,
+            Step::Compare,
+            Step::Identify,
+            Step::Diagnose,
+        ] {
+            let command = spelled.same(step);
+            let cli = Cli::try_parse_from(words(&command));
+            let cli = cli.unwrap_or_else(|error| panic!("{command}: {error}"));
+            assert_eq!(cli.library, [PathBuf::from("my.toml")]);
+            let (data, preparation) = match &cli.command {
+                Command::Compare(other) => (&other.data, &other.preparation),
+                Command::Identify(other) => (&other.data, &other.preparation),
+                Command::Diagnose(other) => (&other.ask.data, &other.ask.preparation),
+                _ => continue,
+            };
+            assert_eq!((data, preparation), (&args.data, &args.preparation));
+        }
+    }
+}

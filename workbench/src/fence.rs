@@ -1,0 +1,112 @@
+//! Files that a sitting may read: those of the model's folder, and those that were named when it began. A text that is edited in
+//! a page may name any path.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, RwLock};
+
+use modelmill::files::{Disk, FileError, FileFault, Files, Kind, Opened};
+
+/// The disk, as far as a sitting may read it.
+pub(crate) struct Fence {
+    disk: Disk,
+    folder: PathBuf,
+    named: RwLock<Vec<PathBuf>>,
+}
+
+impl Fence {
+    /// The folder of the model, and nothing else yet.
+    pub(crate) fn around(model: &Path) -> Arc<Self> {
+        let folder = match model.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        Arc::new(Self {
+            disk: Disk::default(),
+            folder: real(folder),
+            named: RwLock::default(),
+        })
+    }
+
+    /// Lets a file in that was named on purpose.
+    pub(crate) fn admit(&self, path: &Path) {
+        let mut named = match self.named.write() {
+            Ok(named) => named,
+            Err(poisoned) => poisoned.into_inner(),
+        };
+        named.push(real(path));
+    }
+
+    fn check(&self, path: &Path) -> Result<(), FileError> {
+        let real = real(path);
+        let named = match self.named.read() {
+            Ok(named) => named,
+            Err(poisoned) => poisoned.into_inner(),
+        };
+        if real.starts_with(&self.folder) || named.contains(&real) {
+            return Ok(());
+        }
+        let says = format!(
+            "it is outside of {}, the folder of the model, and was not named when the workbench began",
+            self.folder.display()
+        );
+        let kind = ErrorKind::PermissionDenied;
+        Err(FileError::new(path, FileFault::System { kind, says }))
+    }
+}
+
+/// The path without links, where it leads to anything.
+fn real(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
+}
+
+impl Files for Fence {
+    fn read(&self, path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
+        self.check(path)?;
+        self.disk.read(path, most)
+    }
+
+    fn kind(&self, path: &Path) -> Kind {
+        match self.check(path) {
+            Ok(()) => self.disk.kind(path),
+            Err(_) => Kind::Missing,
+        }
+    }
+
+    fn list(&self, folder: &Path) -> Result<Vec<PathBuf>, FileError> {
+        self.check(folder)?;
+        self.disk.list(folder)
+    }
+
+    fn open(&self, path: &Path, most: u64) -> Result<Opened, FileError> {
+        self.check(path)?;
+        self.disk.open(path, most)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_outside_and_was_not_named_is_not_read() {
+        let folder = std::env::temp_dir().join(format!("modelmill-fence-{}", std::process::id()));
+        let inside = folder.join("models");
+        std::fs::create_dir_all(&inside).unwrap();
+        for name in ["models/arm.toml", "models/base.toml", "secret", "run.csv"] {
+            std::fs::write(folder.join(name), name).unwrap();
+        }
+        let fence = Fence::around(&inside.join("arm.toml"));
+        let read = |name: &str| fence.read(&inside.join(name), 100).is_ok();
+        assert!(read("arm.toml") && read("base.toml"));
+        assert!(!read("../secret") && !read("../run.csv") && !read("/etc/passwd"));
+        fence.admit(&folder.join("run.csv"));
+        assert!(read("../run.csv") && !read("../secret"));
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink("../secret", inside.join("link")).unwrap();
+            assert!(!read("link"));
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+}

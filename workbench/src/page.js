@@ -1,0 +1,524 @@
+// The workbench: what is typed goes to the program, what it makes of it comes back. One edit is on its way at a time, and the
+// last text waits for it, so that no more is derived than can be.
+(() => {
+  'use strict';
+  const token = new URLSearchParams(location.search).get('token');
+  const by = (id) => document.getElementById(id);
+  const text = by('text');
+  let view = null, pane = 'mechanism', version = 0;
+  let base = 0, sent = null, isSending = false, isTyped = false;
+
+  const ask = async (path, body) => {
+    const answer = await fetch(`/api/${path}`, {
+      method: body === undefined ? 'GET' : 'POST',
+      headers: { 'x-modelmill-token': token, 'content-type': 'application/json' },
+      body: body === undefined ? undefined : JSON.stringify(body),
+    });
+    const isJson = (answer.headers.get('content-type') || '').includes('json');
+    const told = isJson ? await answer.json() : await answer.text();
+    if (!answer.ok) {
+      const error = new Error(isJson ? told.says : told);
+      error.status = answer.status;
+      throw error;
+    }
+    return told;
+  };
+
+  const say = (words) => {
+    by('says').textContent = words || '';
+    by('says').hidden = !words;
+  };
+
+  // Runs what may fail; what it says then stands above the panes.
+  const tried = async (work) => {
+    try {
+      await work();
+      return true;
+    } catch (error) {
+      say(error.message);
+      return false;
+    }
+  };
+
+  const make = (name, words, cls) => {
+    const element = document.createElement(name);
+    if (words !== undefined) element.textContent = words;
+    if (cls) element.className = cls;
+    return element;
+  };
+  const number = (v) => (v === null || v === undefined ? '\u2014' : Number(v.toPrecision(6)).toString().replace('-', '\u2212'));
+  const percent = (v) => (v === null || v === undefined ? '\u2014' : `${Number((100 * v).toPrecision(3))} %`);
+  const cell = (row, words, cls) => row.appendChild(make('td', words, cls));
+  const put = (element, html) => { element.innerHTML = html; window.enliven(element); };
+
+  // ---- the text
+
+  const plain = (words) => words.replace(/\r\n/g, '\n');
+
+  // Puts a text in the place of the old one by an edit that the browser can undo, of what differs only.
+  const replace = (words) => {
+    const old = text.value, top = text.scrollTop;
+    words = plain(words);
+    if (old === words) return;
+    let from = 0;
+    while (from < old.length && old[from] === words[from]) from++;
+    let end = 0;
+    while (end < old.length - from && end < words.length - from && old[old.length - 1 - end] === words[words.length - 1 - end]) end++;
+    const held = document.activeElement;
+    text.focus({ preventScroll: true });
+    text.setSelectionRange(from, old.length - end);
+    const piece = words.slice(from, words.length - end);
+    isTyped = false;
+    const isDone = document.execCommand(piece ? 'insertText' : 'delete', false, piece);
+    if (!isDone || text.value !== words) text.value = words;
+    if (held && held !== text) held.focus({ preventScroll: true });
+    text.scrollTop = top;
+    lines();
+  };
+
+  const lines = () => {
+    const count = text.value.split('\n').length;
+    const gutter = by('lines');
+    while (gutter.childElementCount > count) gutter.lastElementChild.remove();
+    while (gutter.childElementCount < count) gutter.appendChild(make('div', String(gutter.childElementCount + 1)));
+    gutter.scrollTop = text.scrollTop;
+  };
+
+  const go = (line, column) => {
+    const all = text.value.split('\n');
+    const start = all.slice(0, line - 1).reduce((n, one) => n + one.length + 1, 0);
+    text.focus();
+    text.setSelectionRange(start + (column || 1) - 1, start + (all[line - 1] || '').length);
+    const height = text.scrollHeight / all.length;
+    text.scrollTop = Math.max(0, (line - 6) * height);
+  };
+
+  const faults = () => {
+    const list = by('faults'), gutter = by('lines');
+    for (const one of gutter.children) { one.className = ''; one.title = ''; }
+    const notes = (view.notes || []).filter((note) => note.severity === 'warning');
+    list.replaceChildren(...[...view.diagnostics, ...notes].map((fault) => {
+      const item = make('li', undefined, fault.severity);
+      const isHere = !fault.file || fault.file === view.file;
+      const place = fault.line ? `${isHere ? 'line' : `${fault.file}, line`} ${fault.line}: ` : '';
+      const more = [fault.expected, fault.help].filter(Boolean).join('; ');
+      const words = `${place}${fault.says}${more ? ` (${more})` : ''}`;
+      const button = item.appendChild(make('button', words));
+      button.type = 'button';
+      if (fault.line && isHere) {
+        button.addEventListener('click', () => go(fault.line, fault.column));
+        const mark = gutter.children[fault.line - 1];
+        if (mark && mark.className !== 'error') { mark.className = fault.severity; mark.title = words; }
+      }
+      return item;
+    }));
+  };
+
+  // Sends the text as it stands, and once more if it was changed meanwhile.
+  const send = async () => {
+    if (isSending || !view) return;
+    isSending = true;
+    while (sent !== text.value) {
+      const words = text.value;
+      try {
+        const told = await ask('edit', { base, text: words });
+        sent = words;
+        base = told.revision;
+        show(told);
+      } catch (error) {
+        if (error.status === 409) {
+          // Another window was faster: its text is followed unless something was typed here that is not there.
+          const told = await ask('view?since=0').catch(() => null);
+          if (!told) { say(error.message); break; }
+          if (isTyped) {
+            base = told.revision;
+            say('The text was changed in another window while you typed; what you typed here stays.');
+          } else follow(told);
+          continue;
+        }
+        say(error.message);
+        break;
+      }
+    }
+    isTyped = false;
+    isSending = false;
+  };
+
+  const follow = (told) => {
+    base = told.revision;
+    replace(told.text);
+    sent = text.value;
+    isTyped = false;
+    show(told);
+  };
+
+  // ---- what stands
+
+  const show = (told) => {
+    if (told.version < version) return;
+    version = told.version;
+    view = told;
+    document.title = `${view.changed ? '\u2022 ' : ''}${view.file}`;
+    by('file').textContent = view.file;
+    by('state').textContent = [
+      view.unreadable ? `the file cannot be read: ${view.unreadable}` : view.changed ? 'not saved' : 'saved',
+      view.valid ? `derived in ${(1000 * view.seconds).toFixed(0)} ms` : 'not derived',
+    ].join(', ');
+    by('save').disabled = !view.changed;
+    by('banner').hidden = !view.conflict;
+    by('banner').firstElementChild.textContent =
+      'Another program changed the file while this text had changes of its own. Nothing is written before you choose.';
+    lines();
+    faults();
+    for (const one of document.querySelectorAll('.pane')) one.classList.toggle('stale', !view.valid);
+    if (view.model) { equations(); sliders(); }
+    rungs();
+    by('command').textContent = command();
+    if (view.valid && view.derived === view.revision) refresh();
+  };
+
+  const command = () => {
+    const { commands } = view;
+    const step = { mechanism: 'picture', equations: 'equations', comparison: 'compare', diagnosis: 'diagnose', ladder: 'identify' };
+    if (pane === 'comparison' && by('identified').checked) return commands.identify;
+    return commands[step[pane]];
+  };
+
+  const equations = () => {
+    const { model } = view;
+    by('made').textContent =
+      `${model.products} products with an effect on the drives, ${model.base.length} base parameters; derived in ${(1000 * view.seconds).toFixed(0)} ms.`;
+    by('base').tBodies[0].replaceChildren(...model.base.map((one) => {
+      const row = make('tr', undefined, one.change);
+      cell(row, one.name);
+      row.appendChild(make('td')).appendChild(make('code', one.expression));
+      cell(row, number(one.value), 'number');
+      cell(row, one.unit === '1' ? '' : one.unit);
+      cell(row, one.change === 'changed' ? number(one.was) : '', 'number');
+      return row;
+    }));
+    by('gone').textContent = model.gone.join('; ');
+    by('summary').textContent = model.summary;
+  };
+
+  const rungs = () => {
+    const row = (what, errors) => {
+      const one = make('tr');
+      cell(one, what);
+      for (const whose of ['nominal', 'identified'])
+        for (const of of ['fit', 'check']) cell(one, percent(errors[whose][of]), 'number');
+      return one;
+    };
+    const rows = view.ladder.map((one) => row(one.what, one.errors));
+    if (errors && errors.revision === view.revision) {
+      const brief = (f) => ({ fit: f.fit && f.fit.nrms, check: f.check && f.check.nrms });
+      rows.push(row('now', { nominal: brief(errors.nominal), identified: brief(errors.identified) }));
+    }
+    by('rungs').tBodies[0].replaceChildren(...rows);
+  };
+
+  // ---- panes that ask
+
+  // One question of a kind is on its way at a time; the last one waits for it.
+  const asker = (work) => {
+    let isGoing = false, isWanted = false;
+    return async () => {
+      isWanted = true;
+      if (isGoing) return;
+      isGoing = true;
+      while (isWanted) {
+        isWanted = false;
+        await tried(work);
+      }
+      isGoing = false;
+    };
+  };
+
+  let errors = null, drawn = null, from = null;
+  const at = {};
+
+  const draw = asker(async () => {
+    if (pane !== 'mechanism' || !view || !view.valid) return;
+    const svg = await ask('picture', {
+      at: Object.entries(at), from, names: by('names').checked, frames: by('frames').checked, shadow: by('shadow').checked,
+    });
+    by('picture').innerHTML = svg;
+    say('');
+  });
+
+  const compare = asker(async () => {
+    if (!view || !view.valid || !view.data) return;
+    if (errors && errors.revision === view.revision) return;
+    errors = await ask('compare', { places: false });
+    by('errors').replaceChildren(figures(errors));
+    by('comparison').dataset.revision = errors.revision;
+    rungs();
+    say('');
+  });
+
+  const refresh = () => {
+    draw();
+    compare();
+    for (const old of ['curves', 'where', 'written', 'found']) by(old).classList.toggle('stale', by(old).dataset.revision !== String(view.revision));
+  };
+
+  const figures = (told) => {
+    const table = make('table');
+    const head = table.createTHead().insertRow();
+    for (const words of ['error relative to the force', 'fit', 'check', 'identified, fit', 'identified, check'])
+      head.appendChild(make('th', words, words.startsWith('error') ? '' : 'number'));
+    const all = [told.nominal.fit, told.nominal.check, told.identified.fit, told.identified.check];
+    const body = table.createTBody();
+    const row = (name, value) => {
+      const one = body.insertRow();
+      cell(one, name);
+      for (const figures of all) cell(one, figures ? percent(value(figures)) : '\u2014', 'number');
+    };
+    row('all drives', (f) => f.nrms);
+    for (const drive of Object.keys(told.nominal.fit.channels)) row(drive, (f) => f.channels[drive].nrms);
+    return table;
+  };
+
+  const sliders = () => {
+    const { coordinates } = view.model;
+    const names = coordinates.map((one) => one.name).join();
+    if (by('coordinates').dataset.names === names) return;
+    by('coordinates').dataset.names = names;
+    for (const name in at) delete at[name];
+    by('coordinates').replaceChildren(...coordinates.map((one) => {
+      const label = make('label', one.name);
+      const input = make('input');
+      const reach = one.angle ? Math.PI : Math.max(0.5, Math.abs(one.nominal));
+      Object.assign(input, { type: 'range', min: one.nominal - reach, max: one.nominal + reach, step: 'any', value: one.nominal });
+      input.dataset.name = one.name;
+      const told = make('output', number(one.nominal));
+      input.addEventListener('input', () => { at[one.name] = Number(input.value); told.textContent = number(at[one.name]); draw(); });
+      label.append(input, told);
+      return label;
+    }));
+  };
+
+  const turn = (azimuth, elevation) => {
+    const wrapped = ((azimuth + 180) % 360 + 360) % 360 - 180;
+    from = [wrapped, Math.max(-90, Math.min(90, elevation))];
+    [by('azimuth').value, by('elevation').value] = from;
+    draw();
+  };
+  const angles = () => [Number(by('azimuth').value), Number(by('elevation').value)];
+  for (const id of ['azimuth', 'elevation']) by(id).addEventListener('input', () => turn(...angles()));
+  by('flat').addEventListener('click', () => { from = null; draw(); });
+  for (const id of ['names', 'frames', 'shadow']) by(id).addEventListener('change', draw);
+  let held = null;
+  by('picture').addEventListener('pointerdown', (event) => {
+    held = { x: event.clientX, y: event.clientY, angles: angles() };
+    by('picture').setPointerCapture(event.pointerId);
+  });
+  by('picture').addEventListener('pointermove', (event) => {
+    if (held) turn(held.angles[0] - (event.clientX - held.x) / 2, held.angles[1] + (event.clientY - held.y) / 2);
+  });
+  for (const end of ['pointerup', 'pointercancel']) by('picture').addEventListener(end, () => { held = null; });
+  by('picture').addEventListener('keydown', (event) => {
+    const by_ = { ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, 10], ArrowDown: [0, -10] }[event.key];
+    if (!by_) return;
+    event.preventDefault();
+    const [a, e] = angles();
+    turn(a + by_[0], e + by_[1]);
+  });
+
+  // ---- along a recording
+
+  let motion = null, playing = null;
+  const pose = (k) => {
+    const run = motion.runs[by('run').selectedIndex];
+    motion.names.forEach((name, i) => {
+      at[name] = run.q[i][k];
+      const input = by('coordinates').querySelector(`input[data-name="${CSS.escape(name)}"]`);
+      if (input) { input.value = at[name]; input.nextElementSibling.textContent = number(at[name]); }
+    });
+    by('moment').textContent = `${run.time[k].toFixed(2)} s`;
+    draw();
+  };
+  const choose = () => {
+    by('time').max = motion.runs[by('run').selectedIndex].time.length - 1;
+    by('time').value = 0;
+  };
+  const load = () => tried(async () => {
+    motion = await ask('motion', {});
+    by('motion').hidden = !motion.runs.length;
+    by('run').replaceChildren(...motion.runs.map((run) => make('option', run.file)));
+    if (motion.runs.length) choose();
+  });
+  by('run').addEventListener('change', () => { choose(); pose(0); });
+  by('time').addEventListener('input', () => pose(Number(by('time').value)));
+  by('play').addEventListener('click', () => {
+    by('play').textContent = playing ? 'Play' : 'Stop';
+    if (playing) { clearInterval(playing); playing = null; return; }
+    const run = motion.runs[by('run').selectedIndex];
+    const start = performance.now() - 1000 * (run.time[Number(by('time').value)] - run.time[0]);
+    playing = setInterval(() => {
+      const span = run.time[run.time.length - 1] - run.time[0];
+      const t = run.time[0] + ((performance.now() - start) / 1000) % Math.max(span, 0.1);
+      let k = run.time.findIndex((one) => one >= t);
+      if (k < 0) k = run.time.length - 1;
+      by('time').value = k;
+      pose(k);
+    }, 33);
+  });
+
+  // ---- written out, curves, places
+
+  by('write').addEventListener('click', () => tried(async () => {
+    by('written').textContent = 'writing\u2026';
+    const { revision } = view;
+    const page = new DOMParser().parseFromString(await ask('equations', {}), 'text/html');
+    for (const one of page.querySelectorAll('nav, h1, figure.picture')) one.remove();
+    by('written').replaceChildren(...page.querySelector('main').childNodes);
+    by('written').dataset.revision = revision;
+  }).then((isDone) => { if (!isDone) by('written').textContent = ''; }));
+  by('draw').addEventListener('click', () => tried(async () => {
+    by('curves').textContent = 'comparing\u2026';
+    const { revision } = view;
+    const html = await ask('curves', { identified: by('identified').checked });
+    put(by('curves'), html);
+    by('curves').dataset.revision = revision;
+    say('');
+  }).then((isDone) => { if (!isDone) by('curves').textContent = ''; }));
+  by('identified').addEventListener('change', () => { by('command').textContent = command(); });
+  by('places').addEventListener('click', () => tried(async () => {
+    const told = await ask('compare', { places: true });
+    const places = told.compared.where;
+    by('where').replaceChildren(...(places.length ? places : [{ says: 'No region of coordinates, rates, loads or time stands out' }])
+      .map((one) => make('li', `${one.says}.`)));
+    by('where').dataset.revision = told.revision;
+    say('');
+  }));
+
+  // ---- diagnosis
+
+  let shown = -1;
+  const findings = (told) => {
+    const box = by('found');
+    box.replaceChildren();
+    if (told.cancelled) box.append(make('p', 'The diagnosis was cancelled.'));
+    if (told.failed) box.append(make('p', told.failed, 'alias'));
+    const { found } = told;
+    if (!found) return;
+    const verdict = { adequate: ' adequate', unexplained: ' unexplained' }[found.verdict] || '';
+    box.append(make('p', found.says, `verdict${verdict}`));
+    found.entries.forEach((entry, k) => {
+      const one = make('div', undefined, 'finding');
+      one.append(make('b', `${entry.kind.replaceAll('_', ' ')} (${entry.at.join(', ')}) `));
+      const values = [...Object.entries(entry.parameters).map(([name, p]) => [name, p.nominal]), ...Object.entries(entry.constants)];
+      one.append(make('span', values.filter(([, v]) => v !== null).map(([name, v]) => `${name} = ${number(v)}`).join(', ')), ' ');
+      const button = make('button', 'Add');
+      button.type = 'button';
+      button.addEventListener('click', () => tried(async () => {
+        button.disabled = true;
+        try { follow(await ask('add', { entry: k })); say(''); } catch (error) { button.disabled = false; throw error; }
+      }));
+      one.append(button, make('br'), make('code', entry.command));
+      box.append(one);
+    });
+    for (const effect of found.effects) {
+      if (!effect.indistinguishable_from.length) continue;
+      const others = effect.indistinguishable_from.map((o) => `${o.kind.replaceAll('_', ' ')} (${o.at.join(', ')})`).join(', ');
+      box.append(make('p', `These recordings cannot tell ${effect.kind.replaceAll('_', ' ')} from ${others}. ${effect.separate_by || ''}`));
+      if (effect.separate_command) box.append(make('code', effect.separate_command));
+    }
+    for (const one of found.disturbances) box.append(make('p', `In the recordings: ${one.says}.`));
+    const figure = make('figure', undefined, 'still');
+    figure.innerHTML = found.ladder;
+    figure.prepend(make('figcaption', `Error relative to the force, judged ${found.judged}`));
+    box.append(figure);
+    const list = make('ul');
+    for (const one of found.where) list.append(make('li', `${one.says}.`));
+    box.append(list);
+    for (const note of found.data) if (note.severity === 'warning') box.append(make('p', note.says, 'alias'));
+    box.dataset.revision = told.of_this_text ? String(view.revision) : '';
+  };
+  const follow_diagnosis = async () => {
+    for (;;) {
+      const told = await ask('diagnosis');
+      const { going } = told;
+      by('diagnose').disabled = Boolean(going) || !view.data;
+      by('cancel').hidden = by('progress').hidden = !going;
+      if (!going) {
+        by('going').textContent = '';
+        if (told.number > 0 && shown !== told.number) { shown = told.number; findings(told); }
+        return;
+      }
+      by('going').textContent = `${going.what}, ${going.seconds.toFixed(0)} s`;
+      if (going.total) Object.assign(by('progress'), { max: going.total, value: going.done });
+      else by('progress').removeAttribute('value');
+      await new Promise((done) => setTimeout(done, 200));
+    }
+  };
+  by('diagnose').addEventListener('click', () => tried(async () => {
+    await send();
+    by('found').replaceChildren();
+    await ask('diagnose', {});
+    say('');
+    await follow_diagnosis();
+  }));
+  by('cancel').addEventListener('click', () => tried(() => ask('cancel', {})));
+
+  // ---- the rest
+
+  const save = () => tried(async () => { await send(); show(await ask('save', {})); say(''); });
+  by('save').addEventListener('click', save);
+  document.addEventListener('keydown', (event) => {
+    if ((event.ctrlKey || event.metaKey) && event.key === 's') { event.preventDefault(); save(); }
+  });
+  by('theirs').addEventListener('click', () => tried(async () => follow(await ask('choose', { theirs: true }))));
+  by('mine').addEventListener('click', () => tried(async () => show(await ask('choose', { theirs: false }))));
+  by('copy').addEventListener('click', () => navigator.clipboard.writeText(by('command').textContent));
+  const open = (name) => {
+    pane = name;
+    for (const one of document.querySelectorAll('.pane')) one.hidden = one.id !== pane;
+    for (const tab of by('tabs').children) tab.setAttribute('aria-selected', String(tab.dataset.pane === pane));
+    if (view) { by('command').textContent = command(); refresh(); }
+  };
+  for (const tab of by('tabs').children) tab.addEventListener('click', () => open(tab.dataset.pane));
+  by('tabs').addEventListener('keydown', (event) => {
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!step) return;
+    const tabs = [...by('tabs').children];
+    const next = tabs[(tabs.indexOf(document.activeElement) + step + tabs.length) % tabs.length];
+    next.focus();
+    open(next.dataset.pane);
+  });
+  text.addEventListener('input', () => { lines(); isTyped = true; send(); });
+  text.addEventListener('scroll', () => { by('lines').scrollTop = text.scrollTop; });
+  window.addEventListener('beforeunload', (event) => { if (view && (view.changed || sent !== text.value)) event.preventDefault(); });
+
+  const watch = async () => {
+    for (;;) {
+      try {
+        const told = await ask(`view?since=${version}`);
+        if (told.version <= version || isSending) {
+          // What is on its way brings the rest; until then it is asked again.
+          if (isSending) await new Promise((done) => setTimeout(done, 50));
+          continue;
+        }
+        if (told.revision !== base) follow(told); else show(told);
+        follow_diagnosis().catch(() => {});
+      } catch (error) {
+        by('state').textContent = `the program does not answer (${error.message}); keep this page open, what you typed is here`;
+        await new Promise((done) => setTimeout(done, 2000));
+      }
+    }
+  };
+  tried(async () => {
+    const told = await ask('view?since=0');
+    text.value = plain(told.text);
+    sent = text.value;
+    base = told.revision;
+    by('diagnose').disabled = !told.data;
+    for (const id of ['places', 'draw']) by(id).disabled = !told.data;
+    show(told);
+    if (told.data) load(); else by('errors').textContent = 'No recording is open: give one with --data.';
+    text.focus();
+    watch();
+    await follow_diagnosis();
+  });
+})();

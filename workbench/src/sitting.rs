@@ -1,0 +1,609 @@
+//! A sitting: the text of a model file, what was derived of it, and what was asked about it. Work is done outside of the lock;
+//! what comes back is kept only if the text is still the one that was asked about.
+
+use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use modelmill::diagnose::{Held, Question, Version};
+use modelmill::edit::NewEffect;
+use modelmill::files::{self, FileError};
+use modelmill::identify::Estimation;
+use modelmill::model::Format;
+use modelmill::picture::{Drawing, Style};
+use modelmill::recording::Recording;
+use modelmill::{Error, Host, Model, Outcome, report};
+use serde::Deserialize;
+use serde_json::{Value, json};
+use tokio::sync::watch;
+
+use crate::draft::{Draft, Seen};
+use crate::fence::Fence;
+use crate::watch::Watch;
+use crate::{Commands, Options, Step, told};
+
+/// Longest model file that is edited, bytes.
+pub(crate) const LONGEST: u64 = 4 << 20;
+/// Poses of a recording along which the picture moves.
+const POSES: usize = 600;
+/// Bytes of stack for a diagnosis, as the program itself has.
+pub(crate) const STACK: usize = 16 << 20;
+
+/// A model file on the workbench.
+pub(crate) struct Sitting {
+    host: Host,
+    options: Options,
+    commands: Arc<dyn Commands>,
+    state: Mutex<State>,
+    /// Counts everything that pages should hear of.
+    changes: watch::Sender<u64>,
+}
+
+struct State {
+    draft: Draft,
+    now: Now,
+    /// The model as it was last read or saved, if it has a meaning.
+    saved: Option<Model>,
+    /// Other files that the model is made of, as they were.
+    others: Vec<Option<Vec<u8>>>,
+    /// Why the file cannot be read any more.
+    unreadable: Option<String>,
+    /// What was done since the last rung of the ladder.
+    done: Vec<String>,
+    ladder: Vec<Rung>,
+    diagnosis: Diagnosis,
+}
+
+/// What was derived of a revision of the text.
+#[derive(Clone)]
+struct Now {
+    revision: u64,
+    found: Arc<Result<Model, Error>>,
+    seconds: f64,
+}
+
+/// A step of the sitting, with the errors after it.
+#[derive(Clone)]
+struct Rung {
+    what: String,
+    errors: Value,
+}
+
+#[derive(Default)]
+struct Diagnosis {
+    /// Counts the diagnoses of the sitting.
+    number: u64,
+    /// The text that is asked about.
+    revision: u64,
+    going: Option<(Arc<Watch>, Instant)>,
+    /// What came of the last one.
+    answer: Option<Result<Value, String>>,
+    was_cancelled: bool,
+    entries: Vec<NewEffect>,
+}
+
+/// What a page wants to see of the mechanism.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct Seeing {
+    at: Vec<(String, f64)>,
+    /// Azimuth and elevation, degrees.
+    from: Option<[f64; 2]>,
+    names: bool,
+    frames: bool,
+    /// The saved model below it as a shadow.
+    shadow: bool,
+}
+
+impl Sitting {
+    /// Reads the model file and derives it, if it has a meaning.
+    ///
+    /// Fails when it cannot be read.
+    pub(crate) fn open(
+        host: &Host,
+        options: Options,
+        commands: Arc<dyn Commands>,
+    ) -> Outcome<Self> {
+        let fence = Fence::around(&options.model);
+        let named = (options.data.iter().chain(&options.check).flatten())
+            .chain(host.libraries())
+            .chain([&options.model]);
+        named.for_each(|path| fence.admit(path));
+        // What the file on the disk is made of was named by it.
+        match host.load(&options.model) {
+            Ok(loaded) => loaded.sources.paths().for_each(|path| fence.admit(path)),
+            Err(Error::Model(fault)) => fault.sources.paths().for_each(|path| fence.admit(path)),
+            Err(_) => {}
+        }
+        let host = Host::new()
+            .with_libraries(host.libraries().to_vec())
+            .at_values(host.is_at_values())
+            .with_files(fence);
+        let text = read(&host, &options.model).map_err(Error::input)?;
+        let now = derived(&host, &options.model, &text, 1);
+        let saved = now.found.as_ref().as_ref().ok().cloned();
+        let state = State {
+            others: others(&host, saved.as_ref()),
+            draft: Draft::new(text),
+            now,
+            saved,
+            unreadable: None,
+            done: vec!["as opened".to_owned()],
+            ladder: Vec::new(),
+            diagnosis: Diagnosis::default(),
+        };
+        Ok(Self {
+            host,
+            options,
+            commands,
+            state: Mutex::new(state),
+            changes: watch::channel(1).0,
+        })
+    }
+
+    /// What pages should hear of, counted.
+    pub(crate) fn changes(&self) -> watch::Receiver<u64> {
+        self.changes.subscribe()
+    }
+
+    /// What the workbench calls the file.
+    pub(crate) fn name(&self) -> String {
+        self.options.model.display().to_string()
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn tell(&self) {
+        self.changes.send_modify(|count| *count += 1);
+    }
+
+    /// All that stands at once: the text, what it means, the ladder.
+    pub(crate) fn view(&self) -> Value {
+        let state = self.state();
+        let name = self.name();
+        let now = &state.now;
+        let (model, saved) = (now.found.as_ref().as_ref().ok(), state.saved.as_ref());
+        let mut told = told::derived(&now.found, &name);
+        told["model"] = model.map_or(Value::Null, |model| told::equations(model, saved));
+        let mut told = told::spelled(told, &*self.commands);
+        told["version"] = json!(*self.changes.borrow());
+        told["revision"] = json!(state.draft.revision());
+        told["derived"] = json!(now.revision);
+        told["seconds"] = json!(now.seconds);
+        told["file"] = json!(name);
+        told["text"] = json!(state.draft.text());
+        told["changed"] = json!(state.draft.is_changed());
+        told["conflict"] = json!(state.draft.is_in_conflict());
+        told["unreadable"] = json!(state.unreadable);
+        told["data"] = json!(!self.options.data.is_empty());
+        told["ladder"] = (state.ladder.iter())
+            .map(|rung| json!({ "what": rung.what, "errors": rung.errors }))
+            .collect();
+        told["commands"] = json!({
+            "picture": self.commands.same(Step::Picture),
+            "equations": self.commands.same(Step::Equations),
+            "compare": self.commands.same(Step::Compare),
+            "identify": self.commands.same(Step::Identify),
+            "diagnose": self.commands.same(Step::Diagnose),
+        });
+        told
+    }
+
+    /// Takes an edit that a page made of revision `base`, and derives it; `None` if the text has changed since.
+    pub(crate) fn edit(&self, base: u64, text: &str) -> Option<Value> {
+        {
+            let mut state = self.state();
+            let before = state.draft.revision();
+            if !state.draft.edit(base, text) {
+                return None;
+            }
+            if state.draft.revision() == before {
+                drop(state);
+                return Some(self.view());
+            }
+        }
+        self.derive();
+        Some(self.view())
+    }
+
+    /// Derives the text as it stands.
+    fn derive(&self) {
+        let (text, revision) = {
+            let state = self.state();
+            (state.draft.text().to_owned(), state.draft.revision())
+        };
+        let now = derived(&self.host, &self.options.model, &text, revision);
+        let mut state = self.state();
+        if state.draft.revision() == revision {
+            if !state.draft.is_changed() {
+                state.saved = now.found.as_ref().as_ref().ok().cloned();
+                state.others = others(&self.host, state.saved.as_ref());
+            }
+            state.now = now;
+        }
+        drop(state);
+        self.tell();
+    }
+
+    /// Writes the text to the file as a whole, unless another program wrote something else there.
+    ///
+    /// Fails with a sentence when that is so, or the file cannot be written.
+    pub(crate) fn save(&self) -> Result<Value, String> {
+        let disk = read(&self.host, &self.options.model);
+        let mut state = self.state();
+        if let Ok(disk) = disk {
+            state.draft.see(&disk);
+        }
+        if state.draft.is_in_conflict() {
+            drop(state);
+            self.tell();
+            return Err(format!(
+                "{} was changed by another program; choose which text stays before it is saved",
+                self.name()
+            ));
+        }
+        if state.draft.is_changed() {
+            files::write(&self.options.model, state.draft.text().as_bytes())
+                .map_err(|error| format!("nothing is saved: {error}"))?;
+            state.draft.written();
+            if state.now.revision == state.draft.revision() {
+                state.saved = state.now.found.as_ref().as_ref().ok().cloned();
+                state.others = others(&self.host, state.saved.as_ref());
+            }
+            state.unreadable = None;
+            state.did("edited and saved");
+        }
+        drop(state);
+        self.tell();
+        Ok(self.view())
+    }
+
+    /// Ends a conflict with another program: its text is taken, or the text of the page may be saved over it.
+    pub(crate) fn choose(&self, take_theirs: bool) -> Value {
+        {
+            let mut state = self.state();
+            if take_theirs {
+                state.draft.take();
+                state.did("changed outside");
+            } else {
+                state.draft.keep();
+            }
+        }
+        self.derive();
+        self.view()
+    }
+
+    /// Looks whether another program changed the files.
+    pub(crate) fn look(&self) {
+        let disk = read(&self.host, &self.options.model);
+        let mut state = self.state();
+        let unreadable = disk.as_ref().err().map(ToString::to_string);
+        let is_news = state.unreadable != unreadable;
+        state.unreadable = unreadable;
+        let seen = disk.map_or(Seen::Nothing, |disk| state.draft.see(&disk));
+        if seen == Seen::Followed {
+            state.did("changed outside");
+        }
+        let saved = state.saved.clone();
+        let before = state.others.clone();
+        drop(state);
+        let others_changed = others(&self.host, saved.as_ref()) != before;
+        if seen == Seen::Followed || others_changed {
+            self.derive();
+            let mut state = self.state();
+            state.others = others(&self.host, state.saved.as_ref());
+        } else if seen == Seen::Conflict || is_news {
+            self.tell();
+        }
+    }
+
+    /// The model of the text as it stands, with its revision.
+    fn model(&self) -> Result<(Model, u64), String> {
+        let now = self.state().now.clone();
+        match now.found.as_ref() {
+            Ok(model) => Ok((model.clone(), now.revision)),
+            Err(_) => Err("the text has no meaning yet; mend what is said beside it".to_owned()),
+        }
+    }
+
+    /// The mechanism as SVG.
+    pub(crate) fn picture(&self, seeing: &Seeing) -> Result<String, String> {
+        let (model, _) = self.model()?;
+        let drawing = Drawing {
+            at: seeing.at.clone(),
+            from: seeing.from.map(|from| from.map(f64::to_radians)),
+            style: Style {
+                names: seeing.names,
+                frames: seeing.frames,
+                ..Style::default()
+            },
+        };
+        let saved = self.state().saved.clone();
+        let shadow = saved.filter(|saved| seeing.shadow && saved.text() != model.text());
+        let told = |error| self.said(&error);
+        match model.picture(&drawing, shadow.as_ref()) {
+            // The saved mechanism may have other coordinates, or not reach that pose.
+            Err(_) if shadow.is_some() => model.picture(&drawing, None).map_err(told),
+            drawn => drawn.map_err(told),
+        }
+    }
+
+    /// The page of equations.
+    pub(crate) fn equations(&self) -> Result<String, String> {
+        let (model, _) = self.model()?;
+        let written = model.equations(Format::Html).map_err(|e| self.said(&e))?;
+        Ok(written.text)
+    }
+
+    /// Recordings of fit and check as a model reads them.
+    fn recordings(&self, model: &Model) -> Outcome<[Vec<Recording>; 2]> {
+        let read = |all: &[Vec<std::path::PathBuf>]| -> Outcome<Vec<Recording>> {
+            let one = |run: &Vec<std::path::PathBuf>| {
+                let paths: Vec<&Path> = run.iter().map(std::path::PathBuf::as_path).collect();
+                model.recording_of(&paths, &self.options.reading)
+            };
+            all.iter().map(one).collect()
+        };
+        Ok([read(&self.options.data)?, read(&self.options.check)?])
+    }
+
+    /// Errors along the recordings, with the values of the file and identified; `with_places` says where they live as well.
+    pub(crate) fn compare(&self, with_places: bool) -> Result<Value, String> {
+        let (model, revision) = self.model()?;
+        let mut told = (|| {
+            let [fit, check] = self.recordings(&model)?;
+            let [fit, check] = [&fit, &check].map(|all| all.iter().collect::<Vec<_>>());
+            let identified = model.identify(&fit, &check, &Estimation::default())?;
+            let mut told = told::errors(&identified);
+            if with_places {
+                told["compared"] = model.compare(&fit, &model.nominal)?.json("nominal")?;
+            }
+            Ok(told)
+        })()
+        .map_err(|error| self.said(&error))?;
+        told = told::spelled(told, &*self.commands);
+        told["revision"] = json!(revision);
+        let mut state = self.state();
+        if state.draft.revision() == revision && !state.done.is_empty() {
+            let errors = json!({ "nominal": brief(&told["nominal"]), "identified": brief(&told["identified"]) });
+            let what = std::mem::take(&mut state.done).join(", ");
+            state.ladder.push(Rung { what, errors });
+            drop(state);
+            self.tell();
+        }
+        Ok(told)
+    }
+
+    /// Curves of forces and errors along the recordings: of the text, and of the saved model where it is another one.
+    pub(crate) fn curves(&self, is_identified: bool) -> Result<String, String> {
+        let (model, _) = self.model()?;
+        let saved = self.state().saved.clone();
+        let version = |model: Model| -> Outcome<Version> {
+            let [fit, check] = self.recordings(&model)?;
+            let stretches = |all: Vec<Recording>| all.into_iter().flat_map(|one| one.stretches);
+            let held = if is_identified {
+                Held::Known
+            } else {
+                Held::All
+            };
+            Version::new(
+                model,
+                stretches(fit).collect(),
+                stretches(check).collect(),
+                held,
+            )
+        };
+        let told = |error| self.said(&error);
+        // A model whose drives are others has other curves.
+        let other =
+            saved.filter(|saved| saved.text() != model.text() && saved.drives() == model.drives());
+        let edited = version(model).map_err(told)?;
+        Ok(match other.map(version) {
+            Some(Ok(saved)) => {
+                report::curves(&saved, Some(&edited), ["model as saved", "as edited"])
+            }
+            _ => report::curves(&edited, None, ["model", ""]),
+        })
+    }
+
+    /// Poses along the recordings, in time.
+    pub(crate) fn motion(&self) -> Result<Value, String> {
+        let (model, _) = self.model()?;
+        let recordings = self.recordings(&model).map_err(|e| self.said(&e))?;
+        let names = model.active();
+        let runs = recordings.iter().flatten().flat_map(|one| &one.stretches);
+        let runs = runs.map(|one| {
+            let run = &one.run;
+            let step = run.time.len().div_ceil(POSES).max(1);
+            let thin = |all: &[f64]| all.iter().copied().step_by(step).collect::<Vec<f64>>();
+            let q: Vec<_> = run.q.iter().map(|q| thin(q)).collect();
+            json!({ "file": run.file, "time": thin(&run.time), "q": q })
+        });
+        Ok(json!({ "names": names, "runs": runs.collect::<Vec<_>>() }))
+    }
+
+    /// Begins a diagnosis of the text as it stands.
+    ///
+    /// Fails with a sentence when one goes on, or there is nothing to ask about.
+    pub(crate) fn diagnose(self: &Arc<Self>) -> Result<Value, String> {
+        if self.options.data.is_empty() {
+            return Err("there is no recording to find anything in".to_owned());
+        }
+        self.model()?;
+        let watch = Arc::new(Watch::default());
+        let (text, number) = {
+            let mut state = self.state();
+            if state.diagnosis.going.is_some() {
+                return Err("a diagnosis goes on; wait for it, or cancel it".to_owned());
+            }
+            state.diagnosis = Diagnosis {
+                number: state.diagnosis.number + 1,
+                revision: state.draft.revision(),
+                going: Some((Arc::clone(&watch), Instant::now())),
+                ..Diagnosis::default()
+            };
+            (state.draft.text().to_owned(), state.diagnosis.number)
+        };
+        let sitting = Arc::clone(self);
+        let host = self.host.clone().with_progress(Arc::clone(&watch) as _);
+        let work = move || {
+            // A panic must not leave the page waiting for ever.
+            let asked = std::panic::AssertUnwindSafe(|| sitting.find(&host, &text));
+            let found = std::panic::catch_unwind(asked).unwrap_or_else(|_| {
+                Err(Error::input(
+                    "the diagnosis ended by a fault of the program, which is none of yours",
+                ))
+            });
+            sitting.ended(number, found);
+        };
+        let begun = std::thread::Builder::new()
+            .name("diagnosis".to_owned())
+            .stack_size(STACK)
+            .spawn(work);
+        if let Err(error) = begun {
+            self.state().diagnosis.going = None;
+            return Err(format!("the diagnosis cannot begin: {error}"));
+        }
+        Ok(self.diagnosis())
+    }
+
+    fn find(&self, host: &Host, text: &str) -> Outcome<(Value, Vec<NewEffect>)> {
+        let path = &self.options.model;
+        let model = host.derive(&self.name(), host.load_text(path, text)?)?;
+        let [fit, check] = self.recordings(&model)?;
+        let [fit, check] = [&fit, &check].map(|all| all.iter().collect::<Vec<_>>());
+        let findings = model.diagnose(&fit, &check, &Question::default())?;
+        Ok((
+            told::findings(&findings, &*self.commands),
+            findings.entries.clone(),
+        ))
+    }
+
+    fn ended(&self, number: u64, found: Outcome<(Value, Vec<NewEffect>)>) {
+        let mut state = self.state();
+        let diagnosis = &mut state.diagnosis;
+        if diagnosis.number != number {
+            return;
+        }
+        diagnosis.going = None;
+        match found {
+            Ok((told, entries)) => {
+                diagnosis.answer = Some(Ok(told::spelled(told, &*self.commands)));
+                diagnosis.entries = entries;
+            }
+            Err(Error::Cancelled) => diagnosis.was_cancelled = true,
+            Err(error) => diagnosis.answer = Some(Err(self.said(&error))),
+        }
+        drop(state);
+        self.tell();
+    }
+
+    /// Asks the diagnosis that goes on to stop.
+    pub(crate) fn cancel(&self) -> Value {
+        if let Some((watch, _)) = &self.state().diagnosis.going {
+            watch.cancel();
+        }
+        self.diagnosis()
+    }
+
+    /// How far the diagnosis is, or what it found.
+    pub(crate) fn diagnosis(&self) -> Value {
+        let state = self.state();
+        let diagnosis = &state.diagnosis;
+        let going = diagnosis.going.as_ref().map(|(watch, since)| {
+            let mut told = watch.told();
+            told["seconds"] = json!(since.elapsed().as_secs_f64());
+            told
+        });
+        json!({
+            "number": diagnosis.number,
+            "going": going,
+            "cancelled": diagnosis.was_cancelled,
+            "found": diagnosis.answer.as_ref().and_then(|answer| answer.as_ref().ok()),
+            "failed": diagnosis.answer.as_ref().and_then(|answer| answer.as_ref().err()),
+            "of_this_text": diagnosis.revision == state.draft.revision(),
+        })
+    }
+
+    /// Adds an effect that the last diagnosis found to the text, as `add` does to the file.
+    ///
+    /// Fails with a sentence when there is none, or the text with it has no meaning.
+    pub(crate) fn add(&self, entry: usize) -> Result<Value, String> {
+        let (text, revision, effect) = {
+            let state = self.state();
+            let effect = state.diagnosis.entries.get(entry).cloned();
+            let effect = effect.ok_or("there is no such finding; diagnose again")?;
+            (
+                state.draft.text().to_owned(),
+                state.draft.revision(),
+                effect,
+            )
+        };
+        let edited = self.host.edit(&self.name(), &text, &effect);
+        let edited = edited.map_err(|error| self.said(&error))?;
+        {
+            let mut state = self.state();
+            if !state.draft.edit(revision, &edited.text) {
+                return Err("the text was changed meanwhile; add it again".to_owned());
+            }
+            let what = format!(
+                "+ {} ({})",
+                effect.kind.replace('_', " "),
+                effect.at.join(", ")
+            );
+            state.did(&what);
+        }
+        self.derive();
+        Ok(self.view())
+    }
+
+    /// What an error says, in the words of the reader.
+    fn said(&self, error: &Error) -> String {
+        let says = match error {
+            Error::Model(faults) => faults.render(false),
+            error => error.to_string(),
+        };
+        self.commands.text(&says).into_owned()
+    }
+}
+
+impl State {
+    /// Something was done whose effect on the errors is to stand on the ladder.
+    fn did(&mut self, what: &str) {
+        if self.done.iter().all(|one| one != what) {
+            self.done.push(what.to_owned());
+        }
+    }
+}
+
+fn read(host: &Host, path: &Path) -> Result<String, FileError> {
+    host.files().read_text(path, LONGEST)
+}
+
+/// Derives a text, and measures how long that takes.
+fn derived(host: &Host, path: &Path, text: &str, revision: u64) -> Now {
+    let since = Instant::now();
+    let found = host
+        .load_text(path, text)
+        .and_then(|loaded| host.derive(&path.display().to_string(), loaded));
+    Now {
+        revision,
+        found: Arc::new(found),
+        seconds: since.elapsed().as_secs_f64(),
+    }
+}
+
+/// What stands in the other files that a model is made of.
+fn others(host: &Host, model: Option<&Model>) -> Vec<Option<Vec<u8>>> {
+    let paths = model.into_iter().flat_map(|model| model.files().skip(1));
+    paths
+        .map(|path| host.files().read(path, LONGEST).ok())
+        .collect()
+}
+
+/// Relative errors of fit and check alone.
+fn brief(figures: &Value) -> Value {
+    json!({ "fit": figures["fit"]["nrms"], "check": figures["check"]["nrms"] })
+}

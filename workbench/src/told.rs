@@ -1,0 +1,133 @@
+//! What the page is told, as JSON: the model with its base parameters beside those of the file as it was saved, errors, findings.
+
+use modelmill::diagnose::{Findings, words};
+use modelmill::identify::Identification;
+use modelmill::model::Checked;
+use modelmill::print::{self, Spelling, edit};
+use modelmill::{Error, Model, report};
+use serde_json::{Value, json};
+
+use crate::Commands;
+
+/// A text that was derived, or why it was not, with what is to be said at its lines.
+pub(crate) fn derived(found: &Result<Model, Error>, path: &str) -> Value {
+    match found {
+        Ok(model) => json!({
+            "valid": true,
+            "diagnostics": print::warnings(&model.loaded),
+            "notes": model.notes.iter().chain(&model.nominal_values().notes).map(|note| json!(note)).collect::<Vec<_>>(),
+        }),
+        Err(Error::Model(faults)) => print::faults(faults),
+        Err(error) => print::refusal(&error.to_string(), path),
+    }
+}
+
+/// Base parameters with their values, beside those of the model as it was saved.
+pub(crate) fn equations(model: &Model, saved: Option<&Model>) -> Value {
+    let value = |model: &Model, k: usize| model.has_nominal(k).then(|| model.nominal[k]);
+    let base: Vec<Value> = (model.base.iter().enumerate())
+        .map(|(k, base)| {
+            let same = |one: &&Model| {
+                one.base
+                    .iter()
+                    .position(|b| b.expression == base.expression)
+            };
+            let before = saved.and_then(|saved| Some((saved, same(&saved)?)));
+            let was = before.and_then(|(saved, i)| value(saved, i));
+            let now = value(model, k);
+            let change = match (saved, before) {
+                (None, _) => "same",
+                (Some(_), None) => "new",
+                (Some(_), Some(_)) if was == now => "same",
+                (Some(_), Some(_)) => "changed",
+            };
+            json!({
+                "name": base.name,
+                "retained": base.retained,
+                "expression": base.expression,
+                "unit": base.unit,
+                "value": now,
+                "was": was,
+                "change": change,
+            })
+        })
+        .collect();
+    let gone: Vec<&str> = (saved.iter().flat_map(|saved| &saved.base))
+        .filter(|old| {
+            model
+                .base
+                .iter()
+                .all(|new| new.expression != old.expression)
+        })
+        .map(|old| old.expression.as_str())
+        .collect();
+    let summary = Checked {
+        model: model.clone(),
+        summary: model.summary(),
+        rank: None,
+        warnings: Vec::new(),
+    };
+    json!({
+        "base": base,
+        "gone": gone,
+        "summary": summary.text(modelmill::text::Style::PLAIN),
+        "products": model.derivation.reduction.products.len(),
+        "coordinates": model.motions().iter().map(|(name, is_angle)| {
+            let mut all = model.derivation.mechanism.coordinates.iter();
+            let nominal = all.find(|c| c.name == *name).map_or(0.0, |c| c.nominal);
+            json!({ "name": name, "angle": is_angle, "nominal": nominal })
+        }).collect::<Vec<_>>(),
+        "drives": model.drives(),
+    })
+}
+
+/// Errors of a model along recordings, with its own values and once it is identified.
+pub(crate) fn errors(found: &Identification) -> Value {
+    json!({
+        "nominal": { "fit": found.nominal_fit, "check": found.nominal_check },
+        "identified": { "fit": found.fit.fit, "check": found.fit.check },
+        "samples": found.fit.samples,
+        "notes": found.notes,
+    })
+}
+
+/// What a diagnosis found: its JSON with sentences, the picture of its ladder, and what can be added.
+pub(crate) fn findings(findings: &Findings, commands: &dyn Commands) -> Value {
+    let model = &findings.before.model;
+    let mut told = findings.json(commands);
+    told["says"] = json!(words::verdict(
+        &findings.diagnosis,
+        findings.channels(),
+        findings.judged
+    ));
+    told["ladder"] = json!(report::ladder(findings));
+    told["judged"] = json!(findings.judged.words());
+    told["entries"] = findings
+        .entries
+        .iter()
+        .map(|entry| {
+            let mut told = edit::described(entry);
+            told["command"] = json!(commands.add(model, entry));
+            told
+        })
+        .collect();
+    told
+}
+
+/// A JSON value with all its texts spelled as the reader asks for what they advise.
+pub(crate) fn spelled(value: Value, spelling: &dyn Spelling) -> Value {
+    match value {
+        Value::String(text) => Value::String(spelling.text(&text).into_owned()),
+        Value::Array(values) => {
+            let values = values.into_iter();
+            values.map(|value| spelled(value, spelling)).collect()
+        }
+        Value::Object(members) => {
+            let members = members.into_iter();
+            members
+                .map(|(name, value)| (name, spelled(value, spelling)))
+                .collect()
+        }
+        other => other,
+    }
+}
