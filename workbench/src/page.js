@@ -171,7 +171,7 @@
     lines();
     faults();
     for (const one of document.querySelectorAll('.pane')) one.classList.toggle('stale', !view.valid);
-    if (view.model) { equations(); sliders(); }
+    if (view.model) { equations(); sliders(); by('equations').dataset.revision = view.derived; }
     rungs();
     by('command').textContent = command();
     if (view.valid && view.derived === view.revision) refresh();

@@ -44,3 +44,4 @@ mod sound;
 mod tx40;
 mod usage;
 mod weights;
+mod work;

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 use std::process::Command;
 
-use crate::common::{html, json, number, printed, refused, run, scratch, workspace};
+use crate::common::{browser, html, json, number, printed, refused, run, scratch, workspace};
 use serde_json::Value;
 
 fn model(name: &str) -> String {
@@ -142,36 +142,9 @@ fn a_folder_that_cannot_be_is_said_before_anything_is_done() {
     );
 }
 
-/// A browser of the machine, if it has one.
-fn browser() -> Option<PathBuf> {
-    let names = [
-        "chromium",
-        "chromium-browser",
-        "google-chrome",
-        "google-chrome-stable",
-        "chrome",
-    ];
-    let folders = std::env::var_os("PATH").unwrap_or_default();
-    let own = std::env::var_os("MODELMILL_BROWSER").map(PathBuf::from);
-    own.into_iter()
-        .chain(
-            std::env::split_paths(&folders).flat_map(|folder| names.map(|name| folder.join(name))),
-        )
-        .find(|path| path.is_file())
-}
-
 /// Opens a page without a network, lets `exercise.js` use it, and returns what that wrote down; `None` without a browser.
 fn used(page: &str, name: &str) -> Option<Value> {
-    let Some(browser) = browser() else {
-        assert!(
-            std::env::var_os("MODELMILL_BROWSER_REQUIRED").is_none(),
-            "a browser is required and there is none"
-        );
-        eprintln!(
-            "The page is not opened: there is no chromium or chrome on the path, nor one in MODELMILL_BROWSER."
-        );
-        return None;
-    };
+    let browser = browser::found()?;
     let listen = include_str!("../browser/listen.js");
     let exercise = include_str!("../browser/exercise.js");
     let policy = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; \

@@ -1,5 +1,6 @@
 //! Runs the program and reads what it prints.
 
+pub(crate) mod browser;
 pub(crate) mod html;
 
 use std::panic::Location;
