@@ -24,18 +24,22 @@
     return told;
   };
 
-  const say = (words) => {
-    by('says').textContent = words || '';
-    by('says').hidden = !words;
+  // A sentence above the panes; what follows the text by itself takes back no more than what it said itself.
+  const say = (words, who) => {
+    const box = by('says');
+    if (!words && who && box.dataset.who !== who) return;
+    box.dataset.who = who || '';
+    box.textContent = words || '';
+    box.hidden = !words;
   };
 
   // Runs what may fail; what it says then stands above the panes.
-  const tried = async (work) => {
+  const tried = async (work, who) => {
     try {
       await work();
       return true;
     } catch (error) {
-      say(error.message);
+      say(error.message, who);
       return false;
     }
   };
@@ -220,7 +224,7 @@
   // ---- panes that ask
 
   // One question of a kind is on its way at a time; the last one waits for it.
-  const asker = (work) => {
+  const asker = (who, work) => {
     let isGoing = false, isWanted = false;
     return async () => {
       isWanted = true;
@@ -228,7 +232,7 @@
       isGoing = true;
       while (isWanted) {
         isWanted = false;
-        await tried(work);
+        await tried(work, who);
       }
       isGoing = false;
     };
@@ -237,23 +241,23 @@
   let errors = null, drawn = null, from = null;
   const at = {};
 
-  const draw = asker(async () => {
+  const draw = asker('picture', async () => {
     if (pane !== 'mechanism' || !view || !view.valid) return;
     const svg = await ask('picture', {
       at: Object.entries(at), from, names: by('names').checked, frames: by('frames').checked, shadow: by('shadow').checked,
     });
     by('picture').innerHTML = svg;
-    say('');
+    say('', 'picture');
   });
 
-  const compare = asker(async () => {
+  const compare = asker('errors', async () => {
     if (!view || !view.valid || !view.data) return;
     if (errors && errors.revision === view.revision) return;
     errors = await ask('compare', { places: false });
     by('errors').replaceChildren(figures(errors));
     by('comparison').dataset.revision = errors.revision;
     rungs();
-    say('');
+    say('', 'errors');
   });
 
   const refresh = () => {

@@ -487,7 +487,7 @@ fn equations_follow_while_one_types() {
             "nominal = 12.4560",
             100.0,
         ),
-        ("panda.toml", vec![], "m3 = { nominal = 3.228604", 400.0),
+        ("panda.toml", vec![], "MX = 0.019261", 400.0),
     ];
     for (model, recordings, place, bound) in cases {
         let bench = Workbench::open("typing", model, &recordings);

@@ -143,6 +143,10 @@ impl Browser {
             &script,
         );
         self.ask(Some(&window), "Page.navigate", &json!({ "url": link }));
+        self.run(
+            &window,
+            "await until('the page', () => document.readyState === 'complete');",
+        );
         window
     }
 
