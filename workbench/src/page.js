@@ -522,6 +522,9 @@
     show(told);
     if (told.data) load(); else by('errors').textContent = 'No recording is open: give one with --data.';
     text.focus();
+    text.setSelectionRange(0, 0);
+    text.scrollTop = 0;
+    lines();
     watch();
     await follow_diagnosis();
   });

@@ -79,7 +79,7 @@ pub(crate) fn serve(sitting: Arc<Sitting>, port: u16, opened: impl FnOnce(&str))
 fn random() -> Result<String, String> {
     let mut bytes = [0_u8; 16];
     getrandom::fill(&mut bytes).map_err(|error| format!("no token can be drawn: {error}"))?;
-    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+    Ok(format!("{:032x}", u128::from_le_bytes(bytes)))
 }
 
 async fn look(sitting: Arc<Sitting>) {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use modelmill::diagnose::Separation;
 use modelmill::edit::NewEffect;
+use modelmill::files::Kind;
 use modelmill::print::Spelling;
 use modelmill::{Host, Model};
 use modelmill_workbench::{Commands, Options, Step, serve};
@@ -25,14 +26,18 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> Outcome {
     }
     let files = |paths: &[PathBuf]| -> Outcome<Vec<Vec<PathBuf>>> {
         let runs = paths.iter().map(|path| commands::files_of(path));
-        runs.map(|files| match files.iter().find(|file| !file.exists()) {
-            Some(file) => Err(Failure::Input(format!(
-                "there is no file {}; the path of a recording is expected",
-                file.display()
-            ))),
-            None => Ok(files),
-        })
-        .collect()
+        let is_there = |file: &PathBuf| {
+            let says = match host.files().kind(file) {
+                Kind::File | Kind::Folder => return Ok(()),
+                Kind::Missing => "there is no such file; the path of a recording is expected",
+                Kind::Stream | Kind::Device => {
+                    "this is no file on a disk; recordings are read again after each edit, so write it to a file first"
+                }
+            };
+            Err(Failure::Input(format!("{}: {says}", file.display())))
+        };
+        runs.map(|files| files.iter().try_for_each(is_there).map(|()| files))
+            .collect()
     };
     let options = Options {
         model: args.model.clone(),

@@ -1,5 +1,6 @@
 //! The workbench: who may ask, what happens to the file, and a whole sitting in a browser, with the figures that the commands give.
 
+use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::PathBuf;
@@ -64,9 +65,10 @@ impl Workbench {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port)).expect("it listens");
         let mut text =
             format!("{head} HTTP/1.1\r\nConnection: close\r\nContent-Type: application/json\r\n");
-        text.push_str(&format!("Content-Length: {}\r\n", body.len()));
+        let _ = write!(text, "Content-Length: {}\r\n", body.len());
         for header in headers {
-            text.push_str(&format!("{header}\r\n"));
+            text.push_str(header);
+            text.push_str("\r\n");
         }
         stream
             .write_all(format!("{text}\r\n{body}").as_bytes())
@@ -268,39 +270,55 @@ fn a_sitting_from_a_wrong_text_to_the_completed_model() {
          await until('errors', () => at('comparison').dataset.revision === at('equations').dataset.revision);",
     );
 
-    // The same figures as the command that is shown.
+    let before = compares(&mut browser, &window, &bench, recordings);
+    marks_faults_and_changes(&mut browser, &window, &original);
+    let command = diagnoses(&mut browser, &window);
+    adds_as_the_command_does(&mut browser, &window, &bench, &command, &before);
+    assert_eq!(browser.heard, Vec::<String>::new());
+}
+
+/// The same figures as the command that is shown, and curves; the error of the identified model on the check run.
+fn compares(
+    browser: &mut Browser,
+    window: &Window,
+    bench: &Workbench,
+    recordings: [&str; 4],
+) -> String {
     let mut command = vec!["identify", bench.path(), "--json"];
     command.extend(recordings);
     let identified = common::json(&command);
-    browser.run(&window, "tab('comparison');");
+    browser.run(window, "tab('comparison');");
     let pointers = ["/nominal/fit", "/nominal/check", "/fit", "/check"];
     let expected = pointers.map(|p| percent(number(&identified, &format!("{p}/nrms"))));
-    let shown = row(&mut browser, &window, "errors", 0);
+    let shown = row(browser, window, "errors", 0);
     assert_eq!(shown[1..], expected);
-    let command = browser.run(&window, "return at('command').textContent;");
+    let command = browser.run(window, "return at('command').textContent;");
     let words = command.as_str().expect("a command");
     assert!(
-        words.starts_with("modelmill compare ") && words.contains(&fit),
+        words.starts_with("modelmill compare ") && words.contains(recordings[1]),
         "{words}"
     );
     // Curves with something in them.
     let longest = browser.run(
-        &window,
+        window,
         "at('draw').click();
          await until('curves', () => at('curves').querySelectorAll('svg .curve').length >= 4);
          return Math.min(...[...at('curves').querySelector('details').querySelectorAll('svg .curve')].map((c) => c.getAttribute('d').length));",
     );
     assert!(longest.as_f64().expect("a number") > 500.0, "{longest}");
+    expected[3].clone()
+}
 
-    // A fault is seen at its line, the last sound model stays in sight, and undoing mends it.
-    browser.run(&window, "tab('equations'); select('m2 = {');");
-    browser.write(&window, "m2 = [");
+/// A fault is seen at its line, the last sound model stays in sight, and undoing mends it; what changes is marked.
+fn marks_faults_and_changes(browser: &mut Browser, window: &Window, original: &str) {
+    browser.run(window, "tab('equations'); select('m2 = {');");
+    browser.write(window, "m2 = [");
     let line = 1 + original
         .lines()
         .position(|line| line.starts_with("m2 = {"))
         .expect("m2");
     let marked = browser.run(
-        &window,
+        window,
         "await until('a fault', () => at('faults').querySelector('.error'));
          return [[...at('lines').children].findIndex((one) => one.className === 'error') + 1, at('faults').textContent];",
     );
@@ -310,15 +328,15 @@ fn a_sitting_from_a_wrong_text_to_the_completed_model() {
         "{marked}"
     );
     browser.run(
-        &window,
+        window,
         "at('text').focus(); document.execCommand('undo');
          await until('mended', () => !at('faults').querySelector('.error') && !document.querySelector('.pane.stale'));",
     );
     // A value is changed: what it changes is marked, and the error follows.
-    browser.run(&window, "select('nominal = 12.4560');");
-    browser.write(&window, "nominal = 22.4560");
+    browser.run(window, "select('nominal = 12.4560');");
+    browser.write(window, "nominal = 22.4560");
     let changed = browser.run(
-        &window,
+        window,
         "await until('changes', () => at('base').querySelectorAll('tr.changed').length === 4);
          await until('errors', () => at('comparison').dataset.revision === at('equations').dataset.revision);
          const values = [...at('base').querySelectorAll('tr.changed td:last-child')].map((one) => one.textContent);
@@ -327,12 +345,14 @@ fn a_sitting_from_a_wrong_text_to_the_completed_model() {
          return values;",
     );
     assert_eq!(changed[0], "61.29", "{changed}");
-    let worse = row(&mut browser, &window, "errors", 0);
+    let worse = row(browser, window, "errors", 0);
     assert_ne!(worse[1], "", "{worse:?}");
+}
 
-    // A diagnosis is cancelled, then runs to its end.
+/// A diagnosis is cancelled, then runs to its end; the command that adds what it found.
+fn diagnoses(browser: &mut Browser, window: &Window) -> String {
     let cancelled = browser.run(
-        &window,
+        window,
         "tab('diagnosis'); at('diagnose').click();
          await until('the diagnosis', () => !at('cancel').hidden && at('going').textContent);
          at('cancel').click();
@@ -341,7 +361,7 @@ fn a_sitting_from_a_wrong_text_to_the_completed_model() {
     );
     assert_eq!(cancelled, "The diagnosis was cancelled.");
     let finding = browser.run(
-        &window,
+        window,
         "at('diagnose').click();
          await until('a finding', () => at('found').querySelector('.finding'), 300000);
          return [at('found').querySelectorAll('.finding').length, at('found').querySelector('.finding code').textContent,
@@ -357,10 +377,20 @@ fn a_sitting_from_a_wrong_text_to_the_completed_model() {
         command.contains("rod_inertia --at spindle_left,spindle_right"),
         "{command}"
     );
+    command
+}
 
-    // Added, the text is what the command makes of the file, and the error falls.
+/// Added, the text is what the command makes of the file, and the error falls.
+fn adds_as_the_command_does(
+    browser: &mut Browser,
+    window: &Window,
+    bench: &Workbench,
+    command: &str,
+    expected: &str,
+) {
+    let original = bench.text();
     let added = browser.run(
-        &window,
+        window,
         "at('found').querySelector('.finding button').click();
          await until('the effect', () => at('text').value.includes('rod_inertia'));
          tab('ladder');
@@ -376,17 +406,15 @@ fn a_sitting_from_a_wrong_text_to_the_completed_model() {
     printed(&words);
     let by_command = std::fs::read_to_string(&copy).expect("the copy");
     assert_eq!(added, json!(by_command));
-    let rungs: Vec<Vec<String>> = [0, 1]
-        .map(|k| row(&mut browser, &window, "rungs", k))
-        .into();
+    let rungs: Vec<Vec<String>> = [0, 1].map(|k| row(browser, window, "rungs", k)).into();
     let value = |text: &str| -> f64 { text.trim_end_matches(" %").parse().expect("a percentage") };
     let [before, after] = [0, 1].map(|k| value(&rungs[k][4]));
-    assert_eq!(rungs[0][4], expected[3]);
+    assert_eq!(rungs[0][4], expected);
     assert!(after < 1e-3 * before, "{rungs:?}");
 
     // Undone and done again, then saved by the key.
     browser.run(
-        &window,
+        window,
         "at('text').focus(); document.execCommand('undo');
          await until('undone', () => !at('text').value.includes('rod_inertia') && at('base').tBodies[0].rows.length === 4);
          document.execCommand('redo');
@@ -395,7 +423,6 @@ fn a_sitting_from_a_wrong_text_to_the_completed_model() {
          await until('saved', () => at('save').disabled && at('state').textContent.startsWith('saved'));",
     );
     assert_eq!(bench.text(), by_command);
-    assert_eq!(browser.heard, Vec::<String>::new());
 }
 
 #[test]

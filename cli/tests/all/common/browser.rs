@@ -111,7 +111,7 @@ impl Browser {
             let params = &answer["params"];
             match event {
                 "Runtime.exceptionThrown" => {
-                    self.heard.push(params["exceptionDetails"].to_string())
+                    self.heard.push(params["exceptionDetails"].to_string());
                 }
                 "Log.entryAdded" if params["entry"]["level"] == "error" => {
                     self.heard.push(params["entry"].to_string());
