@@ -1,13 +1,15 @@
 //! The workbench: one model file in the browser, on the user's own machine, with its picture, equations, errors along recordings
 //! and diagnosis beside the text.
 //!
-//! `draft` is the text beside what the disk holds, `fence` what files may be read, `sitting` the text with what was derived of
+//! `draft` is the text beside what the disk holds, `fence` what files may be read, `readings` recordings as a
+//! model reads them, `sitting` the text with what was derived of
 //! it and asked about it, `told` the answers as JSON, `watch` the progress of a diagnosis; `server` lets the page ask, `page` is
 //! the page. All of it is the library's: this crate derives, compares and diagnoses nothing by itself.
 
 mod draft;
 mod fence;
 mod page;
+mod readings;
 mod server;
 mod sitting;
 mod told;

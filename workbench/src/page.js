@@ -253,12 +253,25 @@
   const compare = asker('errors', async () => {
     if (!view || !view.valid || !view.data) return;
     if (errors && errors.revision === view.revision) return;
-    errors = await ask('compare', { places: false });
-    by('errors').replaceChildren(figures(errors));
-    by('comparison').dataset.revision = errors.revision;
+    compared(await ask('compare', { places: false, afresh: false }));
+    // Remarks on the recordings may know values: they come when typing rests.
+    clearTimeout(rest);
+    if (!errors.afresh) rest = setTimeout(again, 700);
+  });
+  let rest = 0;
+  const again = () => tried(async () => {
+    const { revision } = view;
+    const told = await ask('compare', { places: false, afresh: true });
+    if (told.revision === revision && revision === view.revision) compared(told);
+  }, 'errors');
+  const compared = (told) => {
+    errors = told;
+    const notes = told.notes.filter((note) => note.severity === 'warning').map((note) => make('p', note.says, 'alias'));
+    by('errors').replaceChildren(figures(told), ...notes);
+    by('comparison').dataset.revision = told.revision;
     rungs();
     say('', 'errors');
-  });
+  };
 
   const refresh = () => {
     draw();
@@ -389,7 +402,7 @@
   }).then((isDone) => { if (!isDone) by('curves').textContent = ''; }));
   by('identified').addEventListener('change', () => { by('command').textContent = command(); });
   by('places').addEventListener('click', () => tried(async () => {
-    const told = await ask('compare', { places: true });
+    const told = await ask('compare', { places: true, afresh: true });
     const places = told.compared.where;
     by('where').replaceChildren(...(places.length ? places : [{ says: 'No region of coordinates, rates, loads or time stands out' }])
       .map((one) => make('li', `${one.says}.`)));

@@ -292,15 +292,17 @@ async fn equations(State(app): State<Arc<App>>) -> Result<Html<String>, Refusal>
 struct Comparing {
     /// Whether to look where the error lives.
     places: bool,
+    /// Whether to read the recordings again.
+    afresh: bool,
 }
 
 async fn compare(
     State(app): State<Arc<App>>,
     request: Result<Json<Comparing>, JsonRejection>,
 ) -> Answer {
-    let Json(Comparing { places }) = request?;
+    let Json(Comparing { places, afresh }) = request?;
     Ok(Json(
-        worked(&app, move |sitting| sitting.compare(places)).await??,
+        worked(&app, move |sitting| sitting.compare(places, afresh)).await??,
     ))
 }
 

@@ -1,7 +1,7 @@
 //! A sitting: the text of a model file, what was derived of it, and what was asked about it. Work is done outside of the lock;
 //! what comes back is kept only if the text is still the one that was asked about.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -19,6 +19,7 @@ use tokio::sync::watch;
 
 use crate::draft::{Draft, Seen};
 use crate::fence::Fence;
+use crate::readings::{Read, Readings};
 use crate::watch::Watch;
 use crate::{Commands, Options, Step, told};
 
@@ -37,6 +38,7 @@ pub(crate) struct Sitting {
     state: Mutex<State>,
     /// Counts everything that pages should hear of.
     changes: watch::Sender<u64>,
+    readings: Readings,
 }
 
 struct State {
@@ -138,6 +140,7 @@ impl Sitting {
             commands,
             state: Mutex::new(state),
             changes: watch::channel(1).0,
+            readings: Readings::default(),
         })
     }
 
@@ -338,10 +341,10 @@ impl Sitting {
     }
 
     /// Recordings of fit and check as a model reads them.
-    fn recordings(&self, model: &Model) -> Outcome<[Vec<Recording>; 2]> {
-        let read = |all: &[Vec<std::path::PathBuf>]| -> Outcome<Vec<Recording>> {
-            let one = |run: &Vec<std::path::PathBuf>| {
-                let paths: Vec<&Path> = run.iter().map(std::path::PathBuf::as_path).collect();
+    fn recordings(&self, model: &Model) -> Outcome<Read> {
+        let read = |all: &[Vec<PathBuf>]| -> Outcome<Vec<Recording>> {
+            let one = |run: &Vec<PathBuf>| {
+                let paths: Vec<&Path> = run.iter().map(PathBuf::as_path).collect();
                 model.recording_of(&paths, &self.options.reading)
             };
             all.iter().map(one).collect()
@@ -349,14 +352,17 @@ impl Sitting {
         Ok([read(&self.options.data)?, read(&self.options.check)?])
     }
 
-    /// Errors along the recordings, with the values of the file and identified; `with_places` says where they live as well.
-    pub(crate) fn compare(&self, with_places: bool) -> Result<Value, String> {
+    /// Errors along the recordings, with the values of the file and identified; `with_places` says where they live as well,
+    /// `is_afresh` has the recordings read again.
+    pub(crate) fn compare(&self, with_places: bool, is_afresh: bool) -> Result<Value, String> {
         let (model, revision) = self.model()?;
         let mut told = (|| {
-            let [fit, check] = self.recordings(&model)?;
-            let [fit, check] = [&fit, &check].map(|all| all.iter().collect::<Vec<_>>());
+            let read = || self.recordings(&model);
+            let (read, is_read) = self.readings.of(&model, is_afresh, read)?;
+            let [fit, check] = read.each_ref().map(|all| all.iter().collect::<Vec<_>>());
             let identified = model.identify(&fit, &check, &Estimation::default())?;
-            let mut told = told::errors(&identified);
+            let mut told = told::errors(&identified, &read);
+            told["afresh"] = json!(is_read);
             if with_places {
                 told["compared"] = model.compare(&fit, &model.nominal)?.json("nominal")?;
             }

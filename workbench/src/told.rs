@@ -4,7 +4,8 @@ use modelmill::diagnose::{Findings, words};
 use modelmill::identify::Identification;
 use modelmill::model::Checked;
 use modelmill::print::{self, Spelling, edit};
-use modelmill::{Error, Model, report};
+use modelmill::recording::Recording;
+use modelmill::{Error, Model, Note, report};
 use serde_json::{Value, json};
 
 use crate::Commands;
@@ -81,13 +82,20 @@ pub(crate) fn equations(model: &Model, saved: Option<&Model>) -> Value {
     })
 }
 
-/// Errors of a model along recordings, with its own values and once it is identified.
-pub(crate) fn errors(found: &Identification) -> Value {
+/// Errors of a model along recordings, with its own values and once it is identified, and remarks on both.
+pub(crate) fn errors(found: &Identification, recordings: &[Vec<Recording>; 2]) -> Value {
+    let remarks = recordings.iter().flatten().flat_map(Recording::notes);
+    let mut notes: Vec<&Note> = Vec::new();
+    for note in remarks.chain(&found.notes) {
+        if !notes.contains(&note) {
+            notes.push(note);
+        }
+    }
     json!({
         "nominal": { "fit": found.nominal_fit, "check": found.nominal_check },
         "identified": { "fit": found.fit.fit, "check": found.fit.check },
         "samples": found.fit.samples,
-        "notes": found.notes,
+        "notes": notes,
     })
 }
 
