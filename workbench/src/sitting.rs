@@ -19,9 +19,10 @@ use tokio::sync::watch;
 
 use crate::draft::{Draft, Seen};
 use crate::fence::Fence;
+use crate::options::{Commands, Options, Step};
 use crate::readings::{Read, Readings};
+use crate::told;
 use crate::watch::Watch;
-use crate::{Commands, Options, Step, told};
 
 /// Longest model file that is edited, bytes.
 pub(crate) const LONGEST: u64 = 4 << 20;

@@ -8,7 +8,7 @@ use modelmill::recording::Recording;
 use modelmill::{Error, Model, Note, report};
 use serde_json::{Value, json};
 
-use crate::Commands;
+use crate::options::Commands;
 
 /// A text that was derived, or why it was not, with what is to be said at its lines.
 pub(crate) fn derived(found: &Result<Model, Error>, path: &str) -> Value {

@@ -1,0 +1,42 @@
+//! What is put on the workbench, and the words in which its steps are said.
+
+use std::path::PathBuf;
+
+use modelmill::print::Spelling;
+use modelmill::recording::Reading;
+
+/// What is put on the workbench.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// The model file.
+    pub model: PathBuf,
+    /// Recordings to fit to and to compare with, each of one or several files that are joined on time.
+    pub data: Vec<Vec<PathBuf>>,
+    /// Recordings that a fit does not see.
+    pub check: Vec<Vec<PathBuf>>,
+    /// How recordings are read.
+    pub reading: Reading,
+    /// The port on the loopback address; 0 takes one that is free.
+    pub port: u16,
+}
+
+/// What a reader is told that does the same without the workbench.
+pub trait Commands: Spelling + Send + Sync {
+    /// Does what a pane of the workbench does.
+    fn same(&self, step: Step) -> String;
+}
+
+/// What a pane of the workbench does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Draws the mechanism.
+    Picture,
+    /// Derives the model and writes out its equations.
+    Equations,
+    /// Holds it against the recordings.
+    Compare,
+    /// Identifies its base parameters.
+    Identify,
+    /// Asks what it lacks.
+    Diagnose,
+}
