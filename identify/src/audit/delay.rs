@@ -233,7 +233,7 @@ impl DelayAudit<'_> {
                 .collect();
             let is_near = further.iter().all(|f| f.abs() < NEAR * step);
             if (is_near && round > 0) || round + 1 == ROUNDS {
-                let widths = self.half_widths(&columns, &fit, &forces, delays)?;
+                let widths = Self::half_widths(&columns, &fit, &forces, delays)?;
                 let of = |c: usize| Delay {
                     seconds: shifts[c] + further[c],
                     half_width: widths[c % delays].hypot(FINEST * step),
@@ -284,7 +284,6 @@ impl DelayAudit<'_> {
     /// Half widths of the last columns of a fit, from the fits that leave out one block of time each (Quenouille's and Tukey's
     /// jackknife): a swift move that alone tells the delay makes it wide.
     fn half_widths(
-        &self,
         columns: &ByChannel,
         fit: &RobustFit,
         forces: &DVector<f64>,

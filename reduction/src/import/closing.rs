@@ -30,6 +30,8 @@ pub(crate) struct Closed {
     pub(crate) is_moved: bool,
     /// The largest gap, relative to the size, where it is above rounding.
     pub(crate) gap: Option<f64>,
+    /// Conditions of the pairs, each pair by itself, and how many of all are independent.
+    pub(crate) conditions: [usize; 2],
 }
 
 /// Closes loops from `start`. `order` has the variables with those first that should stay independent.
@@ -106,6 +108,7 @@ pub(crate) fn close(
         .unwrap_or(0);
     let pairs = telling(chain, pairs, &poses[general]);
     let (_, rows, _) = chain.gaps(&pairs, &poses[general]);
+    let by_itself = (0..pairs.len()).map(|k| rank(&rows.rows(3 * k, 3).into_owned(), NOTHING).0);
     let passive = follow(&rows, order, wanted);
     let settled = |values: &[f64]| {
         let (_, rows, _) = chain.gaps(&pairs, values);
@@ -134,6 +137,7 @@ pub(crate) fn close(
         values,
         is_moved: best != 0,
         gap: (gap > CLOSED).then_some(gap),
+        conditions: [by_itself.sum(), wanted],
     })
 }
 

@@ -622,6 +622,14 @@ impl Build<'_> {
                     .to_owned(),
             );
         }
+        let [conditions, independent] = closed.conditions;
+        if conditions > independent {
+            self.remarks.push(format!(
+                "of {conditions} conditions of its loops {independent} are independent at the poses that were tried; where the others \
+                 are not recognised as following from these, a model keeps too many base parameters or counts poses as singular: \
+                 hold some forces against another program before you rely on it"
+            ));
+        }
         if let Some(gap) = closed.gap {
             self.remarks.push(format!(
                 "the digits of the description close its loops to {} of their size only",
