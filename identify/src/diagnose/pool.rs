@@ -14,6 +14,8 @@ use super::problem::Layout;
 /// Inner products of a column with earlier ones by part (0 is the fit, 1 the check) and channel on which both act, the parts one
 /// after the other.
 type Products = HashMap<usize, Box<[f64]>>;
+/// Inner products of pairs by fold and common channel.
+type OfFolds = HashMap<(usize, usize), Box<[f64]>>;
 
 /// Folds of the cross-validation where there is no check.
 const FOLDS: usize = 10;
@@ -26,8 +28,7 @@ pub(crate) struct Pool<'a> {
     fit: Range<usize>,
     check: Range<usize>,
     products: RefCell<Vec<Products>>,
-    /// Inner products of pairs by fold and common channel.
-    of_folds: RefCell<HashMap<(usize, usize), Box<[f64]>>>,
+    of_folds: RefCell<OfFolds>,
     /// Folds of all samples.
     folds: Vec<Range<usize>>,
     /// Samples that were not measured, by channel: nothing counts them.
