@@ -72,16 +72,14 @@ fn moving(
     model: &Model,
     wanted: &dyn Fn(usize) -> bool,
 ) -> Outcome<Vec<Option<Vec<f64>>>> {
-    let n_drives = model.drives().len();
     let mut columns: Vec<Option<Vec<f64>>> = Vec::new();
     let mut before = 0;
     one.for_each_block(model, |states| {
         Ok::<_, Error>(
             evaluator.regressor_blocks_of(states, wanted, |samples, block| {
                 columns.resize(block.len(), None);
-                let n = block.len() / n_drives.max(1);
-                for (k, (column, values)) in columns.iter_mut().zip(block).enumerate() {
-                    if !wanted(k % n) || (column.is_none() && values.iter().all(|x| *x == 0.0)) {
+                for (column, values) in columns.iter_mut().zip(block) {
+                    if column.is_none() && values.iter().all(|x| *x == 0.0) {
                         continue;
                     }
                     let column = column.get_or_insert_with(|| {

@@ -38,7 +38,7 @@ impl Column {
     }
 
     /// Channels on which both columns act, with the values of both.
-    pub(crate) fn beside<'a>(
+    pub(crate) fn common<'a>(
         &'a self,
         other: &'a Self,
     ) -> impl Iterator<Item = (usize, &'a [f64], &'a [f64])> {

@@ -121,7 +121,7 @@ impl<'a> Pool<'a> {
         let parts = [&self.fit, &self.check].into_iter();
         let of_part = |range: &Range<usize>| {
             let range = range.clone();
-            let common = a.beside(b);
+            let common = a.common(b);
             common.map(move |(d, a, b)| self.inner(d, a, b, range.clone()))
         };
         parts.flat_map(of_part).collect()
@@ -135,7 +135,7 @@ impl<'a> Pool<'a> {
     /// The same of columns that need not be in the pool, computed anew.
     pub(crate) fn product_of(&self, a: &Column, b: &Column, weights: &[f64]) -> f64 {
         let on = |(d, a, b)| weights[d] * self.inner(d, a, b, self.all());
-        a.beside(b).map(on).sum()
+        a.common(b).map(on).sum()
     }
 
     fn weighted(&self, a: usize, b: usize, weights: &[f64], on: On) -> f64 {
@@ -148,7 +148,7 @@ impl<'a> Pool<'a> {
             .entry(b)
             .or_insert_with(|| self.products_of(a, b));
         let (fit, check) = known.split_at(known.len() / 2);
-        let common = self.columns[a].beside(&self.columns[b]);
+        let common = self.columns[a].common(&self.columns[b]);
         let sums = common
             .zip(fit.iter().zip(check))
             .map(|((d, ..), (fit, check))| {
@@ -187,7 +187,7 @@ impl<'a> Pool<'a> {
                 if !self.meet(a, b) {
                     continue;
                 }
-                let both = || self.columns[a].beside(&self.columns[b]);
+                let both = || self.columns[a].common(&self.columns[b]);
                 common.clear();
                 common.extend(both().map(|(d, ..)| weights[d]));
                 let known = products.entry((a, b)).or_insert_with(|| {

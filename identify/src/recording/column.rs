@@ -33,8 +33,8 @@ pub(crate) struct Column {
     pub(crate) not_finite: Option<Defect>,
     /// Samples where the value joins its neighbours because none was measured or a sensor failed; empty if there are none.
     pub(crate) lost: Vec<bool>,
-    /// The values before faults of the sensor were taken out, where there were any.
-    pub(crate) as_recorded: Option<Vec<f64>>,
+    /// Values and lost samples before faults of the sensor were taken out, where there were any.
+    pub(crate) as_recorded: Option<(Vec<f64>, Vec<bool>)>,
 }
 
 /// Fields of a column that cannot be used: the first of them and how many there are.

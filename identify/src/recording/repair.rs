@@ -77,13 +77,13 @@ impl Recording {
                     percent(share),
                     if n == 1 { "It is" } else { "They are" },
                 )));
+                column.as_recorded = Some((column.values.clone(), column.lost.clone()));
                 if column.lost.is_empty() {
                     column.lost = vec![false; spikes.len()];
                 }
                 for (lost, spike) in column.lost.iter_mut().zip(&spikes) {
                     *lost |= spike;
                 }
-                column.as_recorded = Some(column.values.clone());
                 column.join();
             }
         }
@@ -99,14 +99,9 @@ impl Recording {
         }
         let mut recording = self.clone();
         for column in recording.columns.values_mut() {
-            let Some(recorded) = column.as_recorded.take() else {
-                continue;
-            };
-            let values = column.values.iter().zip(&recorded);
-            for (lost, (value, recorded)) in column.lost.iter_mut().zip(values) {
-                *lost &= value.total_cmp(recorded).is_eq();
+            if let Some(recorded) = column.as_recorded.take() {
+                (column.values, column.lost) = recorded;
             }
-            column.values = recorded;
         }
         Some(recording)
     }
@@ -128,7 +123,7 @@ impl Recording {
             if jumps.is_empty() {
                 continue;
             }
-            column.as_recorded = Some(column.values.clone());
+            column.as_recorded = Some((column.values.clone(), column.lost.clone()));
             let mut off = 0.0;
             let mut next = 0;
             for i in 0..column.values.len() {

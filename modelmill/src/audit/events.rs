@@ -212,18 +212,14 @@ impl Unexplained {
             .collect();
         // A long run is fitted on a part of its samples.
         let every = (samples.len() / LOOKED_AT).max(1);
-        let fit = if every == 1 {
-            robust_fit(&rows.regressor, &measured, &counts)?.values
-        } else {
-            let some: Vec<usize> = (0..samples.len())
-                .step_by(every)
-                .flat_map(|i| i * drives..(i + 1) * drives)
-                .collect();
-            let counts: Vec<bool> = some.iter().map(|row| counts[*row]).collect();
-            let measured = measured.select_rows(&some);
-            robust_fit(&rows.regressor.every(every), &measured, &counts)?.values
-        };
-        let mut rest = &measured - rows.regressor.times(fit.as_slice());
+        let some: Vec<usize> = (0..samples.len())
+            .step_by(every)
+            .flat_map(|i| i * drives..(i + 1) * drives)
+            .collect();
+        let some_count: Vec<bool> = some.iter().map(|row| counts[*row]).collect();
+        let some_measured = measured.select_rows(&some);
+        let fit = robust_fit(&rows.regressor.every(every), &some_measured, &some_count)?;
+        let mut rest = &measured - rows.regressor.times(fit.values.as_slice());
         for (rest, _) in rest.iter_mut().zip(&counts).filter(|(_, counts)| !**counts) {
             *rest = 0.0;
         }

@@ -11,23 +11,18 @@
 //! candidates: at the same cut-off they leave as much as the low-pass, on all recordings that were looked at.
 
 use modelmill_codegen::{Evaluator, States};
-use modelmill_identify::{
-    LowPass, Note, Open, PASSED_BY_DECIMATION, Preparation, Recording as Raw, Run, Smoothing,
-};
+use modelmill_identify::{LowPass, Note, Open, PASSED_BY_DECIMATION, Recording as Raw, Run};
 use nalgebra::{DMatrix, DVector};
 
 use super::free;
 use super::options::Reading;
+use super::smoother::{Smoother, series_up_to, whole};
 use crate::error::Outcome;
 use crate::model::Model;
 use crate::text::table::{percent, significant};
 
 /// Ratio of neighbouring cut-offs.
 const RATIO: f64 = 1.6;
-/// Ratio of neighbouring numbers of harmonics.
-const FEWER: f64 = 1.35;
-/// Harmonics of a series, at most.
-const MOST_HARMONICS: usize = 100;
 /// The highest cut-off, in parts of the sampling rate: beyond, differences take more than the filter leaves.
 const HIGHEST: f64 = 0.2;
 /// The same in parts of the band of the forces: noise above says nothing of them, and makes the model's forces rough.
@@ -90,65 +85,6 @@ struct Left {
     figure: f64,
     /// The geometric mean over the drives of their relative errors below the band of the motion.
     relative: f64,
-}
-
-/// A way to smooth positions.
-#[derive(Clone, Copy)]
-struct Smoother {
-    /// Hz.
-    cutoff: f64,
-    /// The period of a Fourier series, s; none of a low-pass.
-    period: Option<f64>,
-}
-
-impl Smoother {
-    fn low_pass(cutoff: f64) -> Self {
-        Self {
-            cutoff,
-            period: None,
-        }
-    }
-
-    fn series(period: f64, harmonics: usize) -> Self {
-        Self {
-            // Rounding must not take the last one.
-            cutoff: (harmonics as f64 + 1e-6) / period,
-            period: Some(period),
-        }
-    }
-
-    fn harmonics(self) -> Option<usize> {
-        Some(whole(self.cutoff * self.period?))
-    }
-
-    fn goes_into(self, preparation: &mut Preparation) {
-        preparation.cutoff_hz = Some(self.cutoff);
-        if self.period.is_some() {
-            preparation.smoothing = Smoothing::Fourier {
-                period: self.period,
-            };
-        }
-    }
-
-    /// Where it is, beside others of its kind.
-    fn place(self) -> String {
-        match self.harmonics() {
-            Some(1) => "1 harmonic".to_owned(),
-            Some(n) => format!("{n} harmonics"),
-            None => format!("{} Hz", significant(self.cutoff, 3)),
-        }
-    }
-
-    fn describe(self) -> String {
-        match self.period {
-            Some(period) => format!(
-                "is taken for a Fourier series of period {} s with {}",
-                significant(period, 5),
-                self.place()
-            ),
-            None => format!("is smoothed at {}", self.place()),
-        }
-    }
 }
 
 /// Smoothers of one kind that were tried, the one that passes most first.
@@ -521,17 +457,6 @@ impl Search<'_> {
     }
 }
 
-/// Series up to a frequency, Hz, of ever fewer harmonics.
-fn series_up_to(highest: f64, period: f64) -> Vec<Smoother> {
-    let mut harmonics = whole(highest * period).clamp(1, MOST_HARMONICS);
-    let mut ladder = Vec::new();
-    while harmonics > 0 {
-        ladder.push(Smoother::series(period, harmonics));
-        harmonics = whole(harmonics as f64 / FEWER);
-    }
-    ladder
-}
-
 /// A stretch of time, s.
 struct Window {
     from: f64,
@@ -719,14 +644,4 @@ fn duration(run: &Run) -> f64 {
         [first, .., last] => last - first,
         _ => 0.0,
     }
-}
-
-/// A count that was computed, rounded down.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a float becomes the nearest count there is"
-)]
-fn whole(value: f64) -> usize {
-    value as usize
 }

@@ -7,6 +7,7 @@ mod contents;
 pub(crate) mod free;
 mod leverage;
 mod options;
+mod smoother;
 
 use std::path::Path;
 use std::sync::Arc;
