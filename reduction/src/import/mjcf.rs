@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::{Document, Node};
 
-use super::description::{Closure, Coupling, Description, Holds, Inertial, Joint, Kind, Link};
+use super::description::{Description, Inertial, Joint, Kind, Link};
 use super::geoms;
 use super::mjcf_defaults::Defaults;
 use super::placed::{Placed, about, of_quaternion};
@@ -43,13 +43,13 @@ struct Compiler {
     least_inertia: f64,
 }
 
-struct Reader<'a, 'i> {
+pub(super) struct Reader<'a, 'i> {
     compiler: Compiler,
     defaults: Defaults<'a, 'i>,
-    out: Description,
+    pub(super) out: Description,
     /// Places of the bodies at the pose of the file, in the world.
-    world: Vec<Placed>,
-    sites: Vec<(String, Option<usize>, Placed)>,
+    pub(super) world: Vec<Placed>,
+    pub(super) sites: Vec<(String, Option<usize>, Placed)>,
 }
 
 /// Where elements of a body stand.
@@ -77,6 +77,18 @@ pub(crate) fn read(document: &Document) -> Result<Description, String> {
     for option in children(&root, "option") {
         if let Some(text) = option.attribute("gravity") {
             reader.out.gravity = Some(vector(exactly(&option, "gravity", text)?));
+        }
+        let is_off = |flag: Node| flag.attribute("gravity") == Some("disable");
+        if children(&option, "flag").any(is_off) {
+            let says = "its flag switches gravity off; bodies have their weight here";
+            reader.out.remarks.push(at(&option, says));
+        }
+        for key in ["density", "viscosity"] {
+            let text = option.attribute(key);
+            if text.is_some_and(|text| text.trim().parse() != Ok(0.0)) {
+                let says = format!("`{key}`: forces of a fluid are left out");
+                reader.out.remarks.push(at(&option, &says));
+            }
         }
     }
     for node in root.descendants() {
@@ -184,7 +196,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         }
     }
 
-    fn text(
+    pub(super) fn text(
         &self,
         node: &Node<'a, 'i>,
         class: Option<&str>,
@@ -193,7 +205,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         self.defaults.attribute(node, class, key)
     }
 
-    fn numbers<const N: usize>(
+    pub(super) fn numbers<const N: usize>(
         &self,
         node: &Node<'a, 'i>,
         class: Option<&str>,
@@ -551,297 +563,6 @@ impl<'a, 'i> Reader<'a, 'i> {
         let rest = self.first(node, class, "springref")?;
         joint.rest = in_unit(self, rest);
         self.out.links[link].joints.push(joint);
-        Ok(())
-    }
-
-    fn link(&self, node: &Node, name: &str) -> Result<Option<usize>, String> {
-        if name == "world" {
-            return Ok(None);
-        }
-        let found = self.out.links.iter().position(|link| link.name == name);
-        found
-            .map(Some)
-            .ok_or_else(|| at(node, &format!("no body is called `{name}`")))
-    }
-
-    fn site(&self, node: &Node, name: &str) -> Result<(Option<usize>, Placed), String> {
-        let found = self.sites.iter().find(|(site, _, _)| site == name);
-        found
-            .map(|(_, link, placed)| (*link, *placed))
-            .ok_or_else(|| at(node, &format!("no site is called `{name}`")))
-    }
-
-    fn equality(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
-        if self.text(node, None, "active")? == Some("false") {
-            self.out
-                .remarks
-                .push(at(node, "this equality is not active and is left out"));
-            return Ok(());
-        }
-        let tag = node.tag_name().name();
-        let name = node.attribute("name").map_or_else(
-            || format!("{tag}_{}", self.out.closures.len() + 1),
-            str::to_owned,
-        );
-        match tag {
-            "connect" | "weld" => {
-                let holds = if tag == "connect" {
-                    Holds::Origins
-                } else {
-                    Holds::Frames
-                };
-                let ends = if node.attribute("site1").is_some() {
-                    let [one, other] = [word(node, "site1")?, word(node, "site2")?];
-                    [self.site(node, &one)?, self.site(node, &other)?]
-                } else {
-                    self.bodies(node, tag)?
-                };
-                self.out.closures.push(Closure {
-                    name,
-                    line: line(node),
-                    ends,
-                    holds,
-                });
-            }
-            "joint" => self.coupling(node)?,
-            other => {
-                return Err(at(
-                    node,
-                    &format!(
-                        "models do not have the equality `{other}`; they have connect, weld and joint"
-                    ),
-                ));
-            }
-        }
-        Ok(())
-    }
-
-    /// The two ends of a closure between bodies: the second follows from the pose of the file.
-    fn bodies(
-        &self,
-        node: &Node<'a, 'i>,
-        tag: &str,
-    ) -> Result<[(Option<usize>, Placed); 2], String> {
-        let one = self.link(node, &word(node, "body1")?)?;
-        let other = self.link(node, node.attribute("body2").unwrap_or("world"))?;
-        let in_world =
-            |link: Option<usize>| link.map_or(Placed::identity(), |link| self.world[link]);
-        let anchor = match node.attribute("anchor") {
-            Some(text) => vector(exactly(node, "anchor", text)?),
-            None if tag == "weld" => Vector3::zeros(),
-            None => return Err(at(node, "it needs `anchor`")),
-        };
-        if tag == "weld" {
-            // The anchor is a point of the second body; where it is not given, its origin.
-            let pose: Option<[f64; 7]> = match node.attribute("relpose") {
-                Some(text) => Some(exactly(node, "relpose", text)?),
-                None => None,
-            };
-            let relative = match pose {
-                Some([x, y, z, q @ ..]) if q.iter().any(|x| x.abs() > 0.0) => Placed {
-                    p: Vector3::new(x, y, z),
-                    r: of_quaternion(q).ok_or_else(|| at(node, "`relpose` has no direction"))?,
-                },
-                _ => in_world(one).inverse().then(&in_world(other)),
-            };
-            let shift = Placed {
-                p: anchor,
-                r: Matrix3::identity(),
-            };
-            return Ok([(one, relative.then(&shift)), (other, shift)]);
-        }
-        let first = Placed {
-            p: anchor,
-            r: Matrix3::identity(),
-        };
-        let second = in_world(other).inverse().then(&in_world(one)).then(&first);
-        Ok([(one, first), (other, second)])
-    }
-
-    fn coupling(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
-        let joint = word(node, "joint1")?;
-        let of = node.attribute("joint2").map(str::to_owned);
-        let given = match self.text(node, None, "polycoef")? {
-            Some(text) => numbers(node, "polycoef", text)?,
-            None => vec![0.0, 1.0],
-        };
-        let coefficient = |k: usize| given.get(k).copied().unwrap_or(0.0);
-        if of.is_some() && (2..5).any(|k| coefficient(k) != 0.0) {
-            return Err(at(
-                node,
-                "a coupling by a polynomial of higher degree; models have constant ratios",
-            ));
-        }
-        let zero = |name: &str| {
-            let mut joints = self.out.links.iter().flat_map(|link| &link.joints);
-            joints
-                .find(|joint| joint.name == name)
-                .map(|joint| joint.zero)
-                .ok_or_else(|| at(node, &format!("no joint is called `{name}`")))
-        };
-        let ratio = if of.is_some() { coefficient(1) } else { 0.0 };
-        let reference = of.as_deref().map_or(Ok(0.0), zero)?;
-        let offset = zero(&joint)? + coefficient(0) - ratio * reference;
-        self.out.couplings.push(Coupling {
-            line: line(node),
-            joint,
-            of,
-            ratio,
-            offset,
-        });
-        Ok(())
-    }
-
-    /// Which joints are driven, and by how much.
-    fn actuators(&mut self, root: &Node<'a, 'i>) -> Result<(), String> {
-        let mut n = 0;
-        for node in children(root, "actuator").flat_map(|section| {
-            section
-                .children()
-                .filter(Node::is_element)
-                .collect::<Vec<_>>()
-        }) {
-            n += 1;
-            let gear = match self.text(&node, None, "gear")? {
-                Some(text) => numbers(&node, "gear", text)?
-                    .first()
-                    .copied()
-                    .unwrap_or(1.0),
-                None => 1.0,
-            };
-            if let Some(name) = node.attribute("joint").or(node.attribute("jointinparent")) {
-                self.drive(&node, name, gear)?;
-            } else if let Some(name) = node.attribute("tendon") {
-                let tendon = children(root, "tendon")
-                    .flat_map(|section| section.children().collect::<Vec<_>>())
-                    .find(|tendon| tendon.attribute("name") == Some(name))
-                    .ok_or_else(|| at(&node, &format!("no tendon is called `{name}`")))?;
-                if tendon.tag_name().name() != "fixed" {
-                    self.out.remarks.push(at(
-                        &node,
-                        "it pulls a spatial tendon, which models do not have: joints that it moves need drives by hand",
-                    ));
-                    continue;
-                }
-                self.out.remarks.push(at(
-                    &node,
-                    &format!("it drives the joints of the tendon `{name}` together; here each has a force of its own"),
-                ));
-                for joint in children(&tendon, "joint") {
-                    let gear = gear * super::xml::number(&joint, "coef")?;
-                    let name = word(&joint, "joint")?;
-                    self.drive(&joint, &name, gear)?;
-                }
-            } else {
-                self.out.remarks.push(at(
-                    &node,
-                    "it acts on no joint and no fixed tendon and is left out",
-                ));
-            }
-        }
-        for tendon in children(root, "tendon").flat_map(|section| {
-            section
-                .children()
-                .filter(Node::is_element)
-                .collect::<Vec<_>>()
-        }) {
-            let mut bends = Vec::new();
-            for key in ["stiffness", "damping", "frictionloss", "armature"] {
-                if self
-                    .text(&tendon, None, key)?
-                    .is_some_and(|text| text.trim() != "0")
-                {
-                    bends.push(key);
-                }
-            }
-            if !bends.is_empty() {
-                self.out.remarks.push(at(
-                    &tendon,
-                    &format!("{} of this tendon: left out", bends.join(", ")),
-                ));
-            }
-            if tendon.attribute("range").is_some() {
-                self.out.remarks.push(at(
-                    &tendon,
-                    "a range of a tendon is no equality and is left out",
-                ));
-            }
-        }
-        if n == 0 {
-            let joints = self.out.links.iter_mut().flat_map(|link| &mut link.joints);
-            for joint in joints.filter(|joint| joint.kind != Kind::Free) {
-                joint.is_driven = true;
-            }
-            self.out
-                .remarks
-                .push("the file has no actuators; every joint has a drive here".to_owned());
-        }
-        Ok(())
-    }
-
-    /// Gives a joint its drive.
-    fn drive(&mut self, node: &Node<'a, 'i>, name: &str, gear: f64) -> Result<(), String> {
-        let mut range = None;
-        if let Some([low, high]) = self.numbers(node, None, "forcerange")?
-            && low < high
-            && self.text(node, None, "forcelimited")? != Some("false")
-        {
-            range = Some([low, high]);
-        } else if node.tag_name().name() == "motor"
-            && let Some([low, high]) = self.numbers(node, None, "ctrlrange")?
-            && self.text(node, None, "ctrllimited")? != Some("false")
-        {
-            range = Some([low, high]);
-        }
-        let armature = self
-            .numbers::<1>(node, None, "armature")?
-            .map_or(0.0, |[x]| x);
-        let joint = self
-            .out
-            .links
-            .iter_mut()
-            .flat_map(|link| &mut link.joints)
-            .find(|joint| joint.name == name)
-            .ok_or_else(|| at(node, &format!("no joint is called `{name}`")))?;
-        joint.is_driven = joint.kind != Kind::Free;
-        joint.armature += armature * gear * gear;
-        if joint.force.is_none() {
-            joint.force = range.map(|[low, high]| {
-                let ends = [low * gear, high * gear];
-                [ends[0].min(ends[1]), ends[0].max(ends[1])]
-            });
-        }
-        if (gear - 1.0).abs() > 0.0 && node.tag_name().name() != "joint" {
-            self.out.remarks.push(at(
-                node,
-                &format!(
-                    "its gear is {gear}: the force of the drive here is that at the joint `{name}`"
-                ),
-            ));
-        }
-        Ok(())
-    }
-
-    /// The first pose of the file that its author kept, to close loops from.
-    fn keyframe(&mut self, root: &Node<'a, 'i>) -> Result<(), String> {
-        let mut keys =
-            children(root, "keyframe").flat_map(|section| section.children().collect::<Vec<_>>());
-        let Some((key, text)) = keys.find_map(|key| key.attribute("qpos").map(|text| (key, text)))
-        else {
-            return Ok(());
-        };
-        let mut values = numbers(&key, "qpos", text)?.into_iter();
-        for joint in self.out.links.iter().flat_map(|link| &link.joints) {
-            let n = match joint.kind {
-                Kind::Turn | Kind::Slide => 1,
-                Kind::Ball => 4,
-                Kind::Free => 7,
-            };
-            let own: Vec<f64> = values.by_ref().take(n).collect();
-            if let [value] = own[..] {
-                self.out.pose.push((joint.name.clone(), value));
-            }
-        }
         Ok(())
     }
 }

@@ -2,6 +2,7 @@
 
 mod approximations;
 mod faulty;
+mod mjcf;
 mod spidermill;
 mod urdf;
 mod zoo;

@@ -1,0 +1,149 @@
+//! What MJCF ties together: bodies by `connect` and `weld`, joints by `joint`.
+
+use nalgebra::{Matrix3, Vector3};
+use roxmltree::Node;
+
+use super::description::{Closure, Coupling, Holds};
+use super::mjcf::Reader;
+use super::placed::{Placed, of_quaternion};
+use super::xml::{at, exactly, line, numbers, vector, word};
+
+impl<'a, 'i> Reader<'a, 'i> {
+    fn link(&self, node: &Node, name: &str) -> Result<Option<usize>, String> {
+        if name == "world" {
+            return Ok(None);
+        }
+        let found = self.out.links.iter().position(|link| link.name == name);
+        found
+            .map(Some)
+            .ok_or_else(|| at(node, &format!("no body is called `{name}`")))
+    }
+
+    fn site(&self, node: &Node, name: &str) -> Result<(Option<usize>, Placed), String> {
+        let found = self.sites.iter().find(|(site, _, _)| site == name);
+        found
+            .map(|(_, link, placed)| (*link, *placed))
+            .ok_or_else(|| at(node, &format!("no site is called `{name}`")))
+    }
+
+    pub(super) fn equality(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
+        if self.text(node, None, "active")? == Some("false") {
+            self.out
+                .remarks
+                .push(at(node, "this equality is not active and is left out"));
+            return Ok(());
+        }
+        let tag = node.tag_name().name();
+        let name = node.attribute("name").map_or_else(
+            || format!("{tag}_{}", self.out.closures.len() + 1),
+            str::to_owned,
+        );
+        match tag {
+            "connect" | "weld" => {
+                let holds = if tag == "connect" {
+                    Holds::Origins
+                } else {
+                    Holds::Frames
+                };
+                let ends = if node.attribute("site1").is_some() {
+                    let [one, other] = [word(node, "site1")?, word(node, "site2")?];
+                    [self.site(node, &one)?, self.site(node, &other)?]
+                } else {
+                    self.bodies(node, tag)?
+                };
+                self.out.closures.push(Closure {
+                    name,
+                    line: line(node),
+                    ends,
+                    holds,
+                });
+            }
+            "joint" => self.coupling(node)?,
+            other => {
+                return Err(at(
+                    node,
+                    &format!(
+                        "models do not have the equality `{other}`; they have connect, weld and joint"
+                    ),
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// The two ends of a closure between bodies: the second follows from the pose of the file.
+    fn bodies(
+        &self,
+        node: &Node<'a, 'i>,
+        tag: &str,
+    ) -> Result<[(Option<usize>, Placed); 2], String> {
+        let one = self.link(node, &word(node, "body1")?)?;
+        let other = self.link(node, node.attribute("body2").unwrap_or("world"))?;
+        let in_world =
+            |link: Option<usize>| link.map_or(Placed::identity(), |link| self.world[link]);
+        let anchor = match node.attribute("anchor") {
+            Some(text) => vector(exactly(node, "anchor", text)?),
+            None if tag == "weld" => Vector3::zeros(),
+            None => return Err(at(node, "it needs `anchor`")),
+        };
+        if tag == "weld" {
+            // The anchor is a point of the second body; where it is not given, its origin.
+            let pose: Option<[f64; 7]> = match node.attribute("relpose") {
+                Some(text) => Some(exactly(node, "relpose", text)?),
+                None => None,
+            };
+            let relative = match pose {
+                Some([x, y, z, q @ ..]) if q.iter().any(|x| x.abs() > 0.0) => Placed {
+                    p: Vector3::new(x, y, z),
+                    r: of_quaternion(q).ok_or_else(|| at(node, "`relpose` has no direction"))?,
+                },
+                _ => in_world(one).inverse().then(&in_world(other)),
+            };
+            let shift = Placed {
+                p: anchor,
+                r: Matrix3::identity(),
+            };
+            return Ok([(one, relative.then(&shift)), (other, shift)]);
+        }
+        let first = Placed {
+            p: anchor,
+            r: Matrix3::identity(),
+        };
+        let second = in_world(other).inverse().then(&in_world(one)).then(&first);
+        Ok([(one, first), (other, second)])
+    }
+
+    fn coupling(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
+        let joint = word(node, "joint1")?;
+        let of = node.attribute("joint2").map(str::to_owned);
+        let given = match self.text(node, None, "polycoef")? {
+            Some(text) => numbers(node, "polycoef", text)?,
+            None => vec![0.0, 1.0],
+        };
+        let coefficient = |k: usize| given.get(k).copied().unwrap_or(0.0);
+        if of.is_some() && (2..5).any(|k| coefficient(k) != 0.0) {
+            return Err(at(
+                node,
+                "a coupling by a polynomial of higher degree; models have constant ratios",
+            ));
+        }
+        let zero = |name: &str| {
+            let mut joints = self.out.links.iter().flat_map(|link| &link.joints);
+            joints
+                .find(|joint| joint.name == name)
+                .map(|joint| joint.zero)
+                .ok_or_else(|| at(node, &format!("no joint is called `{name}`")))
+        };
+        let ratio = if of.is_some() { coefficient(1) } else { 0.0 };
+        let reference = of.as_deref().map_or(Ok(0.0), zero)?;
+        let offset = zero(&joint)? + coefficient(0) - ratio * reference;
+        self.out.couplings.push(Coupling {
+            line: line(node),
+            joint,
+            of,
+            ratio,
+            offset,
+        });
+        Ok(())
+    }
+}
