@@ -57,7 +57,7 @@ impl DrawingArgs {
 }
 
 /// Reads `NAME=VALUE`.
-fn parse_value(text: &str) -> Result<(String, f64), String> {
+pub(super) fn parse_value(text: &str) -> Result<(String, f64), String> {
     let expected = "expected a coordinate and its value, such as theta1=1.7";
     let (name, value) = text.split_once('=').ok_or(expected)?;
     let value: f64 = value.trim().parse().map_err(|_| expected.to_owned())?;

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::drawing::parse_value;
+
 /// `reduce`.
 #[derive(Debug, Args)]
 pub(crate) struct ReduceArgs {
@@ -35,6 +37,9 @@ pub(crate) struct ImportArgs {
     /// Take angles within 1e-4 rad of multiples of pi/12, such as 1.5708, for these
     #[arg(long)]
     pub(crate) round_angles: bool,
+    /// Values of joints from which loops are closed, rad or m in the description's own zero: which of its assemblies is meant
+    #[arg(long, value_name = "JOINT=VALUE,...", value_parser = parse_value, value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) at: Vec<(String, f64)>,
     /// Write the model to this file
     #[arg(long, value_name = "MODEL.toml")]
     pub(crate) out: PathBuf,

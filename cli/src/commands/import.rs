@@ -42,6 +42,7 @@ pub(crate) fn run(host: &Host, args: &ImportArgs) -> Outcome {
         floating: args.floating,
         round_angles: args.round_angles,
         closures: closing.as_deref(),
+        pose: &args.at,
     };
     let imported = host.import(&file.display().to_string(), &text, &options)?;
     target.write(&imported.model)?;

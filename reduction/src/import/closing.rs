@@ -13,6 +13,9 @@ const NOTHING: f64 = 1e-7;
 /// A pose whose passive variables are settled worse than this is no pose to start from.
 const WELL_SETTLED: f64 = 1e-3;
 
+/// Variables that are settled no better than this are worth another choice of independent ones.
+const POORLY_SETTLED: f64 = 1e-2;
+
 /// A value this little beyond its range is on its edge, rad or m.
 pub(crate) const INSIDE: f64 = 1e-9;
 /// Poses that are tried.
@@ -34,14 +37,14 @@ pub(crate) struct Closed {
     pub(crate) conditions: [usize; 2],
 }
 
-/// Closes loops from `start`. `order` has the variables with those first that should stay independent.
+/// Closes loops from `start`. Variables of which `reluctance` is low should stay independent.
 /// A pose within `ranges` is preferred.
 pub(crate) fn close(
     chain: &Chain,
     pairs: &[Pair],
     start: &[f64],
     ranges: &[Option<[f64; 2]>],
-    order: &[usize],
+    reluctance: &[u8],
 ) -> Result<Closed, String> {
     let mut noise = Noise(1);
     let (mut poses, mut outside): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
@@ -109,17 +112,10 @@ pub(crate) fn close(
     let pairs = telling(chain, pairs, &poses[general]);
     let (_, rows, _) = chain.gaps(&pairs, &poses[general]);
     let by_itself = (0..pairs.len()).map(|k| rank(&rows.rows(3 * k, 3).into_owned(), NOTHING).0);
-    let passive = follow(&rows, order, wanted);
+    let passive = follow(&rows, reluctance, wanted);
     let settled = |values: &[f64]| {
         let (_, rows, _) = chain.gaps(&pairs, values);
-        let columns: Vec<_> = (0..passive.len())
-            .filter(|k| passive[*k])
-            .map(|k| rows.column(k).into_owned())
-            .collect();
-        match rank(&DMatrix::from_columns(&columns), NOTHING) {
-            (n, share) if n == columns.len() => share,
-            _ => 0.0,
-        }
+        share(&rows, &passive)
     };
     let mut best = 0;
     if wanted > 0 && settled(&poses[0]) < WELL_SETTLED {
@@ -156,34 +152,79 @@ fn telling(chain: &Chain, pairs: &[Pair], values: &[f64]) -> Vec<Pair> {
     kept
 }
 
-/// Which variables follow: as many as the rank, from the end of the order.
-fn follow(rows: &DMatrix<f64>, order: &[usize], wanted: usize) -> Vec<bool> {
-    let mut passive = vec![false; rows.ncols()];
-    // Columns of unit length, each made orthogonal to those chosen.
-    let scale = rows.amax().max(f64::MIN_POSITIVE);
+/// Which variables follow: as many as the rank, those first that need not stay independent, from the end of the description.
+fn follow(rows: &DMatrix<f64>, reluctance: &[u8], wanted: usize) -> Vec<bool> {
+    let mut order: Vec<usize> = (0..rows.ncols()).rev().collect();
+    order.sort_by_key(|k| std::cmp::Reverse(reluctance[*k]));
+    let mut passive = Vec::new();
     for least in [1e-2, 1e-4, 1e-6] {
-        let mut chosen: Vec<nalgebra::DVector<f64>> = Vec::new();
-        passive.fill(false);
-        for k in order.iter().rev() {
-            let column = rows.column(*k) / scale;
-            let length = column.norm();
-            let mut rest = column.into_owned();
-            for _ in 0..2 {
-                for direction in &chosen {
-                    let along = direction.dot(&rest);
-                    rest -= direction * along;
-                }
-            }
-            if chosen.len() < wanted && rest.norm() > least * length.max(1e-6) {
-                chosen.push(rest.normalize());
-                passive[*k] = true;
-            }
-        }
-        if chosen.len() == wanted {
+        let n;
+        (passive, n) = chosen(rows, &order, wanted, least);
+        if n == wanted {
             break;
         }
     }
+    exchanged(rows, reluctance, passive)
+}
+
+/// Exchanges variables that may be exchanged as long as the passive ones are settled badly and that settles them much better.
+fn exchanged(rows: &DMatrix<f64>, reluctance: &[u8], mut passive: Vec<bool>) -> Vec<bool> {
+    /// An exchange that gains less is not worth another order than that of the description.
+    const MUCH: f64 = 3.0;
+    let n = passive.len();
+    let mut now = share(rows, &passive);
+    while now < POORLY_SETTLED {
+        let mut best = (MUCH * now, None);
+        for out in (0..n).filter(|k| passive[*k]) {
+            for into in (0..n).filter(|k| !passive[*k] && reluctance[*k] == reluctance[out]) {
+                let mut tried = passive.clone();
+                (tried[out], tried[into]) = (false, true);
+                let then = share(rows, &tried);
+                if then > best.0 {
+                    best = (then, Some(tried));
+                }
+            }
+        }
+        let (then, Some(tried)) = best else { break };
+        (now, passive) = (then, tried);
+    }
     passive
+}
+
+/// The least singular value of the rows by the passive variables, as a share of the largest; zero where these do not follow.
+fn share(rows: &DMatrix<f64>, passive: &[bool]) -> f64 {
+    let columns: Vec<_> = (0..passive.len())
+        .filter(|k| passive[*k])
+        .map(|k| rows.column(k).into_owned())
+        .collect();
+    match rank(&DMatrix::from_columns(&columns), NOTHING) {
+        (n, share) if n == columns.len() => share,
+        _ => 0.0,
+    }
+}
+
+/// Columns in their order of which, beside those taken before, no less than a share is left; and how many.
+fn chosen(rows: &DMatrix<f64>, order: &[usize], wanted: usize, least: f64) -> (Vec<bool>, usize) {
+    let mut passive = vec![false; rows.ncols()];
+    // Each made orthogonal to those chosen.
+    let scale = rows.amax().max(f64::MIN_POSITIVE);
+    let mut chosen: Vec<nalgebra::DVector<f64>> = Vec::new();
+    for k in order {
+        let column = rows.column(*k) / scale;
+        let length = column.norm();
+        let mut rest = column.into_owned();
+        for _ in 0..2 {
+            for direction in &chosen {
+                let along = direction.dot(&rest);
+                rest -= direction * along;
+            }
+        }
+        if chosen.len() < wanted && rest.norm() > least * length.max(1e-6) {
+            chosen.push(rest.normalize());
+            passive[*k] = true;
+        }
+    }
+    (passive, chosen.len())
 }
 
 /// Numbers between -1 and 1 in an order without meaning, the same on every machine.

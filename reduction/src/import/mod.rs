@@ -1,9 +1,9 @@
 //! Robot descriptions of other programs as a starting point: URDF, MJCF or SDF goes in, the text of a model file comes out,
 //! with what was left out or rounded.
 //!
-//! `urdf`, `mjcf` and `sdf` read a format each into a `description`; `couplings` says what follows what, `model_text` makes
-//! frames, bodies and forces of it, and `closing` finds out which coordinates the loops settle, on the frames in numbers
-//! (`chain`).
+//! `urdf`, `mjcf` and `sdf` read a format each into a `description`; `welds` cuts loops where they are simplest, `couplings`
+//! says what follows what, `model_text` makes frames, bodies and forces of it, and `closing` finds out which coordinates the
+//! loops settle, on the frames in numbers (`chain`).
 
 mod chain;
 mod closing;
@@ -19,6 +19,7 @@ mod model_text;
 mod placed;
 mod sdf;
 mod urdf;
+mod welds;
 mod xml;
 
 use std::fmt;
@@ -61,6 +62,9 @@ pub struct Options<'a> {
     pub round_angles: bool,
     /// Text of a file with closures and drives beside a URDF, as the collection example-parallel-robots has it.
     pub closures: Option<&'a str>,
+    /// Joints by name with the values, rad or m in the description's own zero, from which loops are closed; others are at the
+    /// pose of the description. They say in which of their assemblies loops are meant.
+    pub pose: &'a [(String, f64)],
 }
 
 /// Why a robot description makes no model.
@@ -101,7 +105,18 @@ pub fn import(text: &str, options: &Options) -> Result<Imported, ImportError> {
             &format!("expected <robot> (URDF), <mujoco> (MJCF) or <sdf>, found <{other}>"),
         )),
     };
-    let description = read.map_err(ImportError)?;
+    let mut description = read.map_err(ImportError)?;
+    for (name, value) in options.pose {
+        let mut joints = description.links.iter().flat_map(|link| &link.joints);
+        if !joints.any(|joint| joint.name == *name) {
+            return Err(ImportError(format!(
+                "no joint is called `{name}`, for which a value is given"
+            )));
+        }
+        description.pose.retain(|(known, _)| known != name);
+        description.pose.push((name.clone(), *value));
+    }
+    welds::cut_at_joints(&mut description);
     let is_urdf = description.format == "URDF";
     if !is_urdf && (options.floating || options.closures.is_some()) {
         return Err(ImportError(format!(

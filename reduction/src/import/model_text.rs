@@ -590,14 +590,12 @@ impl Build<'_> {
         if pairs.is_empty() {
             return Ok(None);
         }
-        let mut order: Vec<usize> = (0..self.chain.n_variables).collect();
-        order.sort_by_key(|k| self.reluctance[*k]);
         let ranges: Vec<Option<[f64; 2]>> = self
             .acts
             .iter()
             .map(|acts| acts.range.filter(|[low, high]| low < high))
             .collect();
-        let closed = closing::close(&self.chain, &pairs, &self.start, &ranges, &order)?;
+        let closed = closing::close(&self.chain, &pairs, &self.start, &ranges, &self.reluctance)?;
         for coordinate in &mut self.coordinates {
             let Some(variable) = coordinate.variable else {
                 continue;
