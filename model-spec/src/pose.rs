@@ -17,6 +17,9 @@ const FARTHEST_TURN: f64 = 0.5;
 const CLOSED: f64 = 1e-9;
 /// Pivots below this, relative to the largest, count as zero.
 const SINGULAR: f64 = 1e-8;
+/// What is left of an equation beside others, relative to the largest, where it says nothing of its own: the digits of a file
+/// may leave that much of one which follows from them.
+const FOLLOWS: f64 = 1e-5;
 
 /// Checks the nominal pose and refines the passive coordinates there.
 pub(crate) fn check(mechanism: &mut Mechanism, places: &Places, log: &mut Log) {
@@ -284,13 +287,13 @@ fn check_tied(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
         .filter(|&i| mechanism.coordinates[i].passive)
         .collect();
     let n_passive = passive.len();
-    let mut n_equations = rank(&tied_rows(mechanism), SINGULAR);
+    let mut n_equations = rank(&tied_rows(mechanism), FOLLOWS);
     if n_equations > n_passive {
         // Equations that follow from others, as in linkages that move against the count of their freedoms, do so only
         // where the loops close, and not where nominal values are rounded.
         let mut closed = mechanism.clone();
         if move_passive(&mut closed, &passive).is_closed() {
-            n_equations = rank(&tied_rows(&closed), SINGULAR);
+            n_equations = rank(&tied_rows(&closed), FOLLOWS);
         }
     }
     let n_coordinates = mechanism.coordinates.len();

@@ -31,7 +31,7 @@ pub(super) fn sufficient(
     const POSES: usize = 6;
     const REACH: f64 = 0.05;
     /// Residuals relative to the size of the loops, and singular values relative to the largest, that count as zero.
-    const CLOSED: f64 = 1e-8;
+    const CLOSED: f64 = 1e-7;
     const SINGULAR: f64 = 1e-7;
     let size = magnitude::at_nominal(graph, mechanism, residual);
     let loops = NumericLoops::new(graph, mechanism, residual);

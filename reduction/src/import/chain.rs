@@ -108,6 +108,18 @@ impl Chain {
         (gaps, rows, size)
     }
 
+    /// Moves the second point of each pair to where the first one is.
+    pub(crate) fn meet(&self, pairs: &mut [Pair], values: &[f64]) {
+        let posed = self.pose(values);
+        for pair in pairs {
+            let [place, other] = pair
+                .ends
+                .map(|(frame, _)| frame.map_or(Placed::identity(), |frame| posed[frame].at));
+            let first = place.p + place.r * pair.ends[0].1;
+            pair.ends[1].1 = other.r.transpose() * (first - other.p);
+        }
+    }
+
     /// Moves the variables until the pairs coincide as well as they can; the largest gap that is left, of the size.
     pub(crate) fn close(&self, pairs: &[Pair], values: &mut [f64]) -> f64 {
         /// Steps are no longer than this, rad or m.

@@ -5,11 +5,14 @@ use nalgebra::DMatrix;
 use super::chain::{Chain, Pair, rank};
 
 /// Gaps, relative to the size, up to which loops close.
-const CLOSED: f64 = 1e-9;
+const CLOSED: f64 = 1e-11;
 /// Gaps up to which they close by the digits of the description.
 const NEARLY: f64 = 1e-6;
 /// Singular values below this share of the largest say nothing.
 const NOTHING: f64 = 1e-7;
+/// Where loops stay open, equations that follow from others have singular values up to so many times the gap, relative to
+/// the size.
+const OF_GAPS: f64 = 100.0;
 /// A pose whose passive variables are settled worse than this is no pose to start from.
 const WELL_SETTLED: f64 = 1e-3;
 
@@ -31,7 +34,7 @@ pub(crate) struct Closed {
     pub(crate) values: Vec<f64>,
     /// The pose is not the nearest to that of the description.
     pub(crate) is_moved: bool,
-    /// The largest gap, relative to the size, where it is above rounding.
+    /// The largest gap, relative to the size, by which points had to be moved to meet, where it is above rounding.
     pub(crate) gap: Option<f64>,
     /// Conditions of the pairs, each pair by itself, and how many of all are independent.
     pub(crate) conditions: [usize; 2],
@@ -99,13 +102,13 @@ pub(crate) fn close(
     // The rank at poses in general.
     let ranks: Vec<usize> = poses
         .iter()
-        .map(|values| rank(&chain.gaps(pairs, values).1, NOTHING).0)
+        .map(|values| independent(chain, pairs, values).0)
         .collect();
     let wanted = ranks.iter().copied().max().unwrap_or(0);
     let general = (0..poses.len())
         .filter(|k| ranks[*k] == wanted)
         .max_by(|a, b| {
-            let share = |k: usize| rank(&chain.gaps(pairs, &poses[k]).1, NOTHING).1;
+            let share = |k: usize| independent(chain, pairs, &poses[k]).1;
             share(*a).total_cmp(&share(*b))
         })
         .unwrap_or(0);
@@ -127,6 +130,10 @@ pub(crate) fn close(
     }
     let mut values = poses.swap_remove(best);
     let gap = chain.close(&pairs, &mut values);
+    let mut pairs = pairs;
+    if gap > CLOSED {
+        chain.meet(&mut pairs, &values);
+    }
     Ok(Closed {
         pairs,
         passive,
@@ -137,13 +144,19 @@ pub(crate) fn close(
     })
 }
 
+/// How many conditions of the pairs are independent, and the least of their singular values as a share of the largest.
+fn independent(chain: &Chain, pairs: &[Pair], values: &[f64]) -> (usize, f64) {
+    let (gaps, rows, size) = chain.gaps(pairs, values);
+    rank(&rows, NOTHING.max(OF_GAPS * gaps.amax() / size))
+}
+
 /// The pairs that say something that those before do not.
 fn telling(chain: &Chain, pairs: &[Pair], values: &[f64]) -> Vec<Pair> {
     let mut kept: Vec<Pair> = Vec::new();
     let mut n = 0;
     for pair in pairs {
         kept.push(*pair);
-        let (now, _) = rank(&chain.gaps(&kept, values).1, NOTHING);
+        let (now, _) = independent(chain, &kept, values);
         if now == n {
             kept.pop();
         }

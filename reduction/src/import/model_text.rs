@@ -630,7 +630,8 @@ impl Build<'_> {
         }
         if let Some(gap) = closed.gap {
             self.remarks.push(format!(
-                "the digits of the description close its loops to {} of their size only",
+                "the digits of the description close its loops to {} of their size only; points were moved by that to meet at the \
+                 nominal pose",
                 digits(gap, 2)
             ));
         }

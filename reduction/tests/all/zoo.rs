@@ -411,20 +411,6 @@ fn deviations(
     let rows: Option<Vec<usize>> = forces.iter().map(|(name, _)| row_of(name)).collect();
     let rate_of_reference = |name: &str| reference.column(&format!("qd:{name}"));
     for i in 0..n {
-        if std::env::var("DUMP").is_ok() {
-            let w = (0..rates.len())
-                .map(|row| {
-                    ((0..m)
-                        .map(|j| map[i][(row, j)] * moved[j][1][i])
-                        .sum::<f64>()
-                        - speed[row][i])
-                        .abs()
-                })
-                .fold(0.0_f64, f64::max);
-            if w > 1e-8 {
-                println!("SLIP state {i}: {w}");
-            }
-        }
         for row in 0..rates.len() {
             let own: f64 = (0..m).map(|j| map[i][(row, j)] * moved[j][1][i]).sum();
             slip = slip.max((own - speed[row][i]).abs());
@@ -496,12 +482,6 @@ fn check(name: &str) {
         Err(error) => panic!("{name}: not imported: {error}"),
     };
     let start = Instant::now();
-    if let Ok(f) = std::env::var("DUMP") {
-        std::fs::write(format!("{f}/{name}.toml"), &imported.model).unwrap();
-        for r in &imported.remarks {
-            println!("REMARK {r}");
-        }
-    }
     let loaded = modelmill_spec::load("model.toml", &rigid(&imported.model), &Memory::default())
         .unwrap_or_else(|failure| panic!("{name}: {failure}"));
     // Ranks of the reference are those of the file's values.
@@ -534,11 +514,17 @@ fn check(name: &str) {
             ", not clear"
         }
     );
+    // Where the printed digits contradict each other, loops close to that only, in the reference too.
+    let open = reference.manifest["checks"]["closure_position_max"].as_f64();
+    let open = open.unwrap_or(0.0);
     assert!(
-        slip < 1e-6,
+        slip < 1e-6_f64.max(1e3 * open),
         "{name}: its rates are not those of the reference"
     );
-    assert!(forces < ACCURACY, "{name}: forces deviate by {forces:.1e}");
+    assert!(
+        forces < ACCURACY.max(10.0 * open),
+        "{name}: forces deviate by {forces:.1e}"
+    );
     if wanted["clear"] == true {
         assert_eq!(
             Some(rank as u64),
@@ -565,9 +551,7 @@ robots!(
     aloha_mj,
     anymal_c_mj,
     anymal_c_urdf,
-    #[ignore = "falls short: its loops follow to another assembly than the reference's; two minutes"]
     cassie_mj,
-    #[ignore = "falls short: its loops are planar to 1e-9 only, which counts as one equation more"]
     cassie_v2_sdf,
     go1_mj,
     h1_mj,
@@ -576,22 +560,17 @@ robots!(
     panda_mj,
     panda_urdf,
     par_5bar_linkage,
-    #[ignore = "falls short: closed in orientation too, its loop is singular on the way to a state"]
     par_5bar_linkage_iso6d,
-    #[ignore = "falls short: its loops do not follow to the first state"]
     par_cassie_like,
-    #[ignore = "falls short: its nominal pose counts as singular"]
     par_disney_like,
-    #[ignore = "falls short: closed in orientation too, its loops are singular on the way to a state"]
+    #[ignore = "falls short: its parallelograms are such to the digits of the file only, and are four-bars to exact reduction"]
     par_robot_delta,
-    #[ignore = "falls short: of the equations of loops closed in orientation too, those that follow are not recognised"]
     par_wl16_like,
     robotiq_2f85_mj,
     romeo_urdf,
     sawyer_mj,
     schunk_wsg50_sdf,
     shadow_hand_mj,
-    #[ignore = "not derived to the end yet"]
     toddlerbot_2xc_mj,
     ur5_urdf,
 );
