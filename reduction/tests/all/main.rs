@@ -5,4 +5,5 @@ mod faulty;
 mod mjcf;
 mod spidermill;
 mod urdf;
+mod welds;
 mod zoo;
