@@ -57,6 +57,7 @@ fn run(host: &Host, command: &Command) -> Outcome {
         Command::Adopt(args) => commands::adopt::run(host, args),
         Command::Add(args) => commands::add::run(host, args),
         Command::Equations(args) => commands::equations::run(host, args),
+        Command::Atlas(args) => commands::atlas::run(host, args),
         Command::Generate(args) => commands::generate::run(host, args),
         Command::Evaluate(args) => commands::evaluate::run(host, args),
         Command::Identify(args) => commands::identify::run(host, args),

@@ -160,6 +160,7 @@
 pub mod add;
 pub mod adopt;
 pub mod along;
+pub mod atlas;
 pub mod audit;
 pub mod compare;
 pub mod diagnose;

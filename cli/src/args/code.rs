@@ -74,3 +74,14 @@ fn in_folders() -> Vec<(&'static str, &'static str)> {
         .map(|language| ("language", language.name()))
         .collect()
 }
+
+/// `atlas`.
+#[derive(Debug, Args)]
+pub(crate) struct AtlasArgs {
+    /// Model files
+    #[arg(required = true)]
+    pub(crate) models: Vec<PathBuf>,
+    /// Write `atlas.md` and the folder `atlas` into this folder
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+}

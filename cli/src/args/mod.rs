@@ -21,7 +21,7 @@ use effects::{AddArgs, EffectsArgs};
 use runs::RunsArgs;
 use work::WorkArgs;
 
-pub(crate) use code::{EquationsArgs, EquationsFormat, GenerateArgs};
+pub(crate) use code::{AtlasArgs, EquationsArgs, EquationsFormat, GenerateArgs};
 pub(crate) use data::{
     AdoptArgs, AskArgs, CompareArgs, DiagnoseArgs, EvaluateArgs, IdentifyArgs, InterpretArgs,
     ParameterSource, RecordingsArgs, ReportArgs,
@@ -192,6 +192,12 @@ pub(crate) enum Command {
         modelmill check robot.toml"
     )]
     Import(ImportArgs),
+    /// Write an atlas of mechanisms: picture, joints, loops, base parameters with and without gravity, operations
+    #[command(
+        after_help = "Base parameters are counted for the bodies alone; a page of its own for each mechanism has them as expressions.\n\n\
+        Example (from the project's root):\n  modelmill atlas model-spec/models/*.toml --out docs"
+    )]
+    Atlas(AtlasArgs),
     /// Say what changed between runs of one machine: load, friction, offset, scale of a force, clock, encoders, pushes
     #[command(after_help = runs::HELP)]
     Runs(RunsArgs),

@@ -2,6 +2,7 @@
 
 pub(crate) mod add;
 pub(crate) mod adopt;
+pub(crate) mod atlas;
 pub(crate) mod check;
 pub(crate) mod compare;
 pub(crate) mod completions;

@@ -2,6 +2,7 @@
 //!
 //! One target for all of them, since each target links the whole program anew.
 
+mod atlas;
 #[allow(dead_code, reason = "what only the run of the benchmark calls")]
 mod benchmark;
 #[cfg(target_os = "linux")]

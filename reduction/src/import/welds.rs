@@ -106,7 +106,7 @@ fn cut(description: &Description, turned: &[usize]) -> Option<Cut> {
             joint.armature,
             joint.stiffness,
         ];
-        !joint.is_driven && !is_coupled && acts == [0.0; 4]
+        !joint.is_driven && !is_coupled && acts.iter().all(|x| x.abs() <= 0.0)
     };
     // Joints upwards, each with its place in the link that hangs on them while all stand at their zero.
     let mut found: Vec<(Kind, Placed)> = Vec::new();

@@ -75,7 +75,7 @@ ranks! {
 /// What has no symbolic form yet has the right number all the same, and says that its factors are numbers.
 #[test]
 fn numeric_reductions_have_the_rank_of_the_judge() {
-    for (name, rank) in [("rssp", 4), ("two_prs_psr", 23)] {
+    for (name, rank) in [("rssp", 4), ("two_prs_psr", 23), ("sarrus", 5)] {
         let reduction = derive(&judged(name)).reduction;
         assert_eq!(reduction.retained.len(), rank, "{name}");
         assert!(matches!(reduction.method, Method::Numeric { .. }), "{name}");
@@ -86,7 +86,13 @@ fn numeric_reductions_have_the_rank_of_the_judge() {
 /// needs no root sign and where a loop has equations that follow from others.
 #[test]
 fn forces_are_those_of_the_bodies() {
-    for name in ["scott_russell", "hooke", "three_rrs_by_pose", "rscr"] {
+    for name in [
+        "scott_russell",
+        "hooke",
+        "three_rrs_by_pose",
+        "rscr",
+        "sarrus",
+    ] {
         let mut mechanism = judged(name);
         for (i, parameter) in mechanism.parameters.iter_mut().enumerate() {
             if parameter.nominal == 0.0 {
