@@ -228,10 +228,14 @@ impl Drawn {
         ];
         let is_known = !plain.contains(&kind) && law.as_ref().is_none_or(Law::has_known_friction);
         let known = is_known.then(|| {
-            [(); 2].map(|()| [random.log_between(80.0, 250.0), random.log_between(12.0, 40.0)])
+            [(); 2].map(|()| {
+                [
+                    random.log_between(80.0, 250.0),
+                    random.log_between(12.0, 40.0),
+                ]
+            })
         });
-        let courses =
-            [(); 2].map(|()| Course::draw(random, plant.limits(), Repeats::Once));
+        let courses = [(); 2].map(|()| Course::draw(random, plant.limits(), Repeats::Once));
         Self {
             number,
             known,

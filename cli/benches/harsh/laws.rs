@@ -106,7 +106,10 @@ impl Law {
             What::Memory => "friction with memory",
         };
         let Self { size, shape, .. } = self;
-        format!("{words} at {} (size {size}, shape {shape})", DRIVES[self.at])
+        format!(
+            "{words} at {} (size {size}, shape {shape})",
+            DRIVES[self.at]
+        )
     }
 
     pub(crate) fn named_by(&self) -> Vec<String> {

@@ -134,8 +134,7 @@ fn run(options: &Options) -> Result<(), String> {
             score.ask(options, &scratch, case)?;
         }
     }
-    std::fs::remove_dir_all(&scratch)
-        .map_err(|error| format!("{}: {error}", scratch.display()))?;
+    std::fs::remove_dir_all(&scratch).map_err(|error| format!("{}: {error}", scratch.display()))?;
     score.tell();
     Ok(())
 }

@@ -42,14 +42,26 @@ pub(crate) enum Fault {
     /// Forces in steps, N.
     Steps(f64),
     /// Uneven sampling by parts of a step, with true time stamps or stamped as if even.
-    Uneven { by: f64, is_stamped: bool },
+    Uneven {
+        by: f64,
+        is_stamped: bool,
+    },
     /// s
-    Late { drive: Option<usize>, by: f64 },
+    Late {
+        drive: Option<usize>,
+        by: f64,
+    },
     /// Both forces through a low-pass of first order, Hz.
     Lag(f64),
-    Scale { drive: usize, by: f64 },
+    Scale {
+        drive: usize,
+        by: f64,
+    },
     /// N over each run.
-    OffsetDrift { drive: usize, by: f64 },
+    OffsetDrift {
+        drive: usize,
+        by: f64,
+    },
     /// The part of all friction that is gone at the end of each run.
     Fades(f64),
     /// The part of all friction that is gone in the check.
@@ -57,13 +69,29 @@ pub(crate) enum Fault {
     /// kg more at the platform in the check.
     Payload(f64),
     /// A push down on the platform in the check: N, s, and the part of the run before it.
-    Push { force: f64, lasts: f64, at: f64 },
+    Push {
+        force: f64,
+        lasts: f64,
+        at: f64,
+    },
     /// rad, so many times a turn.
-    EccentricJoint { at: usize, by: f64, times: f64, phase: f64 },
+    EccentricJoint {
+        at: usize,
+        by: f64,
+        times: f64,
+        phase: f64,
+    },
     /// m, once a turn of the screw.
-    EccentricScrew { at: usize, by: f64, phase: f64 },
+    EccentricScrew {
+        at: usize,
+        by: f64,
+        phase: f64,
+    },
     /// m of the screw.
-    Backlash { at: usize, by: f64 },
+    Backlash {
+        at: usize,
+        by: f64,
+    },
 }
 
 impl Fault {
@@ -73,7 +101,10 @@ impl Fault {
             "noise-fast" => Self::Coloured(size(15.0, 40.0)),
             "noise-medium" => Self::Coloured(size(3.0, 8.0)),
             "noise-slow" => Self::Coloured(size(0.5, 2.0)),
-            "hum" => Self::Hum([50.0, 60.0][usize::from(size(1.0, 2.0) > 1.41)], size(3.0, 10.0)),
+            "hum" => Self::Hum(
+                [50.0, 60.0][usize::from(size(1.0, 2.0) > 1.41)],
+                size(3.0, 10.0),
+            ),
             "outliers" => Self::Outliers(size(0.002, 0.01), size(80.0, 400.0)),
             "quantised-coarse" => Self::Steps(size(8.0, 30.0)),
             "jitter-stamped" => Self::Uneven {
@@ -179,7 +210,9 @@ impl Fault {
             Self::Uneven { .. } => one("time stamps?|clock|jitter|uneven"),
             Self::Late { drive: Some(d), .. } => {
                 let d = drive(d);
-                vec![format!("(late|delay)[^.]{{0,60}}{d}|{d}[^.]{{0,60}}(late|delay)")]
+                vec![format!(
+                    "(late|delay)[^.]{{0,60}}{d}|{d}[^.]{{0,60}}(late|delay)"
+                )]
             }
             Self::Lag(_) => one(r"low-?pass|\blag(s|ging)?\b|bandwidth"),
             Self::Scale { .. } => one(r"\bscale\b|\bgain\b|calibrat"),
@@ -204,9 +237,9 @@ impl Fault {
     pub(crate) fn also(&self) -> Vec<[String; 2]> {
         let place = |kind: &str, at: &str| [kind.to_owned(), at.to_owned()];
         match self {
-            Self::Late { drive: Some(d), .. } => {
-                ["time_delay", "force_lag"].map(|kind| place(kind, DRIVES[*d])).into()
-            }
+            Self::Late { drive: Some(d), .. } => ["time_delay", "force_lag"]
+                .map(|kind| place(kind, DRIVES[*d]))
+                .into(),
             Self::Lag(_) => ["force", DRIVES[0], DRIVES[1]]
                 .map(|at| place("force_lag", at))
                 .into(),
@@ -390,7 +423,9 @@ fn forces(
 }
 
 fn payload(plant: &Plant, mass: f64) -> Result<modelmill_rig::Effect, String> {
-    let made = plant.rig.effect("point_mass", &["R3m_right"], &[("m", mass)]);
+    let made = plant
+        .rig
+        .effect("point_mass", &["R3m_right"], &[("m", mass)]);
     made.map_err(|faults| faults.iter().map(ToString::to_string).collect())
 }
 
@@ -412,7 +447,11 @@ fn weight(plant: &Plant, q: &[f64]) -> Result<Vec<f64>, String> {
     rig.effects = vec![payload(plant, 1.0)?];
     let with = of(&rig)?;
     let gravity = 9.81;
-    Ok(with.iter().zip(without).map(|(a, b)| (a - b) / gravity).collect())
+    Ok(with
+        .iter()
+        .zip(without)
+        .map(|(a, b)| (a - b) / gravity)
+        .collect())
 }
 
 /// Positions as the encoders would read them without noise, `[sample][coordinate]`.

@@ -164,14 +164,17 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
         ladder.push(bench.rung(&before, &step.picks, step.evidence));
         before.clone_from(&step.picks);
     }
+    let (picks, left) = bench.above_the_unexplained(picks);
+    if picks.len() < before.len() {
+        ladder.push(bench.rung(&before, &picks, None));
+    }
+    let Left {
+        rest,
+        again,
+        unexplained,
+    } = left;
     let aliases = bench.aliases(&picks);
     bench.weigh(&picks);
-    let (factors, _) = bench.fit(&picks, On::All);
-    let rest = bench.rest(&picks, &factors);
-    let again = reproducible(&problem.layout, &problem.variables, &rest);
-    let unexplained: Vec<usize> = (0..rest.len())
-        .filter(|d| bench.is_unexplained(*d, &rest[*d], again[*d]))
-        .collect();
     let (budgets, coloured) = bench.budgets(&picks, &rest, &again);
     disturbances.extend(bench.disturbances(&picks));
     disturbances.extend(coloured);
@@ -247,7 +250,71 @@ fn noise_floor(budgets: &[Budget]) -> f64 {
     }
 }
 
+/// What a set leaves.
+struct Left {
+    /// `[channel][sample]`
+    rest: Vec<Vec<f64>>,
+    /// Share of each channel's squares that comes again.
+    again: Vec<f64>,
+    /// Channels of which that is more than noise.
+    unexplained: Vec<usize>,
+}
+
 impl Bench<'_> {
+    fn left(&mut self, picks: &[Pick]) -> Left {
+        self.weigh(picks);
+        let (factors, _) = self.fit(picks, On::All);
+        let rest = self.rest(picks, &factors);
+        let again = reproducible(&self.problem.layout, &self.problem.variables, &rest);
+        let unexplained = (0..rest.len())
+            .filter(|d| self.is_unexplained(*d, &rest[*d], again[*d]))
+            .collect();
+        Left {
+            rest,
+            again,
+            unexplained,
+        }
+    }
+
+    /// A set without members that explain less than what stays unexplained where they act, and what it leaves: part of a law that
+    /// nobody knows is as likely there as the effect.
+    fn above_the_unexplained(&mut self, mut picks: Vec<Pick>) -> (Vec<Pick>, Left) {
+        loop {
+            let left = self.left(&picks);
+            let mut least: Option<(f64, Vec<Pick>)> = None;
+            for i in 0..picks.len() {
+                let channels = self.acted_on(&picks[i..=i]);
+                let squares =
+                    |rest: &[Vec<f64>], d: usize| self.weights[d] * dot(&rest[d], &rest[d]);
+                let unexplained = channels.iter().filter(|d| left.unexplained.contains(d));
+                let stays: f64 = unexplained
+                    .map(|d| left.again[*d] * squares(&left.rest, *d))
+                    .sum();
+                if stays <= 0.0 {
+                    continue;
+                }
+                let mut fewer = picks.clone();
+                fewer.remove(i);
+                let fewer = self.refresh(fewer);
+                let (factors, _) = self.fit(&fewer, On::All);
+                let rest = self.rest(&fewer, &factors);
+                let squares =
+                    |rest: &[Vec<f64>], d: usize| self.weights[d] * dot(&rest[d], &rest[d]);
+                let gains = channels
+                    .iter()
+                    .map(|d| squares(&rest, *d) - squares(&left.rest, *d));
+                let share = gains.sum::<f64>() / stays;
+                if share < 1.0 && least.as_ref().is_none_or(|(other, _)| share < *other) {
+                    least = Some((share, fewer));
+                }
+            }
+            match least {
+                Some((_, fewer)) => picks = fewer,
+                None => return (picks, left),
+            }
+        }
+    }
+
     /// Whether what is left of a channel is more than noise: it comes again with the state.
     fn is_unexplained(&self, channel: usize, rest: &[f64], again: f64) -> bool {
         let squares = dot(rest, rest) / rest.len().max(1) as f64;
