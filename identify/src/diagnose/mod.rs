@@ -50,13 +50,9 @@ pub use readings::readings;
 pub use tilt::{Sensitivity, Tilt};
 
 use bench::{Bench, Pick};
+use evidence::LEAST_GAIN;
 use pool::{On, dot};
 use reproducible::reproducible;
-
-/// Share of a channel's squared residual that must come again to be called unexplained.
-const UNEXPLAINED: f64 = 0.1;
-/// The same, in squares of the channel's white noise.
-const ABOVE_NOISE: f64 = 0.05;
 
 /// Kinds of friction of which a drift is a change.
 const FRICTION: [&str; 2] = ["viscous_friction", "coulomb_friction"];
@@ -315,11 +311,12 @@ impl Bench<'_> {
         }
     }
 
-    /// Whether what is left of a channel is more than noise: it comes again with the state.
+    /// Whether what is left of a channel is more than noise: it comes again with the state, by a share that an effect would be
+    /// added for.
     fn is_unexplained(&self, channel: usize, rest: &[f64], again: f64) -> bool {
         let squares = dot(rest, rest) / rest.len().max(1) as f64;
         let noise = self.problem.noise[channel].powi(2);
-        squares > noise && again > UNEXPLAINED && again * squares > ABOVE_NOISE * noise
+        again > LEAST_GAIN && again * squares > LEAST_GAIN * noise
     }
 
     /// Share of the squared error of the model as it is that each candidate explains alone.
@@ -427,7 +424,7 @@ impl Bench<'_> {
                 };
                 let why = if trial.wrong_sign.contains(&picks.len()) {
                     "sign"
-                } else if gain < evidence::LEAST_GAIN {
+                } else if gain < LEAST_GAIN {
                     "explains nothing that is left"
                 } else {
                     "another explains more"

@@ -32,10 +32,10 @@ const WAVES: u32 = 12;
 /// Quantiles of a position beyond which stops may begin, percent from either end.
 const BEYOND: [usize; 4] = [3, 8, 15, 30];
 /// Lengths over which friction may remember, in units of a position's spread.
-const MEMORIES: [f64; 3] = [0.02, 0.08, 0.3];
+const MEMORIES: [f64; 5] = [0.02, 0.08, 0.3, 1.0, 3.0];
 
 /// Half widths of what is dragged along a position, in units of its spread.
-const STOPS: [f64; 6] = [0.05, 0.15, 0.3, 0.5, 0.8, 1.2];
+const STOPS: [f64; 8] = [0.05, 0.15, 0.3, 0.5, 0.65, 0.8, 1.0, 1.3];
 
 /// How much of each channel's squared residual comes again where it was not fitted, between 0 and 1; 0 where chance would say as
 /// much.
