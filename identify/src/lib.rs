@@ -44,8 +44,7 @@ mod test_noise;
 mod words;
 
 pub use audit::{
-    ByChannel, Delay, DelayAudit, Delays, ForceAudit, PositionFault, RobustFit, Suspect, Wave,
-    robust_fit,
+    ByChannel, Delay, DelayAudit, Delays, ForceAudit, PositionFault, RobustFit, Suspect, robust_fit,
 };
 pub use estimate::{
     Deviations, Direction, LeastSquares, LeastSquaresError, RANK_TOLERANCE, Solution, Triangle,

@@ -13,5 +13,5 @@ mod signals;
 pub use by_channel::ByChannel;
 pub use delay::{Delay, DelayAudit, Delays};
 pub use exchange::{ForceAudit, Suspect};
-pub use positions::{PositionFault, Wave};
+pub use positions::PositionFault;
 pub use robust::{RobustFit, robust_fit};

@@ -1,10 +1,8 @@
-//! Faults of positions that no smoothing takes away: time stamps that are not when samples were taken, play between encoder and
-//! load, and encoders that err as they turn. A position goes in as it was recorded; all are seen beside the cubic that joins a
-//! sample's neighbours.
+//! Faults of positions that no smoothing takes away: time stamps that are not when samples were taken, and play between encoder
+//! and load. A position goes in as it was recorded; both are seen beside the cubic that joins a sample's neighbours.
 //!
 //! Where stamps are wrong by a time, positions are wrong by that time and their rate: in proportion to the rate, and for all
 //! coordinates by the same time. Where there is play, the reading jumps each time the load changes sides, by one length to and fro.
-//! An eccentric encoder errs by a wave along the way that it turns, which one half of a recording tells the other.
 
 use crate::recording::Recording;
 use crate::signal::median;
@@ -29,11 +27,6 @@ const STEPS: f64 = 8.0;
 const LEAST: f64 = 5e-5;
 /// How much jumps may differ.
 const SPREAD: f64 = 0.35;
-/// Half waves along the way, fewest and most, and the samples that are looked at for them.
-const HALF_WAVES: [u32; 2] = [12, 800];
-const LOOKED_AT_FOR_WAVES: usize = 6000;
-/// What a wave explains of the errors of either half by the values of the other, at least.
-const EXPLAINS: f64 = 0.1;
 /// Samples that are looked at.
 const LOOKED_AT: usize = 20_000;
 
@@ -86,107 +79,6 @@ impl Recording {
         }
         faults
     }
-}
-
-/// A wave in the errors of a position.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wave {
-    /// The way after which it comes again, in the unit of the way.
-    pub pitch: f64,
-    /// rad or m
-    pub amplitude: f64,
-}
-
-impl Wave {
-    /// The wave by which a position errs along a way, such as that of a screw on which its encoder sits.
-    pub fn of(time: &[f64], position: &[f64], way: &[f64]) -> Option<Self> {
-        let n = time.len().min(LOOKED_AT_FOR_WAVES);
-        let low = way[..n].iter().copied().fold(f64::INFINITY, f64::min);
-        let travel = way[..n].iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
-        if n < 40 * SIDE || travel.is_nan() || travel <= 0.0 {
-            return None;
-        }
-        let stencils: Vec<[f64; 2 * SIDE + 1]> = (SIDE..n - SIDE)
-            .map(|i| stencil(&time[i - SIDE..=i + SIDE]))
-            .collect();
-        let beside = |values: &[f64]| -> Vec<f64> {
-            let about = stencils.iter().zip(values.windows(2 * SIDE + 1));
-            let one = |(stencil, about): (&[f64; 2 * SIDE + 1], &[f64])| {
-                stencil.iter().zip(about).map(|(w, x)| w * x).sum()
-            };
-            about.map(one).collect()
-        };
-        let errors = beside(&position[..n]);
-        let half = errors.len() / 2;
-        let of_number = |number: u32| {
-            let waves = |of: fn(f64) -> f64| -> Vec<f64> {
-                let phase = std::f64::consts::PI * f64::from(number) / travel;
-                beside(
-                    &way[..n]
-                        .iter()
-                        .map(|x| of(phase * (x - low)))
-                        .collect::<Vec<f64>>(),
-                )
-            };
-            let (sines, cosines) = (waves(f64::sin), waves(f64::cos));
-            let parts = [0..half, half..errors.len()];
-            let products = parts.clone().map(|part| {
-                let [s, c, e] = [&sines, &cosines, &errors].map(|x| &x[part.clone()]);
-                let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-                [
-                    dot(s, s),
-                    dot(s, c),
-                    dot(c, c),
-                    dot(s, e),
-                    dot(c, e),
-                    dot(e, e),
-                ]
-            });
-            let [first, second] = products;
-            let both = std::array::from_fn(|k| first[k] + second[k]);
-            let told = |by: [f64; 6], of: [f64; 6]| -> f64 {
-                let Some([a, b]) = amplitudes(by) else {
-                    return 0.0;
-                };
-                let [ss, sc, cc, se, ce, ee] = of;
-                let left =
-                    ee - 2.0 * (a * se + b * ce) + a * a * ss + 2.0 * a * b * sc + b * b * cc;
-                1.0 - left / ee
-            };
-            let explained = told(first, second).min(told(second, first));
-            (explained, number, amplitudes(both))
-        };
-        let all = (HALF_WAVES[0]..=HALF_WAVES[1]).map(of_number);
-        let (explained, number, found) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let [a, b] = found?;
-        (explained > EXPLAINS).then_some(Self {
-            pitch: 2.0 * travel / f64::from(number),
-            amplitude: a.hypot(b),
-        })
-    }
-}
-
-/// Factors of a sine and a cosine by their inner products with each other and with what they explain.
-fn amplitudes([ss, sc, cc, se, ce, _]: [f64; 6]) -> Option<[f64; 2]> {
-    let determinant = ss * cc - sc * sc;
-    (determinant > 1e-6 * ss * cc).then(|| {
-        [
-            (se * cc - ce * sc) / determinant,
-            (ce * ss - se * sc) / determinant,
-        ]
-    })
-}
-
-/// What makes the middle of some samples less the cubic through the others.
-fn stencil(time: &[f64]) -> [f64; 2 * SIDE + 1] {
-    std::array::from_fn(|k| {
-        if k == SIDE {
-            return 1.0;
-        }
-        let about = (0..=2 * SIDE).filter(|i| *i != SIDE);
-        let points = about.map(|i| (time[i] - time[SIDE], f64::from(u8::from(i == k))));
-        -cubic(points, 0.0)[0]
-    })
 }
 
 /// What a sample is beside the cubic through its neighbours, and the rate there.
@@ -367,34 +259,6 @@ mod tests {
         });
         let found = jitter(&both).unwrap();
         assert!((0.7e-4..1.4e-4).contains(&found), "{found}");
-    }
-
-    #[test]
-    fn an_eccentric_screw_is_seen_by_its_wave_and_sound_ones_have_none() {
-        for seed in 0..10 {
-            let mut noise = Noise::new(seed);
-            // A crank that a screw turns by way of a lever.
-            let way: Vec<f64> = time()
-                .iter()
-                .map(|t| 0.3 * (1.0 + motion(*t, 0)).sin())
-                .collect();
-            let read = |size: f64, noise: &mut Noise| -> Vec<f64> {
-                let wave = way
-                    .iter()
-                    .map(|x| size * (std::f64::consts::TAU * x / 0.02 + 0.7).sin());
-                let errors = wave.map(|wave| wave + 4e-6 * noise.normal());
-                time()
-                    .iter()
-                    .zip(errors)
-                    .map(|(t, e)| motion(*t, 0) + e)
-                    .collect()
-            };
-            let sound = read(0.0, &mut noise);
-            assert_eq!(Wave::of(&time(), &sound, &way), None, "seed {seed}");
-            let found = Wave::of(&time(), &read(1.5e-5, &mut noise), &way).unwrap();
-            assert!((found.pitch / 0.02 - 1.0).abs() < 0.02, "{found:?}");
-            assert!((found.amplitude / 1.5e-5 - 1.0).abs() < 0.15, "{found:?}");
-        }
     }
 
     #[test]

@@ -33,6 +33,7 @@ mod search;
 mod settle;
 mod tilt;
 mod tuning;
+mod untold;
 
 use serde::Serialize;
 
@@ -41,7 +42,7 @@ pub use column::Column;
 pub use disturbance::{Budget, Disturbance, Quantity};
 pub use drifts::drifts;
 pub use evidence::Evidence;
-pub use noise::{effective_samples, white_noise};
+pub use noise::{ROUNDING, effective_samples, white_noise};
 pub use problem::{
     Candidate, Choice, Effect, EffectParameter, Fault, Layout, Nature, NoSupply, Problem, Reading,
     Sign, Source, Stretch, Supply,
@@ -133,6 +134,8 @@ pub struct Diagnosis {
     pub effects: Vec<FoundEffect>,
     /// All candidates, those that explain most first.
     pub candidates: Vec<Considered>,
+    /// What the recordings leave open: effects as large as a drive's force would hide in what the model has.
+    pub untold: Vec<Effect>,
     /// What is left in the end, `[channel][sample]`.
     pub rest: Vec<Vec<f64>>,
     /// Share of each channel's squared rest that comes again where it was not fitted.
@@ -148,6 +151,7 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
     let mut disturbances = problem.disturbances.clone();
     problem.find_jumps();
     disturbances.extend(cleaning::clean(problem));
+    cleaning::bound_noise(problem);
     let problem = &*problem;
     let mut bench = Bench::new(problem, supply);
     bench.look(&[]);
@@ -200,6 +204,7 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
         (true, false) => Verdict::MissingEffect,
     };
     let candidates = bench.considered(&picks, &found, &alone);
+    let untold = bench.untold(&picks, &rest);
     Diagnosis {
         verdict,
         noise_floor: noise_floor(&budgets),
@@ -208,6 +213,7 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
         ladder,
         effects,
         candidates,
+        untold,
         rest,
         reproducible: again,
         unexplained,
@@ -261,7 +267,8 @@ impl Bench<'_> {
         self.weigh(picks);
         let (factors, _) = self.fit(picks, On::All);
         let rest = self.rest(picks, &factors);
-        let again = reproducible(&self.problem.layout, &self.problem.variables, &rest);
+        let problem = self.problem;
+        let again = reproducible(&problem.layout, &problem.variables, &problem.base, &rest);
         let unexplained = (0..rest.len())
             .filter(|d| self.is_unexplained(*d, &rest[*d], again[*d]))
             .collect();
@@ -316,7 +323,7 @@ impl Bench<'_> {
     fn is_unexplained(&self, channel: usize, rest: &[f64], again: f64) -> bool {
         let squares = dot(rest, rest) / rest.len().max(1) as f64;
         let noise = self.problem.noise[channel].powi(2);
-        again > LEAST_GAIN && again * squares > LEAST_GAIN * noise
+        squares > noise && again > LEAST_GAIN
     }
 
     /// Share of the squared error of the model as it is that each candidate explains alone.

@@ -2,8 +2,8 @@
 
 use modelmill_codegen::Evaluator;
 use modelmill_identify::diagnose::{
-    Column, Considered, Diagnosis, Disturbance, Effect, Problem, Source, Supply, diagnose, drifts,
-    readings, white_noise,
+    Column, Considered, Diagnosis, Disturbance, Effect, Problem, ROUNDING, Source, Supply,
+    diagnose, drifts, readings, white_noise,
 };
 
 use crate::along::drive_rates;
@@ -22,9 +22,6 @@ use super::memory::memories;
 use super::numbers::{layout, stack, variables};
 use super::words;
 use crate::regressors::{Runs, regressor};
-
-/// Errors below this share of a force are rounding, of the recording or of whatever simulated it.
-pub(crate) const ROUNDING: f64 = 3e-6;
 
 /// Which parameters keep their nominal values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -12,9 +12,8 @@ mod smoother;
 use std::path::Path;
 use std::sync::Arc;
 
-use modelmill_codegen::{Evaluator, States};
 use modelmill_identify::diagnose::{Disturbance, Quantity};
-use modelmill_identify::{Note, PositionFault, Recording as Raw, RecordingFiles, Run, Wave};
+use modelmill_identify::{Note, PositionFault, Recording as Raw, RecordingFiles, Run};
 
 use crate::audit;
 use crate::error::{Error, Outcome};
@@ -163,12 +162,9 @@ fn prepare(model: &Model, recording: &Raw, args: &Reading, delay: f64) -> Outcom
         run.notes.extend(idle);
         pair(run, delay)?;
     }
-    let mut faults: Vec<Disturbance> = (recording.position_faults(&model.active()).into_iter())
+    let faults: Vec<Disturbance> = (recording.position_faults(&model.active()).into_iter())
         .map(|fault| position_fault(model, recording.file(), &fault))
         .collect();
-    if faults.is_empty() {
-        faults = encoder_waves(model, recording);
-    }
     let with_variance = runs.into_iter().map(|run| {
         let variance = variances::recorded(recording, &run, &model.drives())?;
         Ok(Stretch {
@@ -226,62 +222,6 @@ fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturban
         interval: None,
         says: Some(says),
     }
-}
-
-/// Encoders that err by a wave along their own coordinate or along a drive, on whose screw they may sit.
-fn encoder_waves(model: &Model, recording: &Raw) -> Vec<Disturbance> {
-    let names = model.active();
-    let columns: Option<Vec<&[f64]>> = names
-        .iter()
-        .map(|name| recording.column(name).ok())
-        .collect();
-    let (Some(q), Ok(time)) = (columns, recording.column("t")) else {
-        return Vec::new();
-    };
-    if q.iter().any(|q| q.iter().any(|x| !x.is_finite())) {
-        return Vec::new();
-    }
-    let still = vec![0.0; time.len()];
-    let rates: Vec<&[f64]> = q.iter().map(|_| still.as_slice()).collect();
-    let states = States {
-        q: q.clone(),
-        qd: rates.clone(),
-        qdd: rates,
-        load: Vec::new(),
-    };
-    let drives = model.drives();
-    let mut ways: Vec<(&str, Vec<f64>)> = Vec::new();
-    if let Ok(lengths) = Evaluator::new(&model.derivation).drives(&states) {
-        let of_drives = drives.iter().map(String::as_str).zip(lengths);
-        // Most drives are those of a coordinate itself.
-        ways.extend(of_drives.filter(|(_, way)| q.iter().all(|q| *q != way.as_slice())));
-    }
-    let mut found = Vec::new();
-    for (name, q) in names.iter().zip(&q) {
-        let own = std::iter::once((name.as_str(), *q));
-        let others = ways.iter().map(|(drive, way)| (*drive, way.as_slice()));
-        let of_way = |(along, way)| Some((along, Wave::of(time, q, way)?));
-        if let Some((along, wave)) = own.chain(others).find_map(of_way) {
-            found.push(Disturbance {
-                kind: "encoder_eccentricity".to_owned(),
-                at: vec![name.clone()],
-                estimates: vec![
-                    Quantity::new("amplitude", wave.amplitude, ""),
-                    Quantity::new("pitch", wave.pitch, ""),
-                ],
-                recordings: vec![recording.file().to_owned()],
-                interval: None,
-                says: Some(format!(
-                    "the encoder of {name} errs as an eccentric one does: in {} the reading has a wave of {} that comes again \
-                     after each {} of {along}",
-                    recording.file(),
-                    significant(wave.amplitude, 2),
-                    significant(wave.pitch, 3)
-                )),
-            });
-        }
-    }
-    found
 }
 
 /// Says that options of the filter do nothing where all derivatives are recorded.
