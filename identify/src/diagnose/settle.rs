@@ -31,7 +31,9 @@ impl Bench<'_> {
                 set[i] = simple;
                 let trial = self.trial(set);
                 if trial.wrong_sign.is_empty()
-                    && !self.evidence(&trial.picks, &picks, &channels).holds()
+                    && !self
+                        .evidence(&trial.picks, &picks, &channels)
+                        .forbids_loss()
                 {
                     picks = trial.picks;
                     break;
@@ -61,7 +63,7 @@ impl Bench<'_> {
             }
             let mut unsupported: Vec<(usize, f64)> = tests
                 .into_iter()
-                .filter(|(_, evidence)| !evidence.holds())
+                .filter(|(_, evidence)| !evidence.forbids_loss())
                 .map(|(i, evidence)| (i, evidence.gain))
                 .collect();
             unsupported.sort_by(|a, b| a.1.total_cmp(&b.1));
