@@ -8,7 +8,6 @@
 use std::f64::consts::TAU;
 
 use super::disturbance::{Disturbance, Quantity};
-use super::noise::{ROUNDING, white_noise};
 use super::pool::{On, Pool, dot, solve};
 use super::problem::Problem;
 use crate::signal::{hann_power, median};
@@ -55,19 +54,6 @@ pub(crate) fn clean(problem: &mut Problem) -> Vec<Disturbance> {
         *all += more;
     }
     found
-}
-
-/// Where few samples are left motion passes for noise in the forces themselves; noise is no more than what base parameters and
-/// friction leave of it.
-pub(crate) fn bound_noise(problem: &mut Problem) {
-    if problem.layout.stretches.iter().all(|s| s.step <= s.sampled) {
-        return;
-    }
-    for (d, rest) in rest(problem).iter().enumerate() {
-        let force = problem.force(d);
-        let rounding = ROUNDING * (dot(&force, &force) / force.len().max(1) as f64).sqrt();
-        problem.noise[d] = problem.noise[d].min(white_noise(rest).max(rounding));
-    }
 }
 
 /// What base parameters and friction leave, channels weighed alike.

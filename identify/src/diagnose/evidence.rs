@@ -53,12 +53,6 @@ impl Evidence {
             && self.above_noise > BELOW_NOISE
     }
 
-    /// Whether what is gained may not be given up again: where evidence is enough to believe in it, and where it is large and worth
-    /// its parameters, even if it is not the same all along. Else the error would rise for want of blocks.
-    pub fn forbids_loss(&self) -> bool {
-        self.holds() || self.gain >= LARGE_GAIN && self.bic > 0.0 && self.above_noise > BELOW_NOISE
-    }
-
     /// Whether the gain is the same all along: in the mean over the blocks, or, if it is large, block by block.
     fn is_steady(&self) -> bool {
         self.blocks_t >= LEAST_T || self.gain >= LARGE_GAIN && self.shares_t >= LEAST_SHARES_T

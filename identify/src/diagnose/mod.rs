@@ -151,7 +151,6 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
     let mut disturbances = problem.disturbances.clone();
     problem.find_jumps();
     disturbances.extend(cleaning::clean(problem));
-    cleaning::bound_noise(problem);
     let problem = &*problem;
     let mut bench = Bench::new(problem, supply);
     bench.look(&[]);
@@ -268,7 +267,7 @@ impl Bench<'_> {
         let (factors, _) = self.fit(picks, On::All);
         let rest = self.rest(picks, &factors);
         let problem = self.problem;
-        let again = reproducible(&problem.layout, &problem.variables, &problem.base, &rest);
+        let again = reproducible(&problem.layout, &problem.variables, &rest);
         let unexplained = (0..rest.len())
             .filter(|d| self.is_unexplained(*d, &rest[*d], again[*d]))
             .collect();

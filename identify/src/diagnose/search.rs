@@ -171,7 +171,7 @@ impl Bench<'_> {
     pub(crate) fn is_worse(&mut self, settled: &[Pick], before: &[Pick]) -> bool {
         self.weigh(before);
         let channels: Vec<usize> = (0..self.weights.len()).collect();
-        self.evidence(settled, before, &channels).forbids_loss()
+        self.evidence(settled, before, &channels).holds()
     }
 
     /// Whether a set is another one and a further effect, which may take the place of what it holds.

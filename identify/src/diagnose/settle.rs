@@ -31,9 +31,7 @@ impl Bench<'_> {
                 set[i] = simple;
                 let trial = self.trial(set);
                 if trial.wrong_sign.is_empty()
-                    && !self
-                        .evidence(&trial.picks, &picks, &channels)
-                        .forbids_loss()
+                    && !self.evidence(&trial.picks, &picks, &channels).holds()
                 {
                     picks = trial.picks;
                     break;
@@ -63,7 +61,7 @@ impl Bench<'_> {
             }
             let mut unsupported: Vec<(usize, f64)> = tests
                 .into_iter()
-                .filter(|(_, evidence)| !evidence.forbids_loss())
+                .filter(|(_, evidence)| !evidence.holds())
                 .map(|(i, evidence)| (i, evidence.gain))
                 .collect();
             unsupported.sort_by(|a, b| a.1.total_cmp(&b.1));
