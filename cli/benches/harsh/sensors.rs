@@ -291,39 +291,7 @@ pub(crate) fn record(
         }
     }
     let along = Along::new(&plant.rig, course, times.clone())?;
-    let mut truth = forces(case, plant, &along, which, duration)?;
-    match case.fault {
-        Fault::Late { drive, by } => {
-            let then = times.iter().map(|t| t - by).collect();
-            let late = Along::new(&plant.rig, course, then)?;
-            let late = forces(case, plant, &late, which, duration)?;
-            for (row, (force, late)) in truth.iter_mut().zip(late).enumerate() {
-                if drive.is_none_or(|d| d == row % DRIVES.len()) {
-                    *force = late;
-                }
-            }
-        }
-        Fault::Lag(corner) => {
-            let fine = RATE * FINE as f64;
-            let count = LEAD + FINE * (times.len() - 1);
-            let time = |i: usize| (i as f64 - LEAD as f64) / fine;
-            let finely = Along::new(&plant.rig, course, (0..=count).map(time).collect())?;
-            let finely = forces(case, plant, &finely, which, duration)?;
-            let kept = libm::exp(-TAU * corner / fine);
-            let mut state = finely[..DRIVES.len()].to_vec();
-            let mut filtered = Vec::new();
-            for (i, row) in finely.chunks(DRIVES.len()).enumerate() {
-                for (x, force) in state.iter_mut().zip(row) {
-                    *x = force + (*x - force) * kept;
-                }
-                if i >= LEAD && (i - LEAD) % FINE == 0 {
-                    filtered.extend_from_slice(&state);
-                }
-            }
-            truth = filtered;
-        }
-        _ => {}
-    }
+    let truth = read(case, plant, &along, which, duration)?;
     let mut csv = format!("t,theta1,theta2,{}\n", DRIVES.join(","));
     let readings = readings(case, &along);
     let mut noises: Vec<Random> = (1..=4).map(stream).collect();
@@ -373,6 +341,52 @@ pub(crate) fn record(
         csv.push('\n');
     }
     Ok((csv, norm(&errors) / norm(&measured)))
+}
+
+/// Forces as sensors without noise read them: late or through a low-pass where they are.
+fn read(
+    case: &Drawn,
+    plant: &Plant,
+    along: &Along,
+    which: usize,
+    duration: f64,
+) -> Result<Vec<f64>, String> {
+    let course = &case.courses[which];
+    let times = &along.times;
+    let mut truth = forces(case, plant, along, which, duration)?;
+    match case.fault {
+        Fault::Late { drive, by } => {
+            let then = times.iter().map(|t| t - by).collect();
+            let late = Along::new(&plant.rig, course, then)?;
+            let late = forces(case, plant, &late, which, duration)?;
+            for (row, (force, late)) in truth.iter_mut().zip(late).enumerate() {
+                if drive.is_none_or(|d| d == row % DRIVES.len()) {
+                    *force = late;
+                }
+            }
+        }
+        Fault::Lag(corner) => {
+            let fine = RATE * FINE as f64;
+            let count = LEAD + FINE * (times.len() - 1);
+            let time = |i: usize| (i as f64 - LEAD as f64) / fine;
+            let finely = Along::new(&plant.rig, course, (0..=count).map(time).collect())?;
+            let finely = forces(case, plant, &finely, which, duration)?;
+            let kept = libm::exp(-TAU * corner / fine);
+            let mut state = finely[..DRIVES.len()].to_vec();
+            let mut filtered = Vec::new();
+            for (i, row) in finely.chunks(DRIVES.len()).enumerate() {
+                for (x, force) in state.iter_mut().zip(row) {
+                    *x = force + (*x - force) * kept;
+                }
+                if i >= LEAD && (i - LEAD).is_multiple_of(FINE) {
+                    filtered.extend_from_slice(&state);
+                }
+            }
+            truth = filtered;
+        }
+        _ => {}
+    }
+    Ok(truth)
 }
 
 /// True forces, with what is different in this run.
