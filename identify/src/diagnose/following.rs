@@ -28,14 +28,30 @@ impl Bench<'_> {
         let is_part_of_load: Vec<bool> = (self.problem.base_is_part_of_load.iter().copied())
             .chain(of_picks)
             .collect();
+        let parts = which[..n].iter().copied().zip(factors.iter().copied());
+        let parts = parts.zip(is_part_of_load);
+        self.rubbing_on(parts.filter_map(|(part, is_part_of_load)| is_part_of_load.then_some(part)))
+    }
+
+    /// The same where drives carry the other friction of the set too: which friction lies between load and drive no model says.
+    fn carried_with_friction(&mut self, picks: &[Pick]) -> HashMap<usize, Pick> {
+        let (factors, _) = self.fit(picks, On::All);
+        let is_own = picks.iter().flat_map(|pick| {
+            let is_carried = matches!(self.candidate(pick).source, Source::Carried);
+            pick.columns.iter().map(move |_| is_carried)
+        });
+        let is_own: Vec<bool> = (self.base.iter().map(|_| false)).chain(is_own).collect();
+        let which = self.columns(picks);
+        let parts = which.into_iter().zip(factors.iter().copied()).zip(is_own);
+        self.rubbing_on(parts.filter_map(|(part, is_own)| (!is_own).then_some(part)))
+    }
+
+    /// Candidates that depend on what the drives carry, where that is the sum of some columns times factors and of what is held.
+    fn rubbing_on(&mut self, parts: impl Iterator<Item = (usize, f64)>) -> HashMap<usize, Pick> {
         let mut load = self.problem.held.clone().unwrap_or_default();
         load.0.resize(self.weights.len(), None);
-        for ((k, factor), is_part_of_load) in
-            which[..n].iter().zip(factors.iter()).zip(is_part_of_load)
-        {
-            if is_part_of_load {
-                load.add(*factor, self.pool.column(*k));
-            }
+        for (k, factor) in parts {
+            load.add(factor, self.pool.column(k));
         }
         let made = self.supply.carried(&load);
         let picks = made.into_iter().map(|(candidate, columns)| {
@@ -108,6 +124,22 @@ impl Bench<'_> {
         }
     }
 
+    /// A member that depends on what the drives carry, with or without friction as explains more.
+    fn best_carried(&mut self, picks: &[Pick], member: usize) -> Option<Pick> {
+        let candidate = picks[member].candidate;
+        let ways = [
+            self.carried(picks).remove(&candidate),
+            self.carried_with_friction(picks).remove(&candidate),
+        ];
+        let squares = |way: &Pick| {
+            let mut set = picks.to_vec();
+            set[member] = way.clone();
+            self.fit(&set, On::All).1
+        };
+        let ways = ways.into_iter().flatten();
+        ways.min_by(|a, b| squares(a).total_cmp(&squares(b)))
+    }
+
     /// Makes the columns of effects that depend on the fit anew.
     pub(crate) fn refresh(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
         for _ in 0..3 {
@@ -122,7 +154,7 @@ impl Bench<'_> {
                 let (factors, _) = self.fit(&picks, On::All);
                 let rank = picks[i].rank;
                 let anew = match self.problem.candidates[candidate].source {
-                    Source::Carried => self.carried(&picks).remove(&candidate),
+                    Source::Carried => self.best_carried(&picks, i),
                     _ => Some(self.changed(candidate, &picks.clone(), &factors)),
                 };
                 if let Some(anew) = anew {

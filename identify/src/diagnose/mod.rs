@@ -33,6 +33,7 @@ mod search;
 mod settle;
 mod tilt;
 mod tuning;
+mod untold;
 
 use serde::Serialize;
 
@@ -41,7 +42,7 @@ pub use column::Column;
 pub use disturbance::{Budget, Disturbance, Quantity};
 pub use drifts::drifts;
 pub use evidence::Evidence;
-pub use noise::{effective_samples, white_noise};
+pub use noise::{ROUNDING, effective_samples, white_noise};
 pub use problem::{
     Candidate, Choice, Effect, EffectParameter, Fault, Layout, Nature, NoSupply, Problem, Reading,
     Sign, Source, Stretch, Supply,
@@ -50,13 +51,9 @@ pub use readings::readings;
 pub use tilt::{Sensitivity, Tilt};
 
 use bench::{Bench, Pick};
+use evidence::LEAST_GAIN;
 use pool::{On, dot};
 use reproducible::reproducible;
-
-/// Share of a channel's squared residual that must come again to be called unexplained.
-const UNEXPLAINED: f64 = 0.1;
-/// The same, in squares of the channel's white noise.
-const ABOVE_NOISE: f64 = 0.05;
 
 /// Kinds of friction of which a drift is a change.
 const FRICTION: [&str; 2] = ["viscous_friction", "coulomb_friction"];
@@ -137,6 +134,8 @@ pub struct Diagnosis {
     pub effects: Vec<FoundEffect>,
     /// All candidates, those that explain most first.
     pub candidates: Vec<Considered>,
+    /// What the recordings leave open: effects as large as a drive's force would hide in what the model has.
+    pub untold: Vec<Effect>,
     /// What is left in the end, `[channel][sample]`.
     pub rest: Vec<Vec<f64>>,
     /// Share of each channel's squared rest that comes again where it was not fitted.
@@ -164,14 +163,17 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
         ladder.push(bench.rung(&before, &step.picks, step.evidence));
         before.clone_from(&step.picks);
     }
+    let (picks, left) = bench.above_the_unexplained(picks);
+    if picks.len() < before.len() {
+        ladder.push(bench.rung(&before, &picks, None));
+    }
+    let Left {
+        rest,
+        again,
+        unexplained,
+    } = left;
     let aliases = bench.aliases(&picks);
     bench.weigh(&picks);
-    let (factors, _) = bench.fit(&picks, On::All);
-    let rest = bench.rest(&picks, &factors);
-    let again = reproducible(&problem.layout, &problem.variables, &rest);
-    let unexplained: Vec<usize> = (0..rest.len())
-        .filter(|d| bench.is_unexplained(*d, &rest[*d], again[*d]))
-        .collect();
     let (budgets, coloured) = bench.budgets(&picks, &rest, &again);
     disturbances.extend(bench.disturbances(&picks));
     disturbances.extend(coloured);
@@ -201,6 +203,7 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
         (true, false) => Verdict::MissingEffect,
     };
     let candidates = bench.considered(&picks, &found, &alone);
+    let untold = bench.untold(&picks, &rest);
     Diagnosis {
         verdict,
         noise_floor: noise_floor(&budgets),
@@ -209,6 +212,7 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
         ladder,
         effects,
         candidates,
+        untold,
         rest,
         reproducible: again,
         unexplained,
@@ -247,12 +251,78 @@ fn noise_floor(budgets: &[Budget]) -> f64 {
     }
 }
 
+/// What a set leaves.
+struct Left {
+    /// `[channel][sample]`
+    rest: Vec<Vec<f64>>,
+    /// Share of each channel's squares that comes again.
+    again: Vec<f64>,
+    /// Channels of which that is more than noise.
+    unexplained: Vec<usize>,
+}
+
 impl Bench<'_> {
-    /// Whether what is left of a channel is more than noise: it comes again with the state.
+    fn left(&mut self, picks: &[Pick]) -> Left {
+        self.weigh(picks);
+        let (factors, _) = self.fit(picks, On::All);
+        let rest = self.rest(picks, &factors);
+        let problem = self.problem;
+        let again = reproducible(&problem.layout, &problem.variables, &rest);
+        let unexplained = (0..rest.len())
+            .filter(|d| self.is_unexplained(*d, &rest[*d], again[*d]))
+            .collect();
+        Left {
+            rest,
+            again,
+            unexplained,
+        }
+    }
+
+    /// A set without members that explain less than what stays unexplained where they act, and what it leaves: part of a law that
+    /// nobody knows is as likely there as the effect.
+    fn above_the_unexplained(&mut self, mut picks: Vec<Pick>) -> (Vec<Pick>, Left) {
+        loop {
+            let left = self.left(&picks);
+            let mut least: Option<(f64, Vec<Pick>)> = None;
+            for i in 0..picks.len() {
+                let channels = self.acted_on(&picks[i..=i]);
+                let squares =
+                    |rest: &[Vec<f64>], d: usize| self.weights[d] * dot(&rest[d], &rest[d]);
+                let unexplained = channels.iter().filter(|d| left.unexplained.contains(d));
+                let stays: f64 = unexplained
+                    .map(|d| left.again[*d] * squares(&left.rest, *d))
+                    .sum();
+                if stays <= 0.0 {
+                    continue;
+                }
+                let mut fewer = picks.clone();
+                fewer.remove(i);
+                let fewer = self.refresh(fewer);
+                let (factors, _) = self.fit(&fewer, On::All);
+                let rest = self.rest(&fewer, &factors);
+                let squares =
+                    |rest: &[Vec<f64>], d: usize| self.weights[d] * dot(&rest[d], &rest[d]);
+                let gains = channels
+                    .iter()
+                    .map(|d| squares(&rest, *d) - squares(&left.rest, *d));
+                let share = gains.sum::<f64>() / stays;
+                if share < 1.0 && least.as_ref().is_none_or(|(other, _)| share < *other) {
+                    least = Some((share, fewer));
+                }
+            }
+            match least {
+                Some((_, fewer)) => picks = fewer,
+                None => return (picks, left),
+            }
+        }
+    }
+
+    /// Whether what is left of a channel is more than noise: it comes again with the state, by a share that an effect would be
+    /// added for.
     fn is_unexplained(&self, channel: usize, rest: &[f64], again: f64) -> bool {
         let squares = dot(rest, rest) / rest.len().max(1) as f64;
         let noise = self.problem.noise[channel].powi(2);
-        squares > noise && again > UNEXPLAINED && again * squares > ABOVE_NOISE * noise
+        squares > noise && again > LEAST_GAIN
     }
 
     /// Share of the squared error of the model as it is that each candidate explains alone.
@@ -360,7 +430,7 @@ impl Bench<'_> {
                 };
                 let why = if trial.wrong_sign.contains(&picks.len()) {
                     "sign"
-                } else if gain < evidence::LEAST_GAIN {
+                } else if gain < LEAST_GAIN {
                     "explains nothing that is left"
                 } else {
                     "another explains more"

@@ -2,6 +2,9 @@
 
 pub use crate::signal::white_noise;
 
+/// Errors below this share of a force are rounding, of the recording or of whatever simulated it.
+pub const ROUNDING: f64 = 3e-6;
+
 /// How many independent values a series is worth: `n / (1 + 2 sum of its autocorrelations)`, summed as long as pairs of
 /// neighbours stay positive (C. J. Geyer, Statistical Science 7, 1992).
 pub fn effective_samples(values: &[f64]) -> f64 {

@@ -80,7 +80,10 @@ impl Bench<'_> {
                 if samples.abs() < SLIGHT {
                     changes.extend(slopes(part).map(|slope| -slope / stretch.step));
                 } else if reading.fault == Fault::Late {
-                    let late = (0..part.len()).map(|i| between(part, i as f64 - samples));
+                    let rates = self.problem.friction.get(3 * d);
+                    let rates = rates.and_then(|column| column.0[d].as_deref());
+                    let rates = rates.map(|rates| &rates[start..start + stretch.samples]);
+                    let late = (0..part.len()).map(|i| between(part, rates, i as f64 - samples));
                     changes.extend(late.zip(part).map(|(then, now)| (then - now) / value));
                 } else {
                     let filtered = lagging(part, samples.abs()).into_iter().zip(part);
@@ -167,8 +170,9 @@ fn lagging(values: &[f64], constant: f64) -> Vec<f64> {
     values.iter().map(follow).collect()
 }
 
-/// A series at a place between its samples.
-fn between(values: &[f64], at: f64) -> f64 {
+/// A force at a place between its samples. Where the drive turns round between two of them friction jumps: up to there the force
+/// goes on as before, and from there on as after.
+fn between(values: &[f64], rates: Option<&[f64]>, at: f64) -> f64 {
     let last = values.len() - 1;
     let at = at.clamp(0.0, last as f64);
     #[allow(
@@ -178,12 +182,31 @@ fn between(values: &[f64], at: f64) -> f64 {
     )]
     let k = at.floor() as usize;
     let share = at - at.floor();
-    values[k] + share * (values[(k + 1).min(last)] - values[k])
+    let turns = rates.filter(|rates| k < last && rates[k] * rates[k + 1] < 0.0);
+    match turns.map(|rates| rates[k] / (rates[k] - rates[k + 1])) {
+        Some(turn) if share < turn => values[k] + share * (values[k] - values[k.saturating_sub(1)]),
+        Some(_) => values[k + 1] - (1.0 - share) * (values[(k + 2).min(last)] - values[k + 1]),
+        None => values[k] + share * (values[(k + 1).min(last)] - values[k]),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Between samples a force is straight, but for a jump at the instant at which the drive turns round.
+    #[test]
+    fn a_late_force_jumps_where_the_drive_turns_round() {
+        let rate = |t: f64| t - 20.3;
+        let force = |t: f64| 3.0 * t + 50.0 * rate(t).signum();
+        let [rates, values]: [Vec<f64>; 2] = [&rate as &dyn Fn(f64) -> f64, &force]
+            .map(|of| (0..40).map(|i| of(f64::from(i))).collect());
+        for i in 1..390 {
+            let t = 0.1 * f64::from(i) + 0.05;
+            let said = between(&values, Some(&rates), t);
+            assert!((said - force(t)).abs() < 1e-9, "{t}: {said}");
+        }
+    }
 
     /// A low-pass of first order answers a step by an exponential and follows a ramp at the distance of its time constant.
     #[test]

@@ -65,28 +65,9 @@ impl Bench<'_> {
         loop {
             self.weigh(&accepted);
             self.look(&accepted);
-            let trials = self.grow(&accepted, &beam);
-            let (grown, exchanged): (Vec<&Trial>, Vec<&Trial>) =
-                trials.iter().partition(|t| self.is_addition(&accepted, t));
-            let mut additions = grown.into_iter();
+            let mut trials = self.grow(&accepted, &beam);
             refused = Vec::new();
-            let chosen = self.first_that_holds(&accepted, &mut additions, &mut refused);
-            // Another set altogether must be much better than one that only grows.
-            let bound = chosen
-                .as_ref()
-                .map_or(f64::INFINITY, |(trial, _)| trial.score - MUCH_BETTER);
-            let mut others = exchanged.into_iter().filter(|t| t.score < bound);
-            let other = self.first_that_holds(&accepted, &mut others, &mut Vec::new());
-            let other = other.filter(|(other, _)| {
-                chosen.as_ref().is_none_or(|(grown, _)| {
-                    let mut differ = difference(&other.picks, &grown.picks);
-                    differ.extend(difference(&grown.picks, &other.picks));
-                    let channels = self.acted_on(&differ);
-                    let evidence = self.evidence(&grown.picks, &other.picks, &channels);
-                    evidence.holds() && evidence.gain > LARGE_CHANGE
-                })
-            });
-            let Some((trial, evidence)) = other.or(chosen) else {
+            let Some(step) = self.step(&accepted, &mut trials, &mut refused) else {
                 break;
             };
             beam = trials
@@ -95,21 +76,11 @@ impl Bench<'_> {
                 .take(BEAM)
                 .map(|other| other.picks.clone())
                 .collect();
-            let (trial, evidence) = self
-                .simple_first(&accepted, &trial)
-                .unwrap_or((trial, evidence));
-            let (picks, evidence) = self.simplest(&accepted, trial, evidence, &trials);
-            let refined = self.refine(picks);
-            let polished = self.polish(refined);
-            let refreshed = self.refresh(polished);
-            accepted = self.trial(refreshed).picks;
+            accepted.clone_from(&step.picks);
             if !beam.contains(&accepted) {
                 beam.insert(0, accepted.clone());
             }
-            steps.push(Step {
-                picks: accepted.clone(),
-                evidence: Some(evidence),
-            });
+            steps.push(step);
             if accepted.len() >= MOST {
                 break;
             }
@@ -132,12 +103,75 @@ impl Bench<'_> {
         Found { steps, refused }
     }
 
+    /// The next step from what is accepted, with all constants and columns that depend on the fit made anew. What does not keep
+    /// then what it promised leaves the trials.
+    fn step(
+        &mut self,
+        accepted: &[Pick],
+        trials: &mut Vec<Trial>,
+        refused: &mut Vec<Refused>,
+    ) -> Option<Step> {
+        loop {
+            let (trial, evidence) = self.next(accepted, trials, refused)?;
+            let promised = members(&trial.picks);
+            let (trial, evidence) = self
+                .simple_first(accepted, &trial)
+                .unwrap_or((trial, evidence));
+            let (picks, _) = self.simplest(accepted, trial, evidence, trials);
+            let refined = self.refine(picks);
+            let polished = self.polish(refined);
+            let refreshed = self.refresh(polished);
+            let settled = self.trial(refreshed);
+            let evidence = self.between(accepted, &settled.picks);
+            if settled.wrong_sign.is_empty() && evidence.holds() {
+                return Some(Step {
+                    picks: settled.picks,
+                    evidence: Some(evidence),
+                });
+            }
+            trials.retain(|trial| members(&trial.picks) != promised);
+        }
+    }
+
+    /// The first of the trials that evidence speaks for.
+    fn next(
+        &mut self,
+        accepted: &[Pick],
+        trials: &[Trial],
+        refused: &mut Vec<Refused>,
+    ) -> Option<(Trial, Evidence)> {
+        let (grown, exchanged): (Vec<&Trial>, Vec<&Trial>) =
+            trials.iter().partition(|t| self.is_addition(accepted, t));
+        let mut additions = grown.into_iter();
+        refused.clear();
+        let chosen = self.first_that_holds(accepted, &mut additions, refused);
+        // Another set altogether must be much better than one that only grows.
+        let bound = chosen
+            .as_ref()
+            .map_or(f64::INFINITY, |(trial, _)| trial.score - MUCH_BETTER);
+        let mut others = exchanged.into_iter().filter(|t| t.score < bound);
+        let other = self.first_that_holds(accepted, &mut others, &mut Vec::new());
+        let other = other.filter(|(other, _)| {
+            chosen.as_ref().is_none_or(|(grown, _)| {
+                let evidence = self.between(&grown.picks, &other.picks);
+                evidence.holds() && evidence.gain > LARGE_CHANGE
+            })
+        });
+        other.or(chosen)
+    }
+
+    /// Evidence for one set beside another, on the channels on which they differ.
+    fn between(&self, before: &[Pick], after: &[Pick]) -> Evidence {
+        let mut differ = difference(after, before);
+        differ.extend(difference(before, after));
+        self.evidence(before, after, &self.acted_on(&differ))
+    }
+
     /// Whether evidence speaks for one set beside another that is to take its place.
     pub(crate) fn is_worse(&mut self, settled: &[Pick], before: &[Pick]) -> bool {
         self.weigh(before);
         let channels: Vec<usize> = (0..self.weights.len()).collect();
-        let evidence = self.evidence(settled, before, &channels);
-        evidence.gain > LARGE_CHANGE && evidence.holds()
+        self.evidence(settled, before, &channels).holds()
     }
 
     /// Whether a set is another one and a further effect, which may take the place of what it holds.
@@ -327,13 +361,21 @@ impl Bench<'_> {
             let own = others.remove(i);
             let table = self.table(&picks);
             let now = self.try_in(&table, picks.clone());
+            // The constants of others may suit this member and no kin of it.
+            let others_are_searched = others.iter().any(|other| is_searched(self, other));
+            let is_kin = |bench: &Self, rival: &Pick| {
+                let [one, two] = [rival, &own].map(|pick| &bench.candidate(pick).effect);
+                others_are_searched
+                    && (one.kind == two.kind || one.at.iter().any(|place| two.at.contains(place)))
+            };
             let rivals: Vec<Pick> = self
                 .present
                 .iter()
                 .flatten()
                 .filter(|rival| {
                     let is_new = picks.iter().all(|p| p.candidate != rival.candidate);
-                    is_new && (is_searched(self, rival) || is_searched(self, &own))
+                    let is_tuned = [*rival, &own].iter().any(|pick| is_searched(self, pick));
+                    is_new && (is_tuned || is_kin(self, rival))
                 })
                 .filter(|rival| self.freedoms(rival) <= self.freedoms(&own))
                 .cloned()
@@ -343,7 +385,7 @@ impl Bench<'_> {
                 let mut set = others.clone();
                 set.insert(i, rival);
                 // On another set's constants a rival is judged by its own.
-                let tuned = if is_searched(self, &set[i]) {
+                let tuned = if is_searched(self, &set[i]) || is_kin(self, &set[i]) {
                     self.retune(set)
                 } else if self.try_in(&table, set.clone()).squares > CLOSE * best.squares {
                     continue;

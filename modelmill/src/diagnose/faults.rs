@@ -1,6 +1,7 @@
 //! What is known to be wrong with recordings before anything is looked for: pushes, coarse readings, and what another recording
 //! of the machine does not share. All of it is told, and none of it is left to be taken for an effect.
 
+use modelmill_identify::changes::Moments;
 use modelmill_identify::diagnose::{Disturbance, Problem, Quantity, step_of_values};
 
 use crate::error::Outcome;
@@ -16,8 +17,10 @@ const MARGIN: f64 = 0.15;
 const SHORTEST: f64 = 0.18;
 /// Pushes closer together are one, s.
 const TOGETHER: f64 = 0.3;
-/// What a place explains holds this part of all samples beyond the place.
-const BEYOND: f64 = 0.5;
+/// Samples beyond a place at other times that say whether a force comes again there.
+const FEWEST_BEYOND: usize = 10;
+/// A law of a place, found during an event, leaves less than this part of squares at other times.
+const COMES_AGAIN: f64 = 0.5;
 
 /// What later recordings do not share with the first one; nothing where that cannot be said.
 pub(crate) fn between_runs(model: &Model, recordings: &[&Recording]) -> Vec<Difference> {
@@ -124,7 +127,8 @@ fn coarse(problem: &mut Problem, model: &Model, all: &Runs<'_>) -> Outcome<()> {
     Ok(())
 }
 
-/// Leaves out pushes: events that no place of a coordinate explains.
+/// Leaves out pushes: events that no place of a coordinate explains. A push does not come again where the state comes again; a
+/// stop does, in any of the recordings.
 fn pushes(problem: &mut Problem, all: &Runs<'_>) {
     let events: Vec<Disturbance> = merged(all);
     if events.is_empty() {
@@ -143,31 +147,88 @@ fn pushes(problem: &mut Problem, all: &Runs<'_>) {
             positions.push(one.run.q.iter().map(|q| q[at]).collect::<Vec<f64>>());
         }
     }
+    let channels = problem.layout.channels.iter().enumerate();
+    let concerned: Vec<usize> = channels
+        .filter(|(_, name)| events.iter().any(|event| event.at.contains(name)))
+        .map(|(d, _)| d)
+        .collect();
     let coordinates = positions.first().map_or(0, Vec::len);
     let explains = |i: usize, sign: f64| {
-        let mut of_event: Vec<f64> = positions
-            .iter()
-            .zip(&inside)
-            .filter(|(_, inside)| **inside)
-            .map(|(q, _)| sign * q[i])
-            .collect();
+        let along: Vec<f64> = positions.iter().map(|q| sign * q[i]).collect();
+        let mut of_event = along.iter().zip(&inside).filter(|(_, inside)| **inside);
+        let mut of_event: Vec<f64> = of_event.by_ref().map(|(x, _)| *x).collect();
         of_event.sort_by(f64::total_cmp);
         let Some(place) = of_event.get(of_event.len() / 10) else {
             return false;
         };
-        let beyond = positions.iter().zip(&inside);
-        let beyond: Vec<bool> = beyond
-            .filter(|(q, _)| sign * q[i] >= *place)
-            .map(|(_, inside)| *inside)
-            .collect();
-        let events = beyond.iter().filter(|inside| **inside).count() as f64;
-        events > BEYOND * beyond.len() as f64
+        let depths: Vec<f64> = along.iter().map(|x| x - place).collect();
+        concerned
+            .iter()
+            .any(|d| acts_beyond(problem, *d, &depths, &inside, &about))
     };
     if (0..coordinates).any(|i| explains(i, 1.0) || explains(i, -1.0)) {
         return;
     }
     problem.left_out = vec![about; problem.layout.channels.len()];
     problem.disturbances.extend(events);
+}
+
+/// Whether the force of an event is one that acts beyond a place: the line over the depth that it follows during the event says it
+/// at other times too. Where there are no other times nothing speaks for an event. The model is fitted to what is neither.
+fn acts_beyond(
+    problem: &Problem,
+    channel: usize,
+    depths: &[f64],
+    inside: &[bool],
+    about: &[bool],
+) -> bool {
+    let Some(measured) = problem.measured.0[channel].as_ref() else {
+        return false;
+    };
+    let friction = problem.friction.get(3 * channel..3 * channel + 3);
+    let columns: Vec<Option<&[f64]>> = (problem.base.iter())
+        .chain(friction.unwrap_or_default())
+        .map(|column| column.0[channel].as_deref())
+        .collect();
+    let is_elsewhere = |i: usize| !about[i] && depths[i] < 0.0;
+    let elsewhere: Vec<usize> = (0..measured.len()).filter(|i| is_elsewhere(*i)).collect();
+    let some = |values: &[f64]| -> Vec<f64> { elsewhere.iter().map(|i| values[*i]).collect() };
+    let picked: Vec<Option<Vec<f64>>> = columns.iter().map(|column| column.map(some)).collect();
+    let picked: Vec<Option<&[f64]>> = picked.iter().map(Option::as_deref).collect();
+    let mut moments = Moments::new(columns.len());
+    moments.add_rows(&picked, &some(measured));
+    let factors = moments.solve().values;
+    let rest = |i: usize| {
+        let said = columns.iter().zip(factors.iter());
+        let said = said.map(|(column, factor)| column.map_or(0.0, |values| factor * values[i]));
+        measured[i] - said.sum::<f64>()
+    };
+    let beyond = |is_event: bool| -> Vec<(f64, f64)> {
+        (0..measured.len())
+            .filter(|i| depths[*i] >= 0.0 && if is_event { inside[*i] } else { !about[*i] })
+            .map(|i| (depths[i], rest(i)))
+            .collect()
+    };
+    let (during, otherwise) = (beyond(true), beyond(false));
+    if otherwise.len() < FEWEST_BEYOND {
+        return true;
+    }
+    let Some(line) = line(&during) else {
+        return false;
+    };
+    let left: f64 = otherwise.iter().map(|(x, y)| (y - line(*x)).powi(2)).sum();
+    let whole: f64 = otherwise.iter().map(|(_, y)| y * y).sum();
+    left < COMES_AGAIN * whole
+}
+
+/// The straight line through some points by least squares.
+fn line(points: &[(f64, f64)]) -> Option<impl Fn(f64) -> f64 + use<>> {
+    let n = points.len() as f64;
+    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
+    let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
+    let spread = mean(&|p| (p.0 - x).powi(2));
+    let slope = mean(&|p| (p.0 - x) * (p.1 - y)) / spread;
+    (spread > 0.0).then_some(move |at: f64| y + slope * (at - x))
 }
 
 /// Events of all recordings, those that are close together as one, without the short ones.

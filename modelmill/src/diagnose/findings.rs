@@ -52,6 +52,8 @@ pub struct Findings {
     pub diagnosis: Diagnosis,
     /// What is missing, with what is known of it.
     pub missing: Vec<Missing>,
+    /// What the recordings leave open.
+    pub untold: Vec<Untold>,
     /// Base parameters of the bodies that are not what the file says, the farthest first.
     pub off_nominal: Vec<OffNominal>,
     /// The same question with all parameters held at their nominal values, where some are off and it was asked for.
@@ -95,6 +97,17 @@ pub struct Missing {
     pub separate_by: Option<String>,
     /// The motion that would tell it from these, if one can be sought.
     pub separation: Option<Separation>,
+}
+
+/// An effect that the recordings leave open.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Untold {
+    /// Its kind and places.
+    pub effect: Effect,
+    /// Why they do.
+    pub says: String,
+    /// Which experiment would tell.
+    pub separate_by: String,
 }
 
 /// Effects between which a motion is to decide.
@@ -198,6 +211,7 @@ impl Model {
         let mut findings = Findings {
             diagnosis: answer.diagnosis.clone(),
             missing: Vec::new(),
+            untold: Vec::new(),
             off_nominal: Vec::new(),
             with_nominal: None,
             regions: Vec::new(),
@@ -213,6 +227,7 @@ impl Model {
             variables,
         };
         findings.missing = missing(&findings);
+        findings.untold = untold(&findings);
         findings.off_nominal = off_nominal(findings.last());
         findings.regions = regions(&findings);
         if question.again_with_nominal && held != Held::All && !findings.off_nominal.is_empty() {
@@ -292,6 +307,26 @@ fn missing(findings: &Findings) -> Vec<Missing> {
             separation: separation(findings, found),
         })
         .collect()
+}
+
+fn untold(findings: &Findings) -> Vec<Untold> {
+    let of = |effect: &Effect| {
+        let mut kinds = findings.answer.candidates.kinds.iter();
+        let kind = kinds.find(|kind| kind.name == effect.kind);
+        let place = effect.at.join(" and ");
+        let known = kind.map_or("", |kind| kind.doubles.as_str());
+        let more = format!(
+            "A motion over more of the travel of {place}, at other speeds and with another load, tells it from what the model has."
+        );
+        Untold {
+            effect: effect.clone(),
+            says: "along these motions its force is all but a combination of forces that the model has, so that even one as large \
+                   as the drive's own is neither seen nor excluded"
+                .to_owned(),
+            separate_by: format!("{known} {more}").trim().to_owned(),
+        }
+    };
+    findings.diagnosis.untold.iter().map(of).collect()
 }
 
 /// Unit of a constant of a found effect at its places.

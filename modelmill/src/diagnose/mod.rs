@@ -24,10 +24,11 @@ pub mod words;
 pub(crate) use candidates::sign;
 pub use chosen::Named;
 pub(crate) use chosen::{Chosen, Constants, base, choose};
-pub use findings::{Estimate, Findings, Missing, OffNominal, Question, Separation, WithNominal};
+pub use findings::{
+    Estimate, Findings, Missing, OffNominal, Question, Separation, Untold, WithNominal,
+};
 pub use modelmill_identify::diagnose::{
     Budget, Diagnosis, Disturbance, Effect, Quantity, Rung, Verdict,
 };
 pub use problem::Held;
-pub(crate) use problem::ROUNDING;
 pub use versions::{Along, Version};

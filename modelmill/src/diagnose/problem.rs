@@ -2,8 +2,8 @@
 
 use modelmill_codegen::Evaluator;
 use modelmill_identify::diagnose::{
-    Column, Considered, Diagnosis, Disturbance, Effect, Problem, Source, Supply, diagnose, drifts,
-    readings, white_noise,
+    Column, Considered, Diagnosis, Disturbance, Effect, Problem, ROUNDING, Source, Supply,
+    diagnose, drifts, readings, white_noise,
 };
 
 use crate::along::drive_rates;
@@ -22,9 +22,6 @@ use super::memory::memories;
 use super::numbers::{layout, stack, variables};
 use super::words;
 use crate::regressors::{Runs, regressor};
-
-/// Errors below this share of a force are rounding, of the recording or of whatever simulated it.
-pub(crate) const ROUNDING: f64 = 3e-6;
 
 /// Which parameters keep their nominal values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -189,7 +186,7 @@ fn problem(
     let made = columns(candidates, model, all)?;
     let problem = Problem {
         layout: layout(model, all),
-        noise: measured.iter().map(|force| noise(force)).collect(),
+        noise: noises(&measured, all)?,
         measured: Column::new(measured),
         base: regressor(all, &Evaluator::new(&model.derivation), model)?,
         candidates: made.candidates,
@@ -252,6 +249,19 @@ fn friction(model: &Model, all: &Runs<'_>) -> Outcome<Vec<Column>> {
         }
     }
     Ok(friction)
+}
+
+/// White noise of each force. Where few samples are kept motion passes for noise: it is no more than that of the recorded ones.
+fn noises(measured: &[Vec<f64>], all: &Runs<'_>) -> Outcome<Vec<f64>> {
+    let mut noises = Vec::with_capacity(measured.len());
+    for (d, kept) in measured.iter().enumerate() {
+        let mut recorded = Vec::new();
+        for (one, _) in all {
+            recorded.extend_from_slice(&one.run.measured()?[d]);
+        }
+        noises.push(noise(kept).min(noise(&recorded)));
+    }
+    Ok(noises)
 }
 
 /// White noise of a force, but not less than what rounding leaves of it.

@@ -2,8 +2,8 @@
 
 use modelmill_identify::diagnose::{Diagnosis, Disturbance, Effect, Rung, Verdict};
 
-use crate::diagnose::ROUNDING;
 use crate::text::table::{number, percent, significant};
+use modelmill_identify::diagnose::ROUNDING;
 
 /// Where errors are judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

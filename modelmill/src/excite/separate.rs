@@ -10,11 +10,12 @@ use modelmill_identify::{PreparedAs, Run};
 use nalgebra::DMatrix;
 
 use crate::diagnose::words;
-use crate::diagnose::{Chosen, Constants, Named, ROUNDING, base, choose};
+use crate::diagnose::{Chosen, Constants, Named, base, choose};
 use crate::error::{Error, Outcome};
 use crate::excite::plant::ModelPlant;
 use crate::model::Model;
 use crate::stretch::Stretch;
+use modelmill_identify::diagnose::ROUNDING;
 
 /// What is to be told apart, derived.
 pub(crate) struct Pair {

@@ -87,6 +87,9 @@ impl Findings {
             "steps": steps(&diagnosis.ladder),
             "effects": effects,
             "candidates": candidates,
+            "untold": self.untold.iter().map(|one| {
+                json!({"kind": one.effect.kind, "at": one.effect.at, "says": one.says, "separate_by": one.separate_by})
+            }).collect::<Vec<_>>(),
             "parameters_off_nominal": off,
             "unexplained": unexplained,
             "data": self.notes,
@@ -146,6 +149,7 @@ impl Findings {
             lines.push("  No region of coordinates, rates, loads or time stands out.".to_owned());
         }
         self.refused_text(style, &mut lines);
+        self.untold_text(style, &mut lines);
         self.off_text(style, spelling, &mut lines);
         if !self.entries.is_empty() {
             lines.push(String::new());
@@ -282,6 +286,24 @@ impl Findings {
             ],
             &rows,
         ));
+    }
+
+    /// What the recordings leave open, with the experiment that would tell.
+    fn untold_text(&self, style: Style, lines: &mut Vec<String>) {
+        if self.untold.is_empty() {
+            return;
+        }
+        lines.push(String::new());
+        lines.push(style.bold("what these recordings cannot tell"));
+        for one in &self.untold {
+            let says = words::lines(
+                &format!("{}: {}.", words::effect(&one.effect), one.says),
+                98,
+            );
+            lines.extend(says.iter().map(|line| format!("  {line}")));
+            let wrapped = words::lines(&one.separate_by, 96);
+            lines.extend(wrapped.iter().map(|line| style.dim(&format!("    {line}"))));
+        }
     }
 
     /// Parameters that differ from what the file says.
