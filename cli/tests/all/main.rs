@@ -3,6 +3,7 @@
 //! One target for all of them, since each target links the whole program anew.
 
 #[allow(dead_code, reason = "what only the run of the benchmark calls")]
+#[path = "../../benches/hidden_effects/parts.rs"]
 mod benchmark;
 #[cfg(target_os = "linux")]
 mod bombs;
