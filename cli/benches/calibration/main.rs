@@ -46,7 +46,12 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), String> {
-    let options = Options::read(&[("count", "300"), ("seed", "1"), ("list", ""), ("program", "")])?;
+    let options = Options::read(&[
+        ("count", "300"),
+        ("seed", "1"),
+        ("list", ""),
+        ("program", ""),
+    ])?;
     let seed: u64 = options.number("seed")?;
     let plant = Plant::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec"))?;
     let numbers: Vec<u64> = (1..=options.number("count")?).collect();
@@ -91,7 +96,8 @@ fn run() -> Result<(), String> {
         }
     }
     if let path @ [_, ..] = options.text("list").as_bytes() {
-        let line = |f: &Finding| format!("{:.4} {} {}\n", f.probability, u8::from(f.is_true), f.says);
+        let line =
+            |f: &Finding| format!("{:.4} {} {}\n", f.probability, u8::from(f.is_true), f.says);
         let text: String = findings.iter().map(line).collect();
         write(Path::new(&*String::from_utf8_lossy(path)), &text)?;
     }
@@ -103,7 +109,9 @@ fn report(findings: &[Finding], recordings: usize, seed: u64) -> String {
     let n = findings.len().max(1) as f64;
     let outcome = |f: &Finding| f64::from(u8::from(f.is_true));
     let share = findings.iter().map(outcome).sum::<f64>() / n;
-    let brier = findings.iter().map(|f| (f.probability - outcome(f)).powi(2));
+    let brier = findings
+        .iter()
+        .map(|f| (f.probability - outcome(f)).powi(2));
     let mut text = format!(
         "seed {seed}, {recordings} pairs of recordings, {} findings, {:.1} % of them true\nBrier score {:.4}; {:.4} for who always \
          says {share:.3}\n\n{:<12}{:>10}{:>12}{:>8}{:>14}\n",
@@ -120,7 +128,8 @@ fn report(findings: &[Finding], recordings: usize, seed: u64) -> String {
     let mut inside = [0, 0];
     for bin in 0..BINS {
         let [low, high] = [bin, bin + 1].map(|k| k as f64 / BINS as f64);
-        let is_in = |f: &&Finding| f.probability >= low && (f.probability < high || bin + 1 == BINS);
+        let is_in =
+            |f: &&Finding| f.probability >= low && (f.probability < high || bin + 1 == BINS);
         let own: Vec<&Finding> = findings.iter().filter(is_in).collect();
         if own.is_empty() {
             continue;
@@ -139,7 +148,10 @@ fn report(findings: &[Finding], recordings: usize, seed: u64) -> String {
             if holds { "" } else { "  outside" }
         );
     }
-    text + &format!("{} of {} bins within their binomial intervals\n", inside[0], inside[1])
+    text + &format!(
+        "{} of {} bins within their binomial intervals\n",
+        inside[0], inside[1]
+    )
 }
 
 /// The least and the most of so many that come true, each with a probability, all but [`BEYOND`] of the time.

@@ -71,11 +71,21 @@ impl Disturbance {
             0 | 1 => Self::None,
             2 | 3 => Self::Coloured {
                 corner: three_digits(random.log_between(1.0, 60.0)),
-                fall: if random.chance(0.5) { Fall::Steep } else { Fall::Gentle },
+                fall: if random.chance(0.5) {
+                    Fall::Steep
+                } else {
+                    Fall::Gentle
+                },
             },
-            4 => Self::Hum { size: three_digits(random.between(2.0, 8.0)) },
-            5 => Self::Outliers { size: three_digits(random.between(80.0, 300.0)) },
-            6 => Self::Steps { size: three_digits(random.between(5.0, 25.0)) },
+            4 => Self::Hum {
+                size: three_digits(random.between(2.0, 8.0)),
+            },
+            5 => Self::Outliers {
+                size: three_digits(random.between(80.0, 300.0)),
+            },
+            6 => Self::Steps {
+                size: three_digits(random.between(5.0, 25.0)),
+            },
             7 => Self::Drift {
                 drive,
                 size: three_digits(random.sign() * random.between(2.0, 8.0)),
@@ -86,7 +96,9 @@ impl Disturbance {
                 drive: random.chance(0.5).then_some(drive),
                 by: three_digits(random.between(1e-3, 4e-3)),
             },
-            9 | 11 => Self::Lag { corner: three_digits(random.log_between(10.0, 40.0)) },
+            9 | 11 => Self::Lag {
+                corner: three_digits(random.log_between(10.0, 40.0)),
+            },
             12 => Self::Scale {
                 drive,
                 part: three_digits(random.sign() * random.between(0.03, 0.08)),
@@ -96,8 +108,12 @@ impl Disturbance {
                 size: three_digits(random.between(0.5e-3, 2e-3)),
                 times: [1, 2, 4, 8][random.below(4)],
             },
-            14 => Self::Jitter { part: three_digits(random.between(0.02, 0.08)) },
-            _ if random.chance(0.5) => Self::Payload { mass: three_digits(random.between(1.0, 4.0)) },
+            14 => Self::Jitter {
+                part: three_digits(random.between(0.02, 0.08)),
+            },
+            _ if random.chance(0.5) => Self::Payload {
+                mass: three_digits(random.between(1.0, 4.0)),
+            },
             _ => Self::Push {
                 size: three_digits(random.sign() * random.between(20.0, 60.0)),
                 at: random.between(0.1, 0.8),
@@ -121,7 +137,8 @@ impl Disturbance {
     /// Records fit (0) or check (1) of a case with it.
     pub(crate) fn record(self, case: &Case, seed: u64, which: usize) -> Result<Recorded, String> {
         let course = &case.courses[which];
-        let stream = |purpose: u64| Random::new(seed, case.number, 300 + 50 * which as u64 + purpose);
+        let stream =
+            |purpose: u64| Random::new(seed, case.number, 300 + 50 * which as u64 + purpose);
         let mut random = stream(0);
         let stamps = course.times(RATE);
         let times = match self {
@@ -181,7 +198,13 @@ impl Disturbance {
                         Self::Coloured { corner, fall } => Some((corner, fall)),
                         _ => None,
                     };
-                    noise(&mut stream(10 + k as u64), along.times.len(), RATE, case.noise, colour)
+                    noise(
+                        &mut stream(10 + k as u64),
+                        along.times.len(),
+                        RATE,
+                        case.noise,
+                        colour,
+                    )
                 })
                 .collect(),
             |k| stream(20 + k as u64),
@@ -218,14 +241,20 @@ impl Disturbance {
                         let slope = *f - before;
                         let keeps = (-constant.recip()).exp();
                         before = *f;
-                        state = *f - slope * constant + (state - *f + slope + slope * constant) * keeps;
+                        state =
+                            *f - slope * constant + (state - *f + slope + slope * constant) * keeps;
                         *f = state;
                     }
                     _ => {}
                 }
             }
         }
-        if let Self::Eccentric { coordinate, size, times } = self {
+        if let Self::Eccentric {
+            coordinate,
+            size,
+            times,
+        } = self
+        {
             for q in &mut samples.positions[coordinate] {
                 *q += size * (f64::from(times) * *q).sin();
             }

@@ -14,6 +14,8 @@ pub(crate) mod coloured;
 pub(crate) mod columns;
 #[path = "course.rs"]
 pub(crate) mod course;
+#[path = "disturbance.rs"]
+pub(crate) mod disturbance;
 #[path = "hidden.rs"]
 pub(crate) mod hidden;
 #[path = "judge.rs"]
@@ -34,5 +36,3 @@ pub(crate) mod span;
 pub(crate) mod table;
 #[path = "work.rs"]
 pub(crate) mod work;
-#[path = "disturbance.rs"]
-pub(crate) mod disturbance;
