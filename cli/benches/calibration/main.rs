@@ -66,11 +66,17 @@ fn run() -> Result<(), String> {
         let (answer, _) = ask::diagnose(program.as_os_str(), &plant.model, &files[0], &files[1]);
         let mut truth = atoms(&case.placed());
         truth.extend(disturbance.makes_true());
-        if let Some(outside) = &case.outside
-            && outside.law == Law::Hysteresis
-        {
-            // Two names for friction that remembers.
-            truth.insert(("dahl_friction".to_owned(), DRIVES[outside.at].to_owned()));
+        if truth.iter().any(|(kind, _)| kind == "time_delay") {
+            truth.extend(DRIVES.map(|drive| ("time_delay".to_owned(), drive.to_owned())));
+        }
+        if let Some(outside) = &case.outside {
+            // Other names for friction that remembers, and for the mean of friction that differs by place.
+            let kind = match outside.law {
+                Law::Hysteresis => "dahl_friction",
+                Law::FrictionByPlace => "viscous_friction",
+                _ => "",
+            };
+            truth.insert((kind.to_owned(), DRIVES[outside.at].to_owned()));
         }
         let answer = match answer {
             Ok(answer) => answer,

@@ -124,11 +124,15 @@ impl Disturbance {
     /// What may be claimed because of it, kind by place.
     pub(crate) fn makes_true(self) -> Vec<Atom> {
         let of = |kind: &str, place: &str| (kind.to_owned(), place.to_owned());
+        let everywhere = |kind: &str| {
+            let places = DRIVES.iter().chain(&["force"]);
+            places.map(|place| of(kind, place)).collect()
+        };
         match self {
             Self::Fades { .. } => DRIVES.map(|drive| of("friction_drift", drive)).to_vec(),
-            Self::Late { drive: None, .. } => vec![of("time_delay", "force")],
+            Self::Late { drive: None, .. } => everywhere("time_delay"),
             Self::Late { drive: Some(d), .. } => vec![of("time_delay", DRIVES[d])],
-            Self::Lag { .. } => vec![of("force_lag", "force")],
+            Self::Lag { .. } => everywhere("force_lag"),
             Self::Scale { drive, .. } => vec![of("drive_gain", DRIVES[drive])],
             _ => Vec::new(),
         }
@@ -180,6 +184,14 @@ impl Disturbance {
                     }
                 }
             }
+            Self::Lag { corner } => {
+                for d in 0..DRIVES.len() {
+                    lag(
+                        forces.iter_mut().skip(d).step_by(DRIVES.len()),
+                        RATE / (TAU * corner),
+                    );
+                }
+            }
             Self::Payload { mass } if which == 1 => {
                 let at = Placed::new("point_mass", &["R3m_right"]);
                 let payload = effect(&case.rig, &at, &[("m", mass)])?;
@@ -220,8 +232,6 @@ impl Disturbance {
         let times = &samples.times;
         let duration = times.last().copied().unwrap_or(1.0);
         for (d, force) in samples.forces.iter_mut().enumerate() {
-            let mut state = force.first().copied().unwrap_or(0.0);
-            let mut before = state;
             for (f, t) in force.iter_mut().zip(times) {
                 match self {
                     Self::Hum { size } => *f += size * (TAU * 50.0 * t + d as f64).sin(),
@@ -234,16 +244,6 @@ impl Disturbance {
                         if (0.0..1.0).contains(&phase) {
                             *f += size * (PI * phase).sin() * [1.0, 0.6][d % 2];
                         }
-                    }
-                    Self::Lag { corner } => {
-                        // Exact for forces that are straight between samples.
-                        let constant = RATE / (TAU * corner);
-                        let slope = *f - before;
-                        let keeps = (-constant.recip()).exp();
-                        before = *f;
-                        state =
-                            *f - slope * constant + (state - *f + slope + slope * constant) * keeps;
-                        *f = state;
                     }
                     _ => {}
                 }
@@ -259,6 +259,20 @@ impl Disturbance {
                 *q += size * (f64::from(times) * *q).sin();
             }
         }
+    }
+}
+
+/// A low-pass of first order whose time constant is so many samples, exact for forces that are straight between them.
+fn lag<'a>(forces: impl Iterator<Item = &'a mut f64>, constant: f64) {
+    let keeps = (-constant.recip()).exp();
+    let mut past: Option<(f64, f64)> = None;
+    for force in forces {
+        let now = *force;
+        let (before, state) = past.unwrap_or((now, now));
+        let slope = now - before;
+        let state = now - slope * constant + (state - before + slope * constant) * keeps;
+        past = Some((now, state));
+        *force = state;
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! `cargo bench -p modelmill-cli --bench sensitivity -- [--seeds 6] [--calm 60] [--figure FILE.svg] [--only KIND]
 //! [--program PATH]`. An effect is as large as the square root of the squares that it adds to both recordings, beside base
-//! parameters, in units of the white noise: d'. A matched filter (W. Peterson, T. Birdsall, W. Fox 1954) at the false-alarm
+//! parameters, in units of the white noise: d'; of a kind that holds a simpler one, what it adds beside that. A matched filter (W. Peterson, T. Birdsall, W. Fox 1954) at the false-alarm
 //! rate of `diagnose` on `--calm` recordings without anything finds half of the effects whose d' is the two-sided
 //! quantile of that rate. For each seed, motion and noise, the size at which `diagnose` begins to name the effect, by itself or
 //! among what it cannot be told from, is found by halving; half of the effects are found at the median over the seeds.
@@ -17,6 +17,7 @@ use std::process::ExitCode;
 
 use parts::ask;
 use parts::case::RATE;
+use parts::columns::columns;
 use parts::course::{Course, Repeats};
 use parts::hidden::{Choice, Hidden, choices};
 use parts::placed::{Placed, atoms};
@@ -112,15 +113,25 @@ fn run() -> Result<(), String> {
         let of = of.filter(|(case, _)| case.kind.as_ref() == Some(kind));
         let mut found: Vec<&Done> = of.map(|(_, done)| done).collect();
         found.sort_by(|a, b| a.size.total_cmp(&b.size));
-        let part = |share: usize| found[(share * (found.len() - 1)).div_ceil(4)];
-        let sizes = [1, 2, 3].map(|share| part(share).size);
+        let at = |share: f64| {
+            let place = share * (found.len() - 1) as f64;
+            let (low, high) = (place.floor(), place.ceil());
+            let of = |place: f64| found.iter().zip(0..).find(|(_, k)| f64::from(*k) >= place);
+            [of(low), of(high)].map(|one| one.map_or(f64::INFINITY, |(done, _)| done.size))
+        };
+        // Between two of them the geometric mean; infinite is infinite.
+        let sizes = [0.25, 0.5, 0.75].map(|share| {
+            let [low, high] = at(share);
+            (low * high).sqrt()
+        });
+        let value = &found[found.len() / 2].value;
         println!(
             "{:<32}{:>8.1}{:>18}{:>10.2}  {}",
             kind.kind,
             sizes[1],
             format!("{:.1} - {:.1}", sizes[0], sizes[2]),
             sizes[1] / oracle,
-            part(2).value
+            value
         );
         rows.push((kind.kind, sizes));
     }
@@ -160,10 +171,19 @@ impl Case {
         }
         // Base parameters are those of both recordings.
         let mut base = alongs[0].base(&plant.derivation)?;
-        for (column, more) in base.iter_mut().zip(alongs[1].base(&plant.derivation)?) {
-            column.extend(more);
+        extend(&mut base, alongs[1].base(&plant.derivation)?);
+        let total = added.concat();
+        let span = Span::from_columns(base);
+        let mut unit = norm(&span.rest(&total)) / NOISE;
+        for lesser in lesser(&hidden) {
+            let of = |along: &Along| columns(along, &lesser, constant(&hidden), &[]);
+            if let (Some(mut both), Some(more)) = (of(&alongs[0]), of(&alongs[1])) {
+                extend(&mut both, more);
+                let mut span = span.clone();
+                span.extend(both);
+                unit = unit.min(norm(&span.rest(&total)) / NOISE);
+            }
         }
-        let unit = norm(&Span::from_columns(base).rest(&added.concat())) / NOISE;
         let noises: Vec<Vec<Vec<f64>>> = (0..2)
             .map(|which| {
                 let of = |k: u64| {
@@ -233,6 +253,37 @@ impl Case {
             value: sized.join(", "),
         })
     }
+}
+
+/// Columns of one recording behind those of another.
+fn extend(columns: &mut [Vec<f64>], more: Vec<Vec<f64>>) {
+    for (column, more) in columns.iter_mut().zip(more) {
+        column.extend(more);
+    }
+}
+
+/// Simpler kinds that are part of what is hidden, each by itself: beside them it must show what it is.
+fn lesser(hidden: &[Hidden]) -> Vec<Placed> {
+    let Some(first) = hidden.first() else {
+        return Vec::new();
+    };
+    let kinds: &[&str] = match first.placed.kind.as_str() {
+        "directional_viscous_friction" => &["viscous_friction"],
+        "directional_coulomb_friction" => &["coulomb_friction", "force_offset"],
+        "spring" => &["force_offset"],
+        _ if hidden.len() > 1 => &["coulomb_friction", "stribeck_friction"],
+        _ => &[],
+    };
+    let of = |kind: &&str| Placed {
+        kind: (*kind).to_owned(),
+        at: first.placed.at.clone(),
+    };
+    kinds.iter().map(of).collect()
+}
+
+/// What bends the curve of what is hidden.
+fn constant(hidden: &[Hidden]) -> f64 {
+    hidden.iter().find_map(Hidden::constant).unwrap_or(1.0)
 }
 
 /// What effects of unit size add to the forces. A delay has no size but its own: what it changes by each of its seconds.

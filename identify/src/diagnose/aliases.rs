@@ -20,6 +20,8 @@ pub(crate) struct Alias {
     pub(crate) effect: Effect,
     /// How much worse it is, in the units of [`APART`]; negative if better.
     pub(crate) worse: f64,
+    /// Whether it is part of another way to write the same down, and no other cause.
+    pub(crate) is_rewriting: bool,
 }
 
 impl Bench<'_> {
@@ -75,6 +77,7 @@ impl Bench<'_> {
                     found.push(Alias {
                         effect: self.candidate(candidate).effect.clone(),
                         worse,
+                        is_rewriting: false,
                     });
                 }
             }
@@ -98,6 +101,8 @@ impl Bench<'_> {
                         found.push(Alias {
                             effect: effect.clone(),
                             worse,
+                            is_rewriting: self.is_within(&pick, candidate)
+                                && self.is_within(&second, candidate),
                         });
                     }
                 }
@@ -122,6 +127,7 @@ impl Bench<'_> {
                             found.push(Alias {
                                 effect: effect.clone(),
                                 worse,
+                                is_rewriting: true,
                             });
                         }
                     }
