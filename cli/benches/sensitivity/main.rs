@@ -230,9 +230,11 @@ impl Case {
         };
         let [mut low, mut high] = SIZES;
         if !is_found(high)? {
+            let claims = ask(high / unit)?.effects;
+            let claims: Vec<String> = claims.iter().map(|c| c.effect.to_string()).collect();
             return Ok(Done {
                 size: f64::INFINITY,
-                value: "never".to_owned(),
+                value: format!("never, but {}", claims.join(", ")),
             });
         }
         for _ in 0..HALVINGS {

@@ -21,7 +21,7 @@ pub(crate) const LEAST_GAIN: f64 = 0.02;
 /// Where all that is left is white noise the least gain follows from it: so many times its variance less on what was not
 /// fitted. Blocks then need less of their own: nothing but noise makes them differ.
 const LEAST_OF_NOISE: f64 = 8.0;
-const LEAST_T_OF_NOISE: f64 = 1.5;
+const LEAST_T_OF_NOISE: f64 = 1.0;
 /// What is left is white noise if it is worth this share of its samples, and no larger than so many times the noise of
 /// neighbours.
 const WHITE: f64 = 0.5;

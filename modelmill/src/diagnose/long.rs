@@ -13,10 +13,10 @@ use crate::stretch::Stretch;
 
 /// Shorter stretches stay as they are.
 const LONG: usize = 150_000;
-/// Samples that are kept at most, where the band of the motion allows it.
-const KEPT: usize = 50_000;
-/// The parallel filter passes so many times the band of the motion.
-const BANDS: f64 = 4.0;
+/// Samples that are kept at most, where that leaves enough of the band in which forces follow the motion.
+const KEPT: usize = 20_000;
+/// The parallel filter passes this part of the band: what many samples say of it is more than enough.
+const PART_OF_BAND: f64 = 0.25;
 /// Samples that are left for the parallel filter to keep one of.
 const LEFT: usize = 4;
 
@@ -44,9 +44,9 @@ pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
         _ => return Ok(stretch.clone()),
     };
     let kept = samples.div_ceil(every);
-    // Beyond, the parallel filter would take something of the motion.
+    // Beyond, the parallel filter would take too much of what tells effects apart.
     let most = (stretch.run.prepared.band_hz).map_or(every as f64, |band| {
-        PASSED_BY_DECIMATION / (BANDS * band * step)
+        PASSED_BY_DECIMATION / (PART_OF_BAND * band * step)
     });
     let more = kept.div_ceil(KEPT);
     let wanted = if ((every * more) as f64) <= most {
