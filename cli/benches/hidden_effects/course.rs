@@ -18,6 +18,7 @@ const CHECKS: usize = 1500;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Repeats {
     /// Three periods.
+    #[allow(dead_code, reason = "only calm recordings repeat so often")]
     Thrice,
     /// Two periods.
     Twice,
