@@ -169,21 +169,7 @@ impl Case {
         for (along, course) in alongs.iter().zip(&courses) {
             added.push(added_by(&hidden, along, course)?);
         }
-        // Base parameters are those of both recordings.
-        let mut base = alongs[0].base(&plant.derivation)?;
-        extend(&mut base, alongs[1].base(&plant.derivation)?);
-        let total = added.concat();
-        let span = Span::from_columns(base);
-        let mut unit = norm(&span.rest(&total)) / NOISE;
-        for lesser in lesser(&hidden) {
-            let of = |along: &Along| columns(along, &lesser, constant(&hidden), &[]);
-            if let (Some(mut both), Some(more)) = (of(&alongs[0]), of(&alongs[1])) {
-                extend(&mut both, more);
-                let mut span = span.clone();
-                span.extend(both);
-                unit = unit.min(norm(&span.rest(&total)) / NOISE);
-            }
-        }
+        let unit = shown(plant, &alongs, &hidden, &added.concat())?;
         let noises: Vec<Vec<Vec<f64>>> = (0..2)
             .map(|which| {
                 let of = |k: u64| {
@@ -255,6 +241,25 @@ impl Case {
             value: sized.join(", "),
         })
     }
+}
+
+/// How much effects show beside base parameters, which are those of both recordings, and beside simpler kinds; in deviations of
+/// the noise.
+fn shown(plant: &Plant, alongs: &[Along], hidden: &[Hidden], total: &[f64]) -> Result<f64, String> {
+    let mut base = alongs[0].base(&plant.derivation)?;
+    extend(&mut base, alongs[1].base(&plant.derivation)?);
+    let span = Span::from_columns(base);
+    let mut least = norm(&span.rest(total)) / NOISE;
+    for lesser in lesser(hidden) {
+        let of = |along: &Along| columns(along, &lesser, constant(hidden), &[]);
+        if let (Some(mut both), Some(more)) = (of(&alongs[0]), of(&alongs[1])) {
+            extend(&mut both, more);
+            let mut span = span.clone();
+            span.extend(both);
+            least = least.min(norm(&span.rest(total)) / NOISE);
+        }
+    }
+    Ok(least)
 }
 
 /// Columns of one recording behind those of another.
