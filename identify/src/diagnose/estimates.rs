@@ -9,7 +9,7 @@ use super::pool::On;
 const LOUDEST: f64 = 20.0;
 /// How likely it is that the cause of what a found effect explains is another one, which no candidate says: where the rest is
 /// noise, and where some of it comes again unexplained.
-const OUTSIDE: f64 = 0.04;
+const OUTSIDE: f64 = 0.02;
 const OUTSIDE_BESIDE_UNEXPLAINED: f64 = 0.25;
 
 impl Bench<'_> {
