@@ -4,7 +4,7 @@
 //! States that were smoothed change little between samples; after a first step as many are left for every one that is kept in
 //! the end as the parallel filter needs to filter regressor and forces alike.
 
-use modelmill_identify::{Note, PASSED_BY_DECIMATION, decimate, decimate_time};
+use modelmill_identify::{LowPass, Note, PASSED_BY_DECIMATION, decimate_time};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -19,6 +19,9 @@ const KEPT: usize = 20_000;
 const PART_OF_BAND: f64 = 0.25;
 /// Samples that are left for the parallel filter to keep one of.
 const LEFT: usize = 4;
+/// Order of the low-pass of the forces. It is Butterworth's, which is flat where the parallel filter passes: one with ripples
+/// would change forces that are held against states as they were.
+const ORDER: usize = 4;
 
 /// The stretches of some recordings, long ones in fewer samples.
 pub(crate) fn stretches(
@@ -64,8 +67,11 @@ pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
         all.iter().map(one).collect()
     };
     let filtered = |all: &[Vec<f64>]| -> Outcome<Vec<Vec<f64>>> {
-        let one = |values: &Vec<f64>| {
-            decimate(values, factor).map_err(|error| Error::input(format!("{}: {error}", run.file)))
+        let one = |values: &Vec<f64>| -> Outcome<Vec<f64>> {
+            let filter = LowPass::butterworth(ORDER, PASSED_BY_DECIMATION / factor as f64, 1.0);
+            let smooth = filter.and_then(|filter| filter.zero_phase(values));
+            let smooth = smooth.map_err(|error| Error::input(format!("{}: {error}", run.file)))?;
+            Ok(smooth.into_iter().step_by(factor).collect())
         };
         all.iter().map(one).collect()
     };
