@@ -37,6 +37,8 @@ pub(crate) struct Claim {
     pub(crate) effect: Placed,
     /// What this recording cannot tell from it.
     pub(crate) aliases: Vec<Placed>,
+    /// How likely it says the effect is; nothing where it does not say.
+    pub(crate) probability: Option<f64>,
 }
 
 impl Answer {
@@ -70,6 +72,7 @@ impl Answer {
             Ok(Claim {
                 effect: placed(effect)?,
                 aliases,
+                probability: effect["probability"].as_f64(),
             })
         });
         let disturbances = value["disturbances"].as_array().into_iter().flatten();

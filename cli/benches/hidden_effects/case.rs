@@ -48,6 +48,17 @@ pub(crate) struct Masses {
     platform: f64,
 }
 
+impl Masses {
+    pub(crate) fn draw(random: &mut Random) -> Self {
+        Self {
+            crank: three_digits(random.between(0.8, 1.3)),
+            coupling: three_digits(random.between(0.7, 1.6)),
+            coupler: three_digits(random.between(0.8, 1.4)),
+            platform: three_digits(random.between(0.8, 2.5)),
+        }
+    }
+}
+
 /// A recording to be diagnosed, and one to check.
 pub(crate) struct Case {
     /// Its number, from 1.
@@ -100,12 +111,7 @@ impl Case {
         } else {
             three_digits(random.log_between(0.5, 3.0))
         };
-        let masses = (class == Class::None && before % 3 != 0).then(|| Masses {
-            crank: three_digits(random.between(0.8, 1.3)),
-            coupling: three_digits(random.between(0.7, 1.6)),
-            coupler: three_digits(random.between(0.8, 1.4)),
-            platform: three_digits(random.between(0.8, 2.5)),
-        });
+        let masses = (class == Class::None && before % 3 != 0).then(|| Masses::draw(&mut random));
         let rig = with_masses(&plant.rig, masses);
         let courses = [(); 2].map(|()| Course::draw(&mut random, plant.limits(), repeats));
         let along = |course: &Course| Along::new(&rig, course, course.times(COARSE));
@@ -497,7 +503,7 @@ fn alike(one: &Choice, other: &Choice) -> bool {
     shared && (same || offsets(one, other) || offsets(other, one))
 }
 
-fn with_masses(rig: &Rig, masses: Option<Masses>) -> Rig {
+pub(crate) fn with_masses(rig: &Rig, masses: Option<Masses>) -> Rig {
     let mut rig = rig.clone();
     let Some(masses) = masses else { return rig };
     for body in &mut rig.bodies {

@@ -17,6 +17,9 @@ const CHECKS: usize = 1500;
 /// How a recording repeats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Repeats {
+    /// Three periods.
+    #[allow(dead_code, reason = "only calm recordings repeat so often")]
+    Thrice,
     /// Two periods.
     Twice,
     /// One period.
@@ -29,6 +32,7 @@ impl Repeats {
     /// A word for lists.
     pub(crate) fn word(self) -> &'static str {
         match self {
+            Self::Thrice => "three periods",
             Self::Twice => "two periods",
             Self::Once => "one period",
             Self::Never => "not periodic",
@@ -76,6 +80,7 @@ impl Course {
     /// Draws a motion that fills most of the limits of positions and keeps those of rates and accelerations.
     pub(crate) fn draw(random: &mut Random, limits: &Limits, repeats: Repeats) -> Self {
         let duration = match repeats {
+            Repeats::Thrice => 3.0 * PERIOD,
             Repeats::Twice => 2.0 * PERIOD,
             Repeats::Once => PERIOD,
             Repeats::Never => random.between(7.0, 12.0),

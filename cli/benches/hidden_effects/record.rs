@@ -3,6 +3,8 @@
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
+use modelmill_rig::State;
+
 use super::case::{Case, RATE};
 use super::plant::{Along, DRIVES};
 use super::random::Random;
@@ -22,45 +24,97 @@ pub(crate) struct Recorded {
     pub(crate) floor: f64,
 }
 
+/// A recording before it is written; columns of samples.
+pub(crate) struct Samples {
+    /// s
+    pub(crate) times: Vec<f64>,
+    /// Readings of the coordinates, rad, before they are rounded to steps of the encoder.
+    pub(crate) positions: Vec<Vec<f64>>,
+    /// Rates and accelerations, where they are recorded.
+    pub(crate) derivatives: Vec<Vec<f64>>,
+    /// Readings of the forces, N.
+    pub(crate) forces: Vec<Vec<f64>>,
+    /// What of them is noise, N.
+    pub(crate) noise: Vec<Vec<f64>>,
+}
+
+impl Samples {
+    /// What the sensors read along a motion: `truth` are the forces (samples times drives), `noise` is added to them, and
+    /// `random` gives the noise of each encoder.
+    pub(crate) fn new(
+        along: &Along,
+        truth: &[f64],
+        noise: Vec<Vec<f64>>,
+        mut random: impl FnMut(usize) -> Random,
+        full: bool,
+    ) -> Self {
+        let column = |of: fn(&State) -> &Vec<f64>, k: usize| -> Vec<f64> {
+            along.states.iter().map(|state| of(state)[k]).collect()
+        };
+        let all = |of: fn(&State) -> &Vec<f64>| (0..DRIVES.len()).map(move |k| column(of, k));
+        let with_noise = |(k, exact): (usize, Vec<f64>)| {
+            let mut random = random(k);
+            let read = exact.iter().map(|q| q + ENCODER_NOISE * random.normal());
+            read.collect::<Vec<f64>>()
+        };
+        let read = |(k, noise): (usize, &Vec<f64>)| {
+            let exact = truth.iter().skip(k).step_by(DRIVES.len());
+            exact.zip(noise).map(|(f, e)| f + e).collect()
+        };
+        Self {
+            times: along.times.clone(),
+            positions: all(|s| &s.q).enumerate().map(with_noise).collect(),
+            derivatives: if full {
+                all(|s| &s.qd).chain(all(|s| &s.qdd)).collect()
+            } else {
+                Vec::new()
+            },
+            forces: noise.iter().enumerate().map(read).collect(),
+            noise,
+        }
+    }
+
+    /// As a file.
+    pub(crate) fn recorded(&self) -> Recorded {
+        let mut csv = String::from("t,theta1,theta2,");
+        if !self.derivatives.is_empty() {
+            csv.push_str("theta1_d,theta2_d,theta1_dd,theta2_dd,");
+        }
+        csv.push_str(&DRIVES.join(","));
+        csv.push('\n');
+        for (i, t) in self.times.iter().enumerate() {
+            let _ = write!(csv, "{t}");
+            for q in &self.positions {
+                let step = 2.0 * PI / STEPS;
+                let reading = (q[i] / step).round() * step;
+                let _ = write!(csv, ",{reading:.9}");
+            }
+            for exact in &self.derivatives {
+                let _ = write!(csv, ",{:.9}", exact[i]);
+            }
+            for force in &self.forces {
+                let _ = write!(csv, ",{:.6}", force[i]);
+            }
+            csv.push('\n');
+        }
+        Recorded {
+            csv,
+            floor: norm(&self.noise.concat()) / norm(&self.forces.concat()),
+        }
+    }
+}
+
 /// Records fit (0) or check (1).
 pub(crate) fn record(case: &Case, seed: u64, which: usize) -> Result<Recorded, String> {
     let course = &case.courses[which];
     let along = Along::new(&case.rig, course, course.times(RATE))?;
     let truth = case.forces(&along, course)?;
-    let mut noises: Vec<Random> = (0..2 * DRIVES.len() as u64)
-        .map(|channel| Random::new(seed, case.number, 10 + 10 * which as u64 + channel))
-        .collect();
-    let mut csv = String::from("t,theta1,theta2,");
-    if case.full {
-        csv.push_str("theta1_d,theta2_d,theta1_dd,theta2_dd,");
-    }
-    csv.push_str(&DRIVES.join(","));
-    csv.push('\n');
-    let mut noise_of_forces = Vec::with_capacity(truth.len());
-    let mut measured = Vec::with_capacity(truth.len());
-    for (i, (t, state)) in along.times.iter().zip(&along.states).enumerate() {
-        let _ = write!(csv, "{t}");
-        for (q, noise) in state.q.iter().zip(&mut noises) {
-            let step = 2.0 * PI / STEPS;
-            let reading = ((q + ENCODER_NOISE * noise.normal()) / step).round() * step;
-            let _ = write!(csv, ",{reading:.9}");
-        }
-        if case.full {
-            for exact in state.qd.iter().chain(&state.qdd) {
-                let _ = write!(csv, ",{exact:.9}");
-            }
-        }
-        for (k, noise) in noises[DRIVES.len()..].iter_mut().enumerate() {
-            let error = case.noise * noise.normal();
-            let force = truth[DRIVES.len() * i + k] + error;
-            let _ = write!(csv, ",{force:.6}");
-            noise_of_forces.push(error);
-            measured.push(force);
-        }
-        csv.push('\n');
-    }
-    Ok(Recorded {
-        csv,
-        floor: norm(&noise_of_forces) / norm(&measured),
-    })
+    let random =
+        |channel: usize| Random::new(seed, case.number, 10 + 10 * which as u64 + channel as u64);
+    let noise = (0..DRIVES.len()).map(|k| {
+        let mut random = random(DRIVES.len() + k);
+        let normal = (0..along.times.len()).map(|_| case.noise * random.normal());
+        normal.collect()
+    });
+    Ok(Samples::new(&along, &truth, noise.collect(), random, case.full).recorded())
 }

@@ -4,8 +4,10 @@
 use std::path::Path;
 
 use crate::benchmark::case::{Case, class_of};
+use crate::benchmark::coloured::{Fall, noise};
 use crate::benchmark::judge::{Class, FALL, SAME, judge};
 use crate::benchmark::plant::{Along, DRIVES, Plant};
+use crate::benchmark::random::Random;
 use crate::benchmark::span::{Span, norm};
 use crate::benchmark::{columns, placed, record, span};
 
@@ -147,4 +149,25 @@ fn hidden_effects_are_found() {
             );
         }
     }
+}
+
+/// Of a low-pass of first order by the bilinear transform neighbours correlate by half of one and its pole.
+#[test]
+fn coloured_noise_has_the_size_and_the_memory_that_are_asked_for() {
+    let (rate, corner) = (250.0, 15.0);
+    let values = noise(
+        &mut Random::new(SEED, 1, 2),
+        200_000,
+        rate,
+        2.0,
+        Some((corner, Fall::Gentle)),
+    );
+    let product = |lag: usize| -> f64 {
+        let pairs = values.iter().zip(&values[lag..]);
+        pairs.map(|(a, b)| a * b).sum::<f64>() / values.len() as f64
+    };
+    let k = (std::f64::consts::PI * corner / rate).tan();
+    let neighbours = 0.5 * (1.0 + (1.0 - k) / (1.0 + k));
+    assert!((product(0).sqrt() - 2.0).abs() < 0.05, "{}", product(0));
+    assert!((product(1) / product(0) - neighbours).abs() < 0.01);
 }

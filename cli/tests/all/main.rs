@@ -4,6 +4,7 @@
 
 mod atlas;
 #[allow(dead_code, reason = "what only the run of the benchmark calls")]
+#[path = "../../benches/hidden_effects/parts.rs"]
 mod benchmark;
 #[cfg(target_os = "linux")]
 mod bombs;

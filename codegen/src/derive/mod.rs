@@ -11,6 +11,7 @@ pub use derivation::Derivation;
 
 use crate::DeriveError;
 use crate::expr::Graph;
+use crate::programs::cheapest::PASSES;
 use crate::programs::closing::Closing;
 use crate::programs::programs;
 use crate::reduce::{Reduction, reduce, unreduced};
@@ -21,7 +22,7 @@ use crate::tree::expressions::Monomial;
 /// Derives the inverse dynamics of a mechanism and reduces it to base parameters, whatever these are worth at the file's
 /// values.
 pub(crate) fn derive(mechanism: &Mechanism) -> Result<Derivation, DeriveError> {
-    let derivation = derive_by(mechanism, |graph, equations| {
+    let derivation = derive_by(mechanism, PASSES.len(), |graph, equations| {
         reduce(graph, mechanism, equations)
     })?;
     checks::check_results(&derivation)?;
@@ -34,12 +35,16 @@ pub fn derive_columns(
     mechanism: &Mechanism,
     wanted: &dyn Fn(&Monomial) -> bool,
 ) -> Result<Derivation, DeriveError> {
-    derive_by(mechanism, |_, equations| Ok(unreduced(equations, wanted)))
+    // Columns are made once along each recording: that takes less time than to look for cheaper forms.
+    derive_by(mechanism, 0, |_, equations| {
+        Ok(unreduced(equations, wanted))
+    })
 }
 
-/// The stages in their order, with `reduce` for the way from p_g to p_min.
+/// The stages in their order, with `reduce` for the way from p_g to p_min and `passes` that look for cheaper forms.
 fn derive_by(
     mechanism: &Mechanism,
+    passes: usize,
     reduce: impl FnOnce(&mut Graph, &Equations) -> Result<Reduction, DeriveError>,
 ) -> Result<Derivation, DeriveError> {
     check_values(mechanism)?;
@@ -47,7 +52,9 @@ fn derive_by(
     let equations = equations(&mut graph, mechanism)?;
     let reduction = reduce(&mut graph, &equations)?;
     let closing = Closing::new(&mut graph, mechanism, &equations)?;
-    let programs = programs(&mut graph, mechanism, &equations, &reduction, &closing)?;
+    let programs = programs(
+        &mut graph, mechanism, &equations, &reduction, &closing, passes,
+    )?;
     Ok(Derivation {
         mechanism: mechanism.clone(),
         graph,

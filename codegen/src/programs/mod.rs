@@ -61,12 +61,14 @@ pub struct Programs {
     pub scale: Option<Program>,
 }
 
+/// `passes` says how many of [`cheapest::PASSES`] look for cheaper forms.
 pub(crate) fn programs(
     graph: &mut Graph,
     mechanism: &Mechanism,
     equations: &Equations,
     reduction: &Reduction,
     closing: &Closing,
+    passes: usize,
 ) -> Result<Programs, DeriveError> {
     let n_drives = mechanism.drives.len();
 
@@ -119,11 +121,10 @@ pub(crate) fn programs(
     let nothing = BTreeMap::new();
     let weigh =
         |graph: &mut Graph, outputs: &[ExprId]| closing.weight(graph, equations, outputs, &nothing);
-    let all_passes = cheapest::PASSES.len();
-    let regressor = cheapest::columns(graph, mechanism, equations, &retained, all_passes, &weigh)?;
+    let regressor = cheapest::columns(graph, mechanism, equations, &retained, passes, &weigh)?;
     let regressor = row_by_row(&regressor);
     let inverse_dynamics =
-        cheapest::total(graph, mechanism, equations, &base_value, all_passes, &weigh)?;
+        cheapest::total(graph, mechanism, equations, &base_value, passes, &weigh)?;
     let slides = mechanism.coordinates.iter().any(|c| c.motion.is_length());
     let scale = (slides && !projection.loops.residual.is_empty()).then(|| {
         let scale = Size::from_residual(graph, mechanism, &projection.loops.residual).scale(graph);

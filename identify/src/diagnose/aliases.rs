@@ -20,6 +20,8 @@ pub(crate) struct Alias {
     pub(crate) effect: Effect,
     /// How much worse it is, in the units of [`APART`]; negative if better.
     pub(crate) worse: f64,
+    /// Whether it is part of another way to write the same down, and no other cause.
+    pub(crate) is_rewriting: bool,
 }
 
 impl Bench<'_> {
@@ -75,6 +77,7 @@ impl Bench<'_> {
                     found.push(Alias {
                         effect: self.candidate(candidate).effect.clone(),
                         worse,
+                        is_rewriting: false,
                     });
                 }
             }
@@ -98,39 +101,52 @@ impl Bench<'_> {
                         found.push(Alias {
                             effect: effect.clone(),
                             worse,
+                            is_rewriting: self.is_within(&pick, candidate)
+                                && self.is_within(&second, candidate),
                         });
                     }
                 }
             }
-            // And two for one.
-            let halves: Vec<&Pick> = (self.present.iter().flatten())
-                .filter(|one| one.rank < pick.rank && self.candidate(one).searched == 0)
-                .filter(|one| picks.iter().all(|p| p.candidate != one.candidate))
-                .filter(|one| self.is_within(one, &pick))
-                .collect();
-            for (k, one) in halves.iter().enumerate() {
-                for two in &halves[k + 1..] {
-                    let mut set = others.clone();
-                    set.extend([(*one).clone(), (*two).clone()]);
-                    let trial = self.trial(set);
-                    let Some(worse) = in_place(self, &others, &trial) else {
-                        continue;
-                    };
-                    for half in [one, two] {
-                        let effect = &self.candidate(half).effect;
-                        if found.iter().all(|alias| alias.effect != *effect) {
-                            found.push(Alias {
-                                effect: effect.clone(),
-                                worse,
-                            });
-                        }
-                    }
+            for (one, worse) in self.halves(&pick, picks, &others, in_place) {
+                if found.iter().all(|alias| alias.effect != one) {
+                    found.push(Alias {
+                        effect: one,
+                        worse,
+                        is_rewriting: true,
+                    });
                 }
             }
             found.sort_by(|a, b| a.worse.total_cmp(&b.worse));
             all.push(found);
         }
         all
+    }
+
+    /// Pairs of simpler effects that say together what one of a set says, each with how much worse the pair is.
+    fn halves(
+        &self,
+        pick: &Pick,
+        picks: &[Pick],
+        others: &[Pick],
+        in_place: impl Fn(&Self, &[Pick], &Trial) -> Option<f64>,
+    ) -> Vec<(Effect, f64)> {
+        let halves: Vec<&Pick> = (self.present.iter().flatten())
+            .filter(|one| one.rank < pick.rank && self.candidate(one).searched == 0)
+            .filter(|one| picks.iter().all(|p| p.candidate != one.candidate))
+            .filter(|one| self.is_within(one, pick))
+            .collect();
+        let mut found = Vec::new();
+        for (k, one) in halves.iter().enumerate() {
+            for two in &halves[k + 1..] {
+                let mut set = others.to_vec();
+                set.extend([(*one).clone(), (*two).clone()]);
+                if let Some(worse) = in_place(self, others, &self.trial(set)) {
+                    let both = [one, two].map(|half| (self.candidate(half).effect.clone(), worse));
+                    found.extend(both);
+                }
+            }
+        }
+        found
     }
 
     /// A set with a wrong reading that comes near to what is found, by a column of the reading's own size.

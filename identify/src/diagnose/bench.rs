@@ -1,7 +1,7 @@
 //! The bench on which sets of effects are tried: which columns they have, and what each set leaves.
 
 use std::cell::RefCell;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -212,6 +212,9 @@ impl<'a> Bench<'a> {
     /// Not so where a kind refines another or is bent by a constant: without one of its parameters it is another kind.
     fn signed(&self, mut picks: Vec<Pick>, fit: impl Fn(&[Pick]) -> (DVector<f64>, f64)) -> Trial {
         let (mut factors, squares) = fit(&picks);
+        if self.wrong_parameters(&picks, factors.as_slice()).is_empty() {
+            return self.judged(picks, factors.as_slice(), squares);
+        }
         let mut trial = self.judged(picks.clone(), factors.as_slice(), squares);
         loop {
             let several = |i: usize| {
@@ -283,12 +286,9 @@ impl<'a> Bench<'a> {
     /// tried without it.
     pub(crate) fn table(&self, also: &[Pick]) -> Table {
         let mut columns: Vec<usize> = Vec::new();
+        let mut known = HashSet::new();
         for pick in self.present.iter().flatten().chain(also) {
-            for k in &pick.columns {
-                if !columns.contains(k) {
-                    columns.push(*k);
-                }
-            }
+            columns.extend(pick.columns.iter().filter(|k| known.insert(**k)));
         }
         columns.retain(|k| *k != self.zero);
         columns.extend([self.zero, self.measured]);
@@ -310,7 +310,10 @@ impl<'a> Bench<'a> {
                 left.column_mut(i).fill(0.0);
             }
         }
-        let place = columns.iter().enumerate().map(|(i, k)| (*k, i)).collect();
+        let mut place = vec![usize::MAX; columns.iter().max().map_or(0, |last| last + 1)];
+        for (i, k) in columns.iter().enumerate() {
+            place[*k] = i;
+        }
         Table { left, place }
     }
 
@@ -320,7 +323,7 @@ impl<'a> Bench<'a> {
             let mut which: Vec<usize> = picks
                 .iter()
                 .flat_map(|p| &p.columns)
-                .map(|k| table.place[k])
+                .map(|k| table.place[*k])
                 .collect();
             which.push(table.left.nrows() - 1);
             let n = which.len();
@@ -334,7 +337,8 @@ impl<'a> Bench<'a> {
 /// Inner products of the effects' columns and the measured forces once the base is taken off.
 pub(crate) struct Table {
     left: DMatrix<f64>,
-    place: HashMap<usize, usize>,
+    /// Where the columns of the pool stand in it.
+    place: Vec<usize>,
 }
 
 pub(crate) fn n_columns(picks: &[Pick]) -> usize {

@@ -7,6 +7,10 @@ use super::pool::On;
 
 /// Odds beyond which nothing speaks louder, in twice their logarithm.
 const LOUDEST: f64 = 20.0;
+/// How likely it is that the cause of what a found effect explains is another one, which no candidate says: where the rest is
+/// noise, and where some of it comes again unexplained.
+const OUTSIDE: f64 = 0.02;
+const OUTSIDE_BESIDE_UNEXPLAINED: f64 = 0.25;
 
 impl Bench<'_> {
     /// Values of each member's parameters with their standard deviations; none where others say the same. Rows count as
@@ -49,15 +53,27 @@ impl Bench<'_> {
     }
 
     /// How likely it is that a member is there: by the odds against the set without it, shared with what cannot be told from
-    /// it, of which it says how much worse each is.
-    pub(crate) fn probability(&self, picks: &[Pick], member: usize, rivals: &[f64]) -> f64 {
+    /// it, of which it says how much worse each is. No evidence speaks against causes that nobody has thought of; they are
+    /// likelier where something of its channels stays unexplained.
+    pub(crate) fn probability(
+        &self,
+        picks: &[Pick],
+        member: usize,
+        rivals: &[f64],
+        unexplained: &[usize],
+    ) -> f64 {
         let mut without = picks.to_vec();
         let pick = without.remove(member);
         let channels = self.acted_on(&[pick]);
         let evidence = self.evidence(&without, picks, &channels);
         let for_it = (0.5 * evidence.bic.clamp(-LOUDEST, LOUDEST)).exp();
-        let others = rivals.iter().map(|worse| (-0.5 * worse.max(0.0)).exp());
+        let others = rivals.iter().map(|worse| (-0.5 * worse).exp());
         let share = 1.0 / (1.0 + others.sum::<f64>());
-        share * for_it / (1.0 + for_it)
+        let outside = if channels.iter().any(|d| unexplained.contains(d)) {
+            OUTSIDE_BESIDE_UNEXPLAINED
+        } else {
+            OUTSIDE
+        };
+        (1.0 - outside) * share * for_it / (1.0 + for_it)
     }
 }

@@ -18,6 +18,16 @@ use super::pool::{On, dot, solve};
 const BLOCKS: usize = 12;
 /// A change must lower the squared error on its channels by this share where it was not fitted.
 pub(crate) const LEAST_GAIN: f64 = 0.02;
+/// Where all that is left is white noise the least gain follows from it: so many times its variance less on what was not
+/// fitted. Blocks then need less of their own: nothing but noise makes them differ.
+const LEAST_OF_NOISE: f64 = 8.0;
+const LEAST_T_OF_NOISE: f64 = 1.0;
+/// What is left is white noise if it is worth this share of its samples, and no larger than so many times the noise of
+/// neighbours.
+const WHITE: f64 = 0.5;
+const LIKE_NOISE: f64 = 1.5;
+/// What adds less than this part of the squares that other effects explain may be how well these are known.
+const BESIDE_OTHERS: f64 = 1e-4;
 /// Squared errors below this, in units of what counts as noise, are nobody's.
 const BELOW_NOISE: f64 = 0.8;
 /// How many of its own deviations over the blocks the gain must be above zero.
@@ -42,12 +52,14 @@ pub struct Evidence {
     pub effective_samples: f64,
     /// The squared error before, relative to the white noise of the channels: less than 1 only where there is nothing but rounding.
     pub above_noise: f64,
+    /// What the gain must reach: a share that matters, or less where all that is left is white noise.
+    pub least_gain: f64,
 }
 
 impl Evidence {
     /// Whether it is enough to believe in a change.
     pub fn holds(&self) -> bool {
-        self.gain >= LEAST_GAIN
+        self.gain >= self.least_gain
             && self.is_steady()
             && self.bic > 0.0
             && self.above_noise > BELOW_NOISE
@@ -55,7 +67,12 @@ impl Evidence {
 
     /// Whether the gain is the same all along: in the mean over the blocks, or, if it is large, block by block.
     fn is_steady(&self) -> bool {
-        self.blocks_t >= LEAST_T || self.gain >= LARGE_GAIN && self.shares_t >= LEAST_SHARES_T
+        let least_t = if self.least_gain < LEAST_GAIN {
+            LEAST_T_OF_NOISE
+        } else {
+            LEAST_T
+        };
+        self.blocks_t >= least_t || self.gain >= LARGE_GAIN && self.shares_t >= LEAST_SHARES_T
     }
 
     /// What is lacking, in words.
@@ -68,7 +85,7 @@ impl Evidence {
             } else {
                 "not supported by cross-validation"
             })
-        } else if self.gain < LEAST_GAIN {
+        } else if self.gain < self.least_gain {
             Some("too small to matter")
         } else if self.bic <= 0.0 {
             Some("not worth its parameters")
@@ -124,7 +141,37 @@ impl Bench<'_> {
                 - (price(after) - price(before)),
             effective_samples: worth,
             above_noise: self.above_noise(&old_rest, channels),
+            least_gain: {
+                let is_known = self.is_white(&new_rest, channels)
+                    && self.is_no_remainder(before, old_squares - new_squares, channels);
+                // Weights are one over the variance of what is left, which is the noise where it is known.
+                let of_noise = LEAST_OF_NOISE / total.max(f64::MIN_POSITIVE);
+                if is_known {
+                    of_noise.min(LEAST_GAIN)
+                } else {
+                    LEAST_GAIN
+                }
+            },
         }
+    }
+
+    /// Whether a residual is white noise on some channels, no larger than neighbours differ by.
+    fn is_white(&self, rest: &[Vec<f64>], channels: &[usize]) -> bool {
+        channels.iter().all(|d| {
+            let counted = rest[*d].iter().filter(|r| **r != 0.0).count() as f64;
+            self.worth(rest, &[*d]) > WHITE * counted && self.above_noise(rest, &[*d]) < LIKE_NOISE
+        })
+    }
+
+    /// Whether squares that a change takes off are more than what may be wrong with the effects beside it.
+    fn is_no_remainder(&self, before: &[Pick], less: f64, channels: &[usize]) -> bool {
+        let explained = |picks: &[Pick]| {
+            let (factors, _) = self.fit(picks, On::All);
+            let rest = self.rest(picks, &factors);
+            let of = |d: &usize| self.weights[*d] * dot(&rest[*d], &rest[*d]);
+            channels.iter().map(of).sum::<f64>()
+        };
+        before.is_empty() || less > BESIDE_OTHERS * (explained(&[]) - explained(before))
     }
 
     /// Squares of a residual relative to those of the white noise, over some channels.

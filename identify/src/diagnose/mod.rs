@@ -184,7 +184,8 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
         if candidate.nature == Nature::Disturbance {
             continue;
         }
-        let rivals: Vec<f64> = aliases.iter().map(|alias| alias.worse).collect();
+        let rivals = aliases.iter().filter(|alias| !alias.is_rewriting);
+        let rivals: Vec<f64> = rivals.map(|alias| alias.worse).collect();
         let (values, deviations) = estimates[i].iter().copied().unzip();
         effects.push(FoundEffect {
             effect: candidate.effect.clone(),
@@ -192,7 +193,7 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
             constants: pick.constants.clone(),
             estimates: values,
             deviations,
-            probability: bench.probability(&picks, i, &rivals),
+            probability: bench.probability(&picks, i, &rivals, &unexplained),
             indistinguishable_from: aliases.into_iter().map(|alias| alias.effect).collect(),
         });
     }

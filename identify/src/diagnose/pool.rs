@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
+use pulp::Arch;
 
 use super::column::Column;
 use super::problem::Layout;
@@ -17,6 +18,8 @@ type Products = HashMap<usize, Box<[f64]>>;
 /// Inner products of pairs by fold and common channel.
 type OfFolds = HashMap<(usize, usize), Box<[f64]>>;
 
+/// Inner products of fewer numbers are made as they stand.
+const SHORT: usize = 64;
 /// Folds of the cross-validation where there is no check.
 const FOLDS: usize = 10;
 
@@ -259,10 +262,24 @@ pub(crate) enum On {
     All,
 }
 
-/// Inner product; several sums at once, which is faster and rounds less.
+/// Inner product; several sums at once, which is faster and rounds less. The sums are the same in vectors of any width, so that
+/// a diagnosis decides alike on every machine.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (chunks_a, chunks_b) = (a.chunks_exact(8), b.chunks_exact(8));
+    // Of a few numbers the choice would cost more than the sum.
+    if a.len() < SHORT {
+        return sums(a, b);
+    }
+    Arch::new().dispatch(|| sums(a, b))
+}
+
+#[allow(
+    clippy::inline_always,
+    reason = "what is inlined has the vectors of its caller"
+)]
+#[inline(always)]
+fn sums(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 16];
+    let (chunks_a, chunks_b) = (a.chunks_exact(16), b.chunks_exact(16));
     let tail: f64 = chunks_a
         .remainder()
         .iter()

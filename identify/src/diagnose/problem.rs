@@ -226,6 +226,24 @@ pub struct Problem {
     pub disturbances: Vec<Disturbance>,
 }
 
+impl Problem {
+    /// What was asked, without the columns: they take most of the memory, and nobody needs them once a diagnosis is made.
+    #[must_use]
+    pub fn without_columns(mut self) -> Self {
+        for candidate in &mut self.candidates {
+            candidate.source = Source::Columns(Vec::new());
+        }
+        Self {
+            measured: Column::default(),
+            held: None,
+            base: Vec::new(),
+            friction: Vec::new(),
+            variables: Vec::new(),
+            ..self
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -30,8 +30,10 @@ impl Bench<'_> {
                 let mut set = picks.clone();
                 set[i] = simple;
                 let trial = self.trial(set);
+                // What takes the place of a wider effect must be worth something by itself.
                 if trial.wrong_sign.is_empty()
                     && !self.evidence(&trial.picks, &picks, &channels).holds()
+                    && self.evidence(&others, &trial.picks, &channels).holds()
                 {
                     picks = trial.picks;
                     break;

@@ -20,6 +20,10 @@ const MOST_HARMONICS: usize = 100;
 const LONGEST_ALONE: usize = 1 << 18;
 /// Samples of a long run in which harmonics are counted first.
 const BEGINNING: usize = 1 << 16;
+/// Samples that are looked at side by side.
+const LANES: usize = 8;
+/// Changes of a period below this part of a step say nothing.
+const SETTLED: f64 = 1e-7;
 /// A line stands out when its power is so many times what noise has on the average: chance lifts one in three million.
 const STANDS_OUT: f64 = 15.0;
 
@@ -52,10 +56,11 @@ impl<'a> Basis<'a> {
         // Products of sines and cosines are sums of those of twice as many harmonics, so that all products of columns
         // follow from as many sums as there are columns.
         let (mut cosines, mut sines) = (vec![0.0; columns], vec![0.0; columns]);
-        for t in time {
-            for_each_harmonic(TAU * (t - time[0]) / period, columns - 1, |k, cos, sin| {
-                cosines[k] += cos;
-                sines[k] += sin;
+        for chunk in time.chunks(LANES) {
+            let angles = lanes(chunk, |t| TAU * (t - time[0]) / period);
+            for_each_harmonic(&angles, columns - 1, |k, cos, sin| {
+                cosines[k] += cos[..chunk.len()].iter().sum::<f64>();
+                sines[k] += sin[..chunk.len()].iter().sum::<f64>();
             });
         }
         let half = |a: f64, b: f64| 0.5 * (a + b);
@@ -91,42 +96,59 @@ impl<'a> Basis<'a> {
 
     /// Coefficients: the constant, then cosine and sine of each harmonic.
     fn series(&self, values: &[f64]) -> DVector<f64> {
-        let mut right = DVector::zeros(2 * self.harmonics + 1);
-        for (t, value) in self.time.iter().zip(values) {
-            right[0] += value;
-            for_each_harmonic(self.angle(*t), self.harmonics, |k, cos, sin| {
-                right[2 * k - 1] += value * cos;
-                right[2 * k] += value * sin;
+        let mut sums = vec![[0.0; LANES]; 2 * self.harmonics + 1];
+        for (chunk, values) in self.time.chunks(LANES).zip(values.chunks(LANES)) {
+            let angles = lanes(chunk, |t| self.angle(*t));
+            // Beyond the last sample there is nothing to count.
+            let values = lanes(values, |value| *value);
+            for (sum, value) in sums[0].iter_mut().zip(&values) {
+                *sum += value;
+            }
+            for_each_harmonic(&angles, self.harmonics, |k, cos, sin| {
+                for lane in 0..LANES {
+                    sums[2 * k - 1][lane] += values[lane] * cos[lane];
+                    sums[2 * k][lane] += values[lane] * sin[lane];
+                }
             });
         }
-        self.normal.solve(&right)
+        let right = sums.iter().map(|sum| sum.iter().sum());
+        self.normal
+            .solve(&DVector::from_iterator(sums.len(), right))
     }
 
     fn angle(&self, t: f64) -> f64 {
         TAU * (t - self.time[0]) / self.period
     }
 
-    /// Value and both derivatives at a time.
-    fn at(&self, series: &DVector<f64>, t: f64) -> [f64; 3] {
+    /// Values and both derivatives at all times.
+    fn along(&self, series: &DVector<f64>) -> [Vec<f64>; 3] {
         let w = TAU / self.period;
-        let mut sum = [series[0], 0.0, 0.0];
-        for_each_harmonic(self.angle(t), self.harmonics, |k, cos, sin| {
-            let (a, b) = (series[2 * k - 1], series[2 * k]);
-            let (value, turned) = (a * cos + b * sin, b * cos - a * sin);
-            let w = w * k as f64;
-            sum[0] += value;
-            sum[1] += w * turned;
-            sum[2] -= w * w * value;
-        });
-        sum
+        let mut along = [(); 3].map(|()| Vec::with_capacity(self.time.len()));
+        for chunk in self.time.chunks(LANES) {
+            let angles = lanes(chunk, |t| self.angle(*t));
+            let mut sums = [[series[0]; LANES], [0.0; LANES], [0.0; LANES]];
+            for_each_harmonic(&angles, self.harmonics, |k, cos, sin| {
+                let (a, b) = (series[2 * k - 1], series[2 * k]);
+                let w = w * k as f64;
+                for lane in 0..LANES {
+                    let value = a * cos[lane] + b * sin[lane];
+                    sums[0][lane] += value;
+                    sums[1][lane] += w * (b * cos[lane] - a * sin[lane]);
+                    sums[2][lane] -= w * w * value;
+                }
+            });
+            for (column, sum) in along.iter_mut().zip(&sums) {
+                column.extend_from_slice(&sum[..chunk.len()]);
+            }
+        }
+        along
     }
 
-    /// What the series leaves of the values.
-    fn residual(&self, series: &DVector<f64>, values: &[f64]) -> Vec<f64> {
-        let pairs = self.time.iter().zip(values);
-        pairs
-            .map(|(t, value)| value - self.at(series, *t)[0])
-            .collect()
+    /// What a series leaves of the values, and the rates of the series.
+    fn residual(&self, series: &DVector<f64>, values: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let [along, rates, _] = self.along(series);
+        let pairs = values.iter().zip(along);
+        (pairs.map(|(value, said)| value - said).collect(), rates)
     }
 
     /// One step of Gauss and Newton towards the period that leaves least of all signals, s; each signal counts by its
@@ -135,18 +157,15 @@ impl<'a> Basis<'a> {
         let (mut slope, mut curvature) = (0.0, 0.0);
         for values in signals {
             let series = self.series(values);
-            let residual = self.residual(&series, values);
+            let (residual, rates) = self.residual(&series, values);
             let size: f64 = residual.iter().map(|r| r * r).sum();
             if size == 0.0 {
                 continue;
             }
             // A longer period slows the motion down about its start; the series itself takes part of that up.
-            let changes: Vec<f64> = self
-                .time
-                .iter()
-                .map(|t| -(t - self.time[0]) / self.period * self.at(&series, *t)[1])
-                .collect();
-            let changes = self.residual(&self.series(&changes), &changes);
+            let slower = |(t, rate): (&f64, f64)| -(t - self.time[0]) / self.period * rate;
+            let changes: Vec<f64> = self.time.iter().zip(rates).map(slower).collect();
+            let (changes, _) = self.residual(&self.series(&changes), &changes);
             let pairs = changes.iter().zip(&residual);
             slope += pairs.map(|(c, r)| c * r).sum::<f64>() / size;
             curvature += changes.iter().map(|c| c * c).sum::<f64>() / size;
@@ -156,13 +175,31 @@ impl<'a> Basis<'a> {
     }
 }
 
-/// Calls `visit` with `k`, `cos(k angle)` and `sin(k angle)` for all `k` from 1 on, by turning step by step.
-fn for_each_harmonic(angle: f64, harmonics: usize, mut visit: impl FnMut(usize, f64, f64)) {
-    let (sin1, cos1) = angle.sin_cos();
-    let (mut cos, mut sin) = (1.0, 0.0);
+/// Some numbers side by side; zero where there are fewer.
+fn lanes(some: &[f64], of: impl Fn(&f64) -> f64) -> [f64; LANES] {
+    let mut lanes = [0.0; LANES];
+    for (lane, x) in lanes.iter_mut().zip(some) {
+        *lane = of(x);
+    }
+    lanes
+}
+
+/// Calls `visit` with `k`, `cos(k angle)` and `sin(k angle)` of some angles for all `k` from 1 on, by turning step by step.
+fn for_each_harmonic(
+    angles: &[f64; LANES],
+    harmonics: usize,
+    mut visit: impl FnMut(usize, &[f64; LANES], &[f64; LANES]),
+) {
+    let (sin1, cos1) = (angles.map(f64::sin), angles.map(f64::cos));
+    let (mut cos, mut sin) = ([1.0; LANES], [0.0; LANES]);
     for k in 1..=harmonics {
-        (cos, sin) = (cos * cos1 - sin * sin1, sin * cos1 + cos * sin1);
-        visit(k, cos, sin);
+        for lane in 0..LANES {
+            (cos[lane], sin[lane]) = (
+                cos[lane] * cos1[lane] - sin[lane] * sin1[lane],
+                sin[lane] * cos1[lane] + cos[lane] * sin1[lane],
+            );
+        }
+        visit(k, &cos, &sin);
     }
 }
 
@@ -176,18 +213,8 @@ pub(crate) fn project(
 ) -> Option<Smoothed> {
     let basis = Basis::new(time, period, harmonics)?;
     let series = basis.series(positions);
-    let mut prepared = Smoothed {
-        q: Vec::with_capacity(time.len()),
-        qd: Vec::with_capacity(time.len()),
-        qdd: Vec::with_capacity(time.len()),
-    };
-    for t in time {
-        let [q, qd, qdd] = basis.at(&series, *t);
-        prepared.q.push(q);
-        prepared.qd.push(qd);
-        prepared.qdd.push(qdd);
-    }
-    Some(prepared)
+    let [q, qd, qdd] = basis.along(&series);
+    Some(Smoothed { q, qd, qdd })
 }
 
 /// The series of which the signals are samples with nothing but white noise beside; `None` if there is none.
@@ -220,7 +247,7 @@ pub(crate) fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<Periodic> 
     let noise = signals
         .iter()
         .map(|values| {
-            let residual = basis.residual(&basis.series(values), values);
+            let (residual, _) = basis.residual(&basis.series(values), values);
             let left = (time.len() - 2 * harmonics - 1) as f64;
             (residual.iter().map(|r| r * r).sum::<f64>() / left).sqrt()
         })
@@ -255,6 +282,9 @@ fn settle(time: &[f64], signals: &[&[f64]], mut period: f64, longest: f64) -> Op
         for _ in 0..4 {
             let change = Basis::new(&time[..samples], period, harmonics)?.step(&signals)?;
             period = (period + change.clamp(-step, step)).clamp(2.0 * step, longest);
+            if change.abs() < SETTLED * step {
+                break;
+            }
         }
         Some(period)
     };
@@ -289,7 +319,7 @@ fn standing_out(time: &[f64], signals: &[&[f64]], period: f64, most: usize) -> O
     let mut harmonics = 0;
     for values in signals {
         let series = basis.series(values);
-        let residual = basis.residual(&series, values);
+        let (residual, _) = basis.residual(&series, values);
         let variance = white_variance(&residual, step, 2.0 * most as f64 / period)?;
         // The series took its share of the noise.
         let variance = variance * time.len() as f64 / (time.len() - 2 * most - 1) as f64;

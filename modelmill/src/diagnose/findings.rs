@@ -10,13 +10,14 @@ use crate::along;
 use crate::compare::{self, Places};
 use crate::error::Outcome;
 use crate::model::Model;
-use crate::recording::{self, Recording};
+use crate::recording::Recording;
 use crate::runs::Difference;
 use crate::stretch::Stretch;
 
 use super::added::{self, Added};
 use super::chosen::Named;
 use super::faults;
+use super::long;
 use super::problem::{self, Answer, Held};
 use super::versions::Version;
 use super::words::Judged;
@@ -166,15 +167,14 @@ impl Model {
         check: &[&Recording],
         question: &Question,
     ) -> Outcome<Findings> {
-        let [fit_data, check_data] = recording::stretches(self, fit, check);
+        let data = long::stretches(self, fit, check)?;
         let held = question.held;
         let recordings: Vec<&Recording> = fit.iter().chain(check).copied().collect();
         let between =
             (self.host()).watched("holding the recordings against each other", 0, |_| {
                 faults::between_runs(self, &recordings)
             })?;
-        let find =
-            |between: &[Difference]| problem::find(self, &fit_data, &check_data, held, between);
+        let find = |between: &[Difference]| problem::find(self, &data[0], &data[1], held, between);
         let mut answer = find(&between)?;
         let mut between = between;
         if !between.is_empty() {
@@ -185,12 +185,12 @@ impl Model {
                 between.clear();
             }
         }
-        let judged = if check_data.is_empty() {
+        let judged = if data[1].is_empty() {
             Judged::CrossValidation
         } else {
             Judged::Check
         };
-        let notes = fit_data.iter().chain(&check_data).flat_map(Stretch::notes);
+        let notes = data.iter().flatten().flat_map(Stretch::notes);
         let notes = self.caution().into_iter().chain(notes.cloned()).collect();
         let entries = added::entries(&answer);
         let (edited, after) = if entries.is_empty() {
@@ -198,12 +198,13 @@ impl Model {
         } else {
             match added::add(self, &entries) {
                 Ok(edited) => {
-                    let after = with_effects(self, &edited, [fit, check], held);
+                    let after = with_effects(self, &edited, [fit, check], &data, held);
                     (Some(edited), after.map_err(|error| error.to_string()))
                 }
                 Err(error) => (None, Err(error.to_string())),
             }
         };
+        let [fit_data, check_data] = data;
         let before = Version::new(self.clone(), fit_data, check_data, held)?;
         let places = places(&before)?;
         let left = after.as_ref().ok().map(self::places).transpose()?;
@@ -253,6 +254,7 @@ fn with_effects(
     model: &Model,
     edited: &Added,
     recordings: [&[&Recording]; 2],
+    before: &[Vec<Stretch>; 2],
     held: Held,
 ) -> Outcome<Version> {
     let delay = model.derivation.mechanism.force_delay;
@@ -263,12 +265,17 @@ fn with_effects(
     let [fit, check] = if is_later {
         // With a delay forces belong to earlier states.
         let again = |recordings: &[&Recording]| -> Outcome<Vec<Stretch>> {
-            let all = recordings.iter().map(|one| one.prepared_for(&model));
-            Ok(all.collect::<Outcome<Vec<_>>>()?.concat())
+            let mut all = Vec::new();
+            for one in recordings {
+                for stretch in one.prepared_for(&model)? {
+                    all.push(long::thinned(&model, &stretch)?);
+                }
+            }
+            Ok(all)
         };
         [again(recordings[0])?, again(recordings[1])?]
     } else {
-        recordings.map(|all| all.iter().flat_map(|one| one.stretches.clone()).collect())
+        before.clone()
     };
     let host = model.host().clone();
     host.watched("identifying with what was found", 0, |_| {

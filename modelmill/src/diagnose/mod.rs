@@ -2,7 +2,7 @@
 //! own derivation, and a search over sets of them decides.
 //!
 //! `places` -> `candidates` (what `add` would add) -> `columns` (numbers along the recordings) -> `problem` (posed and solved)
-//! with `faults` (of recordings, taken off), `encoders` and `memory` (candidates that no entry of a model file says)
+//! with `long` (recordings in fewer samples), `faults` (of recordings, taken off), `encoders` and `memory` (candidates that no entry of a model file says)
 //! -> `added` (the model file with what was found) -> `versions` (both models identified, along all recordings) -> `findings`.
 //! `chosen` does the same for effects that the user names; `words` puts verdicts into sentences.
 
@@ -13,6 +13,7 @@ mod columns;
 mod encoders;
 mod faults;
 mod findings;
+mod long;
 mod memory;
 pub(crate) mod numbers;
 mod places;

@@ -108,7 +108,7 @@ pub(crate) fn find(
             refused: Some("no finite value somewhere along the recordings".to_owned()),
         }));
     Ok(Answer {
-        problem,
+        problem: problem.without_columns(),
         diagnosis,
         candidates,
     })

@@ -1,0 +1,181 @@
+//! Calm: recordings of a machine that lacks nothing, with force noise white or coloured, from a seed; how often `diagnose`
+//! says that the model is adequate, and what it says otherwise.
+//!
+//! `cargo bench -p modelmill-cli --bench calm -- [--seeds 10] [--first 1] [--corners white,60,30,15,8,3,1]
+//! [--program PATH]`. Noise has 0.5 to 3 N; the low-pass is of first order for odd seeds, of second for even ones; masses are
+//! not those of the file for two seeds of three. Figures go to standard output, progress to standard error.
+
+#[allow(dead_code, reason = "what only the other benchmarks call")]
+#[path = "../hidden_effects/parts.rs"]
+mod parts;
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use parts::case::{Masses, RATE};
+use parts::coloured::{Fall, noise};
+use parts::course::{Course, Repeats};
+use parts::plant::{Along, DRIVES, Plant};
+use parts::random::{Random, three_digits};
+use parts::record::{FILES, Samples};
+use parts::work::{Options, work_off, write};
+use parts::{answer::Answer, ask};
+
+/// Deviations of the noise, N.
+const NOISE: [f64; 2] = [0.5, 3.0];
+const REPEATS: [Repeats; 3] = [Repeats::Once, Repeats::Thrice, Repeats::Never];
+
+/// A recording without anything to find.
+struct Calm {
+    seed: u64,
+    corner: Option<f64>,
+    repeats: Repeats,
+}
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(says) => {
+            eprintln!("{says}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<(), String> {
+    let options = Options::read(&[
+        ("seeds", "10"),
+        ("first", "1"),
+        ("corners", "white,60,30,15,8,3,1"),
+        ("program", ""),
+    ])?;
+    let [seeds, first] = [options.number::<u64>("seeds")?, options.number("first")?];
+    let corners = options
+        .text("corners")
+        .split(',')
+        .map(|corner| match corner {
+            "white" => Ok(None),
+            number => number
+                .parse()
+                .map(Some)
+                .map_err(|_| format!("--corners: `{number}` is no number")),
+        });
+    let corners: Vec<Option<f64>> = corners.collect::<Result<_, String>>()?;
+    let plant = Plant::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec"))?;
+    let mut cases = Vec::new();
+    for corner in &corners {
+        for repeats in REPEATS {
+            let of_seed = |seed| Calm {
+                seed,
+                corner: *corner,
+                repeats,
+            };
+            cases.extend((first..first + seeds).map(of_seed));
+        }
+    }
+    let program = options.program();
+    let answers = work_off(&cases, |case, folder| {
+        let files = FILES.map(|file| folder.join(file));
+        for (which, file) in files.iter().enumerate() {
+            write(file, &case.record(&plant, which)?)?;
+        }
+        Ok(ask::diagnose(program.as_os_str(), &plant.model, &files[0], &files[1]).0)
+    })?;
+    println!(
+        "{:<10}{:>16}{:>16}{:>16}",
+        "noise", "one period", "three periods", "not periodic"
+    );
+    let is_calm = |answer: &Result<Answer, String>| {
+        answer
+            .as_ref()
+            .is_ok_and(|a| a.verdict == "adequate" && a.effects.is_empty())
+    };
+    let (mut calm, mut says) = (0, String::new());
+    for corner in &corners {
+        let name = corner.map_or_else(|| "white".to_owned(), |hz| format!("{hz} Hz"));
+        let mut line = format!("{name:<10}");
+        for repeats in REPEATS {
+            let of = cases.iter().zip(&answers).filter(|(case, _)| {
+                case.repeats == repeats && case.corner.map(f64::to_bits) == corner.map(f64::to_bits)
+            });
+            let mut right = 0;
+            for (case, answer) in of {
+                right += u64::from(is_calm(answer));
+                if !is_calm(answer) {
+                    says += &format!(
+                        "- {name}, {}, seed {}: {}\n",
+                        repeats.word(),
+                        case.seed,
+                        told(answer)
+                    );
+                }
+            }
+            calm += right;
+            line += &format!("{:>16}", format!("{right} of {seeds}"));
+        }
+        println!("{line}");
+    }
+    let all = cases.len().max(1);
+    println!(
+        "\n{:.1} % adequate, {calm} of {all}; target 95 %\n{says}",
+        100.0 * calm as f64 / all as f64
+    );
+    Ok(())
+}
+
+/// What an alarm says.
+fn told(answer: &Result<Answer, String>) -> String {
+    match answer {
+        Err(why) => why.clone(),
+        Ok(answer) => {
+            let claims: Vec<String> = answer
+                .effects
+                .iter()
+                .map(|c| c.effect.to_string())
+                .collect();
+            format!(
+                "{} {} | {}",
+                answer.verdict,
+                claims.join(", "),
+                answer.disturbances.join(", ")
+            )
+        }
+    }
+}
+
+impl Calm {
+    /// Fit (0) or check (1) as text.
+    fn record(&self, plant: &Plant, which: usize) -> Result<String, String> {
+        let number = self.corner.map_or(0, f64::to_bits);
+        let stream =
+            |purpose: u64| Random::new(self.seed, number, purpose + 1000 * self.repeats as u64);
+        let mut random = stream(0);
+        let deviation = three_digits(random.log_between(NOISE[0], NOISE[1]));
+        let masses = (self.seed % 3 != 0).then(|| Masses::draw(&mut random));
+        let rig = parts::case::with_masses(&plant.rig, masses);
+        let courses = [(); 2].map(|()| Course::draw(&mut random, plant.limits(), self.repeats));
+        let course = &courses[which];
+        let along = Along::new(&rig, course, course.times(RATE))?;
+        let fall = if self.seed % 2 == 0 {
+            Fall::Steep
+        } else {
+            Fall::Gentle
+        };
+        let of_channel = |channel: usize| stream(10 + 10 * which as u64 + channel as u64);
+        let noise = (0..DRIVES.len()).map(|k| {
+            let corner = self.corner.map(|corner| (corner, fall));
+            noise(
+                &mut of_channel(DRIVES.len() + k),
+                along.times.len(),
+                RATE,
+                deviation,
+                corner,
+            )
+        });
+        Ok(
+            Samples::new(&along, &along.plain, noise.collect(), of_channel, false)
+                .recorded()
+                .csv,
+        )
+    }
+}

@@ -1,0 +1,117 @@
+//! Long recordings in fewer samples: where the parallel filter keeps few of many, states are picked and forces filtered before
+//! anything is made of them, so that memory and time are those of the samples that count.
+//!
+//! States that were smoothed change little between samples; after a first step as many are left for every one that is kept in
+//! the end as the parallel filter needs to filter regressor and forces alike.
+
+use modelmill_identify::{LowPass, Note, PASSED_BY_DECIMATION, decimate_time};
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::recording::{Recording, note_twins};
+use crate::stretch::Stretch;
+
+/// Shorter stretches stay as they are.
+const LONG: usize = 150_000;
+/// Samples that are kept at most, where that leaves enough of the band in which forces follow the motion.
+const KEPT: usize = 20_000;
+/// The parallel filter passes this part of the band: what many samples say of it is more than enough.
+const PART_OF_BAND: f64 = 0.25;
+/// Samples that are left for the parallel filter to keep one of.
+const LEFT: usize = 4;
+/// Order of the low-pass of the forces. It is Butterworth's, which is flat where the parallel filter passes: one with ripples
+/// would change forces that are held against states as they were.
+const ORDER: usize = 4;
+
+/// The stretches of some recordings, long ones in fewer samples.
+pub(crate) fn stretches(
+    model: &Model,
+    fit: &[&Recording],
+    check: &[&Recording],
+) -> Outcome<[Vec<Stretch>; 2]> {
+    let all = |some: &[&Recording]| -> Outcome<Vec<Stretch>> {
+        let each = some.iter().flat_map(|one| &one.stretches);
+        each.map(|one| thinned(model, one)).collect()
+    };
+    let [mut fit, mut check] = [all(fit)?, all(check)?];
+    note_twins(model, &mut fit, &mut check);
+    Ok([fit, check])
+}
+
+/// A stretch in fewer samples, if it is long and the parallel filter keeps few of them.
+pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
+    let (samples, every) = (stretch.samples(), stretch.decimation());
+    let time = &stretch.run.time;
+    let step = match time.as_slice() {
+        [first, .., last] => (last - first) / (samples - 1) as f64,
+        _ => return Ok(stretch.clone()),
+    };
+    let kept = samples.div_ceil(every);
+    // Beyond, the parallel filter would take too much of what tells effects apart.
+    let most = (stretch.run.prepared.band_hz).map_or(every as f64, |band| {
+        PASSED_BY_DECIMATION / (PART_OF_BAND * band * step)
+    });
+    let more = kept.div_ceil(KEPT);
+    let wanted = if ((every * more) as f64) <= most {
+        every * more
+    } else {
+        every
+    };
+    let factor = wanted / LEFT;
+    if samples < LONG || factor < 2 || stretch.weights.is_some() {
+        return Ok(stretch.clone());
+    }
+    let run = &stretch.run;
+    let picked = |all: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let one = |values: &Vec<f64>| values.iter().copied().step_by(factor).collect();
+        all.iter().map(one).collect()
+    };
+    let filtered = |all: &[Vec<f64>]| -> Outcome<Vec<Vec<f64>>> {
+        let one = |values: &Vec<f64>| -> Outcome<Vec<f64>> {
+            let filter = LowPass::butterworth(ORDER, PASSED_BY_DECIMATION / factor as f64, 1.0);
+            let smooth = filter.and_then(|filter| filter.zero_phase(values));
+            let smooth = smooth.map_err(|error| Error::input(format!("{}: {error}", run.file)))?;
+            Ok(smooth.into_iter().step_by(factor).collect())
+        };
+        all.iter().map(one).collect()
+    };
+    // A force has heard of its neighbours through the filter.
+    let heard = |out: &Vec<bool>| -> Vec<bool> {
+        let about = |k: usize| {
+            let from = (factor * k).saturating_sub(factor - 1);
+            out[from..(factor * (k + 1)).min(out.len())].contains(&true)
+        };
+        (0..out.len().div_ceil(factor)).map(about).collect()
+    };
+    let mut thinned = Stretch {
+        variance: stretch.variance.as_deref().map(picked),
+        load: stretch.load.as_deref().map(&filtered).transpose()?,
+        maps_from_degrees: stretch.maps_from_degrees.clone(),
+        faults: stretch.faults.clone(),
+        ..Stretch::from(modelmill_identify::Run {
+            file: run.file.clone(),
+            time: decimate_time(time, factor),
+            q: picked(&run.q),
+            qd: picked(&run.qd),
+            qdd: picked(&run.qdd),
+            force: run.force.as_deref().map(&filtered).transpose()?,
+            missing_force: run.missing_force.clone(),
+            left_out: run.left_out.iter().map(heard).collect(),
+            lines: run.lines.iter().copied().step_by(factor).collect(),
+            repeats: run.repeats.clone(),
+            prepared: run.prepared.clone(),
+            notes: run.notes.clone(),
+        })
+    };
+    thinned.run.prepared.decimate = LEFT;
+    let passed = PASSED_BY_DECIMATION / (step * (factor * LEFT) as f64);
+    let says = format!(
+        "{} is long: the diagnosis looks at one in {} of its {samples} samples, after the parallel filter, which passes what \
+         is below {} Hz.",
+        run.file,
+        factor * LEFT,
+        crate::text::table::significant(passed, 3)
+    );
+    thinned.note(model, Note::info(says));
+    Ok(thinned)
+}
