@@ -80,7 +80,14 @@ impl<'a> Bench<'a> {
             Source::Columns(choices) => choices.iter().map(&mut of_choice).collect(),
             _ => Vec::new(),
         };
-        let choices = problem.candidates.iter().map(of_candidate).collect();
+        let mut choices: Vec<Vec<Vec<usize>>> =
+            problem.candidates.iter().map(of_candidate).collect();
+        for (candidate, choices) in problem.candidates.iter().zip(&mut choices) {
+            if let Source::Body(body) = &candidate.source {
+                let columns = body.columns([0.0; 3]).into_iter();
+                choices.push(columns.map(|column| pool.add(column)).collect());
+            }
+        }
         let mut bench = Self {
             problem,
             supply,
@@ -164,7 +171,14 @@ impl<'a> Bench<'a> {
                 Source::Columns(_) => self
                     .best_choice(k, &beside)
                     .map(|(best, _)| self.pick(k, best)),
-                Source::Tilt(_) | Source::Reading(_) => {
+                // Where nothing is known of it yet, its centre is the origin of its frame.
+                Source::Body(_) if picks.iter().all(|p| p.candidate != k) => Some(Pick {
+                    candidate: k,
+                    constants: Vec::new(),
+                    columns: self.choices[k][0].clone(),
+                    rank: candidate.parameters.len(),
+                }),
+                Source::Tilt(_) | Source::Reading(_) | Source::Body(_) | Source::Constant(_) => {
                     Some(self.changed(k, picks, &beside.factors))
                 }
                 Source::Carried => carried.get(&k).cloned(),
@@ -275,6 +289,11 @@ impl<'a> Bench<'a> {
                     .filter(|(_, is_wrong)| *is_wrong)
                     .map(|(j, _)| (i, j)),
             );
+            if let Source::Body(body) = &self.candidate(pick).source
+                && body.is_beyond(own)
+            {
+                wrong.push((i, 0));
+            }
         }
         wrong
     }

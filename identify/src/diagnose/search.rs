@@ -385,7 +385,11 @@ impl Bench<'_> {
             .iter()
             .flatten()
             .filter(|p| {
-                self.freedoms(p) == 1 && !matches!(self.candidate(p).source, Source::Reading(_))
+                self.freedoms(p) == 1
+                    && !matches!(
+                        self.candidate(p).source,
+                        Source::Reading(_) | Source::Constant(_)
+                    )
             })
             .collect();
         let mut set = accepted.to_vec();

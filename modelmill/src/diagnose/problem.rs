@@ -16,10 +16,13 @@ use crate::text::table::count;
 
 use super::candidates::{Candidates, candidates};
 use super::columns::{Origin, carried, columns, finer};
-use super::encoders::encoders;
+use super::constants::constants;
+use super::encoders::{self, encoders};
 use super::faults::take_off;
+use super::gears::gears;
 use super::memory::memories;
 use super::numbers::{layout, stack, variables};
+use super::payloads::payloads;
 use super::words;
 use crate::regressors::{Runs, regressor};
 
@@ -84,7 +87,14 @@ pub(crate) fn find(
     let mut further = readings(&problem.layout);
     further.extend(drifts(&problem, &units));
     further.extend(memories(model, &all)?);
-    further.extend(encoders(model, &all, &problem, held));
+    let values = encoders::values(model, &problem, held);
+    let slopes = encoders::sensitivities(model, &all, &values);
+    further.extend(encoders(model, &all, &problem, &slopes));
+    further.extend(gears(model, &all, &values, &slopes)?);
+    further.extend(constants(model, &all, &|k| is_held(model, held, k)));
+    if problem.base.is_empty() {
+        further.extend(payloads(model, &all)?);
+    }
     problem.candidates.extend(further);
     // None of these is an entry of a model file.
     origins.resize(problem.candidates.len(), None);
@@ -202,9 +212,14 @@ fn problem(
     Ok((problem, made.origins, made.undefined))
 }
 
+/// Whether a base parameter keeps its nominal value.
+fn is_held(model: &Model, held: Held, k: usize) -> bool {
+    held == Held::All || model.is_known(k)
+}
+
 /// Takes what is not free off the measured forces.
 fn hold(problem: &mut Problem, model: &Model, held: Held) {
-    let is_held = |k: usize| held == Held::All || model.is_known(k);
+    let is_held = |k: usize| is_held(model, held, k);
     let mut known = Column(vec![None; model.drives().len()]);
     let (mut free, mut is_part_of_load) = (Vec::new(), Vec::new());
     for (k, column) in std::mem::take(&mut problem.base).into_iter().enumerate() {
