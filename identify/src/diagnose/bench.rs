@@ -80,14 +80,7 @@ impl<'a> Bench<'a> {
             Source::Columns(choices) => choices.iter().map(&mut of_choice).collect(),
             _ => Vec::new(),
         };
-        let mut choices: Vec<Vec<Vec<usize>>> =
-            problem.candidates.iter().map(of_candidate).collect();
-        for (candidate, choices) in problem.candidates.iter().zip(&mut choices) {
-            if let Source::Body(body) = &candidate.source {
-                let columns = body.columns([0.0; 3]).into_iter();
-                choices.push(columns.map(|column| pool.add(column)).collect());
-            }
-        }
+        let choices = problem.candidates.iter().map(of_candidate).collect();
         let mut bench = Self {
             problem,
             supply,
@@ -105,7 +98,21 @@ impl<'a> Bench<'a> {
         // Channels of very different forces count alike from the start.
         bench.weigh(&[]);
         bench.weigh(&[]);
+        bench.begin();
         bench
+    }
+
+    /// The columns with which bodies and constants are looked at before they are picked: at the origin of a body's frame, and
+    /// without an error, with what the base says alone. Only what is picked is worth columns of its own size.
+    fn begin(&mut self) {
+        let problem = self.problem;
+        let factors = self.alone.factors.clone();
+        for (k, candidate) in problem.candidates.iter().enumerate() {
+            if let Source::Body(_) | Source::Constant(_) = candidate.source {
+                let columns = self.changed(k, &[], &factors).columns;
+                self.choices[k].push(columns);
+            }
+        }
     }
 
     pub(crate) fn candidate(&self, pick: &Pick) -> &'a Candidate {
@@ -171,13 +178,14 @@ impl<'a> Bench<'a> {
                 Source::Columns(_) => self
                     .best_choice(k, &beside)
                     .map(|(best, _)| self.pick(k, best)),
-                // Where nothing is known of it yet, its centre is the origin of its frame.
-                Source::Body(_) if picks.iter().all(|p| p.candidate != k) => Some(Pick {
-                    candidate: k,
-                    constants: Vec::new(),
-                    columns: self.choices[k][0].clone(),
-                    rank: candidate.parameters.len(),
-                }),
+                Source::Body(_) | Source::Constant(_) if picks.iter().all(|p| p.candidate != k) => {
+                    Some(Pick {
+                        candidate: k,
+                        constants: Vec::new(),
+                        columns: self.choices[k][0].clone(),
+                        rank: candidate.parameters.len(),
+                    })
+                }
                 Source::Tilt(_) | Source::Reading(_) | Source::Body(_) | Source::Constant(_) => {
                     Some(self.changed(k, picks, &beside.factors))
                 }

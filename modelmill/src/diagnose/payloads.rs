@@ -99,6 +99,8 @@ pub(crate) fn reach(mechanism: &Mechanism) -> f64 {
         let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
         squares.sum::<f64>().sqrt()
     };
-    let pairs = origins.iter().flat_map(|a| origins.iter().map(move |b| (a, b)));
+    let pairs = origins
+        .iter()
+        .flat_map(|a| origins.iter().map(move |b| (a, b)));
     pairs.map(|(a, b)| distance(a, b)).fold(0.0, f64::max)
 }
