@@ -175,7 +175,6 @@ impl<'a> Bench<'a> {
         let mut present = Vec::with_capacity(problem.candidates.len());
         for (k, candidate) in problem.candidates.iter().enumerate() {
             let pick = match &candidate.source {
-                _ if self.waits(candidate, picks) => None,
                 Source::Columns(_) => self
                     .best_choice(k, &beside)
                     .map(|(best, _)| self.pick(k, best)),
@@ -198,14 +197,6 @@ impl<'a> Bench<'a> {
             }));
         }
         self.present = present;
-    }
-
-    /// Whether a candidate is the wider form of another at the same place that a set does not hold yet: how a mass spreads is
-    /// asked for once the mass is there.
-    pub(crate) fn waits(&self, candidate: &Candidate, picks: &[Pick]) -> bool {
-        let is_wider = candidate.refines.as_ref() == Some(&candidate.effect.kind);
-        let is_it = |pick: &Pick| self.candidate(pick).effect == candidate.effect;
-        is_wider && !picks.iter().any(is_it)
     }
 
     /// The choice of a candidate that explains most beside a set, and how much; an only one is not asked.

@@ -337,9 +337,6 @@ impl Bench<'_> {
         let now = self.try_in(&table, picks.to_vec()).squares;
         let mut considered: Vec<Considered> = Vec::new();
         for (k, candidate) in self.problem.candidates.iter().enumerate() {
-            if self.waits(candidate, picks) {
-                continue;
-            }
             let picked = picks.iter().position(|p| p.candidate == k);
             let (gain, refused) = if let Some(i) = picked {
                 let mut without = picks.to_vec();

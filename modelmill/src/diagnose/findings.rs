@@ -17,7 +17,7 @@ use crate::stretch::Stretch;
 use super::added::{self, Added};
 use super::chosen::Named;
 use super::faults;
-use super::problem::{self, Answer, Held};
+use super::problem::{self, Answer, Asked, Held};
 use super::versions::Version;
 use super::words::Judged;
 
@@ -160,8 +160,14 @@ impl Model {
             (self.host()).watched("holding the recordings against each other", 0, |_| {
                 faults::between_runs(self, &recordings)
             })?;
-        let find =
-            |between: &[Difference]| problem::find(self, &fit_data, &check_data, held, between);
+        let find = |between: &[Difference]| {
+            let asked = Asked {
+                held,
+                with_payloads: true,
+                between,
+            };
+            problem::find(self, &fit_data, &check_data, asked)
+        };
         let mut answer = find(&between)?;
         let mut between = between;
         if !between.is_empty() {
@@ -269,7 +275,12 @@ fn with_nominal(findings: &Findings, between: &[Difference]) -> Outcome<WithNomi
         let wanted = runs.filter(|(_, run)| run.is_check == is_check);
         wanted.map(|(data, _)| data.clone()).collect()
     };
-    let answer = problem::find(&version.model, &of(false), &of(true), Held::All, between)?;
+    let asked = Asked {
+        held: Held::All,
+        with_payloads: false,
+        between,
+    };
+    let answer = problem::find(&version.model, &of(false), &of(true), asked)?;
     let missing = answer.diagnosis.effects.iter().map(|found| {
         let parameters = &answer.problem.candidates[found.candidate].parameters;
         (found.effect.clone(), of_search(parameters, found))

@@ -59,14 +59,26 @@ impl Answer {
     }
 }
 
+/// What is asked.
+#[derive(Clone, Copy)]
+pub(crate) struct Asked<'a> {
+    /// Which parameters keep their nominal values.
+    pub held: Held,
+    /// Whether further bodies are looked for where all are held: not while a model file's own values are only held against
+    /// those that were found, where every wrong value of a body would be one.
+    pub with_payloads: bool,
+    /// What the recordings do not share.
+    pub between: &'a [Difference],
+}
+
 /// Finds what a model lacks.
 pub(crate) fn find(
     model: &Model,
     fit: &[Stretch],
     check: &[Stretch],
-    held: Held,
-    between: &[Difference],
+    asked: Asked<'_>,
 ) -> Outcome<Answer> {
+    let held = asked.held;
     let candidates = model
         .host()
         .watched("writing down what may be missing", 0, |_| candidates(model))??;
@@ -80,7 +92,7 @@ pub(crate) fn find(
                 problem(&candidates, model, &all)
             })??;
     hold(&mut problem, model, held);
-    take_off(&mut problem, model, &all, between)?;
+    take_off(&mut problem, model, &all, asked.between)?;
     let units: Vec<String> = (0..model.drives().len())
         .map(|d| model.force_unit(d).to_owned())
         .collect();
@@ -92,7 +104,7 @@ pub(crate) fn find(
     further.extend(encoders(model, &all, &problem, &slopes));
     further.extend(gears(model, &all, &values, &slopes)?);
     further.extend(constants(model, &all, &|k| is_held(model, held, k)));
-    if problem.base.is_empty() {
+    if asked.with_payloads && problem.base.is_empty() {
         further.extend(payloads(model, &all)?);
     }
     problem.candidates.extend(further);
