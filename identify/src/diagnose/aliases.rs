@@ -149,10 +149,11 @@ impl Bench<'_> {
         found
     }
 
-    /// A set with a wrong reading that comes near to what is found, by a column of the reading's own size.
+    /// A set with a wrong reading or a further body that comes near to what is found, by columns of its own size.
     fn of_its_size(&mut self, candidate: &Pick, tried: Trial, squares: f64) -> Trial {
-        let is_reading = matches!(self.candidate(candidate).source, Source::Reading(_));
-        if !is_reading || tried.squares > CLOSE * squares {
+        let source = &self.candidate(candidate).source;
+        let is_sized = matches!(source, Source::Reading(_) | Source::Body(_));
+        if !is_sized || tried.squares > CLOSE * squares {
             return tried;
         }
         let refreshed = self.refresh(tried.picks);

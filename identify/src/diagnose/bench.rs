@@ -98,7 +98,21 @@ impl<'a> Bench<'a> {
         // Channels of very different forces count alike from the start.
         bench.weigh(&[]);
         bench.weigh(&[]);
+        bench.begin();
         bench
+    }
+
+    /// The columns with which bodies and constants are looked at before they are picked: at the origin of a body's frame, and
+    /// without an error, with what the base says alone. Only what is picked is worth columns of its own size.
+    fn begin(&mut self) {
+        let problem = self.problem;
+        let factors = self.alone.factors.clone();
+        for (k, candidate) in problem.candidates.iter().enumerate() {
+            if let Source::Body(_) | Source::Constant(_) = candidate.source {
+                let columns = self.changed(k, &[], &factors).columns;
+                self.choices[k].push(columns);
+            }
+        }
     }
 
     pub(crate) fn candidate(&self, pick: &Pick) -> &'a Candidate {
@@ -164,7 +178,15 @@ impl<'a> Bench<'a> {
                 Source::Columns(_) => self
                     .best_choice(k, &beside)
                     .map(|(best, _)| self.pick(k, best)),
-                Source::Tilt(_) | Source::Reading(_) => {
+                Source::Body(_) | Source::Constant(_) if picks.iter().all(|p| p.candidate != k) => {
+                    Some(Pick {
+                        candidate: k,
+                        constants: Vec::new(),
+                        columns: self.choices[k][0].clone(),
+                        rank: candidate.parameters.len(),
+                    })
+                }
+                Source::Tilt(_) | Source::Reading(_) | Source::Body(_) | Source::Constant(_) => {
                     Some(self.changed(k, picks, &beside.factors))
                 }
                 Source::Carried => carried.get(&k).cloned(),
@@ -278,6 +300,11 @@ impl<'a> Bench<'a> {
                     .filter(|(_, is_wrong)| *is_wrong)
                     .map(|(j, _)| (i, j)),
             );
+            if let Source::Body(body) = &self.candidate(pick).source
+                && body.is_beyond(own)
+            {
+                wrong.push((i, 0));
+            }
         }
         wrong
     }

@@ -1,4 +1,5 @@
-//! Effects whose columns follow from the fit: a tilted base, late forces, and what depends on the load.
+//! Effects whose columns follow from the fit: a tilted base, late forces, a further body, a wrong number of the model, and
+//! what depends on the load.
 
 use std::collections::HashMap;
 
@@ -113,6 +114,15 @@ impl Bench<'_> {
                     }
                 }
                 vec![self.misread(*reading, &force, found.map_or(0.0, |value| value[0]))]
+            }
+            Source::Body(body) => {
+                body.columns(found.map_or([0.0; 3], |values| body.centre(&values)))
+            }
+            Source::Constant(constant) => {
+                let error = found.map_or(0.0, |values| values[0]);
+                // Factors of the base come first.
+                let base = &factors.as_slice()[..self.base.len()];
+                vec![constant.column(error, base, self.weights.len())]
             }
             Source::Columns(_) | Source::Carried => unreachable!("they change no model"),
         };

@@ -4,7 +4,7 @@
 //! 1. [`Problem`] - measured forces, columns of the model, candidates with the constants that are searched for.
 //! 2. `pool`, `factored`, `beside`, `bench` - inner products of all columns, so that a set of effects is fitted in microseconds;
 //!    `tuning` finds constants, `following` makes columns that depend on the fit, `readings` those of forces that are read
-//!    wrongly, `tilt` turns gravity.
+//!    wrongly, `tilt` turns gravity, `body` places a further mass, `constant` moves a number of the model.
 //! 3. `search` - forward over sets, with exchanges; `evidence` decides on time that was not fitted; `settle` makes the last
 //!    set as small and simple as it can be.
 //! 4. `aliases` - what this recording cannot tell apart; `reproducible` - what no candidate explains and no noise is.
@@ -16,8 +16,10 @@
 mod aliases;
 mod bench;
 mod beside;
+mod body;
 mod cleaning;
 mod column;
+mod constant;
 mod disturbance;
 mod drifts;
 mod estimates;
@@ -37,8 +39,10 @@ mod untold;
 
 use serde::Serialize;
 
+pub use body::Body;
 pub use cleaning::step_of_values;
 pub use column::Column;
+pub use constant::Constant;
 pub use disturbance::{Budget, Disturbance, Quantity};
 pub use drifts::drifts;
 pub use evidence::Evidence;

@@ -1,6 +1,8 @@
 //! What a diagnosis starts from: measured forces, the columns that the model has, and those that effects would add.
 
+use super::body::Body;
 use super::column::Column;
+use super::constant::Constant;
 use super::disturbance::Disturbance;
 use super::tilt::Tilt;
 
@@ -119,6 +121,10 @@ pub enum Source {
     Tilt(Tilt),
     /// Forces are not read as they act.
     Reading(Reading),
+    /// A further body on one that the model has.
+    Body(Body),
+    /// A number of the model is off; the parameter is by how much.
+    Constant(Constant),
     /// They depend on what the drives carry, which the fit says: see [`Supply::carried`].
     Carried,
 }

@@ -105,6 +105,14 @@ impl Bench<'_> {
         };
         let is_curved = |(i, pick): (usize, &Pick)| Some((i, curved(self, pick)?));
         let Some((at, reading)) = trial.picks.iter().enumerate().find_map(is_curved) else {
+            let is_body = |pick: &Pick| matches!(self.candidate(pick).source, Source::Body(_));
+            if trial.picks.iter().any(is_body) {
+                let refreshed = self.refresh(trial.picks.clone());
+                return Trial {
+                    score: trial.score,
+                    ..self.trial(refreshed)
+                };
+            }
             return trial.clone();
         };
         let is_other = |pick: &&Pick| {

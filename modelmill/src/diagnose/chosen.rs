@@ -255,7 +255,7 @@ impl Chosen {
                 };
                 only(tilt.directions(&level).into_iter().map(sum).collect())
             }
-            Source::Reading(_) => Vec::new(),
+            Source::Reading(_) | Source::Body(_) | Source::Constant(_) => Vec::new(),
         };
         Ok(Some((candidate, choices)))
     }

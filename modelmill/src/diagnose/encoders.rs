@@ -24,14 +24,25 @@ const SAMPLES_PER_WAVE: f64 = 12.0;
 /// Beyond so many times its middle size a difference has met a sign that jumped.
 const JUMPED: f64 = 100.0;
 
+/// What forces change by with position, rate and acceleration of every active coordinate, for base parameters.
+pub(crate) fn sensitivities(
+    model: &Model,
+    all: &Runs<'_>,
+    values: &[f64],
+) -> Vec<Option<[Column; 3]>> {
+    let coordinates = 0..model.motions().len();
+    coordinates
+        .map(|i| sensitivity(model, all, values, i))
+        .collect()
+}
+
 /// An error of each encoder with sine and cosine of its angle, for each number of waves that may be.
 pub(crate) fn encoders(
     model: &Model,
     all: &Runs<'_>,
     problem: &Problem,
-    held: Held,
+    slopes: &[Option<[Column; 3]>],
 ) -> Vec<Candidate> {
-    let values = values(model, problem, held);
     let motions = model.motions();
     let mut candidates = Vec::new();
     for (i, (name, is_angle)) in motions.iter().enumerate() {
@@ -51,7 +62,7 @@ pub(crate) fn encoders(
         if travel.is_nan() || travel <= 0.0 || fastest <= 0.0 {
             continue;
         }
-        let Some(slopes) = sensitivities(model, all, &values, i) else {
+        let Some(slopes) = &slopes[i] else {
             continue;
         };
         let step = problem.layout.stretches.iter().map(|s| s.step);
@@ -117,7 +128,7 @@ pub(crate) fn encoders(
 }
 
 /// Base parameters by least squares, drives weighed alike; those that are held keep their nominal values.
-fn values(model: &Model, problem: &Problem, held: Held) -> Vec<f64> {
+pub(crate) fn values(model: &Model, problem: &Problem, held: Held) -> Vec<f64> {
     let mut all = Moments::new(problem.base.len());
     for (d, measured) in problem.measured.0.iter().enumerate() {
         let Some(measured) = measured else { continue };
@@ -144,7 +155,7 @@ fn values(model: &Model, problem: &Problem, held: Held) -> Vec<f64> {
 
 /// What forces change by with a position, its rate and its acceleration, decimated; `None` where the model does not hold
 /// beside the recording.
-fn sensitivities(
+fn sensitivity(
     model: &Model,
     all: &Runs<'_>,
     values: &[f64],

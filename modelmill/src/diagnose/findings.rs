@@ -18,7 +18,7 @@ use super::added::{self, Added};
 use super::chosen::Named;
 use super::faults;
 use super::long;
-use super::problem::{self, Answer, Held};
+use super::problem::{self, Answer, Asked, Held};
 use super::versions::Version;
 use super::words::Judged;
 
@@ -174,7 +174,14 @@ impl Model {
             (self.host()).watched("holding the recordings against each other", 0, |_| {
                 faults::between_runs(self, &recordings)
             })?;
-        let find = |between: &[Difference]| problem::find(self, &data[0], &data[1], held, between);
+        let find = |between: &[Difference]| {
+            let asked = Asked {
+                held,
+                with_payloads: true,
+                between,
+            };
+            problem::find(self, &data[0], &data[1], asked)
+        };
         let mut answer = find(&between)?;
         let mut between = between;
         if !between.is_empty() {
@@ -291,7 +298,12 @@ fn with_nominal(findings: &Findings, between: &[Difference]) -> Outcome<WithNomi
         let wanted = runs.filter(|(_, run)| run.is_check == is_check);
         wanted.map(|(data, _)| data.clone()).collect()
     };
-    let answer = problem::find(&version.model, &of(false), &of(true), Held::All, between)?;
+    let asked = Asked {
+        held: Held::All,
+        with_payloads: false,
+        between,
+    };
+    let answer = problem::find(&version.model, &of(false), &of(true), asked)?;
     let missing = answer.diagnosis.effects.iter().map(|found| {
         let parameters = &answer.problem.candidates[found.candidate].parameters;
         (found.effect.clone(), of_search(parameters, found))

@@ -2,7 +2,8 @@
 //! own derivation, and a search over sets of them decides.
 //!
 //! `places` -> `candidates` (what `add` would add) -> `columns` (numbers along the recordings) -> `problem` (posed and solved)
-//! with `long` (recordings in fewer samples), `faults` (of recordings, taken off), `encoders` and `memory` (candidates that no entry of a model file says)
+//! with `long` (recordings in fewer samples), `faults` (of recordings, taken off), and candidates that no entry of a model
+//! file says: `encoders`, `gears`, `memory`, `payloads`, `constants`
 //! -> `added` (the model file with what was found) -> `versions` (both models identified, along all recordings) -> `findings`.
 //! `chosen` does the same for effects that the user names; `words` puts verdicts into sentences.
 
@@ -10,12 +11,15 @@ pub(crate) mod added;
 mod candidates;
 mod chosen;
 mod columns;
+mod constants;
 mod encoders;
 mod faults;
 mod findings;
+mod gears;
 mod long;
 mod memory;
 pub(crate) mod numbers;
+mod payloads;
 mod places;
 mod problem;
 mod tilt;

@@ -16,10 +16,13 @@ use crate::text::table::count;
 
 use super::candidates::{Candidates, candidates};
 use super::columns::{Origin, carried, columns, finer};
-use super::encoders::encoders;
+use super::constants::constants;
+use super::encoders::{self, encoders};
 use super::faults::take_off;
+use super::gears::gears;
 use super::memory::memories;
 use super::numbers::{layout, stack, variables};
+use super::payloads::payloads;
 use super::words;
 use crate::regressors::{Runs, regressor};
 
@@ -53,14 +56,26 @@ impl Answer {
     }
 }
 
+/// What is asked.
+#[derive(Clone, Copy)]
+pub(crate) struct Asked<'a> {
+    /// Which parameters keep their nominal values.
+    pub held: Held,
+    /// Whether further bodies are looked for where all are held: not while a model file's own values are only held against
+    /// those that were found, where every wrong value of a body would be one.
+    pub with_payloads: bool,
+    /// What the recordings do not share.
+    pub between: &'a [Difference],
+}
+
 /// Finds what a model lacks.
 pub(crate) fn find(
     model: &Model,
     fit: &[Stretch],
     check: &[Stretch],
-    held: Held,
-    between: &[Difference],
+    asked: Asked<'_>,
 ) -> Outcome<Answer> {
+    let held = asked.held;
     let candidates = model
         .host()
         .watched("writing down what may be missing", 0, |_| candidates(model))??;
@@ -74,14 +89,21 @@ pub(crate) fn find(
                 problem(&candidates, model, &all)
             })??;
     hold(&mut problem, model, held);
-    take_off(&mut problem, model, &all, between)?;
+    take_off(&mut problem, model, &all, asked.between)?;
     let units: Vec<String> = (0..model.drives().len())
         .map(|d| model.force_unit(d).to_owned())
         .collect();
     let mut further = readings(&problem.layout);
     further.extend(drifts(&problem, &units));
     further.extend(memories(model, &all)?);
-    further.extend(encoders(model, &all, &problem, held));
+    let values = encoders::values(model, &problem, held);
+    let slopes = encoders::sensitivities(model, &all, &values);
+    further.extend(encoders(model, &all, &problem, &slopes));
+    further.extend(gears(model, &all, &values, &slopes)?);
+    further.extend(constants(model, &all, &|k| is_held(model, held, k)));
+    if asked.with_payloads && problem.base.is_empty() {
+        further.extend(payloads(model, &all)?);
+    }
     problem.candidates.extend(further);
     // None of these is an entry of a model file.
     origins.resize(problem.candidates.len(), None);
@@ -199,9 +221,14 @@ fn problem(
     Ok((problem, made.origins, made.undefined))
 }
 
+/// Whether a base parameter keeps its nominal value.
+fn is_held(model: &Model, held: Held, k: usize) -> bool {
+    held == Held::All || model.is_known(k)
+}
+
 /// Takes what is not free off the measured forces.
 fn hold(problem: &mut Problem, model: &Model, held: Held) {
-    let is_held = |k: usize| held == Held::All || model.is_known(k);
+    let is_held = |k: usize| is_held(model, held, k);
     let mut known = Column(vec![None; model.drives().len()]);
     let (mut free, mut is_part_of_load) = (Vec::new(), Vec::new());
     for (k, column) in std::mem::take(&mut problem.base).into_iter().enumerate() {

@@ -8,7 +8,7 @@
 mod changes;
 mod columns;
 mod layout;
-mod payload;
+pub(crate) mod payload;
 mod per_run;
 mod points;
 mod rows;

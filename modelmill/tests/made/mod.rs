@@ -38,6 +38,8 @@ pub(crate) enum Made<'a> {
     BodyAndScales(&'a str, &'a [f64]),
     /// So many times what a model weighs more, between two samples: a push.
     Push(&'a Model, f64, usize, usize),
+    /// The encoder of a joint sits before a gear that yields by so much for each unit of what its drive carries.
+    Yields(usize, f64),
     /// The force of a drive lacks between two samples.
     Lost(usize, usize, usize),
 }
@@ -144,6 +146,7 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
         });
         push(&mut forces, &with, &without, times, from..to);
     }
+    let carried = forces.clone();
     let motion = evaluator.drives(&states).expect("drives");
     let drives = model.drives();
     let mut clock = 1.0;
@@ -179,8 +182,12 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
     let mut text = format!("t,{},{}", active.join(","), drives.join(","));
     for k in 0..SAMPLES {
         let _ = write!(text, "\n{}", clock * STEP * k as f64);
-        for column in &columns[0] {
-            let _ = write!(text, ",{}", column[k]);
+        for (i, column) in columns[0].iter().enumerate() {
+            let yielded = match made {
+                Made::Yields(drive, by) if drive == i => by * carried[drive][k],
+                _ => 0.0,
+            };
+            let _ = write!(text, ",{}", column[k] + yielded);
         }
         for (d, force) in forces.iter().enumerate() {
             let is_lost = matches!(made, Made::Lost(drive, from, to) if drive == d && (from..to).contains(&k));

@@ -1,0 +1,56 @@
+//! A number of the model that is off, such as a length: forces bend as it moves, by their first and second derivatives.
+
+use super::column::Column;
+use super::tilt::Sensitivity;
+
+/// A constant of the model whose value may be wrong; its parameter is what it is too small by.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Constant {
+    /// What forces change by with it, for each unit.
+    pub slope: Sensitivity,
+    /// What that changes by, for each unit.
+    pub bend: Sensitivity,
+}
+
+impl Constant {
+    /// What forces change by, for each unit, between no error and one of a size: times the error it is the whole change, up to
+    /// its third power. `base` are the parameters of the base columns.
+    pub(crate) fn column(&self, error: f64, base: &[f64], channels: usize) -> Column {
+        let mut sum = Column(vec![None; channels]);
+        for (part, share) in [(&self.slope, 1.0), (&self.bend, 0.5 * error)] {
+            if share == 0.0 {
+                continue;
+            }
+            sum.add(share, &part.held);
+            for (change, factor) in part.base.iter().zip(base) {
+                sum.add(share * factor, change);
+            }
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The square of a number, of which the base column and a held force have one part each.
+    #[test]
+    fn the_column_times_the_error_is_the_change() {
+        let one = |value: f64| Column(vec![Some(vec![value])]);
+        let (constant, factor) = (3.0, 5.0);
+        let held = |value: f64| Sensitivity {
+            base: vec![one(value)],
+            held: one(2.0 * value),
+        };
+        let square = Constant {
+            slope: held(2.0 * constant),
+            bend: held(2.0),
+        };
+        let error = 0.4_f64;
+        let column = square.column(error, &[factor], 1);
+        let change = error * column.0[0].as_deref().unwrap_or_default()[0];
+        let expected = (factor + 2.0) * ((constant + error).powi(2) - constant.powi(2));
+        assert!((change - expected).abs() < 1e-12, "{change} {expected}");
+    }
+}

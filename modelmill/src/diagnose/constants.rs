@@ -1,0 +1,113 @@
+//! Lengths and angles of the model that may be wrong: what the forces of its base parameters change by with each of its constants,
+//! by central differences. While base parameters are held they hide what a constant does to them, and nothing is asked.
+
+use modelmill_codegen::Evaluator;
+use modelmill_identify::diagnose::{
+    Candidate, Column, Constant, Effect, EffectParameter, Nature, Sensitivity, Sign, Source,
+};
+
+use crate::model::Model;
+use crate::regressors::{Runs, regressor};
+
+use super::payloads::reach;
+
+/// Steps of the differences: this part of the machine's size, or of a radian.
+const STEP: f64 = 1e-3;
+
+/// An error of every constant that is a length or an angle; `is_held` says which base parameters are known.
+pub(crate) fn constants(
+    model: &Model,
+    all: &Runs<'_>,
+    is_held: &dyn Fn(usize) -> bool,
+) -> Vec<Candidate> {
+    let derivation = &model.derivation;
+    let mechanism = &derivation.mechanism;
+    if (0..model.base.len()).all(is_held) {
+        return Vec::new();
+    }
+    let usual: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
+    let along = |k: usize, step: f64| {
+        let mut moved = usual.clone();
+        moved[k] += step;
+        regressor(all, &Evaluator::with_constants(derivation, moved), model)
+    };
+    let mut middle = None;
+    let mut candidates = Vec::new();
+    for (k, constant) in mechanism.constants.iter().enumerate() {
+        let step = match constant.unit.as_str() {
+            "m" => STEP * reach(mechanism),
+            "rad" => STEP,
+            _ => continue,
+        };
+        // With another length the mechanism may not close along the recordings.
+        let (Ok(back), Ok(ahead)) = (along(k, -step), along(k, step)) else {
+            continue;
+        };
+        if middle.is_none() {
+            middle = along(k, 0.0).ok();
+        }
+        let Some(middle) = &middle else { continue };
+        let [mut slope, mut bend] = [(); 2].map(|()| Sensitivity {
+            base: Vec::new(),
+            held: Column(vec![None; model.drives().len()]),
+        });
+        for (p, middle) in middle.iter().enumerate() {
+            let sum = |parts: [(f64, &Column); 3]| {
+                let mut sum = Column(vec![None; model.drives().len()]);
+                for (factor, part) in parts.into_iter().filter(|(factor, _)| *factor != 0.0) {
+                    sum.add(factor, part);
+                }
+                without_rounding(sum)
+            };
+            let first = 0.5 / step;
+            let second = 1.0 / (step * step);
+            let first = sum([(first, &ahead[p]), (0.0, middle), (-first, &back[p])]);
+            let second = sum([
+                (second, &ahead[p]),
+                (-2.0 * second, middle),
+                (second, &back[p]),
+            ]);
+            for (part, change) in [(&mut slope, first), (&mut bend, second)] {
+                if is_held(p) {
+                    part.held.add(model.nominal[p], &change);
+                } else {
+                    part.base.push(change);
+                }
+            }
+        }
+        if slope.held.is_zero() && slope.base.iter().all(Column::is_zero) {
+            continue;
+        }
+        candidates.push(Candidate {
+            effect: Effect {
+                kind: "constant_error".to_owned(),
+                at: vec![constant.name.clone()],
+            },
+            parameters: vec![EffectParameter {
+                symbol: "error".to_owned(),
+                unit: constant.unit.clone(),
+                sign: Sign::Any,
+            }],
+            searched: 0,
+            is_part_of_load: true,
+            refines: None,
+            nature: Nature::Effect,
+            is_per_run: false,
+            source: Source::Constant(Constant { slope, bend }),
+        });
+    }
+    candidates
+}
+
+/// Differences below this are rounding.
+const ROUNDING: f64 = 1e-7;
+
+fn without_rounding(mut column: Column) -> Column {
+    for slot in &mut column.0 {
+        let most = slot.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
+        if most < ROUNDING {
+            *slot = None;
+        }
+    }
+    column
+}

@@ -1,0 +1,114 @@
+//! Gears between an encoder and what moves: they yield by the torque that they carry, and where they have backlash their load
+//! lies on one flank or the other. The encoder reads the motor's side, so that the load is elsewhere, by an angle that is known
+//! but for its size; forces change by that as by an error of the encoder. The inertia of the motor and the blow
+//! between flanks do not show in this.
+
+use modelmill_identify::diagnose::{
+    Candidate, Choice, Column, Effect, EffectParameter, Nature, Sign, Source,
+};
+use modelmill_spec::DriveKind;
+
+use crate::along;
+use crate::error::Outcome;
+use crate::model::Model;
+use crate::regressors::Runs;
+
+use super::numbers::stack;
+
+/// What the load's position is off by, of each kind: torque times compliance, or half the play to either side.
+const KINDS: [(&str, &str); 2] = [("drive_compliance", "compliance"), ("backlash", "play")];
+
+/// Compliance and backlash of every drive that turns or pushes a joint; `slopes` say what forces change by with position,
+/// rate and acceleration of each coordinate, and `values` are base parameters.
+pub(crate) fn gears(
+    model: &Model,
+    all: &Runs<'_>,
+    values: &[f64],
+    slopes: &[Option<[Column; 3]>],
+) -> Outcome<Vec<Candidate>> {
+    // Friction of motor and gear does not pass through the gear.
+    let carried: Vec<f64> = (values.iter().enumerate())
+        .map(|(k, value)| if model.is_effect(k) { 0.0 } else { *value })
+        .collect();
+    let n = model.drives().len();
+    let loads = stack(all, |one| {
+        let loads = along::forces(model, one, &carried)?;
+        let rate = |values: &[f64]| -> Vec<f64> {
+            let last = values.len().saturating_sub(1);
+            let time = &one.run.time;
+            let slope = |i: usize| {
+                let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
+                (values[b] - values[a]) / (time[b] - time[a]).max(f64::MIN_POSITIVE)
+            };
+            (0..values.len()).map(slope).collect()
+        };
+        let rates: Vec<Vec<f64>> = loads.iter().map(|load| rate(load)).collect();
+        let bends = rates.iter().map(|of| rate(of)).collect::<Vec<_>>();
+        Ok(loads.into_iter().chain(rates).chain(bends).collect())
+    })?;
+    let mechanism = &model.derivation.mechanism;
+    let active = model.active();
+    let driven = mechanism.drives.iter().filter(|drive| drive.is_driven);
+    let mut candidates = Vec::new();
+    for (d, drive) in driven.enumerate() {
+        let DriveKind::Joint(joint) = drive.kind else {
+            continue;
+        };
+        let name = &mechanism.coordinates[joint.0].name;
+        let Some(i) = active.iter().position(|one| one == name) else {
+            continue;
+        };
+        let Some(slopes) = slopes.get(i).and_then(Option::as_ref) else {
+            continue;
+        };
+        let is_angle = model.motions()[i].1;
+        for (kind, symbol) in KINDS {
+            let is_yielding = kind == "drive_compliance";
+            let shift = |order: usize, sample: usize| match (is_yielding, order) {
+                (true, order) => loads[order * n + d][sample],
+                (false, 0) => 0.5 * loads[d][sample].signum(),
+                (false, _) => 0.0,
+            };
+            let mut column = Column(vec![None; n]);
+            for (order, slope) in slopes.iter().enumerate() {
+                let mut part = slope.clone();
+                for values in part.0.iter_mut().flatten() {
+                    for (sample, x) in values.iter_mut().enumerate() {
+                        *x *= shift(order, sample);
+                    }
+                }
+                column.add(-1.0, &part);
+            }
+            if column.is_zero() {
+                continue;
+            }
+            let unit = match (is_yielding, is_angle) {
+                (true, true) => "rad/(N m)",
+                (true, false) => "m/N",
+                (false, true) => "rad",
+                (false, false) => "m",
+            };
+            candidates.push(Candidate {
+                effect: Effect {
+                    kind: kind.to_owned(),
+                    at: vec![drive.name.clone()],
+                },
+                parameters: vec![EffectParameter {
+                    symbol: symbol.to_owned(),
+                    unit: unit.to_owned(),
+                    sign: Sign::Positive,
+                }],
+                searched: 0,
+                is_part_of_load: false,
+                refines: None,
+                nature: Nature::Effect,
+                is_per_run: false,
+                source: Source::Columns(vec![Choice {
+                    constants: Vec::new(),
+                    columns: vec![column],
+                }]),
+            });
+        }
+    }
+    Ok(candidates)
+}

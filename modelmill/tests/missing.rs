@@ -1,0 +1,100 @@
+//! `diagnose` where an arm carries more than its model, where a length of the model is wrong, and where a gear yields. Forces are
+//! those of a model file that has the body or the length; the encoder's error is put into the recorded positions.
+
+mod draws;
+#[allow(dead_code, reason = "other tests do more to runs")]
+mod made;
+
+use std::path::Path;
+
+use modelmill::Model;
+use modelmill::diagnose::{Findings, Held, Missing, Question};
+use modelmill::recording::Reading;
+
+use made::{Made, bundled, run, run_of};
+
+const ARM: &str = "puma560";
+
+fn diagnosed(file: &Path, held: Held) -> Findings {
+    let model = Model::open(bundled(ARM)).expect("the model");
+    let recording = model
+        .recording(file, &Reading::default())
+        .expect("the recording");
+    let question = Question {
+        held,
+        again_with_nominal: false,
+    };
+    (model.diagnose(&[&recording], &[], &question)).expect("an answer")
+}
+
+/// The only effect that was found, at its place.
+#[track_caller]
+fn only<'a>(findings: &'a Findings, kind: &str, at: &str) -> &'a Missing {
+    let [found] = &findings.missing[..] else {
+        panic!("{:#?}", findings.missing);
+    };
+    assert_eq!(
+        (found.effect.kind.as_str(), &found.effect.at[..]),
+        (kind, &[at.to_owned()][..])
+    );
+    found
+}
+
+#[track_caller]
+fn near(found: &Missing, name: &str, truth: f64, part: f64) {
+    let estimate = found.estimates.iter().find(|one| one.name == name);
+    let value = estimate.expect("an estimate").value;
+    assert!(
+        (value - truth).abs() < part * truth.abs(),
+        "{name}: {value}, not {truth}"
+    );
+}
+
+#[test]
+fn a_load_on_the_flange_is_weighed_and_placed_while_the_base_is_held() {
+    let part = "\n[[part]]\nname = \"tool\"\non = \"link6\"\nmass = 2.8\ncentre = [0.03, -0.02, 0.08]\n\
+                inertia = { xx = 0.004, yy = 0.005, zz = 0.006 }\n";
+    let file = run(ARM, 700, Made::Body(part));
+    let findings = diagnosed(&file, Held::All);
+    let found = only(&findings, "payload", "link6");
+    near(found, "mass", 2.8, 0.05);
+    near(found, "mz", 2.8 * 0.08, 0.1);
+    // Beside free base parameters it is none of what may be missing.
+    let free = diagnosed(&file, Held::Known);
+    assert!(free.missing.is_empty(), "{:#?}", free.missing);
+    let candidates = &free.diagnosis.candidates;
+    assert!(candidates.iter().all(|one| one.effect.kind != "payload"));
+}
+
+#[test]
+fn nothing_is_carried_where_nothing_was_added() {
+    for seed in 710..713 {
+        let file = run(ARM, seed, Made::Nothing);
+        let findings = diagnosed(&file, Held::All);
+        assert!(findings.missing.is_empty(), "{:#?}", findings.missing);
+    }
+}
+
+#[test]
+fn a_length_that_is_off_is_found_with_its_error() {
+    let text = std::fs::read_to_string(bundled(ARM)).expect("a model");
+    let longer = text.replacen("r4 = { value = 0.4331", "r4 = { value = 0.5331", 1);
+    assert_ne!(text, longer);
+    let truth = Model::from_text("longer", &longer).expect("the model");
+    let file = run_of(&truth, ARM, 720, Made::Nothing);
+    let findings = diagnosed(&file, Held::Known);
+    near(only(&findings, "constant_error", "r4"), "error", 0.1, 0.1);
+}
+
+#[test]
+fn a_gear_that_yields_is_found_with_its_compliance() {
+    let file = run(ARM, 730, Made::Yields(1, 4e-4));
+    let findings = diagnosed(&file, Held::All);
+    let drive = findings.channels()[1].clone();
+    near(
+        only(&findings, "drive_compliance", &drive),
+        "compliance",
+        4e-4,
+        0.2,
+    );
+}
