@@ -28,6 +28,8 @@ const WHITE: f64 = 0.5;
 const LIKE_NOISE: f64 = 1.5;
 /// What adds less than this part of the squares that other effects explain may be how well these are known.
 const BESIDE_OTHERS: f64 = 1e-4;
+/// What adds less than this part of a force's squares may be what smoothing made of the positions.
+const OF_FORCE: f64 = 1e-5;
 /// Squared errors below this, in units of what counts as noise, are nobody's.
 const BELOW_NOISE: f64 = 0.8;
 /// How many of its own deviations over the blocks the gain must be above zero.
@@ -146,7 +148,9 @@ impl Bench<'_> {
                     && self.is_no_remainder(before, old_squares - new_squares, channels);
                 // Weights are one over the variance of what is left, which is the noise where it is known.
                 let of_noise = LEAST_OF_NOISE / total.max(f64::MIN_POSITIVE);
-                if is_known {
+                if !self.is_beyond_smoothing(old_squares - new_squares, channels) {
+                    f64::INFINITY
+                } else if is_known {
                     of_noise.min(LEAST_GAIN)
                 } else {
                     LEAST_GAIN
@@ -172,6 +176,16 @@ impl Bench<'_> {
             channels.iter().map(of).sum::<f64>()
         };
         before.is_empty() || less > BESIDE_OTHERS * (explained(&[]) - explained(before))
+    }
+
+    /// Whether squares that a change takes off are more than what smoothing the positions may have made, where parameters are
+    /// held and cannot take that up.
+    fn is_beyond_smoothing(&self, less: f64, channels: &[usize]) -> bool {
+        let squares = |d: &usize| {
+            let force = self.problem.force(*d);
+            self.weights[*d] * dot(&force, &force)
+        };
+        self.problem.held.is_none() || less > OF_FORCE * channels.iter().map(squares).sum::<f64>()
     }
 
     /// Squares of a residual relative to those of the white noise, over some channels.

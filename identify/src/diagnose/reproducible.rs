@@ -1,13 +1,9 @@
-//! What of a residual would come again: flexible functions of the state are fitted to it and held against time that they have
-//! not seen. What these explain no noise can be, whether a library knows its law or not.
+//! What of a residual would come again: a flexible function of the state is fitted to it and held against time that it has
+//! not seen. What that explains no noise can be, whether a library knows its law or not.
 //!
-//! One family of functions has all products of up to three variables (two if there are many) and smooth signs of the rates; one
-//! for each position has waves along it, alone and with its rate. The strength of a ridge is chosen by the same folds. A residual
-//! that resembles its neighbours is explained a little by chance: how much, the same residual says when it runs backwards in time
-//! and begins elsewhere, so that it has its spectrum and nothing to do with the motion
-//! (J. Theiler et al., "Testing for nonlinearity in time series: the method of surrogate data", Physica D 58, 1992).
+//! The functions are all products of up to three variables (two if there are many) and smooth signs of the rates, with a
+//! ridge whose strength is chosen by the same folds.
 
-use std::f64::consts::PI;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
@@ -21,24 +17,17 @@ const MOST: usize = 6000;
 const MOST_FEATURES: usize = 1500;
 const MOST_OF_MANY: usize = 1500;
 /// Strengths of the ridge, relative to a function's own squares.
-const RIDGES: [f64; 7] = [1e-6, 1e-4, 1e-2, 1e-1, 1.0, 10.0, 100.0];
-/// Residuals that have nothing to do with the motion: none of them may be explained as well.
-const BACKWARDS: usize = 19;
-/// What comes again less than that is not asked about.
-const LEAST: f64 = 0.01;
-/// Half waves along a position, at most.
-const WAVES: u32 = 12;
+const RIDGES: [f64; 5] = [1e-6, 1e-4, 1e-2, 1e-1, 1.0];
 
 /// Quantiles of a position beyond which stops may begin, percent from either end.
 const BEYOND: [usize; 4] = [3, 8, 15, 30];
 /// Lengths over which friction may remember, in units of a position's spread.
-const MEMORIES: [f64; 5] = [0.02, 0.08, 0.3, 1.0, 3.0];
+const MEMORIES: [f64; 3] = [0.02, 0.08, 0.3];
 
 /// Half widths of what is dragged along a position, in units of its spread.
-const STOPS: [f64; 8] = [0.05, 0.15, 0.3, 0.5, 0.65, 0.8, 1.0, 1.3];
+const STOPS: [f64; 4] = [0.05, 0.15, 0.4, 1.0];
 
-/// How much of each channel's squared residual comes again where it was not fitted, between 0 and 1; 0 where chance would say as
-/// much.
+/// How much of each channel's squared residual comes again where it was not fitted, between 0 and 1.
 pub(crate) fn reproducible(
     layout: &Layout,
     variables: &[(String, Vec<f64>)],
@@ -52,74 +41,33 @@ pub(crate) fn reproducible(
         MOST
     };
     let picked: Vec<usize> = (0..n).step_by(n.div_ceil(most).max(1)).collect();
+    let features = features(variables, &picked);
+    if features.is_empty() {
+        return vec![0.0; rest.len()];
+    }
     let folds: Vec<Range<usize>> = (layout.blocks(FOLDS).iter())
         .map(|block| {
             let at = |sample: usize| picked.partition_point(|i| *i < sample);
             at(block.start)..at(block.end)
         })
         .collect();
-    let mut families = vec![features(variables, &picked)];
-    families.extend(variables.iter().filter_map(|(name, values)| {
-        let rate = variables
-            .iter()
-            .find(|(rate, _)| *rate == format!("{name}_d"));
-        rate.map(|(_, rate)| of_place(values, rate, &picked))
-    }));
-    let families: Vec<DMatrix<f64>> = (families.into_iter())
-        .filter(|features| !features.is_empty())
-        .map(|features| {
-            let columns: Vec<DVector<f64>> = features.into_iter().map(DVector::from).collect();
-            DMatrix::from_columns(&columns)
-        })
-        .collect();
     let target = |r: &Vec<f64>| DVector::from_iterator(picked.len(), picked.iter().map(|i| r[*i]));
     let targets: Vec<DVector<f64>> = rest.iter().map(target).collect();
-    let mut shares = explained(&families, &targets, &folds);
-    let asked: Vec<usize> = (0..rest.len()).filter(|d| shares[*d] > LEAST).collect();
-    let others: Vec<DVector<f64>> = (asked.iter())
-        .flat_map(|d| (0..BACKWARDS).map(|k| backwards(&targets[*d], k)))
-        .collect();
-    let by_chance = explained(&families, &others, &folds);
-    for (d, by_chance) in asked.iter().zip(by_chance.chunks(BACKWARDS)) {
-        if by_chance.iter().any(|chance| *chance >= shares[*d]) {
-            shares[*d] = 0.0;
-        }
-    }
-    shares
-}
-
-/// A series from its end to its beginning, round and round, from somewhere on.
-fn backwards(values: &DVector<f64>, which: usize) -> DVector<f64> {
-    let n = values.len();
-    let start = n * (2 * which + 1) / (2 * BACKWARDS);
-    DVector::from_fn(n, |i, _| values[(2 * n - 1 - i - start) % n])
-}
-
-/// How much of each target the best family and ridge explain on folds that were not fitted.
-fn explained(
-    families: &[DMatrix<f64>],
-    targets: &[DVector<f64>],
-    folds: &[Range<usize>],
-) -> Vec<f64> {
-    let mut best = vec![0.0_f64; targets.len()];
-    if targets.is_empty() {
-        return best;
-    }
-    let targets = DMatrix::from_columns(targets);
-    for features in families {
-        let held_out = if features.ncols() <= features.nrows() {
-            by_features(features, &targets, folds)
-        } else {
-            by_samples(features.clone(), &targets, folds)
-        };
-        for (d, (best, target)) in best.iter_mut().zip(targets.column_iter()).enumerate() {
-            let total = target.norm_squared();
-            for left in held_out.iter().filter(|_| total > 0.0) {
-                *best = best.max(1.0 - left[d] / total);
-            }
-        }
-    }
-    best
+    let targets = DMatrix::from_columns(&targets);
+    let columns: Vec<DVector<f64>> = features.into_iter().map(DVector::from).collect();
+    let features = DMatrix::from_columns(&columns);
+    let held_out = if features.ncols() <= features.nrows() {
+        by_features(&features, &targets, &folds)
+    } else {
+        by_samples(features, &targets, &folds)
+    };
+    let totals = targets.column_iter().map(|target| target.norm_squared());
+    let share = |(d, total): (usize, f64)| {
+        let explained = held_out.iter().map(|left| 1.0 - left[d] / total);
+        let best = explained.fold(0.0, f64::max);
+        if total > 0.0 { best } else { 0.0 }
+    };
+    totals.enumerate().map(share).collect()
 }
 
 /// Squared errors on folds that were not fitted, of each target, for each strength of the ridge.
@@ -262,39 +210,6 @@ fn features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec<f64>>
     features
 }
 
-/// Functions of a position and its rate: waves along it, alone, with the rate, its sign and its square, and what remembers.
-fn of_place(position: &[f64], rate: &[f64], picked: &[usize]) -> Vec<Vec<f64>> {
-    let [position, rate] = [position, rate].map(|values| -> Vec<f64> {
-        let some = picked.iter().map(|i| values[*i]);
-        some.collect()
-    });
-    let n = position.len() as f64;
-    let low = position.iter().copied().fold(f64::INFINITY, f64::min);
-    let travel = position.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
-    let mean = position.iter().sum::<f64>() / n;
-    let spread = (position.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt();
-    let speed = (rate.iter().map(|v| v * v).sum::<f64>() / n).sqrt();
-    if !(travel > 0.0 && speed > 0.0 && travel.is_finite() && speed.is_finite()) {
-        return Vec::new();
-    }
-    let mut all = hinges(&position, spread);
-    all.extend(MEMORIES.map(|share| memory(&position, share * spread)));
-    all.extend(STOPS.map(|share| stop(&position, share * spread)));
-    let shapes: [fn(f64) -> f64; 4] = [|_| 1.0, |v| v, |v| (50.0 * v).tanh(), |v| v * v.abs()];
-    for shape in shapes {
-        let with: Vec<f64> = rate.iter().map(|v| shape(v / speed)).collect();
-        all.extend((0..=WAVES).map(|k| {
-            let wave = |x: &f64| (PI * f64::from(k) * (x - low) / travel).cos();
-            position
-                .iter()
-                .zip(&with)
-                .map(|(x, w)| wave(x) * w)
-                .collect()
-        }));
-    }
-    all
-}
-
 /// How far a position is beyond some of its own quantiles, at both ends, in units of its spread.
 fn hinges(values: &[f64], spread: f64) -> Vec<Vec<f64>> {
     let mut sorted = values.to_vec();
@@ -395,7 +310,7 @@ mod tests {
             by_features(&scaled, &targets, &folds),
             by_samples(features, &targets, &folds),
         ];
-        assert_eq!((by_features.len(), by_samples.len()), (7, 7));
+        assert_eq!((by_features.len(), by_samples.len()), (5, 5));
         // A ridge counts the squares of what is fitted in the one, of all samples in the other.
         let [weakest, strongest] = [0, 4];
         for d in 0..2 {
