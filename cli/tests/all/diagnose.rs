@@ -373,7 +373,7 @@ fn friction_and_a_drive_inertia_of_a_real_arm_are_found() {
         "{found:?}"
     );
     let steps = list(&answer, "steps");
-    assert!((100.0 * number(&steps[0], "/fit") - 47.7).abs() < 0.5);
+    assert!((100.0 * number(&steps[0], "/fit") - 48.0).abs() < 1.0);
     assert!((100.0 * number(&steps[0], "/check") - 46.0).abs() < 1.0);
     // Friction on all joints gives 15.3 % on A and 15.7 % on C.
     let last = &steps[steps.len() - 1];
