@@ -9,6 +9,7 @@
 #[path = "../hidden_effects/parts.rs"]
 mod parts;
 
+use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -102,8 +103,9 @@ fn run() -> Result<(), String> {
             for (case, answer) in of {
                 right += u64::from(is_calm(answer));
                 if !is_calm(answer) {
-                    says += &format!(
-                        "- {name}, {}, seed {}: {}\n",
+                    let _ = writeln!(
+                        says,
+                        "- {name}, {}, seed {}: {}",
                         repeats.word(),
                         case.seed,
                         told(answer)
@@ -111,7 +113,7 @@ fn run() -> Result<(), String> {
                 }
             }
             calm += right;
-            line += &format!("{:>16}", format!("{right} of {seeds}"));
+            let _ = write!(line, "{:>16}", format!("{right} of {seeds}"));
         }
         println!("{line}");
     }
@@ -151,12 +153,12 @@ impl Calm {
             |purpose: u64| Random::new(self.seed, number, purpose + 1000 * self.repeats as u64);
         let mut random = stream(0);
         let deviation = three_digits(random.log_between(NOISE[0], NOISE[1]));
-        let masses = (self.seed % 3 != 0).then(|| Masses::draw(&mut random));
+        let masses = (!self.seed.is_multiple_of(3)).then(|| Masses::draw(&mut random));
         let rig = parts::case::with_masses(&plant.rig, masses);
         let courses = [(); 2].map(|()| Course::draw(&mut random, plant.limits(), self.repeats));
         let course = &courses[which];
         let along = Along::new(&rig, course, course.times(RATE))?;
-        let fall = if self.seed % 2 == 0 {
+        let fall = if self.seed.is_multiple_of(2) {
             Fall::Steep
         } else {
             Fall::Gentle
