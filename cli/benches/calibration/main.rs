@@ -11,6 +11,7 @@
 #[path = "../hidden_effects/parts.rs"]
 mod parts;
 
+use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -146,8 +147,9 @@ fn report(findings: &[Finding], recordings: usize, seed: u64) -> String {
         let holds = (least..=most).contains(&right);
         inside[0] += usize::from(holds);
         inside[1] += 1;
-        text += &format!(
-            "{:<12}{:>10}{mean:>12.3}{right:>8}{:>14}{}\n",
+        let _ = writeln!(
+            text,
+            "{:<12}{:>10}{mean:>12.3}{right:>8}{:>14}{}",
             format!("{low:.1} - {high:.1}"),
             own.len(),
             format!("{least} - {most}"),
