@@ -67,6 +67,10 @@ impl Spelling for Flags {
         command
     }
 
+    fn add_from(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
+        format!("{} --library {}", self.add(model, effect), quoted(library))
+    }
+
     fn identify(&self, model: &Model) -> String {
         format!(
             "modelmill identify {} {} --out fit.json",

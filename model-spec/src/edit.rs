@@ -551,7 +551,8 @@ fn refuse_twin(
             .iter()
             .all(|one| known.constant(&one.symbol, mechanism) == wanted(&one.symbol));
         // What couples two places may couple each with a third.
-        let names = known.places.iter().map(|p| mechanism.place_name(*p));
+        let places = known.places.iter().chain(&known.other);
+        let names = places.map(|p| mechanism.place_name(*p));
         if kind.places == Some(2) && !names.clone().all(|n| effect.at.iter().any(|at| at == n)) {
             continue;
         }

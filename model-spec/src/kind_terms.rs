@@ -4,7 +4,7 @@ use std::cell::Cell;
 
 use crate::diagnostic::{Diagnostic, Log};
 use crate::exact::{Exact, ParameterIdx, PlaceQuantity, Symbol};
-use crate::kinds::Carries;
+use crate::kinds::{Carries, OtherMotion};
 use crate::schema::EffectKindEntry;
 use crate::scope::{Meaning, Scope, Sort, Wanted, meaning};
 use crate::unit::{Dimension, Unit};
@@ -152,28 +152,20 @@ fn scope(
             log,
         );
     }
-    let places = match carries {
-        Carries::Mass | Carries::Elsewhere => return scope,
-        Carries::Force => [
-            Dimension::LENGTH,
-            Dimension::VELOCITY,
-            Dimension::ACCELERATION,
-            Dimension::FORCE,
-        ],
-        Carries::Torque => [
-            Dimension::ONE,
-            Dimension::RATE,
-            Dimension::ANGULAR_ACCELERATION,
-            Dimension::TORQUE,
-        ],
+    let Some(own) = dimensions(carries) else {
+        return scope;
     };
-    let [length, rate, acceleration, force] = places;
+    let other = entry.other.map_or(carries, OtherMotion::carries);
+    let other = dimensions(other).unwrap_or(own);
     for quantity in PlaceQuantity::ALL {
         let dimension = match quantity {
-            PlaceQuantity::Coordinate | PlaceQuantity::OtherCoordinate => length,
-            PlaceQuantity::Rate | PlaceQuantity::OtherRate => rate,
-            PlaceQuantity::Acceleration | PlaceQuantity::OtherAcceleration => acceleration,
-            PlaceQuantity::Load => force,
+            PlaceQuantity::Coordinate => own[0],
+            PlaceQuantity::Rate => own[1],
+            PlaceQuantity::Acceleration => own[2],
+            PlaceQuantity::Load => own[3],
+            PlaceQuantity::OtherCoordinate => other[0],
+            PlaceQuantity::OtherRate => other[1],
+            PlaceQuantity::OtherAcceleration => other[2],
         };
         let symbol = Symbol::Place(quantity);
         scope.declare(
@@ -183,6 +175,25 @@ fn scope(
         );
     }
     scope
+}
+
+/// Dimensions of position, rate, acceleration and load of a place, where it has them.
+fn dimensions(carries: Carries) -> Option<[Dimension; 4]> {
+    match carries {
+        Carries::Mass | Carries::Elsewhere => None,
+        Carries::Force => Some([
+            Dimension::LENGTH,
+            Dimension::VELOCITY,
+            Dimension::ACCELERATION,
+            Dimension::FORCE,
+        ]),
+        Carries::Torque => Some([
+            Dimension::ONE,
+            Dimension::RATE,
+            Dimension::ANGULAR_ACCELERATION,
+            Dimension::TORQUE,
+        ]),
+    }
 }
 
 fn is_parameter(symbol: Symbol) -> bool {

@@ -114,6 +114,34 @@ impl ActsOn {
 }
 
 words! {
+    /// How the second place of a kind moves that acts at the first alone.
+    #[derive(PartialOrd, Ord, Hash)]
+    pub OtherMotion as "OtherMotionName": "how a place moves",
+    /// It turns.
+    "angle" => Angle,
+    /// It slides, or is the length of a linear drive.
+    "length" => Length,
+}
+
+impl OtherMotion {
+    /// What a place carries that moves so.
+    pub fn carries(self) -> Carries {
+        match self {
+            Self::Angle => Carries::Torque,
+            Self::Length => Carries::Force,
+        }
+    }
+
+    /// How it moves, for people.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Angle => "turns",
+            Self::Length => "slides",
+        }
+    }
+}
+
+words! {
     /// What the values of a search are relative to.
     #[derive(PartialOrd, Ord, Hash)]
     pub Scale as "ScaleName": "what a range is relative to",
@@ -160,6 +188,8 @@ pub struct EffectKind {
     pub constants: Vec<KindConstant>,
     /// How many places it must have; any number if `None`.
     pub places: Option<usize>,
+    /// How the second place moves, where it acts at the first alone.
+    pub other: Option<OtherMotion>,
     /// One paragraph: what it is, where it comes from, how the error looks that it leaves. May be empty.
     pub explains: String,
     /// What it is easily taken for, and which experiment tells them apart. May be empty.
@@ -277,6 +307,7 @@ pub(crate) fn describe(entry: &EffectKindEntry, is_own: bool) -> EffectKind {
             .map_or_else(String::new, |expression| expression.text.clone()),
         mechanics: entry.mechanics,
         places: n_places(entry),
+        other: entry.other,
         parameters: parameters
             .map(|(key, parameter)| KindParameter {
                 symbol: key.name.clone(),
@@ -343,6 +374,16 @@ pub(crate) fn check(entry: &EffectKindEntry, log: &mut Log) {
     check_constant_values(entry, log);
     if !check_way(entry, log) {
         return;
+    }
+    if let (Some(_), Some(expression), None) = (entry.other, &entry.expression, n_places(entry)) {
+        log.push(
+            Diagnostic::error(
+                expression.ast.span,
+                "this kind says how its other place moves and does not use it",
+            )
+            .label("expected `other_coordinate`, `other_rate` or `other_acceleration`")
+            .help("delete `other`, or use the other place's motion"),
+        );
     }
     let mut acts = false;
     for carries in Carries::ALL {

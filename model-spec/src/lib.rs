@@ -54,7 +54,8 @@ pub use document::LARGEST_FILE;
 pub use exact::*;
 pub use joint_motion::Motion;
 pub use kinds::{
-    ActsOn, Carries, EffectKind, KindConstant, KindParameter, LIBRARY, Scale, Search, Sign, library,
+    ActsOn, Carries, EffectKind, KindConstant, KindParameter, LIBRARY, OtherMotion, Scale, Search,
+    Sign, library,
 };
 pub use load::{Failure, Loaded, kinds_with, load, load_file, load_file_with, load_with};
 pub use mechanics::Mechanics;

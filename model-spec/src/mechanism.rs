@@ -302,6 +302,8 @@ pub struct Effect {
     pub kind: String,
     /// Where it acts; its parameters are shared by all places.
     pub places: Vec<Place>,
+    /// The place whose motion it has besides, where it acts at one place alone.
+    pub other: Option<Place>,
     /// Mechanics of its own. Without them the effect is `sum of parameter * expression`, the same at every place: a force
     /// or torque on drives and coordinates; at points the parameter is a mass and the expression its factor.
     pub mechanics: Option<Mechanics>,

@@ -1,7 +1,7 @@
 //! The tables of a model file as types; readers and the JSON Schema for editors derive from them.
 
 use crate::formula::Formula;
-use crate::kinds::{ActsOn, Scale, Sign};
+use crate::kinds::{ActsOn, OtherMotion, Scale, Sign};
 use crate::mechanics::Mechanics;
 use crate::range::Range;
 use crate::record::{List, Named, OneOrMany, record};
@@ -387,6 +387,9 @@ record! {
         /// linear in them, and in `coordinate`, `rate`, `acceleration` and `load` of the place. A kind that uses
         /// `other_coordinate`, `other_rate` or `other_acceleration` acts on two places, at each with the other's.
         "expression" expression: optional Formula,
+        /// That it acts at the first of its two places alone, with the motion of the second, which turns (`angle`) or slides
+        /// (`length`).
+        "other" other: optional OtherMotion,
         /// What it does in place of an expression: a swinging `rod` along a linear drive, another `placement` of
         /// lumped masses, differences of a `part`, a `tilt` of gravity, a `delay` of the measured forces.
         "mechanics" mechanics: optional Mechanics,

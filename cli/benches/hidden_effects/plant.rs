@@ -153,11 +153,13 @@ impl Along {
 
     /// Length, rate and acceleration of a drive at each time.
     pub(crate) fn of_drive(&self, drive: usize) -> Vec<Measured> {
-        let at = |motion| modelmill_rig::measured(&self.rig, Place::Drive(drive), motion);
-        self.motions
-            .iter()
-            .map(|motion| at(motion).unwrap_or_default())
-            .collect()
+        self.of_place(Place::Drive(drive)).unwrap_or_default()
+    }
+
+    /// The same of any place that moves.
+    pub(crate) fn of_place(&self, place: Place) -> Option<Vec<Measured>> {
+        let at = |motion| modelmill_rig::measured(&self.rig, place, motion);
+        self.motions.iter().map(at).collect()
     }
 
     /// Columns of the model's base parameters.

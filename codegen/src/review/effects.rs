@@ -34,11 +34,12 @@ pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
     ]);
     let is_coupled = |effect: &Effect| {
         let mut terms = effect.terms.iter();
-        terms.any(|term| {
-            term.expression.mentions(
-                &|symbol| matches!(symbol, modelmill_spec::Symbol::Place(q) if q.is_other()),
-            )
-        })
+        effect.other.is_none()
+            && terms.any(|term| {
+                term.expression.mentions(
+                    &|symbol| matches!(symbol, modelmill_spec::Symbol::Place(q) if q.is_other()),
+                )
+            })
     };
     if mechanism.effects.iter().any(is_coupled) {
         page.paragraph([
@@ -58,6 +59,10 @@ pub(super) fn effects(page: &mut Document, mechanism: &Mechanism) {
                 }
                 places.push(code(mechanism.place_name(*place)));
             }
+            if let Some(other) = effect.other {
+                places.push(text(", by "));
+                places.push(code(mechanism.place_name(other)));
+            }
             vec![
                 cell(text(effect.kind.replace('_', " "))),
                 places,
@@ -75,14 +80,19 @@ fn adds(mechanism: &Mechanism, effect: &Effect, each: &str, other: &str) -> Line
         .map(|term| Formula::name(&*mechanism.parameters[term.parameter.0].name))
         .collect();
     let Some(mechanics) = effect.mechanics else {
-        let x = match effect.places.as_slice() {
-            [Place::Drive(d)] => match mechanism.drives[d.0].kind {
-                DriveKind::Joint(c) => &*mechanism.coordinates[c.0].name,
-                DriveKind::Linear { .. } => &*mechanism.drives[d.0].name,
+        let name = |place: &Place| match place {
+            Place::Drive(d) => match mechanism.drives[d.0].kind {
+                DriveKind::Joint(c) => Some(&*mechanism.coordinates[c.0].name),
+                DriveKind::Linear { .. } => Some(&*mechanism.drives[d.0].name),
             },
-            [Place::Coordinate(c)] => &*mechanism.coordinates[c.0].name,
+            Place::Coordinate(c) => Some(&*mechanism.coordinates[c.0].name),
+            _ => None,
+        };
+        let x = match effect.places.as_slice() {
+            [place] => name(place).unwrap_or(each),
             _ => each,
         };
+        let other = effect.other.as_ref().and_then(name).unwrap_or(other);
         let terms = effect.terms.iter().zip(&names);
         let sum = Formula::sum(terms.map(|(term, parameter)| {
             let factor = exact_at(mechanism, &term.expression, [x, other]);

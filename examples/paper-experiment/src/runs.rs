@@ -39,7 +39,7 @@ pub(crate) fn search(model: &Model, options: &Options, message: &str) -> Outcome
     let coordinates = limits::of_active(model, &all_limits)?;
     let plant = ModelPlant::new(model, &all_limits);
     let search = model.host().watched(message, steps(options), |job| {
-        excite(&plant, &coordinates, options, &|more| job.add(more))
+        excite(&plant, &coordinates, options, &|more| job.flow(more))
     })?;
     let found = search.map_err(|error| Error::input(format!("{}: {error}", model.path)))?;
     // Rounding may leave the limits by a hair; shrinking by parts in a thousand returns.

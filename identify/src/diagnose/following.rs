@@ -17,6 +17,12 @@ impl Bench<'_> {
         if !self.problem.candidates.iter().any(is_carried) {
             return HashMap::new();
         }
+        let load = self.load(picks);
+        self.rubbing_on(&load, None)
+    }
+
+    /// What the drives carry by a set's fit: masses and weight, and no friction.
+    pub(crate) fn load(&self, picks: &[Pick]) -> Column {
         let mut which = self.columns(picks);
         let n = which.len();
         which.extend(&self.friction);
@@ -31,11 +37,11 @@ impl Bench<'_> {
             .collect();
         let parts = which[..n].iter().copied().zip(factors.iter().copied());
         let parts = parts.zip(is_part_of_load);
-        self.rubbing_on(parts.filter_map(|(part, is_part_of_load)| is_part_of_load.then_some(part)))
+        self.sum(parts.filter_map(|(part, is_part_of_load)| is_part_of_load.then_some(part)))
     }
 
     /// The same where drives carry the other friction of the set too: which friction lies between load and drive no model says.
-    fn carried_with_friction(&mut self, picks: &[Pick]) -> HashMap<usize, Pick> {
+    fn load_with_friction(&self, picks: &[Pick]) -> Column {
         let (factors, _) = self.fit(picks, On::All);
         let is_own = picks.iter().flat_map(|pick| {
             let is_carried = matches!(self.candidate(pick).source, Source::Carried);
@@ -44,17 +50,22 @@ impl Bench<'_> {
         let is_own: Vec<bool> = (self.base.iter().map(|_| false)).chain(is_own).collect();
         let which = self.columns(picks);
         let parts = which.into_iter().zip(factors.iter().copied()).zip(is_own);
-        self.rubbing_on(parts.filter_map(|(part, is_own)| (!is_own).then_some(part)))
+        self.sum(parts.filter_map(|(part, is_own)| (!is_own).then_some(part)))
     }
 
-    /// Candidates that depend on what the drives carry, where that is the sum of some columns times factors and of what is held.
-    fn rubbing_on(&mut self, parts: impl Iterator<Item = (usize, f64)>) -> HashMap<usize, Pick> {
-        let mut load = self.problem.held.clone().unwrap_or_default();
-        load.0.resize(self.weights.len(), None);
+    /// The sum of some columns times factors and of what is held.
+    fn sum(&self, parts: impl Iterator<Item = (usize, f64)>) -> Column {
+        let mut sum = self.problem.held.clone().unwrap_or_default();
+        sum.0.resize(self.weights.len(), None);
         for (k, factor) in parts {
-            load.add(factor, self.pool.column(k));
+            sum.add(factor, self.pool.column(k));
         }
-        let made = self.supply.carried(&load);
+        sum
+    }
+
+    /// Candidates that depend on what the drives carry, all or one.
+    fn rubbing_on(&mut self, load: &Column, only: Option<usize>) -> HashMap<usize, Pick> {
+        let made = self.supply.carried(load, only);
         let picks = made.into_iter().map(|(candidate, columns)| {
             let pick = Pick {
                 candidate,
@@ -137,10 +148,8 @@ impl Bench<'_> {
     /// A member that depends on what the drives carry, with or without friction as explains more.
     fn best_carried(&mut self, picks: &[Pick], member: usize) -> Option<Pick> {
         let candidate = picks[member].candidate;
-        let ways = [
-            self.carried(picks).remove(&candidate),
-            self.carried_with_friction(picks).remove(&candidate),
-        ];
+        let loads = [self.load(picks), self.load_with_friction(picks)];
+        let ways = loads.map(|load| self.rubbing_on(&load, Some(candidate)).remove(&candidate));
         let squares = |way: &Pick| {
             let mut set = picks.to_vec();
             set[member] = way.clone();
@@ -152,6 +161,7 @@ impl Bench<'_> {
 
     /// Makes the columns of effects that depend on the fit anew.
     pub(crate) fn refresh(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
+        let known = self.pool.len();
         for _ in 0..3 {
             for i in 0..picks.len() {
                 let candidate = picks[i].candidate;
@@ -172,6 +182,19 @@ impl Bench<'_> {
                 }
             }
         }
+        self.keep_only(known, &mut picks);
         picks
+    }
+
+    /// Forgets columns that were made since the pool had a length, but for those of a set.
+    fn keep_only(&mut self, known: usize, picks: &mut [Pick]) {
+        let added = self.pool.split_off(known);
+        let is_known = |columns: &[usize]| columns.iter().all(|k| *k < known);
+        (self.within.get_mut()).retain(|(one, other), _| is_known(one) && is_known(other));
+        for k in picks.iter_mut().flat_map(|pick| &mut pick.columns) {
+            if *k >= known {
+                *k = self.pool.add(added[*k - known].clone());
+            }
+        }
     }
 }

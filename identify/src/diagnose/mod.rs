@@ -26,6 +26,7 @@ mod estimates;
 mod evidence;
 mod factored;
 mod following;
+mod laws;
 mod noise;
 mod pool;
 mod problem;
@@ -46,6 +47,7 @@ pub use constant::Constant;
 pub use disturbance::{Budget, Disturbance, Quantity};
 pub use drifts::drifts;
 pub use evidence::Evidence;
+pub use laws::{Factor, Law, Product, Proposal, Shape, Site, Term, Variable};
 pub use noise::{ROUNDING, effective_samples, white_noise};
 pub use problem::{
     Candidate, Choice, Effect, EffectParameter, Fault, Layout, Nature, NoSupply, Problem, Reading,
@@ -146,6 +148,10 @@ pub struct Diagnosis {
     pub reproducible: Vec<f64>,
     /// Channels whose rest is unexplained.
     pub unexplained: Vec<usize>,
+    /// Places on which laws may act, where something is unexplained.
+    pub sites: Vec<Site>,
+    /// Laws that no library holds and that would explain it.
+    pub laws: Vec<Proposal>,
 }
 
 /// Finds what is missing. `supply` makes columns that are not known from the start. Outliers and hum are taken off the measured
@@ -173,9 +179,29 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
     }
     let Left {
         rest,
-        again,
-        unexplained,
+        mut again,
+        mut unexplained,
     } = left;
+    let (sites, laws) = laws::propose(
+        &bench,
+        &picks,
+        &laws::Left {
+            rest: &rest,
+            again: &again,
+            unexplained: &unexplained,
+        },
+        supply,
+    );
+    // What a law foretells comes again.
+    for proposal in &laws {
+        for d in &proposal.channels {
+            again[*d] = again[*d].max(proposal.law.gain);
+            if !unexplained.contains(d) && bench.is_unexplained(*d, &rest[*d], again[*d]) {
+                unexplained.push(*d);
+            }
+        }
+    }
+    unexplained.sort_unstable();
     let aliases = bench.aliases(&picks);
     bench.weigh(&picks);
     let (budgets, coloured) = bench.budgets(&picks, &rest, &again);
@@ -221,6 +247,8 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
         rest,
         reproducible: again,
         unexplained,
+        sites,
+        laws,
     }
 }
 

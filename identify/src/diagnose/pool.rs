@@ -13,11 +13,8 @@ use super::column::Column;
 use super::problem::Layout;
 
 /// Inner products of a column with earlier ones by part (0 is the fit, 1 the check) and channel on which both act, the parts one
-/// after the other.
+/// after the other; or by fold and channel.
 type Products = HashMap<usize, Box<[f64]>>;
-/// Inner products of pairs by fold and common channel.
-type OfFolds = HashMap<(usize, usize), Box<[f64]>>;
-
 /// Inner products of fewer numbers are made as they stand.
 const SHORT: usize = 64;
 /// Folds of the cross-validation where there is no check.
@@ -31,7 +28,7 @@ pub(crate) struct Pool<'a> {
     fit: Range<usize>,
     check: Range<usize>,
     products: RefCell<Vec<Products>>,
-    of_folds: RefCell<OfFolds>,
+    of_folds: RefCell<Vec<Products>>,
     /// Folds of all samples.
     folds: Vec<Range<usize>>,
     /// Samples that were not measured, by channel: nothing counts them.
@@ -105,7 +102,20 @@ impl<'a> Pool<'a> {
         self.acts.push(acts.into());
         self.columns.push(column);
         self.products.get_mut().push(HashMap::new());
+        self.of_folds.get_mut().push(HashMap::new());
         self.columns.len() - 1
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Takes the columns from a place on out again, with all their products.
+    pub(crate) fn split_off(&mut self, known: usize) -> Vec<Cow<'a, Column>> {
+        self.acts.truncate(known);
+        self.products.get_mut().truncate(known);
+        self.of_folds.get_mut().truncate(known);
+        self.columns.split_off(known)
     }
 
     pub(crate) fn column(&self, k: usize) -> &Column {
@@ -193,7 +203,7 @@ impl<'a> Pool<'a> {
                 let both = || self.columns[a].common(&self.columns[b]);
                 common.clear();
                 common.extend(both().map(|(d, ..)| weights[d]));
-                let known = products.entry((a, b)).or_insert_with(|| {
+                let known = products[a].entry(b).or_insert_with(|| {
                     let of_fold = |fold: &Range<usize>| {
                         let fold = fold.clone();
                         both().map(move |(d, a, b)| self.inner(d, a, b, fold.clone()))

@@ -4,6 +4,7 @@ use super::body::Body;
 use super::column::Column;
 use super::constant::Constant;
 use super::disturbance::Disturbance;
+use super::laws::Site;
 use super::tilt::Tilt;
 
 /// A stretch of samples that follow each other in time.
@@ -163,8 +164,13 @@ pub trait Supply {
     /// Columns of a candidate for another value of the constant that is searched for, if they can be had.
     fn finer(&self, candidate: usize, constant: f64) -> Option<Vec<Column>>;
 
-    /// Columns of all candidates that depend on what the drives carry.
-    fn carried(&self, load: &Column) -> Vec<(usize, Vec<Column>)>;
+    /// Columns of candidates that depend on what the drives carry: of all, or of one.
+    fn carried(&self, load: &Column, only: Option<usize>) -> Vec<(usize, Vec<Column>)>;
+
+    /// Places on which laws that no library holds may act; asked where something stays unexplained.
+    fn sites(&self) -> Vec<Site> {
+        Vec::new()
+    }
 }
 
 /// For problems in which all columns are known from the start.
@@ -175,7 +181,7 @@ impl Supply for NoSupply {
         None
     }
 
-    fn carried(&self, _: &Column) -> Vec<(usize, Vec<Column>)> {
+    fn carried(&self, _: &Column, _: Option<usize>) -> Vec<(usize, Vec<Column>)> {
         Vec::new()
     }
 }

@@ -39,6 +39,14 @@ pub(crate) struct Step {
     pub(crate) evidence: Option<Evidence>,
 }
 
+/// A set that evidence speaks for.
+struct Next {
+    /// The candidates that were tried; once their columns are settled they may be others.
+    tried: Vec<usize>,
+    trial: Trial,
+    evidence: Evidence,
+}
+
 /// Why the best candidates of a step were refused.
 #[derive(Clone, Debug)]
 pub(crate) struct Refused {
@@ -112,11 +120,10 @@ impl Bench<'_> {
         refused: &mut Vec<Refused>,
     ) -> Option<Step> {
         loop {
-            let (trial, evidence) = self.next(accepted, trials, refused)?;
-            let promised = members(&trial.picks);
+            let next = self.next(accepted, trials, refused)?;
             let (trial, evidence) = self
-                .simple_first(accepted, &trial)
-                .unwrap_or((trial, evidence));
+                .simple_first(accepted, &next.trial)
+                .unwrap_or((next.trial, next.evidence));
             let (picks, _) = self.simplest(accepted, trial, evidence, trials);
             let refined = self.refine(picks);
             let polished = self.polish(refined);
@@ -129,7 +136,7 @@ impl Bench<'_> {
                     evidence: Some(evidence),
                 });
             }
-            trials.retain(|trial| members(&trial.picks) != promised);
+            trials.retain(|trial| members(&trial.picks) != next.tried);
         }
     }
 
@@ -139,7 +146,7 @@ impl Bench<'_> {
         accepted: &[Pick],
         trials: &[Trial],
         refused: &mut Vec<Refused>,
-    ) -> Option<(Trial, Evidence)> {
+    ) -> Option<Next> {
         let (grown, exchanged): (Vec<&Trial>, Vec<&Trial>) =
             trials.iter().partition(|t| self.is_addition(accepted, t));
         let mut additions = grown.into_iter();
@@ -148,12 +155,12 @@ impl Bench<'_> {
         // Another set altogether must be much better than one that only grows.
         let bound = chosen
             .as_ref()
-            .map_or(f64::INFINITY, |(trial, _)| trial.score - MUCH_BETTER);
+            .map_or(f64::INFINITY, |next| next.trial.score - MUCH_BETTER);
         let mut others = exchanged.into_iter().filter(|t| t.score < bound);
         let other = self.first_that_holds(accepted, &mut others, &mut Vec::new());
-        let other = other.filter(|(other, _)| {
-            chosen.as_ref().is_none_or(|(grown, _)| {
-                let evidence = self.between(&grown.picks, &other.picks);
+        let other = other.filter(|other| {
+            chosen.as_ref().is_none_or(|grown| {
+                let evidence = self.between(&grown.trial.picks, &other.trial.picks);
                 evidence.holds() && evidence.gain > LARGE_CHANGE
             })
         });
@@ -191,12 +198,13 @@ impl Bench<'_> {
         accepted: &[Pick],
         trials: &mut dyn Iterator<Item = &Trial>,
         refused: &mut Vec<Refused>,
-    ) -> Option<(Trial, Evidence)> {
+    ) -> Option<Next> {
         let mut tested = 0;
         for trial in trials {
             if tested == TESTED {
                 break;
             }
+            let tried = members(&trial.picks);
             let trial = self.settled(trial);
             // What turns out impossible once its columns have its own size was no test.
             tested += usize::from(trial.wrong_sign.is_empty());
@@ -204,7 +212,11 @@ impl Bench<'_> {
             let evidence = self.evidence(accepted, &trial.picks, &self.acted_on(&news));
             let wrong_sign = !trial.wrong_sign.is_empty();
             if evidence.holds() && !wrong_sign {
-                return Some((trial, evidence));
+                return Some(Next {
+                    tried,
+                    trial,
+                    evidence,
+                });
             }
             if let [pick] = news.as_slice() {
                 refused.push(Refused {
@@ -362,10 +374,10 @@ impl Bench<'_> {
     /// grids the wrong one may have been nearer to its best value.
     fn polish(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
         let is_searched = |bench: &Self, pick: &Pick| bench.candidate(pick).searched > 0;
+        let mut table = self.table(&picks);
         for i in 0..picks.len() {
             let mut others = picks.clone();
             let own = others.remove(i);
-            let table = self.table(&picks);
             let now = self.try_in(&table, picks.clone());
             // The constants of others may suit this member and no kin of it.
             let others_are_searched = others.iter().any(|other| is_searched(self, other));
@@ -413,7 +425,10 @@ impl Bench<'_> {
                     best = trial;
                 }
             }
-            picks = best.picks;
+            if best.picks != picks {
+                picks = best.picks;
+                table = self.table(&picks);
+            }
         }
         picks
     }

@@ -220,12 +220,16 @@ pub fn samples(options: &Options) -> usize {
     (16 * options.harmonics).max(128)
 }
 
-/// Finds a trajectory; `progress` is told of each step out of [`steps`].
+/// Whether a search goes on.
+pub type Flow = std::ops::ControlFlow<()>;
+
+/// Finds a trajectory; `progress` is told of each step out of [`steps`] and says whether to go on. A search that is stopped ends
+/// soon, with what it has or an error.
 pub fn excite(
     plant: &dyn Plant,
     limits: &[CoordinateLimits],
     options: &Options,
-    progress: &dyn Fn(usize),
+    progress: &dyn Fn(usize) -> Flow,
 ) -> Result<Excitation, ExciteError> {
     if limits.is_empty() {
         return Err(ExciteError::NothingToExcite);
@@ -284,6 +288,7 @@ pub fn random_motions(
     let mut draws = random::Draws(options.seed);
     random::feasible_ones(&measure, &mut draws, wanted, |series| {
         motions.push(measure.motion(&series));
+        Flow::Continue(())
     })?;
     Ok(motions)
 }

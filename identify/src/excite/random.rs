@@ -2,7 +2,7 @@
 
 use super::feasible::{reach, worst};
 use super::measure::{Measure, half};
-use super::{Criterion, ExciteError, Series};
+use super::{Criterion, ExciteError, Flow, Series};
 
 /// Trajectories that kept the limits.
 pub(super) struct Drawn {
@@ -18,25 +18,35 @@ const PATIENCE: usize = 20;
 const SHRINKS: usize = 12;
 
 /// Draws as many as the options say.
-pub(super) fn draw(measure: &Measure<'_>, progress: &dyn Fn(usize)) -> Result<Drawn, ExciteError> {
+pub(super) fn draw(
+    measure: &Measure<'_>,
+    progress: &dyn Fn(usize) -> Flow,
+) -> Result<Drawn, ExciteError> {
     let wanted = measure.options.random.max(1);
     let mut draws = Draws(measure.options.seed);
     let mut drawn: Vec<(f64, Vec<Series>)> = Vec::new();
     let mut feasible = 0;
+    let mut stopped = false;
     feasible_ones(measure, &mut draws, wanted, |series| {
         feasible += 1;
-        progress(1);
+        let flow = progress(1);
         let value = measure.value(&measure.motion(&series));
         if value.is_finite() {
             drawn.push((value, series));
         }
+        stopped = flow.is_break();
+        flow
     })?;
     if drawn.is_empty() {
         return Err(nothing(measure));
     }
     drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
     // A search polishes each of them; before that, they must hold between samples too.
-    drawn.truncate(4 * measure.options.starts.max(1));
+    drawn.truncate(if stopped {
+        1
+    } else {
+        4 * measure.options.starts.max(1)
+    });
     let kept: Vec<(f64, Vec<Series>)> = drawn
         .into_iter()
         .filter_map(|(_, series)| super::feasible::within(measure, &series))
@@ -57,17 +67,18 @@ fn nothing(measure: &Measure<'_>) -> ExciteError {
     }
 }
 
-/// Draws trajectories until as many as are wanted have kept the limits, or patience ends; an error if none has.
+/// Draws trajectories until as many as are wanted have kept the limits, patience ends, or `take` says that it is enough; an error if none has.
 pub(super) fn feasible_ones(
     measure: &Measure<'_>,
     draws: &mut Draws,
     wanted: usize,
-    mut take: impl FnMut(Vec<Series>),
+    mut take: impl FnMut(Vec<Series>) -> Flow,
 ) -> Result<(), ExciteError> {
     let names = measure.plant.limits();
     let mut blame = vec![0_usize; names.len()];
     let (mut tried, mut feasible) = (0, 0);
-    while feasible < wanted && tried < PATIENCE * wanted {
+    let mut flow = Flow::Continue(());
+    while flow.is_continue() && feasible < wanted && tried < PATIENCE * wanted {
         tried += 1;
         let mut series: Vec<Series> = (0..measure.limits.len())
             .map(|i| one(measure, i, draws))
@@ -76,7 +87,7 @@ pub(super) fn feasible_ones(
             match worst(measure, &series, super::samples(measure.options)) {
                 Some((_, excess)) if excess <= 0.0 => {
                     feasible += 1;
-                    take(series);
+                    flow = take(series);
                     break;
                 }
                 Some((k, _)) if k < blame.len() => blame[k] += 1,

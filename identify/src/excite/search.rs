@@ -4,12 +4,12 @@
 //! The largest excess over a limit is taken as `log(sum of exp(r * excess)) / r`, which is smooth and never below it
 //! (G. Kreisselmeier and R. Steinhauser, 1979); r grows from one round to the next.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 
 use slsqp::{StopTols, minimize};
 
 use super::measure::{Measure, excess, half};
-use super::{Criterion, Motion, Series};
+use super::{Criterion, Flow, Motion, Series};
 
 /// Sharpness of the smooth largest value, in the first round and in those that polish.
 const FIRST: f64 = 50.0;
@@ -37,7 +37,7 @@ pub(super) const POLISHES: usize = POLISH.len();
 pub(super) fn improve(
     measure: &Measure<'_>,
     start: &[Series],
-    progress: &dyn Fn(usize),
+    progress: &dyn Fn(usize) -> Flow,
 ) -> Vec<Series> {
     let scales = Scales::new(measure);
     let x = round(measure, &scales, &scales.encode(start), FIRST, progress);
@@ -48,7 +48,7 @@ pub(super) fn improve(
 pub(super) fn polish(
     measure: &Measure<'_>,
     start: &[Series],
-    progress: &dyn Fn(usize),
+    progress: &dyn Fn(usize) -> Flow,
 ) -> Vec<Series> {
     let scales = Scales::new(measure);
     let mut x = scales.encode(start);
@@ -63,13 +63,21 @@ fn round(
     scales: &Scales<'_, '_>,
     start: &[f64],
     sharpness: f64,
-    progress: &dyn Fn(usize),
+    progress: &dyn Fn(usize) -> Flow,
 ) -> Vec<f64> {
     let known: RefCell<Option<Known>> = RefCell::new(None);
+    let flow = Cell::new(Flow::Continue(()));
     let entry = |x: &[f64], k: usize, gradient: Option<&mut [f64]>| -> f64 {
+        if flow.get().is_break() {
+            // Where nothing changes any more, the search ends by itself.
+            if let Some(gradient) = gradient {
+                gradient.fill(0.0);
+            }
+            return 0.0;
+        }
         let is_known = known.borrow().as_ref().is_some_and(|known| known.at == x);
         if !is_known {
-            progress(usize::from(k == 0));
+            flow.set(progress(usize::from(k == 0)));
             *known.borrow_mut() = Some(look(measure, scales, x, sharpness));
         }
         let known = known.borrow();

@@ -1,5 +1,5 @@
 //! The file of a recording, opened once: an ordinary file is read from its place, so that it may be longer than memory;
-//! what came through a pipe, and files that are in memory anyway, are read from there.
+//! what came through a pipe, files that are in memory anyway, and tables are read from there.
 
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -10,18 +10,19 @@ use modelmill_boundary::files::{Files, Opened};
 
 use crate::recording::error::{Fault, RecordingError};
 use crate::recording::formats::{Format, Input, LONGEST_STREAM, TELLING_BYTES, format_of};
+use crate::recording::table::{self, Table};
 use crate::recording::{ReadOptions, Recording, TableInfo, name_of_bytes};
 
 /// A recording that is open, to be read as often as needed.
 pub struct RecordingFile {
     name: String,
-    format: &'static dyn Format,
     source: Source,
 }
 
 enum Source {
-    File(File),
-    Memory(Arc<Vec<u8>>),
+    File(&'static dyn Format, File),
+    Memory(&'static dyn Format, Arc<Vec<u8>>),
+    Table(Table),
 }
 
 impl RecordingFile {
@@ -42,15 +43,25 @@ impl RecordingFile {
                     .map_err(|error| fail(error.to_string()))?;
                 Ok(Self {
                     name,
-                    format: format_of(&first),
-                    source: Source::File(file),
+                    source: Source::File(format_of(&first), file),
                 })
             }
             Opened::Memory(bytes) => Ok(Self {
                 name: name_of_bytes(&name, &bytes),
-                format: format_of(&bytes),
-                source: Source::Memory(bytes),
+                source: Source::Memory(format_of(&bytes), bytes),
             }),
+        }
+    }
+
+    /// A table of columns in memory; `name` is what messages call it. Fails when columns differ in length.
+    pub fn of_table(name: &str, columns: Vec<(String, Vec<f64>)>) -> Result<Self, RecordingError> {
+        let name = format!("{name}{}", table::SUFFIX);
+        match Table::new(columns) {
+            Ok(table) => Ok(Self {
+                name,
+                source: Source::Table(table),
+            }),
+            Err(fault) => Err(RecordingError { file: name, fault }),
         }
     }
 
@@ -61,37 +72,50 @@ impl RecordingFile {
 
     /// The names of its columns as the file has them; fails when it cannot be read.
     pub fn names(&self) -> Result<Vec<String>, RecordingError> {
-        let names = self.input().and_then(|input| self.format.names(input));
-        names.map_err(|fault| self.fault(fault))
+        self.asked(
+            |format, input| format.names(input),
+            |table| Ok(table.names()),
+        )
     }
 
     /// What it holds, table by table or topic by topic; fails when it cannot be read.
     pub fn tables(&self) -> Result<Vec<TableInfo>, RecordingError> {
-        let tables = self.input().and_then(|input| self.format.tables(input));
-        tables.map_err(|fault| self.fault(fault))
+        self.asked(
+            |format, input| format.tables(input),
+            |table| Ok(vec![table.info()]),
+        )
     }
 
     /// Reads it; fails as [`Recording::read`] does.
     pub fn read(&self, options: &ReadOptions) -> Result<Recording, RecordingError> {
-        let input = self.input();
-        let recording = input.and_then(|input| self.format.read(input, &self.name, options));
-        recording.map_err(|fault| self.fault(fault))
+        self.asked(
+            |format, input| format.read(input, &self.name, options),
+            |table| table.read(&self.name, options),
+        )
     }
 
-    /// All of it, from its beginning.
-    fn input(&self) -> Result<Input<'_>, Fault> {
-        match &self.source {
-            Source::Memory(bytes) => Ok(Input::Bytes(bytes)),
-            Source::File(file) => {
+    /// What its format says of all of it, from its beginning.
+    fn asked<T>(
+        &self,
+        of_format: impl FnOnce(&dyn Format, Input<'_>) -> Result<T, Fault>,
+        of_table: impl FnOnce(&Table) -> Result<T, Fault>,
+    ) -> Result<T, RecordingError> {
+        let answer = match &self.source {
+            Source::Table(table) => of_table(table),
+            Source::Memory(format, bytes) => of_format(*format, Input::Bytes(bytes)),
+            Source::File(format, file) => {
                 let rewound = file.try_clone().and_then(|mut file| {
                     file.rewind()?;
                     Ok(Input::File(file))
                 });
-                rewound.map_err(|error| Fault::Unreadable {
-                    reason: error.to_string(),
-                })
+                rewound
+                    .map_err(|error| Fault::Unreadable {
+                        reason: error.to_string(),
+                    })
+                    .and_then(|input| of_format(*format, input))
             }
-        }
+        };
+        answer.map_err(|fault| self.fault(fault))
     }
 
     pub(crate) fn fault(&self, fault: Fault) -> RecordingError {

@@ -15,6 +15,7 @@ mod notes;
 mod options;
 mod read;
 mod repair;
+mod table;
 mod tables;
 mod together;
 

@@ -8,6 +8,7 @@ use modelmill_boundary::files::Disk;
 use crate::recording::error::RecordingError;
 use crate::recording::file::RecordingFile;
 use crate::recording::formats::{FORMATS, Format, Input, format_of};
+use crate::recording::table;
 use crate::recording::{ReadOptions, Recording};
 
 impl Recording {
@@ -110,10 +111,8 @@ pub fn place_word(file: &str) -> &'static str {
                 endings.any(|ending| extension.eq_ignore_ascii_case(ending))
             })
     };
-    if FORMATS
-        .into_iter()
-        .any(|format| format.is_table() && is_of(format))
-    {
+    let mut tables = FORMATS.into_iter().filter(|format| format.is_table());
+    if file.ends_with(table::SUFFIX) || tables.any(is_of) {
         "row"
     } else {
         "line"

@@ -37,6 +37,15 @@ impl RecordingFiles {
         })
     }
 
+    /// A table of columns in memory; `name` is what messages call it. Fails when columns differ in length.
+    pub fn of_table(name: &str, columns: Vec<(String, Vec<f64>)>) -> Result<Self, RecordingError> {
+        let file = RecordingFile::of_table(name, columns)?;
+        Ok(Self {
+            name: file.name().to_owned(),
+            files: vec![file],
+        })
+    }
+
     /// What messages call them.
     pub fn name(&self) -> &str {
         &self.name

@@ -1,6 +1,7 @@
 //! Motion of one axis that tells effects apart, where the best that can be is known.
 
 use std::f64::consts::PI;
+use std::ops::ControlFlow;
 
 use modelmill_identify::excite::separate::{Question, separation};
 use modelmill_identify::excite::{
@@ -62,7 +63,7 @@ fn found(axis: &Axis, harmonics: usize) -> Result<f64, ExciteError> {
         random: 200,
         ..Options::default()
     };
-    let found = excite(axis, &limits, &options, &|_| ())?;
+    let found = excite(axis, &limits, &options, &|_| ControlFlow::Continue(()))?;
     assert!(found.margins.iter().all(|margin| margin.excess <= 0.0));
     assert!(found.value <= found.first);
     println!(

@@ -5,7 +5,7 @@ use crate::build::symbols::Symbols;
 use crate::diagnostic::{Diagnostic, Log};
 use crate::exact::CoordinateIdx;
 use crate::kind_terms::lacking_units;
-use crate::kinds::{ActsOn, Carries, n_places};
+use crate::kinds::{ActsOn, Carries, OtherMotion, n_places};
 use crate::mechanism::{Drive, DriveIdx, DriveKind, LumpedMass, Part, PartIdx, Place};
 use crate::record::OneOrMany;
 use crate::schema::EffectKindEntry;
@@ -114,7 +114,19 @@ pub(super) fn common_load(
     let kind_name = kind.name.as_ref().map_or("", |name| name.text.as_str());
     let mut common: Option<Carries> = None;
     let mut fine = true;
-    for (i, (name, place)) in names.iter().zip(places).enumerate() {
+    let n_acting = if kind.other.is_some() { 1 } else { names.len() };
+    if let (Some(motion), [first, other, ..], Some(place)) = (kind.other, &names[..], places.get(1))
+    {
+        fine = moves(motion, other, *place, &carried, drives, log);
+        if first.text == other.text {
+            log.push(
+                Diagnostic::error(other.span, format!("`{}` is listed twice", other.text))
+                    .label("expected another place than that on which it acts"),
+            );
+            fine = false;
+        }
+    }
+    for (i, (name, place)) in names.iter().zip(places).enumerate().take(n_acting) {
         let (sort, carries) = match place {
             Place::Drive(idx) => (ActsOn::Drive, carried(drives[idx.0].kind)),
             Place::Coordinate(idx) => (ActsOn::Coordinate, carried(DriveKind::Joint(*idx))),
@@ -173,6 +185,10 @@ pub(super) fn common_load(
     if let Some(n) = n_places(kind).filter(|n| *n != names.len()) {
         let (word, why) = match n {
             1 => ("one place", "it acts on one place at a time"),
+            _ if kind.other.is_some() => (
+                "two places",
+                "it acts on the first with the motion of the second",
+            ),
             _ => (
                 "two places",
                 "at each of two places it acts with the motion of the other",
@@ -186,4 +202,33 @@ pub(super) fn common_load(
         fine = false;
     }
     common.filter(|_| fine)
+}
+
+/// Whether a place moves as a kind asks of its other one.
+fn moves(
+    motion: OtherMotion,
+    name: &Name,
+    place: Place,
+    carried: &dyn Fn(DriveKind) -> Carries,
+    drives: &[Drive],
+    log: &mut Log,
+) -> bool {
+    let carries = match place {
+        Place::Drive(idx) => Some(carried(drives[idx.0].kind)),
+        Place::Coordinate(idx) => Some(carried(DriveKind::Joint(idx))),
+        Place::Point(_) | Place::Part(_) | Place::Base | Place::Force => None,
+    };
+    if carries == Some(motion.carries()) {
+        return true;
+    }
+    let expected = format!("expected a drive or coordinate that {}", motion.words());
+    log.push(
+        Diagnostic::error(
+            name.span,
+            format!("`{}` does not move as this kind asks", name.text),
+        )
+        .label(expected)
+        .help("the kind says in `other` whether its other place is an `angle` or a `length`"),
+    );
+    false
 }

@@ -42,7 +42,10 @@ pub(super) fn effects(
             .kind
             .as_ref()
             .and_then(|kind| kinds.get(kind.text.as_str()));
-        kind.is_some_and(|(kind, _)| n_places(kind) == Some(2))
+        kind.and_then(|(kind, _)| {
+            let both_ways = kind.other.is_none();
+            (n_places(kind) == Some(2)).then_some(both_ways)
+        })
     };
     warn_of_twins(entries.clone(), &couples, log);
     check_single(entries.clone(), &kinds, log);
@@ -79,10 +82,11 @@ fn check_single<'a>(
 }
 
 /// Warns of a kind that acts twice at one place with the same constants: the columns are equal, and a variant that means
-/// to override an effect without a name brings this about. What couples places is a twin if it couples the same ones.
+/// to override an effect without a name brings this about. What couples places is a twin if it couples the same ones;
+/// `couples` says whether it does so both ways.
 fn warn_of_twins<'a>(
     entries: impl Iterator<Item = &'a EffectEntry>,
-    couples: &dyn Fn(&EffectEntry) -> bool,
+    couples: &dyn Fn(&EffectEntry) -> Option<bool>,
     log: &mut Log,
 ) {
     let mut seen: BTreeMap<(&str, Vec<&str>), (&EffectEntry, &Name)> = BTreeMap::new();
@@ -91,11 +95,13 @@ fn warn_of_twins<'a>(
         let mut all: Vec<&str> = (entry.at.iter().flat_map(|at| &at.entries))
             .map(|place| place.text.as_str())
             .collect();
-        all.sort_unstable();
         let together = couples(entry);
-        let n_keys = if together { 1 } else { all.len() };
+        if together != Some(false) {
+            all.sort_unstable();
+        }
+        let n_keys = if together.is_some() { 1 } else { all.len() };
         for place in entry.at.iter().flat_map(|at| &at.entries).take(n_keys) {
-            let key = if together {
+            let key = if together.is_some() {
                 all.clone()
             } else {
                 vec![place.text.as_str()]
@@ -176,6 +182,13 @@ fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut Log) -> Kinds<'a> {
     kinds
 }
 
+fn unknown(kind: &Name, kinds: &Kinds<'_>) -> Diagnostic {
+    let message = format!("unknown kind of effect `{}`", kind.text);
+    Diagnostic::error(kind.span, message)
+        .label("expected a kind of the library or of this file")
+        .help(suggest::advice(&kind.text, "kinds", kinds.keys().copied()))
+}
+
 fn effect(
     entry: &EffectEntry,
     kinds: &Kinds<'_>,
@@ -191,25 +204,14 @@ fn effect(
     let allowed: &[ActsOn] = known
         .and_then(|(kind, _)| kind.on.as_ref())
         .map_or(&[], |on| on.entries.as_slice());
-    let places: Vec<Place> = at
+    let mut places: Vec<Place> = at
         .iter()
         .flat_map(|at| &at.entries)
         .filter_map(|name| place(name, allowed, symbols, scene, log))
         .collect();
     let kind_name = entry.kind.as_ref()?;
     let Some(&(kind, is_sound)) = known else {
-        log.push(
-            Diagnostic::error(
-                kind_name.span,
-                format!("unknown kind of effect `{}`", kind_name.text),
-            )
-            .label("expected a kind of the library or of this file")
-            .help(suggest::advice(
-                &kind_name.text,
-                "kinds",
-                kinds.keys().copied(),
-            )),
-        );
+        log.push(unknown(kind_name, kinds));
         return None;
     };
     check_parameter_names(entry, kind, log);
@@ -275,9 +277,14 @@ fn effect(
         terms.sort_by_key(|term| listed.clone().position(|symbol| symbol == term.symbol));
         bodies = way.bodies(&terms, &places, scene);
     }
+    let other = kind.other.and(places.get(1).copied());
+    if other.is_some() {
+        places.truncate(1);
+    }
     (log.n_errors() == before).then(|| Effect {
         kind: kind_name.text.clone(),
         places,
+        other,
         mechanics: kind.mechanics,
         terms,
         constants,

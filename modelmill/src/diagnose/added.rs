@@ -127,7 +127,7 @@ fn sum(one: &NewEffect, other: &NewEffect) -> NewEffect {
     both
 }
 
-fn rounded(value: f64) -> f64 {
+pub(crate) fn rounded(value: f64) -> f64 {
     let text = format!("{value:.*e}", DIGITS - 1);
     text.parse().unwrap_or(value)
 }

@@ -108,7 +108,7 @@ pub(crate) fn candidates(model: &Model) -> Outcome<Candidates> {
             continue;
         }
         let first = singles.len();
-        let (places, sums) = sets(mechanism, kind, &fitting);
+        let (places, sums) = sets(mechanism, kind, &fitting, &all);
         for spots in places {
             if kind.places == Some(2) && has(mechanism, kind, &spots) {
                 continue;
@@ -146,7 +146,11 @@ pub(crate) fn candidates(model: &Model) -> Outcome<Candidates> {
 
 /// Whether the model has the effect at all of some places already.
 fn has(mechanism: &Mechanism, kind: &EffectKind, spots: &[&Spot]) -> bool {
-    let holds = |effect: &Effect| spots.iter().all(|spot| effect.places.contains(&spot.place));
+    let holds = |effect: &Effect| {
+        let has =
+            |spot: &&Spot| effect.places.contains(&spot.place) || effect.other == Some(spot.place);
+        spots.iter().all(has)
+    };
     let mut effects = mechanism.effects.iter();
     effects.any(|effect| effect.kind == kind.name && holds(effect))
 }

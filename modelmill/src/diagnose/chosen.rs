@@ -22,6 +22,54 @@ pub struct Named {
     pub values: Vec<(String, f64)>,
 }
 
+impl Named {
+    /// Reads `KIND@PLACE,PLACE:NAME=VALUE:NAME=VALUE`.
+    ///
+    /// Fails with what is expected.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let expected = || {
+            "expected KIND@PLACE, such as coulomb_friction@motor, several places with commas, values behind colons: \
+             coulomb_friction@motor:Fc=25.9"
+                .to_owned()
+        };
+        let mut parts = text.split(':');
+        let (kind, places) = parts
+            .next()
+            .and_then(|effect| effect.split_once('@'))
+            .ok_or_else(expected)?;
+        let at: Vec<String> = places
+            .split(',')
+            .map(|place| place.trim().to_owned())
+            .collect();
+        if kind.trim().is_empty() || at.iter().any(String::is_empty) {
+            return Err(expected());
+        }
+        if let Some(twice) = (0..at.len()).find(|k| at[..*k].contains(&at[*k])) {
+            return Err(format!("`{}` is named twice", at[twice]));
+        }
+        let mut values: Vec<(String, f64)> = Vec::new();
+        for part in parts {
+            let (symbol, value) = part.split_once('=').ok_or_else(expected)?;
+            let symbol = symbol.trim();
+            let value = match value.trim().parse::<f64>() {
+                Ok(value) if value.is_finite() => value,
+                _ => return Err(format!("`{}` is no finite number", value.trim())),
+            };
+            if values.iter().any(|(known, _)| known == symbol) {
+                return Err(format!("`{symbol}` has two values"));
+            }
+            values.push((symbol.to_owned(), value));
+        }
+        Ok(Self {
+            effect: Effect {
+                kind: kind.trim().to_owned(),
+                at,
+            },
+            values,
+        })
+    }
+}
+
 /// Whether constants of an effect that have no given value are searched for or have their usual one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Constants {
@@ -58,11 +106,16 @@ pub(crate) fn choose(model: &Model, named: &Named, constants: Constants) -> Outc
         )));
     }
     let all = spots(mechanism);
-    let of_kind = named
-        .effect
-        .at
-        .iter()
-        .map(|place| spot(mechanism, &kind, &all, place));
+    let of_kind = named.effect.at.iter().enumerate().map(|(k, place)| {
+        // The other place of a kind is where it does not act.
+        let moves = |one: &&Spot| {
+            one.name == *place && matches!(one.sort, ActsOn::Drive | ActsOn::Coordinate)
+        };
+        match all.iter().find(moves) {
+            Some(other) if k > 0 && kind.other.is_some() => Ok(other.clone()),
+            _ => spot(mechanism, &kind, &all, place),
+        }
+    });
     let places: Vec<Spot> = of_kind.collect::<Outcome<_>>()?;
     let mut singles = Vec::new();
     let mut variants: [Variant; 3] = Default::default();
@@ -237,7 +290,7 @@ impl Chosen {
         let choices = match &candidate.source {
             Source::Columns(choices) => choices.clone(),
             Source::Carried => {
-                let made = carried(&self.candidates, model, all, load)?;
+                let made = carried(&self.candidates, model, all, load, None)?;
                 made.into_iter()
                     .next()
                     .map_or_else(Vec::new, |(_, c)| only(c))
@@ -287,4 +340,31 @@ pub(crate) fn base(model: &Model, all: &Runs<'_>) -> Outcome<(Vec<Column>, Colum
         channel.get_or_insert_with(|| vec![0.0; samples]);
     }
     Ok((free, load, known))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn effects_are_read_and_nonsense_is_refused() {
+        let read = Named::parse("stribeck_friction@a,b:Fs=15:vs=-2e-2").unwrap();
+        assert_eq!(read.effect.kind, "stribeck_friction");
+        assert_eq!(read.effect.at, ["a", "b"]);
+        let values = [("Fs".to_owned(), 15.0), ("vs".to_owned(), -0.02)];
+        assert_eq!(read.values, values);
+        for text in [
+            "spring",
+            "@a",
+            "spring@",
+            "spring@a,",
+            "spring@a,a",
+            "spring@a:k",
+            "spring@a:k=x",
+            "spring@a:k=nan",
+            "spring@a:k=1:k=2",
+        ] {
+            assert!(Named::parse(text).is_err(), "{text}");
+        }
+    }
 }

@@ -13,8 +13,12 @@ use crate::stretch::Stretch;
 
 use super::candidates::{Candidates, Change, Entry, Single, Sort, grid, sign};
 use super::numbers::Motions;
+use super::places::Spot;
 use super::tilt::{TILTS, tilt};
 use crate::regressors::{Runs, regressor_of};
+
+/// The kind that is a force of one times its parameter.
+const CONSTANT: &str = "force_offset";
 
 /// Candidates with their columns; where each comes from is said in the same order.
 pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) -> Outcome<Made> {
@@ -245,6 +249,25 @@ fn singles(
         .collect())
 }
 
+/// What the drives must supply for a force or torque of one at each place where the library puts a constant one.
+pub(crate) fn unit_forces(
+    candidates: &Candidates,
+    model: &Model,
+    all: &Runs<'_>,
+) -> Outcome<Vec<(Spot, Column)>> {
+    let is_constant = |k: &usize| {
+        let single = &candidates.singles[*k];
+        candidates.kinds[single.kind].name == CONSTANT && single.spots.len() == 1
+    };
+    let which: Vec<usize> = (0..candidates.singles.len()).filter(is_constant).collect();
+    let made = singles(candidates, &which, model, all, Sort::Known, &|_, _| 1.0)?;
+    let of = |(k, columns): (&usize, Vec<Column>)| {
+        let column = columns.into_iter().next()?;
+        Some((candidates.singles[*k].spots[0].clone(), column))
+    };
+    Ok(which.iter().zip(made).filter_map(of).collect())
+}
+
 /// A candidate from the columns of its single places, with which of its parameters have an effect; `None` if none has.
 fn candidate(
     candidates: &Candidates,
@@ -356,15 +379,18 @@ fn is_part_of_load(kind: &EffectKind) -> bool {
     kind.on.contains(&ActsOn::Point) || kind.mechanics.is_some_and(Mechanics::is_part_of_load)
 }
 
-/// Columns of all candidates that depend on what the drives carry, for loads that are stacked and decimated like the forces.
+/// Columns of candidates that depend on what the drives carry, of all or of one entry, for loads that are stacked and decimated
+/// like the forces.
 pub(crate) fn carried(
     candidates: &Candidates,
     model: &Model,
     all: &Runs<'_>,
     load: &Column,
+    only: Option<usize>,
 ) -> Outcome<Vec<(usize, Vec<Column>)>> {
+    let is_wanted = |k: &usize| only.is_none_or(|e| candidates.entries[e].singles.contains(k));
     let which: Vec<usize> = (0..candidates.singles.len())
-        .filter(|k| candidates.singles[*k].sort == Sort::Carried)
+        .filter(|k| candidates.singles[*k].sort == Sort::Carried && is_wanted(k))
         .collect();
     if which.is_empty() {
         return Ok(Vec::new());
@@ -393,7 +419,8 @@ pub(crate) fn carried(
     };
     let found = singles(candidates, &which, model, &all, Sort::Carried, &value)?;
     let mut made = Vec::new();
-    for (k, entry) in candidates.entries.iter().enumerate() {
+    let wanted = candidates.entries.iter().enumerate();
+    for (k, entry) in wanted.filter(|(k, _)| only.is_none_or(|only| only == *k)) {
         let place = |single: &usize| which.iter().position(|w| w == single);
         let mut places = entry.singles.iter().filter_map(place);
         let Some(first) = places.next() else { continue };

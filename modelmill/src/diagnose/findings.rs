@@ -17,6 +17,7 @@ use crate::stretch::Stretch;
 use super::added::{self, Added};
 use super::chosen::Named;
 use super::faults;
+use super::laws::{self, Hypothesis};
 use super::long;
 use super::problem::{self, Answer, Asked, Held};
 use super::versions::Version;
@@ -53,6 +54,8 @@ pub struct Findings {
     pub diagnosis: Diagnosis,
     /// What is missing, with what is known of it.
     pub missing: Vec<Missing>,
+    /// Laws that no library holds and that would explain what nobody explains: hypotheses.
+    pub laws: Vec<Hypothesis>,
     /// What the recordings leave open.
     pub untold: Vec<Untold>,
     /// Base parameters of the bodies that are not what the file says, the farthest first.
@@ -219,6 +222,7 @@ impl Model {
         let mut findings = Findings {
             diagnosis: answer.diagnosis.clone(),
             missing: Vec::new(),
+            laws: Vec::new(),
             untold: Vec::new(),
             off_nominal: Vec::new(),
             with_nominal: None,
@@ -235,6 +239,7 @@ impl Model {
             variables,
         };
         findings.missing = missing(&findings);
+        findings.laws = laws::hypotheses(&findings.before.model, &findings.diagnosis);
         findings.untold = untold(&findings);
         findings.off_nominal = off_nominal(findings.last());
         findings.regions = regions(&findings);

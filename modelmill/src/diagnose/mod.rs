@@ -16,6 +16,7 @@ mod encoders;
 mod faults;
 mod findings;
 mod gears;
+mod laws;
 mod long;
 mod memory;
 pub(crate) mod numbers;
@@ -32,6 +33,7 @@ pub(crate) use chosen::{Chosen, Constants, base, choose};
 pub use findings::{
     Estimate, Findings, Missing, OffNominal, Question, Separation, Untold, WithNominal,
 };
+pub use laws::{Hypothesis, Law, LawEntry};
 pub use modelmill_identify::diagnose::{
     Budget, Diagnosis, Disturbance, Effect, Quantity, Rung, Verdict,
 };

@@ -121,7 +121,23 @@ pub(crate) fn sets<'a>(
     mechanism: &Mechanism,
     kind: &EffectKind,
     spots: &[&'a Spot],
+    all: &'a [Spot],
 ) -> (Vec<Vec<&'a Spot>>, Vec<Vec<usize>>) {
+    if let Some(motion) = kind.other {
+        let moves = |spot: &&&Spot| {
+            matches!(spot.sort, ActsOn::Drive | ActsOn::Coordinate)
+                && spot.carries == motion.carries()
+        };
+        let others: Vec<&Spot> = all.iter().filter(|spot| moves(&spot)).collect();
+        let with_others = |one: &&'a Spot| {
+            let one = *one;
+            let apart = others.iter().filter(move |other| other.place != one.place);
+            apart.map(|other| vec![one, *other]).collect::<Vec<_>>()
+        };
+        let pairs: Vec<Vec<&Spot>> = spots.iter().flat_map(with_others).collect();
+        let sets = (0..pairs.len()).map(|k| vec![k]).collect();
+        return (pairs, sets);
+    }
     if kind.places == Some(2) {
         let mut pairs = Vec::new();
         for (i, one) in spots.iter().enumerate() {

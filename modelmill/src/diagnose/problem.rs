@@ -2,7 +2,7 @@
 
 use modelmill_codegen::Evaluator;
 use modelmill_identify::diagnose::{
-    Column, Considered, Diagnosis, Disturbance, Effect, Problem, ROUNDING, Source, Supply,
+    Column, Considered, Diagnosis, Disturbance, Effect, Problem, ROUNDING, Site, Source, Supply,
     diagnose, drifts, readings, white_noise,
 };
 
@@ -20,6 +20,7 @@ use super::constants::constants;
 use super::encoders::{self, encoders};
 use super::faults::take_off;
 use super::gears::gears;
+use super::laws::sites;
 use super::memory::memories;
 use super::numbers::{layout, stack, variables};
 use super::payloads::payloads;
@@ -168,9 +169,19 @@ impl Supply for Made<'_> {
         Some(kept.map(|(column, _)| column).collect())
     }
 
-    fn carried(&self, load: &Column) -> Vec<(usize, Vec<Column>)> {
+    fn sites(&self) -> Vec<Site> {
         // Poses without answer were reported when the recordings were evaluated for the first time.
-        let made = carried(self.candidates, self.model, self.all, load).unwrap_or_default();
+        sites(self.candidates, self.model, self.all).unwrap_or_default()
+    }
+
+    fn carried(&self, load: &Column, only: Option<usize>) -> Vec<(usize, Vec<Column>)> {
+        let only = match only.map(|candidate| self.origins[candidate].as_ref()) {
+            Some(Some((entry, _))) => Some(*entry),
+            Some(None) => return Vec::new(),
+            None => None,
+        };
+        // Poses without answer were reported when the recordings were evaluated for the first time.
+        let made = carried(self.candidates, self.model, self.all, load, only).unwrap_or_default();
         let place = |entry: usize| {
             let is_its = |origin: &Origin| origin.as_ref().is_some_and(|(k, _)| *k == entry);
             self.origins.iter().position(is_its)

@@ -49,8 +49,9 @@ fn unknown(name: &str, kinds: &[EffectKind]) -> Error {
 fn places(kind: &EffectKind) -> String {
     let all: Vec<&str> = kind.on.iter().map(|on| on.words()).collect();
     let joined = all.join(" or ");
-    match kind.places {
-        Some(2) => format!("two of: {joined}"),
+    match (kind.places, kind.other) {
+        (_, Some(other)) => format!("{joined}, by another place that {}", other.words()),
+        (Some(2), None) => format!("two of: {joined}"),
         _ => joined,
     }
 }

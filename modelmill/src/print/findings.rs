@@ -3,6 +3,7 @@
 use modelmill_identify::diagnose::{Rung, Verdict};
 use serde_json::{Map, Value, json};
 
+use super::laws;
 use crate::diagnose::{Estimate, Findings, words};
 use crate::print::Spelling;
 use crate::text::Style;
@@ -90,6 +91,7 @@ impl Findings {
             "untold": self.untold.iter().map(|one| {
                 json!({"kind": one.effect.kind, "at": one.effect.at, "says": one.says, "separate_by": one.separate_by})
             }).collect::<Vec<_>>(),
+            "laws": laws::laws(&self.laws, model, spelling),
             "parameters_off_nominal": off,
             "unexplained": unexplained,
             "data": self.notes,
@@ -148,6 +150,7 @@ impl Findings {
         if places.is_empty() {
             lines.push("  No region of coordinates, rates, loads or time stands out.".to_owned());
         }
+        lines.extend(laws::text(&self.laws, &self.before.model, style, spelling));
         self.refused_text(style, &mut lines);
         self.untold_text(style, &mut lines);
         self.off_text(style, spelling, &mut lines);
@@ -357,7 +360,7 @@ impl Findings {
 }
 
 /// Estimates as scripts read them.
-fn estimates(all: &[Estimate]) -> Vec<Value> {
+pub(super) fn estimates(all: &[Estimate]) -> Vec<Value> {
     let one =
         |e: &Estimate| json!({"name": e.name, "value": e.value, "std": e.std, "unit": e.unit});
     all.iter().map(one).collect()

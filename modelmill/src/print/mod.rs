@@ -10,6 +10,7 @@ mod excitation;
 mod findings;
 mod identification;
 mod interpretation;
+pub(crate) mod laws;
 mod next_step;
 mod reduction;
 mod runs;

@@ -14,6 +14,11 @@ pub trait Spelling {
     /// Adds an effect to the file of a model.
     fn add(&self, model: &Model, effect: &NewEffect) -> String;
 
+    /// Adds an effect of a kind that a further library holds, which is kept in a file of some name.
+    fn add_from(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
+        format!("{}, with the library {library}", self.add(model, effect))
+    }
+
     /// Identifies a model once more from the same recordings.
     fn identify(&self, model: &Model) -> String;
 

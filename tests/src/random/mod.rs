@@ -460,6 +460,7 @@ impl Draft {
         self.mechanism.effects.push(Effect {
             kind: kind.to_owned(),
             places,
+            other: None,
             mechanics: None,
             terms: vec![EffectTerm {
                 symbol: "p".to_owned(),

@@ -1,0 +1,252 @@
+//! What laws take off where they were not fitted: blocks of time take turns, and those of the check are foretold by the recordings
+//! of the fit alone.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::features::Product;
+use super::ground::Samples;
+use crate::diagnose::bench::{Bench, Pick};
+use crate::diagnose::noise::effective_samples;
+use crate::diagnose::pool::{dot, solve};
+
+/// Blocks of each stretch.
+const BLOCKS: usize = 12;
+
+/// Inner products by blocks of what is known and what is left; the base alone is one of the laws.
+pub(crate) struct HeldOut {
+    /// Blocks of the samples that are looked at.
+    blocks: Vec<Range<usize>>,
+    is_check: Vec<bool>,
+    /// Columns of base and effects, then what is left, `[channel][column]`.
+    columns: Vec<Vec<Vec<f64>>>,
+    /// Their inner products on each block, over all channels.
+    grams: Vec<DMatrix<f64>>,
+}
+
+/// A law along time that it was not fitted to.
+#[derive(Clone, Debug)]
+pub(crate) struct Judged {
+    /// Squares that it leaves of each block, in units of the noise.
+    pub(crate) left: Vec<f64>,
+    /// Its parameters, from all blocks.
+    pub(crate) values: Vec<f64>,
+    /// Their deviations, by how they differ where blocks are left out.
+    pub(crate) deviations: Vec<f64>,
+    /// Factors of all columns, from all blocks.
+    factors: DVector<f64>,
+}
+
+impl Judged {
+    pub(crate) fn total(&self) -> f64 {
+        self.left.iter().sum()
+    }
+
+    /// By how much more it leaves than another, and the deviation of that over the blocks.
+    pub(crate) fn worse_than(&self, other: &Self) -> (f64, f64) {
+        let differences: Vec<f64> = self
+            .left
+            .iter()
+            .zip(&other.left)
+            .map(|(a, b)| a - b)
+            .collect();
+        let n = differences.len() as f64;
+        let mean = differences.iter().sum::<f64>() / n;
+        let squares: f64 = differences.iter().map(|d| (d - mean).powi(2)).sum();
+        (n * mean, (n * squares / (n - 1.0).max(1.0)).sqrt())
+    }
+}
+
+impl HeldOut {
+    pub(crate) fn new(
+        bench: &Bench<'_>,
+        picks: &[Pick],
+        rest: &[Vec<f64>],
+        samples: &Samples<'_>,
+        deviations: &[f64],
+    ) -> Self {
+        let layout = &bench.problem.layout;
+        let fit = layout.fit_samples();
+        let at = |sample: usize| samples.picked.partition_point(|i| *i < sample);
+        let all = layout.blocks(BLOCKS);
+        let is_check = all.iter().map(|block| block.start >= fit).collect();
+        let blocks: Vec<Range<usize>> = all.iter().map(|b| at(b.start)..at(b.end)).collect();
+        let some = |d: usize, values: &[f64]| -> Vec<f64> {
+            let scaled = samples.picked.iter().map(|i| values[*i] / deviations[d]);
+            scaled.collect()
+        };
+        let columns: Vec<Vec<Vec<f64>>> = (0..deviations.len())
+            .map(|d| {
+                let mut all: Vec<Vec<f64>> = (bench.columns(picks).iter())
+                    .map(|k| match bench.pool.column(*k).0[d].clone() {
+                        Some(mut values) => {
+                            bench.pool.silence(d, 0, &mut values);
+                            some(d, &values)
+                        }
+                        None => Vec::new(),
+                    })
+                    .collect();
+                all.push(some(d, &rest[d]));
+                all
+            })
+            .collect();
+        Self {
+            grams: grams(&blocks, &columns),
+            blocks,
+            is_check,
+            columns,
+        }
+    }
+
+    /// Puts a law to what is known.
+    pub(crate) fn take_up(&mut self, samples: &Samples<'_>, site: usize, terms: &[Product]) {
+        let channels = samples.channels(site);
+        for column in terms.iter().flat_map(|term| samples.columns(site, term)) {
+            for (d, columns) in self.columns.iter_mut().enumerate() {
+                let part = channels.iter().position(|channel| *channel == d);
+                let k = samples.picked.len();
+                let own = part.map_or_else(Vec::new, |p| column[p * k..(p + 1) * k].to_vec());
+                columns.insert(columns.len() - 1, own);
+            }
+        }
+        self.grams = grams(&self.blocks, &self.columns);
+    }
+
+    /// A law of some products at a place, fitted and held out.
+    pub(crate) fn judge(&self, samples: &Samples<'_>, site: usize, terms: &[Product]) -> Judged {
+        let channels = samples.channels(site);
+        let own: Vec<Vec<f64>> = (terms.iter())
+            .flat_map(|term| samples.columns(site, term))
+            .collect();
+        let k = samples.picked.len();
+        let n = self.grams.first().map_or(0, DMatrix::nrows) - 1;
+        let m = own.len();
+        // Base, law, rest.
+        let of_block = |(block, gram): (&Range<usize>, &DMatrix<f64>)| {
+            let mut whole = DMatrix::zeros(n + m + 1, n + m + 1);
+            let place = |i: usize| if i < n { i } else { n + m };
+            for i in 0..=n {
+                for j in 0..=n {
+                    whole[(place(i), place(j))] = gram[(i, j)];
+                }
+            }
+            for (a, column) in own.iter().enumerate() {
+                for (part, d) in channels.iter().enumerate() {
+                    let values = &column[part * k..(part + 1) * k];
+                    for (i, other) in self.columns[*d].iter().enumerate() {
+                        let product = on(block, values, other);
+                        whole[(n + a, place(i))] += product;
+                        whole[(place(i), n + a)] += product;
+                    }
+                    for (b, other) in own.iter().enumerate().take(a + 1) {
+                        let product = on(block, values, &other[part * k..(part + 1) * k]);
+                        whole[(n + a, n + b)] += product;
+                        if a != b {
+                            whole[(n + b, n + a)] += product;
+                        }
+                    }
+                }
+            }
+            whole
+        };
+        let grams: Vec<DMatrix<f64>> = self.blocks.iter().zip(&self.grams).map(of_block).collect();
+        let zero = || DMatrix::zeros(n + m + 1, n + m + 1);
+        let whole = grams.iter().fold(zero(), |sum, gram| sum + gram);
+        let of_fit = grams
+            .iter()
+            .zip(&self.is_check)
+            .filter(|(_, check)| !**check);
+        let of_fit = of_fit.fold(zero(), |sum, (gram, _)| sum + gram);
+        let fitted = |gram: &DMatrix<f64>| -> DVector<f64> {
+            let (factors, _) = solve(gram);
+            factors.push(-1.0)
+        };
+        let by_fit = fitted(&of_fit);
+        let mut left = Vec::new();
+        let mut others: Vec<Vec<f64>> = Vec::new();
+        for (gram, is_check) in grams.iter().zip(&self.is_check) {
+            let factors = if *is_check {
+                by_fit.clone()
+            } else {
+                let factors = fitted(&(&whole - gram));
+                others.push(factors.as_slice()[n..n + m].to_vec());
+                factors
+            };
+            left.push(factors.dot(&(gram * &factors)).max(0.0));
+        }
+        let factors = fitted(&whole);
+        let values = factors.as_slice()[n..n + m].to_vec();
+        let count = others.len() as f64;
+        let deviation = |a: usize| {
+            let mean = others.iter().map(|one| one[a]).sum::<f64>() / count;
+            let squares: f64 = others.iter().map(|one| (one[a] - mean).powi(2)).sum();
+            ((count - 1.0) / count * squares).sqrt()
+        };
+        Judged {
+            left,
+            deviations: (0..m).map(deviation).collect(),
+            values,
+            factors,
+        }
+    }
+
+    /// Squares of what a law leaves for each independent sample, on the channels that feel it.
+    pub(crate) fn scatter(
+        &self,
+        samples: &Samples<'_>,
+        site: usize,
+        terms: &[Product],
+        judged: &Judged,
+    ) -> f64 {
+        let own: Vec<Vec<f64>> = (terms.iter())
+            .flat_map(|term| samples.columns(site, term))
+            .collect();
+        let k = samples.picked.len();
+        let (mut squares, mut worth) = (0.0, 0.0);
+        for (part, d) in samples.channels(site).iter().enumerate() {
+            let known = &self.columns[*d];
+            let n = known.len() - 1;
+            let mut left = known[n].clone();
+            let of_law = own.iter().map(|column| &column[part * k..(part + 1) * k]);
+            let all = known[..n].iter().map(Vec::as_slice).chain(of_law);
+            for (column, factor) in all.zip(judged.factors.iter()) {
+                for (left, x) in left.iter_mut().zip(column) {
+                    *left -= factor * x;
+                }
+            }
+            squares += dot(&left, &left);
+            worth += effective_samples(&left);
+        }
+        squares / worth.max(1.0)
+    }
+}
+
+/// Inner products of columns on each block, over all channels.
+fn grams(blocks: &[Range<usize>], columns: &[Vec<Vec<f64>>]) -> Vec<DMatrix<f64>> {
+    let n = columns.first().map_or(0, Vec::len);
+    let gram = |block: &Range<usize>| {
+        let mut gram = DMatrix::zeros(n, n);
+        for of_channel in columns {
+            for i in 0..n {
+                for j in 0..=i {
+                    let product = on(block, &of_channel[i], &of_channel[j]);
+                    gram[(i, j)] += product;
+                    if i != j {
+                        gram[(j, i)] += product;
+                    }
+                }
+            }
+        }
+        gram
+    };
+    blocks.iter().map(gram).collect()
+}
+
+/// Inner product on a block of columns, of which one without numbers is zero.
+fn on(block: &Range<usize>, a: &[f64], b: &[f64]) -> f64 {
+    if a.is_empty() || b.is_empty() {
+        return 0.0;
+    }
+    dot(&a[block.clone()], &b[block.clone()])
+}

@@ -1,0 +1,450 @@
+//! Laws that no library holds: where something comes again with the state and no candidate explains it, products of what places
+//! do and carry are held against what is left, and those that take most of it off where they were not fitted are proposed.
+//! A proposal is a hypothesis: it says what would explain the recordings, not what the machine has.
+//!
+//! 1. `shapes`, `features` - the grammar; `dimensions` - units of what multiplies it.
+//! 2. `ground` - thousands of products are scored by inner products beside the base parameters and the effects that were found.
+//! 3. The best of each form has its constants sought, and second terms beside it.
+//! 4. `held_out` - what each takes off in time that it was not fitted to, and which differences are within the noise of that.
+//!
+//! Sources: S. L. Brunton, J. L. Proctor, J. N. Kutz, PNAS 113 (2016), for sparse regression over a library of functions;
+//! Y. C. Pati, R. Rezaiifar, P. S. Krishnaprasad, Asilomar 1993, for the orthogonal search.
+
+mod dimensions;
+mod features;
+mod ground;
+mod held_out;
+mod shapes;
+
+use std::collections::BTreeMap;
+
+pub use features::{Factor, Product, Site};
+pub use shapes::{Shape, Variable};
+
+use super::aliases::APART;
+use super::bench::{Bench, Pick};
+use super::evidence::LEAST_GAIN;
+use super::pool::{On, dot};
+use super::problem::{Effect, Nature, Supply};
+use features::Skeleton;
+use ground::{Ground, Part, Samples, Scored};
+use held_out::{HeldOut, Judged};
+
+/// A term of a law: a product, and the parameter or two that it is multiplied by.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Term {
+    /// The product.
+    pub product: Product,
+    /// Its parameters: one, or those of sine and cosine.
+    pub values: Vec<f64>,
+    /// Their standard deviations.
+    pub deviations: Vec<f64>,
+}
+
+/// A law at a place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Law {
+    /// Where it acts, by number among the sites.
+    pub site: usize,
+    /// One or two.
+    pub terms: Vec<Term>,
+    /// Share of the squares on the drives that feel it that it takes off where it was not fitted.
+    pub gain: f64,
+    /// Effects that were found and that it makes needless.
+    pub instead_of: Vec<Effect>,
+}
+
+/// What is proposed for what nobody explains, the simplest of those that do it best first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Proposal {
+    /// The law.
+    pub law: Law,
+    /// Laws that differ from it by no more than the noise of the ranking, the best first.
+    pub near_ties: Vec<Law>,
+    /// The channels that feel it, of those that something is left of.
+    pub channels: Vec<usize>,
+}
+
+/// Samples by which products are scored first, and on which the best are held out.
+const SCREENED: usize = 1500;
+const HELD_OUT: usize = 8000;
+/// Forms whose constants are sought.
+const FORMS: usize = 48;
+/// Laws of one term beside which a second is sought, and second terms of each.
+const FIRST_TERMS: usize = 6;
+const SECOND_TERMS: usize = 4;
+/// Steps by which constants are sought, as parts of what is usual: the first, and the last.
+const STEPS: [f64; 2] = [0.06, 0.002];
+/// A constant that gets better by less than this part has come to rest: on its way to infinity it gets better for ever.
+const WORTH_A_STEP: f64 = 1e-4;
+/// Rounds over all constants of a form.
+const MOST_ROUNDS: usize = 40;
+/// Squares that are left of a channel, in units of its white noise, from which on a law is sought though nothing else says that they
+/// come again.
+const SUSPICIOUS: f64 = 4.0;
+/// What a law must take off of that which comes again, and of all that is left where nothing else says that it does.
+const LEAST_PART: f64 = 0.5;
+const LEAST_ALONE: f64 = 0.6;
+/// How many independent columns the grammar may have, and how likely it may be that one of them does as well by chance.
+const FORMS_THERE_ARE: f64 = 1e5;
+const CHANCE: f64 = 1e-3;
+/// Deviations over the blocks by which two terms must be better than one.
+const LEAST_T: f64 = 3.0;
+/// The part of what the best takes off that is nobody's: what readings and derivatives err by is no noise.
+const SAME: f64 = 0.002;
+/// Near-ties that are told.
+const TOLD: usize = 8;
+
+/// Beside what laws are sought: a set of effects, and what it leaves.
+struct Base {
+    picks: Vec<Pick>,
+    ground: Ground,
+    held_out: HeldOut,
+}
+
+impl Base {
+    fn new(
+        bench: &Bench<'_>,
+        picks: Vec<Pick>,
+        few: &Samples<'_>,
+        many: &Samples<'_>,
+        deviations: &[f64],
+    ) -> Self {
+        let (factors, _) = bench.fit(&picks, On::All);
+        let rest = bench.rest(&picks, &factors);
+        Self {
+            ground: Ground::new(bench, &picks, few, deviations),
+            held_out: HeldOut::new(bench, &picks, &rest, many, deviations),
+            picks,
+        }
+    }
+
+    fn beside(&mut self, few: &Samples<'_>, many: &Samples<'_>, site: usize, terms: &[Product]) {
+        for term in terms {
+            self.ground = self.ground.beside(few, site, term);
+        }
+        self.held_out.take_up(many, site, terms);
+    }
+}
+
+/// A law with what it leaves.
+struct Tried {
+    site: usize,
+    terms: Vec<Product>,
+    /// Beside which of the bases.
+    base: usize,
+    /// What it takes to write it down, with the effects beside it.
+    size: usize,
+    judged: Judged,
+}
+
+/// What a set of effects leaves.
+pub(crate) struct Left<'a> {
+    /// `[channel][sample]`
+    pub(crate) rest: &'a [Vec<f64>],
+    /// The part of each channel's squares that comes again.
+    pub(crate) again: &'a [f64],
+    /// Channels of which that is more than noise.
+    pub(crate) unexplained: &'a [usize],
+}
+
+impl Left<'_> {
+    /// Squares per sample of a channel.
+    fn size(&self, channel: usize) -> f64 {
+        let rest = &self.rest[channel];
+        dot(rest, rest) / rest.len().max(1) as f64
+    }
+
+    /// Of each channel what does not come again, at least its noise.
+    fn deviations(&self, noise: &[f64]) -> Vec<f64> {
+        let deviation = |d: usize| {
+            let own = self.size(d) * (1.0 - self.again[d]);
+            own.sqrt().max(noise[d].max(f64::MIN_POSITIVE))
+        };
+        (0..self.rest.len()).map(deviation).collect()
+    }
+
+    /// Channels that a law may be sought for: those that are unexplained, then those that are far from white noise, since a law that
+    /// depends on few things of many may come again where no flexible function of all of them does.
+    fn open(&self, noise: &[f64]) -> Vec<usize> {
+        let is_suspicious = |d: &usize| {
+            !self.unexplained.contains(d) && self.size(*d) > SUSPICIOUS * noise[*d].powi(2)
+        };
+        let others = (0..self.rest.len()).filter(is_suspicious);
+        self.unexplained.iter().copied().chain(others).collect()
+    }
+}
+
+/// Proposes laws for what a set of effects leaves.
+pub(crate) fn propose(
+    bench: &Bench<'_>,
+    picks: &[Pick],
+    left: &Left<'_>,
+    supply: &dyn Supply,
+) -> (Vec<Site>, Vec<Proposal>) {
+    let mut open = left.open(&bench.problem.noise);
+    if open.is_empty() {
+        return (Vec::new(), Vec::new());
+    }
+    let all_open = open.clone();
+    let asked_of = |channels: &[usize]| -> Vec<usize> {
+        let of = channels.iter().filter(|d| all_open.contains(d));
+        of.copied().collect()
+    };
+    let sites = supply.sites();
+    if sites.is_empty() {
+        return (Vec::new(), Vec::new());
+    }
+    let load = bench.load(picks);
+    let of_site = |site: &Site| site.channel.and_then(|d| load.0[d].clone());
+    let loads: Vec<Option<Vec<f64>>> = sites.iter().map(of_site).collect();
+    let deviations = left.deviations(&bench.problem.noise);
+    let few = Samples::new(bench, &sites, &loads, &deviations, SCREENED);
+    let many = Samples::new(bench, &sites, &loads, &deviations, HELD_OUT);
+    let base = |picks: Vec<Pick>| Base::new(bench, picks, &few, &many, &deviations);
+    let mut bases = vec![base(picks.to_vec())];
+    let fewer = fewer(bench, picks, &open);
+    if fewer.len() < picks.len() {
+        bases.push(base(fewer));
+    }
+    let mut proposals = Vec::new();
+    while let Some(channel) = open.first().copied() {
+        open.retain(|d| *d != channel);
+        let is_felt = |site: &usize| few.channels(*site).contains(&channel);
+        let felt: Vec<usize> = (0..sites.len()).filter(is_felt).collect();
+        let without = bases[0].held_out.judge(&many, 0, &[]);
+        let mut tried = Vec::new();
+        for (k, base) in bases.iter().enumerate() {
+            let beside: usize = base.picks.iter().map(|pick| 2 * bench.freedoms(pick)).sum();
+            for (site, terms) in forms(&base.ground, &few, &felt) {
+                tried.push(Tried {
+                    judged: base.held_out.judge(&many, site, &terms),
+                    size: beside + terms.iter().map(|term| 1 + term.size()).sum::<usize>(),
+                    base: k,
+                    site,
+                    terms,
+                });
+            }
+        }
+        // Part of what is left of some channels, in units of the noise.
+        let squares = |site: usize, of: &dyn Fn(usize) -> f64| -> f64 {
+            let scaled = (many.channels(site).into_iter())
+                .map(|d| of(d) * left.size(d) / deviations[d].powi(2));
+            many.picked.len() as f64 * scaled.sum::<f64>()
+        };
+        let gain = |one: &Tried| {
+            let off = without.total() - one.judged.total();
+            off / squares(one.site, &|_| 1.0).max(f64::MIN_POSITIVE)
+        };
+        let scatter = |one: &Tried| {
+            let held_out = &bases[one.base].held_out;
+            held_out.scatter(&many, one.site, &one.terms, &one.judged)
+        };
+        let is_one = |one: &Tried| {
+            let channels = many.channels(one.site);
+            let gain = gain(one);
+            let all = squares(one.site, &|_| 1.0);
+            let is_proven = channels.iter().any(|d| left.unexplained.contains(d));
+            let least = if is_proven {
+                LEAST_PART * squares(one.site, &|d| left.again[d]) / all
+            } else {
+                LEAST_ALONE
+            };
+            // The best of many columns that have nothing to do with what is left explains so much of so few samples.
+            let worth = bench.worth(left.rest, &channels);
+            let by_chance = FORMS_THERE_ARE * (1.0 - gain).max(0.0).powf(0.5 * worth);
+            let (off, deviation) = without.worse_than(&one.judged);
+            gain >= least && off > deviation && by_chance < CHANCE
+        };
+        let Some((chosen, near_ties)) = best(tried, &without, &many, &is_one, &scatter) else {
+            continue;
+        };
+        let law = |one: &Tried| {
+            let is_gone = |pick: &&Pick| !bases[one.base].picks.contains(pick);
+            let replaced = picks.iter().filter(is_gone);
+            Law {
+                site: one.site,
+                terms: terms(one),
+                gain: gain(one),
+                instead_of: replaced
+                    .map(|pick| bench.candidate(pick).effect.clone())
+                    .collect(),
+            }
+        };
+        proposals.push(Proposal {
+            law: law(&chosen),
+            near_ties: near_ties.iter().map(law).collect(),
+            channels: asked_of(&many.channels(chosen.site)),
+        });
+        bases.swap(0, chosen.base);
+        bases.truncate(1);
+        bases[0].beside(&few, &many, chosen.site, &chosen.terms);
+        open.retain(|d| !many.channels(chosen.site).contains(d));
+    }
+    (sites.into_iter().map(bare).collect(), proposals)
+}
+
+/// A site whose motions have done their part.
+fn bare(site: Site) -> Site {
+    Site {
+        name: site.name,
+        is_angle: site.is_angle,
+        channel: site.channel,
+        ..Site::default()
+    }
+}
+
+/// Effects without those that act where something is open: what was found may be no more than what of the law an effect of the
+/// library is like.
+fn fewer(bench: &Bench<'_>, picks: &[Pick], open: &[usize]) -> Vec<Pick> {
+    let stays = |pick: &&Pick| {
+        let channels = bench.acted_on(std::slice::from_ref(*pick));
+        bench.candidate(pick).nature == Nature::Disturbance
+            || channels.iter().all(|d| !open.contains(d))
+    };
+    picks.iter().filter(stays).cloned().collect()
+}
+
+/// The products of a law with their parameters.
+fn terms(one: &Tried) -> Vec<Term> {
+    let mut parameters = one.judged.values.iter().zip(&one.judged.deviations);
+    let term = |product: &Product| {
+        let own = parameters.by_ref().take(product.parameters());
+        let (values, deviations) = own.unzip();
+        Term {
+            product: product.clone(),
+            values,
+            deviations,
+        }
+    };
+    one.terms.iter().map(term).collect()
+}
+
+/// The best laws of each form with their constants, those of one term and then those of two.
+fn forms(ground: &Ground, samples: &Samples<'_>, sites: &[usize]) -> Vec<(usize, Vec<Product>)> {
+    let parts: BTreeMap<usize, Part> = (sites.iter())
+        .map(|site| (*site, ground.at(samples, *site)))
+        .collect();
+    let screened = parts
+        .values()
+        .flat_map(|part| part.screen(samples, &|_| true));
+    let mut single: Vec<Scored> = (best_of_forms(screened, FORMS).into_iter())
+        .map(|one| refined(&parts[&one.site], samples, one))
+        .collect();
+    single.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let mut laws: Vec<(usize, Vec<Product>)> = Vec::new();
+    for first in single.iter().take(FIRST_TERMS) {
+        let part = (ground.beside(samples, first.site, &first.product)).at(samples, first.site);
+        let screened = part.screen(samples, &|other| first.product.other == Some(other));
+        for second in best_of_forms(screened.into_iter(), SECOND_TERMS) {
+            let second = refined(&part, samples, second);
+            laws.push((first.site, vec![first.product.clone(), second.product]));
+        }
+    }
+    let singles = single.into_iter().map(|one| (one.site, vec![one.product]));
+    singles.chain(laws).collect()
+}
+
+/// The best of each form, the best forms first.
+fn best_of_forms(scored: impl Iterator<Item = Scored>, most: usize) -> Vec<Scored> {
+    let mut best: BTreeMap<(usize, Skeleton), Scored> = BTreeMap::new();
+    for one in scored {
+        let form = (one.site, one.product.skeleton());
+        match best.get(&form) {
+            Some(known) if known.score >= one.score => {}
+            _ => {
+                best.insert(form, one);
+            }
+        }
+    }
+    let mut forms: Vec<Scored> = best.into_values().collect();
+    forms.sort_by(|a, b| b.score.total_cmp(&a.score));
+    forms.truncate(most);
+    forms
+}
+
+/// The same form with the constants that take most off, found by smaller and smaller steps.
+fn refined(part: &Part, samples: &Samples<'_>, mut best: Scored) -> Scored {
+    let [mut step, last] = STEPS;
+    for _ in 0..MOST_ROUNDS {
+        if step <= last {
+            break;
+        }
+        let mut is_better = false;
+        for factor in 0..best.product.factors.len() {
+            for which in 0..best.product.factors[factor].shape.freedoms() {
+                let range = samples.range(best.site, &best.product, factor);
+                for way in [step, -step] {
+                    let mut product = best.product.clone();
+                    let shape = &mut product.factors[factor].shape;
+                    *shape = shape.moved(which, way, range);
+                    let score = part.score(samples, &product);
+                    if score > best.score {
+                        is_better |= score > (1.0 + WORTH_A_STEP) * best.score;
+                        best.score = score;
+                        best.product = product;
+                        break;
+                    }
+                }
+            }
+        }
+        if !is_better {
+            step *= 0.4;
+        }
+    }
+    best
+}
+
+/// The simplest of the laws that leave least where they were not fitted, with those that leave no more; `None` where the best
+/// is none, as `is_one` says. What a law leaves more than the best is held against the squares of an independent sample, which
+/// `scatter` gives.
+fn best(
+    tried: Vec<Tried>,
+    without: &Judged,
+    samples: &Samples<'_>,
+    is_one: &dyn Fn(&Tried) -> bool,
+    scatter: &dyn Fn(&Tried) -> f64,
+) -> Option<(Tried, Vec<Tried>)> {
+    // What the library has it was asked about already.
+    let is_new = |one: &Tried| {
+        let mut terms = one.terms.iter();
+        terms.any(|term| !term.is_known(&samples.sites[one.site]))
+    };
+    let all = tried.into_iter().filter(is_new);
+    let (mut laws, double): (Vec<Tried>, Vec<Tried>) = all.partition(|one| one.terms.len() == 1);
+    let least = |all: &[Tried]| -> Option<usize> {
+        let totals = all.iter().map(|one| one.judged.total()).enumerate();
+        totals.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
+    };
+    if let (Some(one), Some(two)) = (least(&laws), least(&double)) {
+        let (more, deviation) = laws[one].judged.worse_than(&double[two].judged);
+        if more > LEAST_T * deviation && more > LEAST_GAIN * without.total() {
+            laws = double;
+        }
+    } else if laws.is_empty() {
+        laws = double;
+    }
+    laws.sort_by(|a, b| a.judged.total().total_cmp(&b.judged.total()));
+    let first = laws.first()?;
+    if !is_one(first) {
+        return None;
+    }
+    let less = without.total() - first.judged.total();
+    let most = first.judged.total() + (APART * scatter(first)).max(SAME * less);
+    laws.retain(|one| one.judged.total() <= most);
+    let simplest = (0..laws.len()).min_by_key(|k| laws[*k].size)?;
+    let chosen = laws.remove(simplest);
+    let mut seen = vec![(chosen.site, skeletons(&chosen))];
+    laws.retain(|one| {
+        let form = (one.site, skeletons(one));
+        let is_new = !seen.contains(&form);
+        seen.push(form);
+        is_new
+    });
+    laws.truncate(TOLD);
+    Some((chosen, laws))
+}
+
+fn skeletons(one: &Tried) -> Vec<Skeleton> {
+    one.terms.iter().map(Product::skeleton).collect()
+}

@@ -1,0 +1,562 @@
+//! Laws that no library holds, by the names of a model: where they may act, what they say as formulas over its coordinates, drives
+//! and loads, and the entry of a library by which `add` takes them.
+
+use std::fmt::Write as _;
+
+use modelmill_codegen::Evaluator;
+use modelmill_identify::diagnose::{
+    Column, Diagnosis, Effect, Factor, Law as Proposed, Product, Proposal, Shape, Site, Term,
+    Variable,
+};
+use modelmill_spec::edit::{NewEffect, NewParameter};
+use modelmill_spec::{ActsOn, Carries, DriveKind, Place};
+
+use crate::along;
+use crate::error::Outcome;
+use crate::model::Model;
+use crate::regressors::Runs;
+use crate::stretch::Stretch;
+
+use super::added::rounded;
+use super::candidates::Candidates;
+use super::columns::unit_forces;
+use super::findings::Estimate;
+use super::places::{Spot, spots};
+
+/// Places on which laws may act, along all recordings: drives, and joints without a drive of their own.
+pub(crate) fn sites(candidates: &Candidates, model: &Model, all: &Runs<'_>) -> Outcome<Vec<Site>> {
+    let mechanism = &model.loaded.mechanism;
+    let forces = unit_forces(candidates, model, all)?;
+    let mut sites: Vec<Site> = Vec::new();
+    let mut places = Vec::new();
+    for spot in spots(mechanism) {
+        if !matches!(spot.sort, ActsOn::Drive | ActsOn::Coordinate) {
+            continue;
+        }
+        let (force, channel) = match (spot.place, forces.iter().find(|(at, _)| *at == spot)) {
+            (Place::Drive(d), _) => (on_drive(model, all, d.0), Some(d.0)),
+            (_, Some((_, force))) => (force.clone(), None),
+            (_, None) => continue,
+        };
+        if force.is_zero() {
+            continue;
+        }
+        sites.push(Site {
+            name: spot.name.clone(),
+            is_angle: spot.carries == Carries::Torque,
+            channel,
+            force,
+            ..Site::default()
+        });
+        places.push(spot);
+    }
+    for (one, _) in all {
+        let motions = motions(model, one, &places)?;
+        for (site, [position, rate, acceleration]) in sites.iter_mut().zip(motions) {
+            site.position.extend(position);
+            site.rate.extend(rate);
+            site.acceleration.extend(acceleration);
+        }
+    }
+    Ok(sites)
+}
+
+/// A force of one along a drive.
+fn on_drive(model: &Model, all: &Runs<'_>, drive: usize) -> Column {
+    let samples = all.iter().map(|(one, _)| one.time().len()).sum();
+    let mut column = Column(vec![None; model.drives().len()]);
+    column.0[drive] = Some(vec![1.0; samples]);
+    column
+}
+
+/// Position, rate and acceleration of places along a recording, of the samples that are kept.
+fn motions(model: &Model, one: &Stretch, places: &[Spot]) -> Outcome<Vec<[Vec<f64>; 3]>> {
+    let evaluator = Evaluator::new(&model.derivation);
+    let mechanism = &model.derivation.mechanism;
+    let (active, passive) = model.derivation.coordinates();
+    let drives = along::columns(model, one, |states| evaluator.drives(states))?;
+    let of_passive = if passive.is_empty() {
+        Vec::new()
+    } else {
+        along::columns(model, one, |states| evaluator.passive(states))?
+    };
+    let of_coordinate = |i: usize| -> Option<[Vec<f64>; 3]> {
+        let run = &one.run;
+        if let Some(k) = active.iter().position(|a| *a == i) {
+            return Some([run.q[k].clone(), run.qd[k].clone(), run.qdd[k].clone()]);
+        }
+        let k = passive.iter().position(|p| *p == i)?;
+        let n = passive.len();
+        Some([k, n + k, 2 * n + k].map(|at| of_passive[at].clone()))
+    };
+    let kept = |values: Vec<f64>| values.into_iter().step_by(one.decimation()).collect();
+    let motion = |spot: &Spot| {
+        let found = match spot.place {
+            Place::Coordinate(i) => of_coordinate(i.0),
+            Place::Drive(d) => match mechanism.drives[d.0].kind {
+                DriveKind::Joint(i) => of_coordinate(i.0),
+                DriveKind::Linear { .. } => {
+                    let rate = drives[mechanism.drives.len() + d.0].clone();
+                    let acceleration = slopes(&rate, &one.run.time);
+                    Some([drives[d.0].clone(), rate, acceleration])
+                }
+            },
+            _ => None,
+        };
+        found.unwrap_or_default().map(&kept)
+    };
+    Ok(places.iter().map(motion).collect())
+}
+
+/// Central differences.
+fn slopes(values: &[f64], time: &[f64]) -> Vec<f64> {
+    let last = values.len().saturating_sub(1);
+    let at = |i: usize| {
+        let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
+        let step = time[b] - time[a];
+        if step > 0.0 {
+            (values[b] - values[a]) / step
+        } else {
+            0.0
+        }
+    };
+    (0..values.len()).map(at).collect()
+}
+
+/// A law that would explain what nobody explains; a hypothesis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Law {
+    /// What it adds to the force of its place, over coordinates, rates (`_d`), lengths of drives (`_length`) and what drives carry
+    /// (by their names).
+    pub expression: String,
+    /// The drive or coordinate on which it acts.
+    pub at: String,
+    /// Its parameters.
+    pub parameters: Vec<Estimate>,
+    /// Share of the squared error on the drives that feel it that it takes off where it was not fitted.
+    pub gain: f64,
+    /// Effects that were found and that it makes needless.
+    pub instead_of: Vec<Effect>,
+    /// How a model file takes it; `None` where the law remembers the way, which no formula says.
+    pub entry: Option<LawEntry>,
+}
+
+/// A law as a kind of effect of a library.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LawEntry {
+    /// The table of the library.
+    pub text: String,
+    /// The effect by which a model has it.
+    pub effect: NewEffect,
+}
+
+/// A law with those that do as well.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hypothesis {
+    /// The simplest.
+    pub law: Law,
+    /// Others, the best first.
+    pub near_ties: Vec<Law>,
+}
+
+impl Law {
+    /// The formula with its place.
+    pub fn says(&self) -> String {
+        format!("{} at {}", self.expression, self.at)
+    }
+}
+
+/// Laws that a diagnosis proposes, by the names of the model.
+pub(crate) fn hypotheses(model: &Model, diagnosis: &Diagnosis) -> Vec<Hypothesis> {
+    let sites = &diagnosis.sites;
+    let one = |proposal: &Proposal| Hypothesis {
+        law: law(model, sites, &proposal.law),
+        near_ties: (proposal.near_ties.iter())
+            .map(|tie| law(model, sites, tie))
+            .collect(),
+    };
+    diagnosis.laws.iter().map(one).collect()
+}
+
+fn law(model: &Model, sites: &[Site], law: &Proposed) -> Law {
+    let site = &sites[law.site];
+    let mut named = Formula::new(law);
+    let expression = named.text(law, &|variable, other| {
+        name(model, &sites[other.unwrap_or(law.site)], variable)
+    });
+    let mut parameters = Vec::new();
+    let mut symbols = named.parameters.iter();
+    for term in &law.terms {
+        let values = term.values.iter().zip(&term.deviations);
+        for ((value, deviation), symbol) in values.zip(symbols.by_ref()) {
+            parameters.push(Estimate {
+                name: symbol.clone(),
+                value: *value,
+                std: deviation.is_finite().then_some(*deviation),
+                unit: term.product.unit(site, sites),
+            });
+        }
+    }
+    Law {
+        expression,
+        at: site.name.clone(),
+        entry: entry(sites, law, &parameters),
+        parameters,
+        gain: law.gain,
+        instead_of: law.instead_of.clone(),
+    }
+}
+
+/// The name of a place's variable, as errors and recordings have it.
+fn name(model: &Model, site: &Site, variable: Variable) -> String {
+    let drive = site
+        .channel
+        .map(|d| &model.derivation.mechanism.drives[d].kind);
+    let base = match drive {
+        Some(DriveKind::Joint(i)) => &model.derivation.mechanism.coordinates[i.0].name,
+        _ => &site.name,
+    };
+    let is_linear = matches!(drive, Some(DriveKind::Linear { .. }));
+    match variable {
+        Variable::Position | Variable::OtherPosition if is_linear => format!("{base}_length"),
+        Variable::Position | Variable::OtherPosition => base.clone(),
+        Variable::Rate | Variable::OtherRate => format!("{base}_d"),
+        Variable::Acceleration => format!("{base}_dd"),
+        Variable::Load => site.name.clone(),
+    }
+}
+
+/// The words of a kind's expression.
+fn word(variable: Variable) -> &'static str {
+    match variable {
+        Variable::Position => "coordinate",
+        Variable::Rate => "rate",
+        Variable::Acceleration => "acceleration",
+        Variable::Load => "load",
+        Variable::OtherPosition => "other_coordinate",
+        Variable::OtherRate => "other_rate",
+    }
+}
+
+/// The table of a library, and the effect that a model has by it.
+fn entry(sites: &[Site], law: &Proposed, parameters: &[Estimate]) -> Option<LawEntry> {
+    let mut products = law.terms.iter().map(|term| &term.product);
+    if products.any(Product::remembers) {
+        return None;
+    }
+    let site = &sites[law.site];
+    let other = law.terms.iter().find_map(|term| term.product.other);
+    let other = other.map(|other| &sites[other]);
+    let mut formula = Formula::new(law);
+    formula.with_symbols = true;
+    let expression = formula.text(law, &|variable, _| word(variable).to_owned());
+    let kind = format!("law_of_{}", site.name);
+    let on = if site.channel.is_some() {
+        "drive"
+    } else {
+        "coordinate"
+    };
+    let carries = if site.is_angle { "torque" } else { "force" };
+    let mut text = format!("[[effect_kind]]\nname = \"{kind}\"\non = \"{on}\"\n");
+    if let Some(other) = other {
+        let motion = if other.is_angle { "angle" } else { "length" };
+        let _ = writeln!(text, "other = \"{motion}\"");
+    }
+    let _ = writeln!(
+        text,
+        "expression = \"{expression}\"\nsays = \"A hypothesis that recordings suggest: no law of a machine until it is understood.\""
+    );
+    text.push_str("[effect_kind.parameters]\n");
+    for parameter in parameters {
+        let _ = writeln!(
+            text,
+            "{} = {{ unit = {{ {carries} = \"{}\" }} }}",
+            parameter.name, parameter.unit
+        );
+    }
+    if !formula.constants.is_empty() {
+        text.push_str("[effect_kind.constants]\n");
+    }
+    for (symbol, value, factor) in &formula.constants {
+        let unit = factor.unit(site.is_angle, other.is_some_and(|other| other.is_angle));
+        let _ = writeln!(
+            text,
+            "{symbol} = {{ unit = {{ {carries} = \"{unit}\" }}, value = {} }}",
+            rounded(*value)
+        );
+    }
+    let nominal = |p: &Estimate| NewParameter {
+        symbol: p.name.clone(),
+        nominal: Some(rounded(p.value)),
+        ..NewParameter::default()
+    };
+    let at = std::iter::once(site).chain(other);
+    Some(LawEntry {
+        text,
+        effect: NewEffect {
+            kind,
+            at: at.map(|site| site.name.clone()).collect(),
+            parameters: parameters.iter().map(nominal).collect(),
+            ..NewEffect::default()
+        },
+    })
+}
+
+/// A law as a formula, with the symbols of its parameters and constants.
+struct Formula {
+    parameters: Vec<String>,
+    constants: Vec<(String, f64, Factor)>,
+    /// Whether constants stand as symbols rather than as numbers.
+    with_symbols: bool,
+}
+
+impl Formula {
+    fn new(law: &Proposed) -> Self {
+        let several = law.terms.len() > 1;
+        let of_term = |(k, term): (usize, &Term)| {
+            let number = if several {
+                (k + 1).to_string()
+            } else {
+                String::new()
+            };
+            let symbols: &[&str] = match term.values.len() {
+                1 => &["k"],
+                _ => &["ks", "kc"],
+            };
+            let named = symbols.iter().map(|symbol| format!("{symbol}{number}"));
+            named.collect::<Vec<_>>()
+        };
+        Self {
+            parameters: law.terms.iter().enumerate().flat_map(of_term).collect(),
+            constants: Vec::new(),
+            with_symbols: false,
+        }
+    }
+
+    fn text(&mut self, law: &Proposed, name: &dyn Fn(Variable, Option<usize>) -> String) -> String {
+        let mut symbols = self.parameters.clone().into_iter();
+        let mut terms = Vec::new();
+        for term in &law.terms {
+            let factors: Vec<Vec<String>> = (term.product.factors.iter())
+                .map(|factor| {
+                    let is_other = matches!(
+                        factor.variable,
+                        Variable::OtherPosition | Variable::OtherRate
+                    );
+                    let other = term.product.other.filter(|_| is_other);
+                    self.factor(*factor, &name(factor.variable, other))
+                })
+                .collect();
+            let wave = factors.iter().find(|texts| texts.len() > 1);
+            let mut product = Vec::new();
+            if let Some(wave) = wave {
+                let parts = wave.iter().zip(symbols.by_ref());
+                let parts: Vec<String> = parts
+                    .map(|(text, symbol)| format!("{symbol}*{text}"))
+                    .collect();
+                let is_alone = factors.len() == 1 && law.terms.len() == 1;
+                let sum = parts.join(" + ");
+                product.push(if is_alone { sum } else { format!("({sum})") });
+            } else {
+                product.extend(symbols.next());
+            }
+            let others = factors.iter().filter(|texts| texts.len() == 1);
+            product.extend(others.map(|texts| texts[0].clone()));
+            terms.push(product.join("*"));
+        }
+        terms.join(" + ")
+    }
+
+    /// A constant as a number, or by a symbol of its own.
+    fn constant(&mut self, symbol: &str, value: f64, factor: Factor) -> String {
+        if !self.with_symbols {
+            return rounded(value).to_string();
+        }
+        let of_name =
+            |one: &&(String, f64, Factor)| one.0.trim_end_matches(char::is_numeric) == symbol;
+        let symbol = match self.constants.iter().filter(of_name).count() {
+            0 => symbol.to_owned(),
+            n => format!("{symbol}{}", n + 1),
+        };
+        self.constants.push((symbol.clone(), value, factor));
+        symbol
+    }
+
+    /// A shape of a variable: one text, or those of sine and cosine.
+    fn factor(&mut self, factor: Factor, z: &str) -> Vec<String> {
+        let text = match factor.shape {
+            Shape::Power {
+                halves,
+                is_odd,
+                scale,
+            } => {
+                if halves % 2 == 0 {
+                    whole_power(z, halves / 2, is_odd)
+                } else {
+                    let share = format!("abs({z})/{}", self.constant("scale", scale, factor));
+                    let whole = match halves / 2 {
+                        0 => String::new(),
+                        1 => format!("{share}*"),
+                        n => format!("({share})^{n}*"),
+                    };
+                    let sign = if is_odd {
+                        format!("sign({z})*")
+                    } else {
+                        String::new()
+                    };
+                    format!("{sign}{whole}sqrt({share})")
+                }
+            }
+            Shape::Shifted { centre, power } => {
+                let centre = self.constant("centre", centre, factor);
+                format!("({})^{power}", less(z, &centre))
+            }
+            Shape::Beyond { from, side, power } => {
+                let over = if from == 0.0 {
+                    z.to_owned()
+                } else {
+                    less(z, &self.constant("from", from, factor))
+                };
+                let way = if side > 0.0 { "+" } else { "-" };
+                let ramp = format!("(abs({over}) {way} ({over}))/2");
+                match power {
+                    1 => ramp,
+                    n => format!("({ramp})^{n}"),
+                }
+            }
+            Shape::Wave { pitch } => {
+                let pitch = self.constant("pitch", pitch, factor);
+                return ["sin", "cos"]
+                    .map(|f| format!("{f}(2*pi*{z}/{pitch})"))
+                    .to_vec();
+            }
+            Shape::Bump { centre, width } => {
+                format!("exp(-({})^2)", self.near(z, centre, width, factor))
+            }
+            Shape::Detent { centre, width } => {
+                let near = self.near(z, centre, width, factor);
+                format!("{near}*exp(-({near})^2)")
+            }
+            Shape::Step { centre, width } => {
+                format!("tanh({})", self.near(z, centre, width, factor))
+            }
+            Shape::Fading { scale, halves } => {
+                let scale = self.constant("scale", scale, factor);
+                let power = match halves {
+                    1 => format!("sqrt(abs({z})/{scale})"),
+                    2 => format!("abs({z})/{scale}"),
+                    _ => format!("({z}/{scale})^{}", halves / 2),
+                };
+                format!("sign({z})*exp(-{power})")
+            }
+            Shape::Memory { length, curve } => {
+                let state = if curve == 1 { "dahl" } else { "bouc_wen" };
+                format!("{state}({z}, {})", self.constant("length", length, factor))
+            }
+            Shape::Slip { width } => {
+                format!("slip({z}, {})", self.constant("width", width, factor))
+            }
+        };
+        vec![text]
+    }
+
+    /// `(z - centre)/width`
+    fn near(&mut self, z: &str, centre: f64, width: f64, factor: Factor) -> String {
+        let from = if centre == 0.0 {
+            z.to_owned()
+        } else {
+            let centre = self.constant("centre", centre, factor);
+            format!("({})", less(z, &centre))
+        };
+        format!("{from}/{}", self.constant("width", width, factor))
+    }
+}
+
+fn whole_power(z: &str, power: i32, is_odd: bool) -> String {
+    match (power, is_odd) {
+        (0, _) => format!("sign({z})"),
+        (1, true) => z.to_owned(),
+        (1, false) => format!("abs({z})"),
+        (n, is_odd) if (n % 2 == 1) == is_odd => format!("{z}^{n}"),
+        (2, _) => format!("{z}*abs({z})"),
+        (n, true) => format!("sign({z})*{z}^{n}"),
+        (n, false) => format!("abs({z})^{n}"),
+    }
+}
+
+/// `z - centre`, where the centre may be a number below zero.
+fn less(z: &str, centre: &str) -> String {
+    match centre.strip_prefix('-') {
+        Some(positive) => format!("{z} + {positive}"),
+        None => format!("{z} - {centre}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn formula(factors: &[(Variable, Shape)], with_symbols: bool) -> String {
+        let factor = |(variable, shape): &(Variable, Shape)| Factor {
+            variable: *variable,
+            shape: *shape,
+        };
+        let product = Product {
+            other: None,
+            factors: factors.iter().map(factor).collect(),
+        };
+        let parameters = if factors.iter().any(|f| matches!(f.1, Shape::Wave { .. })) {
+            2
+        } else {
+            1
+        };
+        let law = Proposed {
+            site: 0,
+            terms: vec![Term {
+                product,
+                values: vec![1.0; parameters],
+                deviations: vec![0.0; parameters],
+            }],
+            gain: 1.0,
+            instead_of: Vec::new(),
+        };
+        let mut formula = Formula::new(&law);
+        formula.with_symbols = with_symbols;
+        formula.text(&law, &|variable, _| word(variable).to_owned())
+    }
+
+    #[test]
+    fn laws_are_formulas() {
+        use Variable::{Load, OtherPosition, Position, Rate};
+        let wave = Shape::Wave { pitch: 0.02 };
+        assert_eq!(
+            formula(
+                &[(OtherPosition, Shape::LINEAR), (Rate, Shape::LINEAR)],
+                false
+            ),
+            "k*other_coordinate*rate"
+        );
+        assert_eq!(
+            formula(&[(Position, wave), (Rate, Shape::LINEAR)], true),
+            "(ks*sin(2*pi*coordinate/pitch) + kc*cos(2*pi*coordinate/pitch))*rate"
+        );
+        let beyond = Shape::Beyond {
+            from: -0.25,
+            side: 1.0,
+            power: 1,
+        };
+        assert_eq!(
+            formula(&[(Position, beyond)], false),
+            "k*(abs(coordinate + 0.25) + (coordinate + 0.25))/2"
+        );
+        let power = Shape::Power {
+            halves: 3,
+            is_odd: false,
+            scale: 200.0,
+        };
+        assert_eq!(
+            formula(&[(Load, power), (Rate, Shape::SIGN)], false),
+            "k*abs(load)/200*sqrt(abs(load)/200)*sign(rate)"
+        );
+    }
+}

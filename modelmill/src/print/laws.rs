@@ -1,0 +1,119 @@
+//! Laws that a diagnosis proposes, as JSON and for people.
+
+use serde_json::{Value, json};
+
+use super::findings::estimates;
+use crate::diagnose::{Hypothesis, Law, words};
+use crate::model::Model;
+use crate::print::Spelling;
+use crate::text::Style;
+use crate::text::table::{number, percent, significant};
+
+/// What is said of every law.
+pub(crate) const HYPOTHESIS: &str =
+    "A hypothesis that these recordings suggest, no finding: nothing says that the machine has it.";
+/// What an entry of a library needs to be known, and where the law cannot be written down.
+pub(crate) const LIBRARY: &str = "laws.toml";
+pub(crate) const REMEMBERS: &str = "It depends on the way there, which no formula of a library says; it is told so that it can be looked for.";
+
+/// Laws as scripts read them.
+pub(super) fn laws(laws: &[Hypothesis], model: &Model, spelling: &dyn Spelling) -> Vec<Value> {
+    let one = |hypothesis: &Hypothesis| {
+        let mut told = law(&hypothesis.law, model, spelling);
+        let ties = hypothesis.near_ties.iter();
+        told["near_ties"] = ties.clone().map(|tie| json!(tie.says())).collect();
+        told["ties"] = ties.map(|tie| law(tie, model, spelling)).collect();
+        told["says"] = json!(HYPOTHESIS);
+        told
+    };
+    laws.iter().map(one).collect()
+}
+
+fn law(law: &Law, model: &Model, spelling: &dyn Spelling) -> Value {
+    let entry = law.entry.as_ref();
+    json!({
+        "expression": law.expression,
+        "at": [law.at],
+        "gain": law.gain,
+        "parameters": estimates(&law.parameters),
+        "instead_of": law.instead_of,
+        "entry": entry.map(|entry| &entry.text),
+        "kind": entry.map(|entry| &entry.effect.kind),
+        "places": entry.map(|entry| &entry.effect.at),
+        "command": entry.map(|entry| spelling.add_from(model, &entry.effect, LIBRARY)),
+    })
+}
+
+/// Laws for people, line by line.
+pub(super) fn text(
+    laws: &[Hypothesis],
+    model: &Model,
+    style: Style,
+    spelling: &dyn Spelling,
+) -> Vec<String> {
+    let mut lines = Vec::new();
+    if laws.is_empty() {
+        return lines;
+    }
+    lines.push(String::new());
+    lines.push(style.bold("which law would explain what is left: a hypothesis, to be tried"));
+    for hypothesis in laws {
+        let law = &hypothesis.law;
+        lines.push(format!("  {}", law.says()));
+        lines.push(format!("    {}", values(law)));
+        let wrapped = words::lines(&gain(law), 96);
+        lines.extend(wrapped.iter().map(|line| format!("    {line}")));
+        if !hypothesis.near_ties.is_empty() {
+            lines.push("    As near to these recordings are".to_owned());
+            for tie in &hypothesis.near_ties {
+                lines.push(format!("      {}", tie.says()));
+            }
+        }
+        match &law.entry {
+            Some(entry) => {
+                lines.push(format!("    As a library, {LIBRARY}:"));
+                lines.extend(
+                    entry
+                        .text
+                        .lines()
+                        .map(|line| style.dim(&format!("      {line}"))),
+                );
+                lines.push("    and with it".to_owned());
+                let command = spelling.add_from(model, &entry.effect, LIBRARY);
+                lines.push(format!("      {command}"));
+            }
+            None => {
+                let wrapped = words::lines(REMEMBERS, 96);
+                lines.extend(wrapped.iter().map(|line| format!("    {line}")));
+            }
+        }
+    }
+    lines
+}
+
+/// Parameters with their deviations and units.
+pub(crate) fn values(law: &Law) -> String {
+    let value = |p: &crate::diagnose::Estimate| {
+        let deviation =
+            (p.std).map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
+        let unit = if p.unit == "1" { "" } else { &p.unit };
+        let said = format!("{} = {}{deviation} {unit}", p.name, number(p.value));
+        said.trim_end().to_owned()
+    };
+    let all: Vec<String> = law.parameters.iter().map(value).collect();
+    all.join(", ")
+}
+
+/// What it takes off, and what it makes needless.
+pub(crate) fn gain(law: &Law) -> String {
+    let mut says = format!(
+        "takes off {} of the squared error that is left where it was not fitted",
+        percent(Some(law.gain))
+    );
+    if !law.instead_of.is_empty() {
+        says.push_str(", and then the recordings need no ");
+        says.push_str(&words::effects(&law.instead_of));
+    }
+    says.push('.');
+    says
+}
