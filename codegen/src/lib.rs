@@ -19,6 +19,7 @@ pub use derive::base::BaseParameter;
 pub use derive::{Derivation, derive_columns};
 pub use emit::{
     Emitted, EmittedFile, Form, LANGUAGES, Language, Source, emit, emit_with_dynamics, module_name,
+    vectors_c,
 };
 pub use error::DeriveError;
 pub use evaluate::{Evaluator, PoseFault, PoseReason, States};

@@ -89,13 +89,13 @@ impl Evaluated {
 }
 
 /// Names of the components of all reactions, such as `elbow.Fx`, `elbow.Mz`, and of a loop `closure.Fx`.
-struct Components {
+pub(crate) struct Components {
     /// Those that equations of motion determine, in the order of the program's outputs.
-    determined: Vec<String>,
-    left_out: Vec<String>,
+    pub(crate) determined: Vec<String>,
+    pub(crate) left_out: Vec<String>,
 }
 
-fn components(reactions: &Reactions) -> Components {
+pub(crate) fn components(reactions: &Reactions) -> Components {
     let mut found = Components {
         determined: Vec::new(),
         left_out: Vec::new(),

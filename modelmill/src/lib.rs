@@ -41,6 +41,7 @@
 //! | [`Model::equations`] | p_g, dependences, p_min and programs as a page |
 //! | [`Model::generate`] | code |
 //! | [`Model::evaluate`] | forces along a recording |
+//! | [`Model::functions`] | forces, regressor, mass matrix and the like at given states |
 //! | [`Model::identify`] | base parameters from recordings, eq. (12) |
 //! | [`Model::compare`] | error figures, and where the error lives |
 //! | [`Model::diagnose`] | which physical effect is missing |
@@ -154,7 +155,7 @@
 //! # Layout
 //!
 //! In the order of the flow, each standing on those before it: [`text`], [`error`], [`progress`], [`host`], [`model`],
-//! [`stretch`], [`along`], [`audit`], [`recording`], [`compare`], [`evaluate`], [`identify`], [`diagnose`], [`add`], [`adopt`],
+//! [`stretch`], [`along`], [`audit`], [`recording`], [`compare`], [`evaluate`], [`states`], [`identify`], [`diagnose`], [`add`], [`adopt`],
 //! [`runs`], [`interpret`], [`excite`], [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@print`], [`report`].
 
 pub mod add;
@@ -182,6 +183,7 @@ mod regressors;
 pub mod report;
 pub mod runs;
 pub mod simulate;
+pub mod states;
 pub mod stretch;
 pub mod text;
 

@@ -1,5 +1,6 @@
 //! Progress and cancellation: whoever starts a verb hears what goes on, and may stop it.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -56,6 +57,14 @@ impl Job {
     /// Counts some more steps.
     pub fn add(&self, steps: usize) {
         self.done.fetch_add(steps as u64, Ordering::Relaxed);
+    }
+
+    /// Counts some more steps, and says whether to go on.
+    pub fn flow(&self, steps: usize) -> ControlFlow<()> {
+        match self.step(steps) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(_) => ControlFlow::Break(()),
+        }
     }
 
     /// Counts some more steps.

@@ -7,8 +7,10 @@ mod identifier;
 mod language;
 mod languages;
 pub(crate) mod tree;
+mod vectors;
 mod wrap;
 
 pub use language::rust::{Emitted, emit, emit_with_dynamics, module_name};
 pub use language::{EmittedFile, Form, Language, Source};
 pub use languages::LANGUAGES;
+pub use vectors::vectors_c;

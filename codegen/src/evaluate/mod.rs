@@ -250,6 +250,19 @@ impl<'a> Evaluator<'a> {
         self.run(&dynamics.effects, states, base)
     }
 
+    /// `c + g + e`, generalised forces that do not depend on accelerations: one vector per independent coordinate.
+    pub fn bias(
+        &self,
+        dynamics: &Dynamics,
+        states: &States<'_>,
+        base: &[f64],
+    ) -> Result<Vec<Vec<f64>>, PoseFault> {
+        let mut found = self.run(&dynamics.bias, states, base)?;
+        // The Jacobian of the drives stands behind them.
+        found.truncate(self.active.len());
+        Ok(found)
+    }
+
     /// All determined components of the reactions for the parameters of the model file, one vector each, in the order in
     /// which the places of [`Reactions`] count them.
     pub fn reactions(

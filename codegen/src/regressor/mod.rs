@@ -235,7 +235,7 @@ impl Equations {
         let place = effect.places[at];
         let other = match effect.places.as_slice() {
             [_, _] => Some(effect.places[1 - at]),
-            _ => None,
+            _ => effect.other,
         };
         let here = self.quantities(graph, place);
         let there = other.map_or([None; 4], |other| self.quantities(graph, other));

@@ -133,7 +133,7 @@ impl Model {
         let found = self
             .host()
             .watched("searching for a trajectory", steps(&options), |job| {
-                excite(searched, &coordinates, &options, &|more| job.add(more))
+                excite(searched, &coordinates, &options, &|more| job.flow(more))
             })?
             .map_err(|error| Error::input(format!("{}: {error}", self.path)))?;
         let samples = samples(request.rate, options.period);

@@ -470,6 +470,14 @@ impl Model {
             })
     }
 
+    /// Whether passive coordinates are followed from state to state by Newton's method, for want of a closed form.
+    pub fn follows_loops(&self) -> bool {
+        matches!(
+            self.derivation.programs.passive_position,
+            modelmill_codegen::PassivePosition::Newton(_)
+        )
+    }
+
     /// Effects whose force depends on the load of the drive.
     pub fn load_dependent(&self) -> Vec<&str> {
         let effects = self.derivation.mechanism.effects.iter();

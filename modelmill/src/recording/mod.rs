@@ -13,7 +13,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use modelmill_identify::diagnose::{Disturbance, Quantity};
-use modelmill_identify::{Note, PositionFault, Recording as Raw, RecordingFiles, Run};
+use modelmill_identify::{Note, PositionFault, Recording as Raw, RecordingFiles};
 
 use crate::audit;
 use crate::error::{Error, Outcome};
@@ -27,12 +27,11 @@ use leverage::Leverage;
 
 pub use contents::{ColumnInfo, Contents, TableInfo};
 pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER, has_ending_of_a_recording};
-pub use modelmill_identify::{Preparation, Smoothing};
+pub use modelmill_identify::{Preparation, Run, Smoothing};
 pub use options::Reading;
 
 /// Reads a recording with the columns that a model needs.
-fn read_raw(model: &Model, paths: &[&Path], reading: &Reading) -> Outcome<Raw> {
-    let file = RecordingFiles::open(model.host().files(), paths)?;
+fn read_raw(model: &Model, file: &RecordingFiles, reading: &Reading) -> Outcome<Raw> {
     let name = file.name();
     let options = read_options(model, reading, &file.names()?, name)?;
     let mut raw = model
@@ -69,7 +68,8 @@ pub(crate) fn read_as_recorded(
     path: &Path,
     reading: &Reading,
 ) -> Outcome<Vec<Stretch>> {
-    let raw = read_raw(model, &[path], reading)?;
+    let file = RecordingFiles::open(model.host().files(), &[path])?;
+    let raw = read_raw(model, &file, reading)?;
     let (mut reading, note) = settled(model, &raw, reading)?;
     if reading.preparation.chosen {
         // Rows of a fit are of no interest here.
@@ -293,7 +293,11 @@ impl Model {
     /// As [`Model::recording`], of several files of one run, whose columns are joined on time: the slowest gives the
     /// samples, and the others are interpolated.
     pub fn recording_of(&self, paths: &[&Path], reading: &Reading) -> Outcome<Recording> {
-        let raw = read_raw(self, paths, reading).map_err(|failure| {
+        let opened = RecordingFiles::open(self.host().files(), paths);
+        let read = opened
+            .map_err(Error::from)
+            .and_then(|file| read_raw(self, &file, reading));
+        let raw = read.map_err(|failure| {
             let kinds = paths.iter().map(|path| (path, kinds_of_files::kind(self.host(), path)));
             let mut others = kinds.filter_map(|(path, kind)| Some((path.display(), kind?)));
             others.next().map_or(failure, |(path, kind)| {
@@ -303,6 +307,20 @@ impl Model {
                 ))
             })
         })?;
+        Recording::new(self, raw, reading)
+    }
+
+    /// As [`Model::recording`], of columns that are in memory, such as those of a data frame, with their names; NaN stands
+    /// for what is missing. `name` is what messages call them.
+    ///
+    /// Fails as [`Model::recording`] does, and when columns differ in length.
+    pub fn recording_of_table(
+        &self,
+        name: &str,
+        columns: Vec<(String, Vec<f64>)>,
+        reading: &Reading,
+    ) -> Outcome<Recording> {
+        let raw = read_raw(self, &RecordingFiles::of_table(name, columns)?, reading)?;
         Recording::new(self, raw, reading)
     }
 }

@@ -8,7 +8,7 @@ use modelmill_identify::diagnose::Verdict;
 use super::{Findings, curves, keys, ladder, maps, regions, spectrum, tables, words};
 use crate::compare::Places;
 use crate::error::Outcome;
-use crate::print::Spelling;
+use crate::print::{Spelling, laws as told};
 use crate::text::svg::escape;
 use crate::text::table::percent;
 
@@ -144,6 +144,57 @@ fn the_ladder(findings: &Findings) -> String {
 }
 
 fn found(findings: &Findings, spelling: &dyn Spelling) -> String {
+    let mut html = effects(findings, spelling);
+    if !findings.laws.is_empty() {
+        html.push_str(&laws(findings, spelling));
+    }
+    html
+}
+
+/// Laws that would explain what is left.
+fn laws(findings: &Findings, spelling: &dyn Spelling) -> String {
+    let model = &findings.before.model;
+    let mut html = format!(
+        "<h3>Which law would explain what is left</h3>\n<p>{}</p>\n",
+        escape(told::HYPOTHESIS)
+    );
+    for hypothesis in &findings.laws {
+        let law = &hypothesis.law;
+        let _ = writeln!(
+            html,
+            "<p><code>{}</code> with {}: it {}</p>",
+            escape(&law.says()),
+            escape(&told::values(law)),
+            escape(&told::gain(law))
+        );
+        if !hypothesis.near_ties.is_empty() {
+            html.push_str("<p>As near to these recordings are</p>\n<ul>\n");
+            for tie in &hypothesis.near_ties {
+                let _ = writeln!(html, "<li><code>{}</code></li>", escape(&tie.says()));
+            }
+            html.push_str("</ul>\n");
+        }
+        match &law.entry {
+            Some(entry) => {
+                let command = spelling.add_from(model, &entry.effect, told::LIBRARY);
+                let _ = writeln!(
+                    html,
+                    "<p>As a library, <code>{}</code>, and with it:</p>\n<pre class=\"commands\"><code>{}</code></pre>\n\
+                     <pre class=\"commands\"><code>{}</code></pre>",
+                    told::LIBRARY,
+                    escape(&entry.text),
+                    escape(&command)
+                );
+            }
+            None => {
+                let _ = writeln!(html, "<p>{}</p>", escape(told::REMEMBERS));
+            }
+        }
+    }
+    html
+}
+
+fn effects(findings: &Findings, spelling: &dyn Spelling) -> String {
     if findings.entries.is_empty() {
         let says = match findings.diagnosis.verdict {
             Verdict::Adequate => {

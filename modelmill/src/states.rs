@@ -1,0 +1,367 @@
+//! A model's functions at states that are given as numbers, many at once: forces, regressor, mass matrix, bias, forward dynamics,
+//! reactions. A program of the derivation runs over blocks of states, without a compiler.
+
+use std::ops::Range;
+use std::sync::OnceLock;
+
+use modelmill_codegen::{Dynamics, Evaluator, PoseFault, PoseReason, Reactions, States, vectors_c};
+use rayon::prelude::*;
+
+use crate::error::{Error, Outcome};
+use crate::evaluate::components;
+use crate::model::Model;
+
+/// States that are evaluated at once; large beside the preparation of a program, small beside the cache.
+const CHUNK: usize = 4096;
+
+/// Numbers of many states, such as positions: a row for each state, a column for each coordinate or drive.
+#[derive(Clone, Copy, Debug)]
+pub struct Rows<'a> {
+    /// The numbers, as many as rows times columns.
+    pub numbers: &'a [f64],
+    /// How many there are of each state.
+    pub width: usize,
+    /// Whether those of one state lie side by side; else those of one column do.
+    pub by_state: bool,
+}
+
+impl Rows<'_> {
+    fn len(&self) -> usize {
+        self.numbers.len() / self.width.max(1)
+    }
+
+    /// The columns of some states, one after the other.
+    fn columns(&self, states: &Range<usize>) -> Vec<Vec<f64>> {
+        let n = self.len();
+        (0..self.width)
+            .map(|k| {
+                if self.by_state {
+                    let rows = &self.numbers[states.start * self.width..states.end * self.width];
+                    rows.iter().skip(k).step_by(self.width).copied().collect()
+                } else {
+                    self.numbers[k * n + states.start..k * n + states.end].to_vec()
+                }
+            })
+            .collect()
+    }
+}
+
+/// States, and the forces that go with them. What a function does not read may be left out.
+#[derive(Clone, Copy, Debug)]
+pub struct Given<'a> {
+    /// Positions of the active coordinates, rad or m, in the order of [`Model::active`].
+    pub q: Rows<'a>,
+    /// Rates, rad/s or m/s.
+    pub qd: Option<Rows<'a>>,
+    /// Accelerations, rad/s^2 or m/s^2.
+    pub qdd: Option<Rows<'a>>,
+    /// Forces of the drives, N or N m: what forward dynamics starts from, and what effects by load depend on.
+    pub forces: Option<Rows<'a>>,
+}
+
+/// A function of a state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Function {
+    /// Forces of the drives, N or N m.
+    InverseDynamics,
+    /// H_min of eq. (4): a row for each drive, a column for each base parameter.
+    Regressor,
+    /// M of `J' f = M q'' + b`: a row and a column for each active coordinate.
+    MassMatrix,
+    /// b of `J' f = M q'' + b`: generalised forces of rates, weight and effects, one for each active coordinate.
+    Bias,
+    /// Accelerations of the active coordinates under given forces of the drives.
+    ForwardDynamics,
+    /// What joints and the cuts of loops transmit, for the parameters of the model file: the components that
+    /// [`Functions::reactions`] names.
+    Reactions,
+}
+
+impl Function {
+    /// Whether rates, accelerations and forces are read.
+    fn reads(self) -> [bool; 3] {
+        match self {
+            Self::InverseDynamics | Self::Regressor | Self::Reactions => [true, true, false],
+            Self::MassMatrix => [false, false, false],
+            Self::Bias => [true, false, false],
+            Self::ForwardDynamics => [true, false, true],
+        }
+    }
+}
+
+/// The functions of a model; what is derived for one of them is kept.
+pub struct Functions {
+    model: Model,
+    dynamics: OnceLock<Dynamics>,
+    reactions: OnceLock<Reactions>,
+}
+
+impl Model {
+    /// The model's functions at states that are given as numbers.
+    pub fn functions(&self) -> Functions {
+        Functions {
+            model: self.clone(),
+            dynamics: OnceLock::new(),
+            reactions: OnceLock::new(),
+        }
+    }
+}
+
+/// What is made once for all states.
+struct Prepared<'a> {
+    evaluator: Evaluator<'a>,
+    dynamics: Option<&'a Dynamics>,
+    reactions: Option<&'a Reactions>,
+}
+
+impl Functions {
+    /// Names of the components that [`Function::Reactions`] gives, such as `elbow.Fx`, and of those that equations of motion do
+    /// not determine.
+    ///
+    /// Fails when reactions cannot be derived.
+    pub fn reactions(&self) -> Outcome<(Vec<String>, Vec<String>)> {
+        let named = components(self.derived_reactions()?);
+        Ok((named.determined, named.left_out))
+    }
+
+    /// How many numbers a function has of one state: rows and columns, 1 column for a vector.
+    ///
+    /// Fails when the function cannot be derived.
+    pub fn shape(&self, function: Function) -> Outcome<[usize; 2]> {
+        let (active, drives) = (self.model.active().len(), self.model.drives().len());
+        Ok(match function {
+            Function::InverseDynamics => [drives, 1],
+            Function::Regressor => [drives, self.model.base.len()],
+            Function::MassMatrix => [active, active],
+            Function::Bias | Function::ForwardDynamics => [active, 1],
+            Function::Reactions => [self.reactions()?.0.len(), 1],
+        })
+    }
+
+    /// A function at all given states: its numbers row by row, state after state. `values` are those of the base parameters.
+    /// Work is shared among all cores, unless each state starts from the one before (loops without closed form).
+    ///
+    /// Fails when something that the function reads is not given or has another length, and at the first state without an
+    /// answer.
+    pub fn at(&self, function: Function, given: &Given<'_>, values: &[f64]) -> Outcome<Vec<f64>> {
+        let parts = self.parts(function, given)?;
+        if values.len() != self.model.base.len() {
+            return Err(Error::input(format!(
+                "{} values of base parameters are given; the model has {}",
+                values.len(),
+                self.model.base.len()
+            )));
+        }
+        let n = given.q.len();
+        let width: usize = self.shape(function)?.iter().product();
+        let prepared = self.prepared(function)?;
+        let mut out = vec![0.0; n * width];
+        let chunk = if self.model.follows_loops() {
+            n.max(1)
+        } else {
+            CHUNK
+        };
+        let one = |k: usize, out: &mut [f64]| {
+            let states = k * chunk..(k * chunk + chunk).min(n);
+            fill(function, &prepared, &parts, &states, values, out).map_err(|fault| PoseFault {
+                sample: fault.sample + states.start,
+                reason: fault.reason,
+            })
+        };
+        let of_state = |fault: PoseFault| Error::input(format!("{}: {fault}", self.model.path));
+        if width == 0 || n == 0 {
+            return Ok(out);
+        }
+        if n <= chunk {
+            one(0, &mut out).map_err(of_state)?;
+            return Ok(out);
+        }
+        let what = "evaluating states";
+        let found = self.model.host().watched(what, n, |job| {
+            let chunks = out.par_chunks_mut(chunk * width).enumerate();
+            let done = chunks.map(|(k, out)| {
+                job.step(out.len() / width)?;
+                Ok::<_, Error>(one(k, out))
+            });
+            done.collect::<Outcome<Vec<_>>>()
+        })??;
+        // The first state that has no answer is told, whichever core met one first.
+        for result in found {
+            result.map_err(of_state)?;
+        }
+        Ok(out)
+    }
+
+    /// A function as C for eight states at once ([`vectors_c`]), for callers with a C compiler; base parameters are its arguments,
+    /// other values those of the model.
+    ///
+    /// Fails for forward dynamics, which is no straight-line program, and where each state starts from the one before.
+    pub fn vectors_c(&self, function: Function) -> Outcome<String> {
+        let derivation = &self.model.derivation;
+        if self.model.follows_loops() || function == Function::ForwardDynamics {
+            return Err(Error::input(format!(
+                "{}: {} takes steps that depend on the state and is not compiled",
+                self.model.path,
+                if function == Function::ForwardDynamics {
+                    "forward dynamics"
+                } else {
+                    "closing the loops by Newton's method"
+                }
+            )));
+        }
+        let program = match function {
+            Function::InverseDynamics => &derivation.programs.inverse_dynamics,
+            Function::Regressor => &derivation.programs.regressor,
+            Function::MassMatrix => &self.dynamics()?.mass_matrix,
+            Function::Bias | Function::ForwardDynamics => &self.dynamics()?.bias,
+            Function::Reactions => &self.derived_reactions()?.program,
+        };
+        let width = self.shape(function)?.iter().product();
+        Ok(vectors_c(derivation, program, width))
+    }
+
+    /// Positions, rates, accelerations and forces as far as they are read, with their lengths looked at.
+    fn parts<'a>(&self, function: Function, given: &Given<'a>) -> Outcome<[Option<Rows<'a>>; 4]> {
+        let (active, drives) = (self.model.active().len(), self.model.drives().len());
+        let [rates, accelerations, forces] = function.reads();
+        let by_load = self.model.load_dependent();
+        let n = given.q.len();
+        let parts = [
+            ("positions", Some(given.q), true, active),
+            ("rates", given.qd, rates, active),
+            ("accelerations", given.qdd, accelerations, active),
+            (
+                "forces of the drives",
+                given.forces,
+                forces || !by_load.is_empty(),
+                drives,
+            ),
+        ];
+        let mut found = [None; 4];
+        for (slot, (name, rows, is_read, width)) in found.iter_mut().zip(parts) {
+            match rows {
+                _ if !is_read => {}
+                None if name.starts_with("forces") && !forces => {
+                    return Err(Error::input(format!(
+                        "{} depends on the load: forces of the drives are needed besides the states",
+                        by_load.join(", ")
+                    )));
+                }
+                None => return Err(Error::input(format!("{name} are needed and not given"))),
+                Some(rows) if rows.width != width || rows.numbers.len() != n * width => {
+                    return Err(Error::input(format!(
+                        "{name} have {} rows of {}; {n} rows of {width} are needed",
+                        rows.len(),
+                        rows.width
+                    )));
+                }
+                Some(rows) => *slot = Some(rows),
+            }
+        }
+        Ok(found)
+    }
+
+    fn prepared(&self, function: Function) -> Outcome<Prepared<'_>> {
+        let needs_dynamics = matches!(
+            function,
+            Function::MassMatrix | Function::Bias | Function::ForwardDynamics
+        );
+        Ok(Prepared {
+            evaluator: Evaluator::new(&self.model.derivation),
+            dynamics: needs_dynamics.then(|| self.dynamics()).transpose()?,
+            reactions: (function == Function::Reactions)
+                .then(|| self.derived_reactions())
+                .transpose()?,
+        })
+    }
+
+    fn dynamics(&self) -> Outcome<&Dynamics> {
+        if let Some(known) = self.dynamics.get() {
+            return Ok(known);
+        }
+        let what = "deriving the equation of motion";
+        let derived = (self.model.host()).watched(what, 0, |_| self.model.derivation.dynamics())?;
+        let derived = derived.map_err(|error| Error::derivation(&self.model.path, error))?;
+        Ok(self.dynamics.get_or_init(|| derived))
+    }
+
+    fn derived_reactions(&self) -> Outcome<&Reactions> {
+        if let Some(known) = self.reactions.get() {
+            return Ok(known);
+        }
+        let what = "deriving the reactions";
+        let derived =
+            (self.model.host()).watched(what, 0, |_| self.model.derivation.reactions())?;
+        let derived = derived.map_err(|error| Error::derivation(&self.model.path, error))?;
+        Ok(self.reactions.get_or_init(|| derived))
+    }
+}
+
+/// Writes a function of some states to `out`, a row for each.
+fn fill(
+    function: Function,
+    prepared: &Prepared<'_>,
+    parts: &[Option<Rows<'_>>; 4],
+    states: &Range<usize>,
+    values: &[f64],
+    out: &mut [f64],
+) -> Result<(), PoseFault> {
+    let columns = parts.map(|rows| rows.map_or_else(Vec::new, |rows| rows.columns(states)));
+    let zeros = vec![0.0; states.len()];
+    let [q, qd, qdd, forces] = columns
+        .each_ref()
+        .map(|columns| columns.iter().map(Vec::as_slice).collect::<Vec<_>>());
+    // What a function does not read is not given, but has its place.
+    let all_zeros: Vec<&[f64]> = q.iter().map(|_| zeros.as_slice()).collect();
+    let given = States {
+        qd: if qd.is_empty() { all_zeros.clone() } else { qd },
+        qdd: if qdd.is_empty() { all_zeros } else { qdd },
+        q,
+        load: forces.clone(),
+    };
+    let width = out.len() / states.len().max(1);
+    let evaluator = &prepared.evaluator;
+    let (dynamics, reactions) = (prepared.dynamics, prepared.reactions);
+    let found = match (function, dynamics, reactions) {
+        (Function::InverseDynamics, ..) => evaluator.inverse_dynamics(&given, values)?,
+        (Function::MassMatrix, Some(dynamics), _) => {
+            evaluator.mass_matrix(dynamics, &given, values)?
+        }
+        (Function::Bias, Some(dynamics), _) => evaluator.bias(dynamics, &given, values)?,
+        (Function::ForwardDynamics, Some(dynamics), _) => {
+            evaluator.forward_dynamics(dynamics, &given, values, &forces)?
+        }
+        (Function::Reactions, _, Some(reactions)) => evaluator.reactions(reactions, &given)?,
+        (Function::Regressor, ..) => {
+            let mut start = 0;
+            return evaluator.regressor_blocks(&given, |len, columns| {
+                scatter(
+                    columns,
+                    &mut out[start * width..(start + len) * width],
+                    start,
+                )?;
+                start += len;
+                Ok(())
+            });
+        }
+        _ => unreachable!("what a function needs is prepared before"),
+    };
+    let columns: Vec<&[f64]> = found.iter().map(Vec::as_slice).collect();
+    scatter(&columns, out, 0)
+}
+
+/// Columns to rows; `first` is the state of the first row, for the fault of a number that is none.
+fn scatter(columns: &[&[f64]], out: &mut [f64], first: usize) -> Result<(), PoseFault> {
+    for (k, row) in out.chunks_exact_mut(columns.len().max(1)).enumerate() {
+        for (value, column) in row.iter_mut().zip(columns) {
+            *value = column[k];
+        }
+        if row.iter().any(|value| !value.is_finite()) {
+            return Err(PoseFault {
+                sample: first + k,
+                reason: PoseReason::Undefined,
+            });
+        }
+    }
+    Ok(())
+}
