@@ -28,13 +28,13 @@ pub(crate) enum Seen {
 }
 
 impl Draft {
-    /// What was just read from the disk.
-    pub(crate) fn new(text: String) -> Self {
+    /// What was just read from the disk; its changes count from `revision`.
+    pub(crate) fn new(text: String, revision: u64) -> Self {
         Self {
             saved: text.clone(),
             text,
             outside: None,
-            revision: 1,
+            revision,
         }
     }
 
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn what_others_write_is_followed_where_nothing_is_lost() {
-        let mut draft = Draft::new("a".to_owned());
+        let mut draft = Draft::new("a".to_owned(), 1);
         assert_eq!(draft.see("a"), Seen::Nothing);
         assert_eq!(draft.see("b"), Seen::Followed);
         assert_eq!(
@@ -159,12 +159,12 @@ mod tests {
 
     #[test]
     fn lines_end_as_they_did() {
-        let mut draft = Draft::new("a\r\nb\r\n".to_owned());
+        let mut draft = Draft::new("a\r\nb\r\n".to_owned(), 1);
         assert!(draft.edit(1, "a\nb\n"));
         assert!(!draft.is_changed());
         assert!(draft.edit(1, "a\nc\nb\n"));
         assert_eq!(draft.text(), "a\r\nc\r\nb\r\n");
-        let mut draft = Draft::new("a\nb\n".to_owned());
+        let mut draft = Draft::new("a\nb\n".to_owned(), 1);
         assert!(draft.edit(1, "a\nc\n"));
         assert_eq!(draft.text(), "a\nc\n");
     }
@@ -172,7 +172,7 @@ mod tests {
     #[test]
     fn both_texts_stay_until_somebody_chooses() {
         let conflict = || {
-            let mut draft = Draft::new("a".to_owned());
+            let mut draft = Draft::new("a".to_owned(), 1);
             assert!(draft.edit(1, "mine"));
             assert_eq!(draft.see("theirs"), Seen::Conflict);
             assert_eq!(draft.see("theirs"), Seen::Nothing);

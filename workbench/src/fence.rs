@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, RwLock};
 
 use modelmill::files::{Disk, FileError, FileFault, Files, Kind, Opened};
+use modelmill::{Error, Host};
+
+use crate::options::Options;
 
 /// The disk, as far as a sitting may read it.
 pub(crate) struct Fence {
@@ -16,7 +19,7 @@ pub(crate) struct Fence {
 
 impl Fence {
     /// The folder of the model, and nothing else yet.
-    pub(crate) fn around(model: &Path) -> Arc<Self> {
+    fn around(model: &Path) -> Arc<Self> {
         let folder = match model.parent() {
             Some(parent) if parent != Path::new("") => parent,
             _ => Path::new("."),
@@ -28,8 +31,23 @@ impl Fence {
         })
     }
 
+    /// Lets in what a sitting was opened with: what was named, and what the model file as the disk holds it is made of.
+    pub(crate) fn opened(host: &Host, options: &Options) -> Arc<Self> {
+        let fence = Self::around(&options.model);
+        let named = (options.data.iter().chain(&options.check).flatten())
+            .chain(host.libraries())
+            .chain([&options.model]);
+        named.for_each(|path| fence.admit(path));
+        match host.load(&options.model) {
+            Ok(loaded) => loaded.sources.paths().for_each(|path| fence.admit(path)),
+            Err(Error::Model(fault)) => fault.sources.paths().for_each(|path| fence.admit(path)),
+            Err(_) => {}
+        }
+        fence
+    }
+
     /// Lets a file in that was named on purpose.
-    pub(crate) fn admit(&self, path: &Path) {
+    fn admit(&self, path: &Path) {
         let mut named = match self.named.write() {
             Ok(named) => named,
             Err(poisoned) => poisoned.into_inner(),

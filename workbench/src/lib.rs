@@ -1,40 +1,53 @@
 //! The workbench: one model file in the browser, on the user's own machine, with its picture, equations, errors along recordings
 //! and diagnosis beside the text.
 //!
-//! `options` is what is put on it, `draft` the text beside what the disk holds, `fence` what files may be read, `readings`
-//! recordings as a model reads them, `watch` the progress of a diagnosis; `sitting` is the text with what was derived of it and
-//! asked about it, `told` the answers as JSON; `server` lets the page ask, `page` is the page. All of it is the library's: this
-//! crate derives, compares and diagnoses nothing by itself.
+//! `options` is what is put on it, `draft` the text beside what the disk holds, `readings` recordings as a model reads them,
+//! `surroundings` what a sitting needs of where it takes place, `watch` the progress of a diagnosis; `sitting` is the text with
+//! what was derived of it and asked about it, `told` the answers as JSON, `answers` what a page may ask, `page` the page.
+//!
+//! It takes place on this machine, where `machine` has the disk behind a `fence` and a `server` lets the page ask; or on a
+//! `desk` in memory (its files on a `shelf`), which WebAssembly carries into the page itself. All of the work is the library's:
+//! this crate derives, compares and diagnoses nothing by itself.
 
+mod answers;
+mod desk;
 mod draft;
-mod fence;
 mod options;
-mod page;
 mod readings;
-mod server;
+mod shelf;
 mod sitting;
+mod surroundings;
 mod told;
 mod watch;
 
-use std::sync::Arc;
+#[cfg(not(target_family = "wasm"))]
+mod fence;
+#[cfg(not(target_family = "wasm"))]
+mod machine;
+#[cfg(not(target_family = "wasm"))]
+mod page;
+#[cfg(not(target_family = "wasm"))]
+mod server;
 
-use modelmill::{Host, Outcome};
-
+pub use desk::Desk;
 pub use options::{Commands, Options, Step};
-use sitting::Sitting;
+#[cfg(not(target_family = "wasm"))]
+pub use page::{Bundle, alone};
 
 /// Serves the workbench on the loopback address until the program is stopped; `opened` gets the link as soon as it answers.
 ///
 /// `host` gives libraries of effects and how models are derived; files come through a fence of the workbench's own.
 /// Fails when the model file cannot be read, or the port is taken. A model file that has no meaning is no failure: it is what
 /// the workbench is for.
+#[cfg(not(target_family = "wasm"))]
 pub fn serve(
-    host: &Host,
+    host: &modelmill::Host,
     options: Options,
-    commands: Arc<dyn Commands>,
+    commands: std::sync::Arc<dyn Commands>,
     opened: impl FnOnce(&str),
-) -> Outcome {
+) -> modelmill::Outcome {
     let port = options.port;
-    let sitting = Arc::new(Sitting::open(host, options, commands)?);
-    server::serve(sitting, port, opened)
+    let machine = std::sync::Arc::new(machine::Machine::new(fence::Fence::opened(host, &options)));
+    let sitting = sitting::Sitting::open(host, options, commands, machine.clone())?;
+    server::serve(std::sync::Arc::new(sitting), machine, port, opened)
 }

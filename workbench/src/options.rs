@@ -16,14 +16,17 @@ pub struct Options {
     pub check: Vec<Vec<PathBuf>>,
     /// How recordings are read.
     pub reading: Reading,
+    /// What revisions and versions are counted from, so that a page which opens one sitting after the other never takes one's
+    /// answers for the other's.
+    pub first: u64,
     /// The port on the loopback address; 0 takes one that is free.
     pub port: u16,
 }
 
 /// What a reader is told that does the same without the workbench.
 pub trait Commands: Spelling + Send + Sync {
-    /// Does what a pane of the workbench does.
-    fn same(&self, step: Step) -> String;
+    /// Does what a pane of the workbench does; `None` where nothing else does.
+    fn same(&self, step: Step) -> Option<String>;
 }
 
 /// What a pane of the workbench does.

@@ -1,28 +1,12 @@
-// The workbench: what is typed goes to the program, what it makes of it comes back. One edit is on its way at a time, and the
-// last text waits for it, so that no more is derived than can be.
+// The workbench: what is typed goes to the mill, what it makes of it comes back. One edit is on its way at a time, and the
+// last text waits for it, so that no more is derived than can be. Who answers, `window.mill` knows.
 (() => {
   'use strict';
-  const token = new URLSearchParams(location.search).get('token');
+  const { ask, news } = window.mill;
   const by = (id) => document.getElementById(id);
   const text = by('text');
   let view = null, pane = 'mechanism', version = 0;
-  let base = 0, sent = null, isSending = false, isTyped = false;
-
-  const ask = async (path, body) => {
-    const answer = await fetch(`/api/${path}`, {
-      method: body === undefined ? 'GET' : 'POST',
-      headers: { 'x-modelmill-token': token, 'content-type': 'application/json' },
-      body: body === undefined ? undefined : JSON.stringify(body),
-    });
-    const isJson = (answer.headers.get('content-type') || '').includes('json');
-    const told = isJson ? await answer.json() : await answer.text();
-    if (!answer.ok) {
-      const error = new Error(isJson ? told.says : told);
-      error.status = answer.status;
-      throw error;
-    }
-    return told;
-  };
+  let base = 0, sent = null, isSending = false, isTyped = false, opened = null;
 
   // A sentence above the panes; what follows the text by itself takes back no more than what it said itself.
   const say = (words, who) => {
@@ -118,12 +102,14 @@
     }));
   };
 
+  const slow = window.mill.slow || (() => {});
   // Sends the text as it stands, and once more if it was changed meanwhile.
   const send = async () => {
     if (isSending || !view) return;
     isSending = true;
     while (sent !== text.value) {
       const words = text.value;
+      const late = setTimeout(() => slow(true), 1500);
       try {
         const told = await ask('edit', { base, text: words });
         sent = words;
@@ -132,7 +118,7 @@
       } catch (error) {
         if (error.status === 409) {
           // Another window was faster: its text is followed unless something was typed here that is not there.
-          const told = await ask('view?since=0').catch(() => null);
+          const told = await news(0).catch(() => null);
           if (!told) { say(error.message); break; }
           if (isTyped) {
             base = told.revision;
@@ -142,6 +128,9 @@
         }
         say(error.message);
         break;
+      } finally {
+        clearTimeout(late);
+        slow(false);
       }
     }
     isTyped = false;
@@ -177,7 +166,8 @@
     for (const one of document.querySelectorAll('.pane')) one.classList.toggle('stale', !view.valid);
     if (view.model) { equations(); sliders(); by('equations').dataset.revision = view.derived; }
     rungs();
-    by('command').textContent = command();
+    if (opened !== view.opened) { opened = view.opened; brought(); }
+    told_command();
     if (view.valid && view.derived === view.revision) refresh();
   };
 
@@ -186,6 +176,21 @@
     const step = { mechanism: 'picture', equations: 'equations', comparison: 'compare', diagnosis: 'diagnose', ladder: 'identify' };
     if (pane === 'comparison' && by('identified').checked) return commands.identify;
     return commands[step[pane]];
+  };
+  const told_command = () => {
+    const words = command();
+    by('command').textContent = words || '';
+    by('command').parentElement.hidden = !words;
+  };
+  // Another model or other recordings than before.
+  const brought = () => {
+    say('');
+    errors = motion = null;
+    by('diagnose').disabled = !view.data;
+    for (const id of ['places', 'draw']) by(id).disabled = !view.data;
+    for (const id of ['curves', 'where', 'written', 'found']) by(id).replaceChildren();
+    by('motion').hidden = true;
+    if (view.data) load(); else by('errors').textContent = window.mill.hint;
   };
 
   const equations = () => {
@@ -400,7 +405,7 @@
     by('curves').dataset.revision = revision;
     say('');
   }).then((isDone) => { if (!isDone) by('curves').textContent = ''; }));
-  by('identified').addEventListener('change', () => { by('command').textContent = command(); });
+  by('identified').addEventListener('change', told_command);
   by('places').addEventListener('click', () => tried(async () => {
     const told = await ask('compare', { places: true, afresh: true });
     const places = told.compared.where;
@@ -452,10 +457,11 @@
     box.append(list);
     for (const note of found.data) if (note.severity === 'warning') box.append(make('p', note.says, 'alias'));
     box.dataset.revision = told.of_this_text ? String(view.revision) : '';
+    box.classList.toggle('stale', !told.of_this_text);
   };
   const follow_diagnosis = async () => {
     for (;;) {
-      const told = await ask('diagnosis');
+      const told = await ask('diagnosis', {});
       const { going } = told;
       by('diagnose').disabled = Boolean(going) || !view.data;
       by('cancel').hidden = by('progress').hidden = !going;
@@ -493,7 +499,7 @@
     pane = name;
     for (const one of document.querySelectorAll('.pane')) one.hidden = one.id !== pane;
     for (const tab of by('tabs').children) tab.setAttribute('aria-selected', String(tab.dataset.pane === pane));
-    if (view) { by('command').textContent = command(); refresh(); }
+    if (view) { told_command(); refresh(); }
   };
   for (const tab of by('tabs').children) tab.addEventListener('click', () => open(tab.dataset.pane));
   by('tabs').addEventListener('keydown', (event) => {
@@ -511,7 +517,7 @@
   const watch = async () => {
     for (;;) {
       try {
-        const told = await ask(`view?since=${version}`);
+        const told = await news(version);
         if (told.version <= version || isSending) {
           // What is on its way brings the rest; until then it is asked again.
           if (isSending) await new Promise((done) => setTimeout(done, 50));
@@ -526,14 +532,11 @@
     }
   };
   tried(async () => {
-    const told = await ask('view?since=0');
+    const told = await news(0);
     text.value = plain(told.text);
     sent = text.value;
     base = told.revision;
-    by('diagnose').disabled = !told.data;
-    for (const id of ['places', 'draw']) by(id).disabled = !told.data;
     show(told);
-    if (told.data) load(); else by('errors').textContent = 'No recording is open: give one with --data.';
     text.focus();
     text.setSelectionRange(0, 0);
     text.scrollTop = 0;

@@ -1,19 +1,83 @@
-//! The page: one file that needs no other, in the style of all pages.
+//! The page: one file that needs no other, in the style of all pages. It asks a server, or the mill that it carries.
 
+use std::fmt::Write as _;
+use std::io::Write as _;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use modelmill::report;
+use serde::Serialize;
 
-/// The page's text; `nonce` is what lets its scripts run, and no other.
+/// Models and recordings that a page brings along.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Bundle {
+    /// Model files: names and texts. They may name each other.
+    pub models: Vec<(String, String)>,
+    /// Recordings that belong to a model: its name, the recording's, its text, and whether it is kept from the fit.
+    pub recordings: Vec<(String, String, String, bool)>,
+}
+
+/// The page that a server sends; `nonce` is what lets its scripts run, and no other.
 pub(crate) fn page(nonce: &str) -> String {
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+    let scripts = [
+        include_str!("served.js"),
+        report::SCRIPT,
+        include_str!("page.js"),
+    ];
+    written("", &format!(" nonce=\"{nonce}\""), "", &scripts)
+}
+
+/// The page that has the mill in itself and needs neither server nor network. `module` is the mill as WebAssembly, with the
+/// functions and the imports of `in-browser`; nothing that the page is given leaves it, which its policy says.
+pub fn alone(module: &[u8], bundle: &Bundle) -> String {
+    let policy = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
+                  script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src blob:; style-src 'unsafe-inline'; \
+                  img-src data:; base-uri 'none'; form-action 'none'\">\n";
+    let bundle = serde_json::to_vec(bundle).unwrap_or_default();
+    let mut carried = String::new();
+    for (id, bytes) in [("module", module), ("bundle", &bundle)] {
+        let _ = writeln!(
+            carried,
+            "<script type=\"application/gzip\" id=\"{id}\">{}</script>",
+            packed(bytes)
+        );
+    }
+    let worker = include_str!("worker.js");
+    let _ = write!(
+        carried,
+        "<script type=\"text/plain\" id=\"worker\">\n{worker}</script>\n"
+    );
+    let scripts = [
+        include_str!("alone.js"),
+        report::SCRIPT,
+        include_str!("page.js"),
+    ];
+    written(policy, "", &carried, &scripts)
+}
+
+/// Gzip in Base64.
+fn packed(bytes: &[u8]) -> String {
+    let mut packer = GzEncoder::new(Vec::new(), Compression::best());
+    // Memory takes whatever is written to it.
+    let _ = packer.write_all(bytes);
+    STANDARD.encode(packer.finish().unwrap_or_default())
+}
+
+fn written(head: &str, attributes: &str, carried: &str, scripts: &[&str]) -> String {
+    let mut page = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n{head}\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"color-scheme\" content=\"light dark\">\n\
-         <title>modelmill</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{}{}</style>\n</head>\n\
-         {}\n<script nonce=\"{nonce}\">\n{}</script>\n<script nonce=\"{nonce}\">\n{}</script>\n</body>\n</html>\n",
+         <title>modelmill</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{}{}</style>\n</head>\n{}{carried}",
         report::style(),
         include_str!("page.css"),
         include_str!("page.html"),
-        report::SCRIPT,
-        include_str!("page.js"),
-    )
+    );
+    for script in scripts {
+        let _ = write!(page, "\n<script{attributes}>\n{script}</script>");
+    }
+    page.push_str("\n</body>\n</html>\n");
+    page
 }

@@ -8,8 +8,8 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::time::Duration;
 
-use axum::extract::rejection::JsonRejection;
-use axum::extract::{DefaultBodyLimit, Query, Request, State};
+use axum::body::Bytes;
+use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
 use axum::http::StatusCode;
 use axum::http::header::{
     CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HOST, HeaderName, HeaderValue, ORIGIN,
@@ -21,11 +21,13 @@ use axum::routing::{get, post};
 use axum::{Json, Router};
 use modelmill::{Error, Outcome};
 use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::json;
 use tokio::net::TcpListener;
 
+use crate::answers::{Answer, Refusal, answer};
+use crate::machine::{Machine, STACK};
 use crate::page;
-use crate::sitting::{LONGEST, STACK, Seeing, Sitting};
+use crate::sitting::{LONGEST, Sitting};
 
 /// How the page shows that it is the one that was opened with the link.
 const TOKEN: HeaderName = HeaderName::from_static("x-modelmill-token");
@@ -37,6 +39,7 @@ const NEWS: Duration = Duration::from_secs(20);
 
 struct App {
     sitting: Arc<Sitting>,
+    machine: Arc<Machine>,
     token: String,
     port: u16,
 }
@@ -44,7 +47,12 @@ struct App {
 /// Serves a sitting until the program is stopped; `opened` gets the link.
 ///
 /// Fails when the port cannot be had.
-pub(crate) fn serve(sitting: Arc<Sitting>, port: u16, opened: impl FnOnce(&str)) -> Outcome {
+pub(crate) fn serve(
+    sitting: Arc<Sitting>,
+    machine: Arc<Machine>,
+    port: u16,
+    opened: impl FnOnce(&str),
+) -> Outcome {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .thread_stack_size(STACK)
@@ -65,6 +73,7 @@ pub(crate) fn serve(sitting: Arc<Sitting>, port: u16, opened: impl FnOnce(&str))
         tokio::spawn(look(Arc::clone(&sitting)));
         let app = Arc::new(App {
             sitting,
+            machine,
             token,
             port,
         });
@@ -96,18 +105,7 @@ fn router(app: Arc<App>) -> Router {
     Router::new()
         .route("/", get(start))
         .route("/api/view", get(view))
-        .route("/api/edit", post(edit))
-        .route("/api/save", post(save))
-        .route("/api/choose", post(choose))
-        .route("/api/picture", post(picture))
-        .route("/api/equations", post(equations))
-        .route("/api/compare", post(compare))
-        .route("/api/curves", post(curves))
-        .route("/api/motion", post(motion))
-        .route("/api/diagnosis", get(diagnosis))
-        .route("/api/diagnose", post(diagnose))
-        .route("/api/cancel", post(cancel))
-        .route("/api/add", post(add))
+        .route("/api/{question}", post(asked))
         .layer(DefaultBodyLimit::max(most))
         .layer(middleware::from_fn_with_state(Arc::clone(&app), guard))
         .with_state(app)
@@ -169,27 +167,22 @@ fn is_same(given: &str, token: &str) -> bool {
     given.len() == token.len() && pairs.fold(0, |differs, (a, b)| differs | (a ^ b)) == 0
 }
 
-/// What a handler answers: JSON, or a sentence that says why there is none.
-type Answer = Result<Json<Value>, Refusal>;
+/// What a handler answers, or why it does not.
+type Reply = Result<Response, Refused>;
 
 /// Why there is no answer.
-struct Refusal(StatusCode, String);
+struct Refused(StatusCode, String);
 
-impl IntoResponse for Refusal {
+impl IntoResponse for Refused {
     fn into_response(self) -> Response {
         (self.0, Json(json!({ "says": self.1 }))).into_response()
     }
 }
 
-impl From<String> for Refusal {
-    fn from(says: String) -> Self {
-        Self(StatusCode::UNPROCESSABLE_ENTITY, says)
-    }
-}
-
-impl From<JsonRejection> for Refusal {
-    fn from(fault: JsonRejection) -> Self {
-        Self(fault.status(), fault.body_text())
+impl From<Refusal> for Refused {
+    fn from(Refusal(fault, says): Refusal) -> Self {
+        let status = StatusCode::from_u16(fault.status());
+        Self(status.unwrap_or(StatusCode::UNPROCESSABLE_ENTITY), says)
     }
 }
 
@@ -197,19 +190,19 @@ impl From<JsonRejection> for Refusal {
 async fn worked<T: Send + 'static>(
     app: &App,
     work: impl FnOnce(&Arc<Sitting>) -> T + Send + 'static,
-) -> Result<T, Refusal> {
+) -> Result<T, Refused> {
     let sitting = Arc::clone(&app.sitting);
     let done = tokio::task::spawn_blocking(move || work(&sitting)).await;
     done.map_err(|_| {
-        Refusal(
+        Refused(
             StatusCode::INTERNAL_SERVER_ERROR,
             "a fault of the program, which is none of yours; the text is kept".to_owned(),
         )
     })
 }
 
-async fn start() -> Result<Response, Refusal> {
-    let nonce = random()?;
+async fn start() -> Reply {
+    let nonce = random().map_err(Refusal::from)?;
     let policy = format!(
         "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'unsafe-inline'; img-src data:; connect-src 'self'; \
          base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -230,124 +223,23 @@ struct Since {
 }
 
 /// What stands, as soon as it is news.
-async fn view(State(app): State<Arc<App>>, Query(Since { since }): Query<Since>) -> Answer {
-    let mut changes = app.sitting.changes();
+async fn view(State(app): State<Arc<App>>, Query(Since { since }): Query<Since>) -> Reply {
+    let mut changes = app.machine.changes();
     let news = changes.wait_for(|version| *version != since);
     // Without news it is told once more.
     let _ = tokio::time::timeout(NEWS, news).await;
-    Ok(Json(worked(&app, |sitting| sitting.view()).await?))
+    let told = worked(&app, |sitting| sitting.view()).await?;
+    Ok(Json(told).into_response())
 }
 
-#[derive(Deserialize)]
-struct Edit {
-    /// The revision that the text was made of.
-    base: u64,
-    text: String,
-}
-
-async fn edit(State(app): State<Arc<App>>, request: Result<Json<Edit>, JsonRejection>) -> Answer {
-    let Json(Edit { base, text }) = request?;
-    let told = worked(&app, move |sitting| sitting.edit(base, &text)).await?;
-    told.map(Json).ok_or_else(|| {
-        Refusal(
-            StatusCode::CONFLICT,
-            "the text was changed elsewhere meanwhile".to_owned(),
-        )
+/// Anything else.
+async fn asked(State(app): State<Arc<App>>, Path(question): Path<String>, body: Bytes) -> Reply {
+    let found = worked(&app, move |sitting| answer(sitting, &question, &body)).await?;
+    Ok(match found? {
+        Answer::Json(told) => Json(told).into_response(),
+        Answer::Svg(svg) => ([(CONTENT_TYPE, "image/svg+xml")], svg).into_response(),
+        Answer::Html(html) => Html(html).into_response(),
     })
-}
-
-async fn save(State(app): State<Arc<App>>) -> Answer {
-    Ok(Json(worked(&app, |sitting| sitting.save()).await??))
-}
-
-#[derive(Deserialize)]
-struct Choice {
-    theirs: bool,
-}
-
-async fn choose(
-    State(app): State<Arc<App>>,
-    request: Result<Json<Choice>, JsonRejection>,
-) -> Answer {
-    let Json(Choice { theirs }) = request?;
-    Ok(Json(
-        worked(&app, move |sitting| sitting.choose(theirs)).await?,
-    ))
-}
-
-async fn picture(
-    State(app): State<Arc<App>>,
-    request: Result<Json<Seeing>, JsonRejection>,
-) -> Result<Response, Refusal> {
-    let Json(seeing) = request?;
-    let svg = worked(&app, move |sitting| sitting.picture(&seeing)).await??;
-    Ok(([(CONTENT_TYPE, "image/svg+xml")], svg).into_response())
-}
-
-async fn equations(State(app): State<Arc<App>>) -> Result<Html<String>, Refusal> {
-    Ok(Html(worked(&app, |sitting| sitting.equations()).await??))
-}
-
-#[derive(Deserialize)]
-struct Comparing {
-    /// Whether to look where the error lives.
-    places: bool,
-    /// Whether to read the recordings again.
-    afresh: bool,
-}
-
-async fn compare(
-    State(app): State<Arc<App>>,
-    request: Result<Json<Comparing>, JsonRejection>,
-) -> Answer {
-    let Json(Comparing { places, afresh }) = request?;
-    Ok(Json(
-        worked(&app, move |sitting| sitting.compare(places, afresh)).await??,
-    ))
-}
-
-#[derive(Deserialize)]
-struct Curves {
-    /// With identified values rather than those of the file.
-    identified: bool,
-}
-
-async fn curves(
-    State(app): State<Arc<App>>,
-    request: Result<Json<Curves>, JsonRejection>,
-) -> Result<Html<String>, Refusal> {
-    let Json(Curves { identified }) = request?;
-    Ok(Html(
-        worked(&app, move |sitting| sitting.curves(identified)).await??,
-    ))
-}
-
-async fn motion(State(app): State<Arc<App>>) -> Answer {
-    Ok(Json(worked(&app, |sitting| sitting.motion()).await??))
-}
-
-async fn diagnosis(State(app): State<Arc<App>>) -> Answer {
-    Ok(Json(app.sitting.diagnosis()))
-}
-
-async fn diagnose(State(app): State<Arc<App>>) -> Answer {
-    Ok(Json(app.sitting.diagnose()?))
-}
-
-async fn cancel(State(app): State<Arc<App>>) -> Answer {
-    Ok(Json(app.sitting.cancel()))
-}
-
-#[derive(Deserialize)]
-struct Add {
-    entry: usize,
-}
-
-async fn add(State(app): State<Arc<App>>, request: Result<Json<Add>, JsonRejection>) -> Answer {
-    let Json(Add { entry }) = request?;
-    Ok(Json(
-        worked(&app, move |sitting| sitting.add(entry)).await??,
-    ))
 }
 
 #[cfg(test)]

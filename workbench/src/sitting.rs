@@ -2,12 +2,12 @@
 //! what comes back is kept only if the text is still the one that was asked about.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
 
 use modelmill::diagnose::{Held, Question, Version};
 use modelmill::edit::NewEffect;
-use modelmill::files::{self, FileError};
+use modelmill::files::FileError;
 use modelmill::identify::Estimation;
 use modelmill::model::Format;
 use modelmill::picture::{Drawing, Style};
@@ -15,12 +15,11 @@ use modelmill::recording::Recording;
 use modelmill::{Error, Host, Model, Outcome, report};
 use serde::Deserialize;
 use serde_json::{Value, json};
-use tokio::sync::watch;
 
-use crate::draft::{Draft, Seen};
-use crate::fence::Fence;
+use crate::draft::Draft;
 use crate::options::{Commands, Options, Step};
 use crate::readings::{Read, Readings};
+use crate::surroundings::Surroundings;
 use crate::told;
 use crate::watch::Watch;
 
@@ -28,8 +27,6 @@ use crate::watch::Watch;
 pub(crate) const LONGEST: u64 = 4 << 20;
 /// Poses of a recording along which the picture moves.
 const POSES: usize = 600;
-/// Bytes of stack for a diagnosis, as the program itself has.
-pub(crate) const STACK: usize = 16 << 20;
 
 /// A model file on the workbench.
 pub(crate) struct Sitting {
@@ -37,8 +34,9 @@ pub(crate) struct Sitting {
     options: Options,
     commands: Arc<dyn Commands>,
     state: Mutex<State>,
+    surroundings: Arc<dyn Surroundings>,
     /// Counts everything that pages should hear of.
-    changes: watch::Sender<u64>,
+    version: AtomicU64,
     readings: Readings,
 }
 
@@ -78,7 +76,7 @@ struct Diagnosis {
     number: u64,
     /// The text that is asked about.
     revision: u64,
-    going: Option<(Arc<Watch>, Instant)>,
+    going: Option<(Arc<Watch>, f64)>,
     /// What came of the last one.
     answer: Option<Result<Value, String>>,
     was_cancelled: bool,
@@ -106,48 +104,46 @@ impl Sitting {
         host: &Host,
         options: Options,
         commands: Arc<dyn Commands>,
+        surroundings: Arc<dyn Surroundings>,
     ) -> Outcome<Self> {
-        let fence = Fence::around(&options.model);
-        let named = (options.data.iter().chain(&options.check).flatten())
-            .chain(host.libraries())
-            .chain([&options.model]);
-        named.for_each(|path| fence.admit(path));
-        // What the file on the disk is made of was named by it.
-        match host.load(&options.model) {
-            Ok(loaded) => loaded.sources.paths().for_each(|path| fence.admit(path)),
-            Err(Error::Model(fault)) => fault.sources.paths().for_each(|path| fence.admit(path)),
-            Err(_) => {}
-        }
         let host = Host::new()
             .with_libraries(host.libraries().to_vec())
             .at_values(host.is_at_values())
-            .with_files(fence);
+            .with_files(surroundings.files());
         let text = read(&host, &options.model).map_err(Error::input)?;
-        let now = derived(&host, &options.model, &text, 1);
+        let draft = Draft::new(text, options.first + 1);
+        let version = AtomicU64::new(options.first + 1);
+        surroundings.changed(options.first + 1);
+        let now = derived(
+            &host,
+            &*surroundings,
+            &options.model,
+            draft.text(),
+            draft.revision(),
+        );
         let saved = now.found.as_ref().as_ref().ok().cloned();
         let state = State {
             others: others(&host, saved.as_ref()),
-            draft: Draft::new(text),
+            draft,
             now,
             saved,
             unreadable: None,
             done: vec!["as opened".to_owned()],
             ladder: Vec::new(),
-            diagnosis: Diagnosis::default(),
+            diagnosis: Diagnosis {
+                number: options.first,
+                ..Diagnosis::default()
+            },
         };
         Ok(Self {
             host,
             options,
             commands,
             state: Mutex::new(state),
-            changes: watch::channel(1).0,
+            surroundings,
+            version,
             readings: Readings::default(),
         })
-    }
-
-    /// What pages should hear of, counted.
-    pub(crate) fn changes(&self) -> watch::Receiver<u64> {
-        self.changes.subscribe()
     }
 
     /// What the workbench calls the file.
@@ -160,7 +156,8 @@ impl Sitting {
     }
 
     fn tell(&self) {
-        self.changes.send_modify(|count| *count += 1);
+        let version = 1 + self.version.fetch_add(1, Ordering::Relaxed);
+        self.surroundings.changed(version);
     }
 
     /// All that stands at once: the text, what it means, the ladder.
@@ -172,7 +169,7 @@ impl Sitting {
         let mut told = told::derived(&now.found, &name);
         told["model"] = model.map_or(Value::Null, |model| told::equations(model, saved));
         let mut told = told::spelled(told, &*self.commands);
-        told["version"] = json!(*self.changes.borrow());
+        told["version"] = json!(self.version.load(Ordering::Relaxed));
         told["revision"] = json!(state.draft.revision());
         told["derived"] = json!(now.revision);
         told["seconds"] = json!(now.seconds);
@@ -182,6 +179,7 @@ impl Sitting {
         told["conflict"] = json!(state.draft.is_in_conflict());
         told["unreadable"] = json!(state.unreadable);
         told["data"] = json!(!self.options.data.is_empty());
+        told["opened"] = json!(self.options.first);
         told["ladder"] = (state.ladder.iter())
             .map(|rung| json!({ "what": rung.what, "errors": rung.errors }))
             .collect();
@@ -195,8 +193,9 @@ impl Sitting {
         told
     }
 
-    /// Takes an edit that a page made of revision `base`, and derives it; `None` if the text has changed since.
-    pub(crate) fn edit(&self, base: u64, text: &str) -> Option<Value> {
+    /// Takes an edit that a page made of revision `base`, and derives it; `None` if the text has changed since. What it did, if
+    /// anything is said of it, is to stand on the ladder.
+    pub(crate) fn edit(&self, base: u64, text: &str, did: Option<&str>) -> Option<Value> {
         {
             let mut state = self.state();
             let before = state.draft.revision();
@@ -206,6 +205,9 @@ impl Sitting {
             if state.draft.revision() == before {
                 drop(state);
                 return Some(self.view());
+            }
+            if let Some(what) = did {
+                state.did(what);
             }
         }
         self.derive();
@@ -218,7 +220,13 @@ impl Sitting {
             let state = self.state();
             (state.draft.text().to_owned(), state.draft.revision())
         };
-        let now = derived(&self.host, &self.options.model, &text, revision);
+        let now = derived(
+            &self.host,
+            &*self.surroundings,
+            &self.options.model,
+            &text,
+            revision,
+        );
         let mut state = self.state();
         if state.draft.revision() == revision {
             if !state.draft.is_changed() {
@@ -249,7 +257,8 @@ impl Sitting {
             ));
         }
         if state.draft.is_changed() {
-            files::write(&self.options.model, state.draft.text().as_bytes())
+            let bytes = state.draft.text().as_bytes();
+            (self.surroundings.write(&self.options.model, bytes))
                 .map_err(|error| format!("nothing is saved: {error}"))?;
             state.draft.written();
             if state.now.revision == state.draft.revision() {
@@ -280,7 +289,10 @@ impl Sitting {
     }
 
     /// Looks whether another program changed the files.
+    #[cfg(not(target_family = "wasm"))]
     pub(crate) fn look(&self) {
+        use crate::draft::Seen;
+
         let disk = read(&self.host, &self.options.model);
         let mut state = self.state();
         let unreadable = disk.as_ref().err().map(ToString::to_string);
@@ -439,7 +451,7 @@ impl Sitting {
             return Err("there is no recording to find anything in".to_owned());
         }
         self.model()?;
-        let watch = Arc::new(Watch::default());
+        let watch = Arc::new(Watch::new(Arc::clone(&self.surroundings)));
         let (text, number) = {
             let mut state = self.state();
             if state.diagnosis.going.is_some() {
@@ -448,7 +460,7 @@ impl Sitting {
             state.diagnosis = Diagnosis {
                 number: state.diagnosis.number + 1,
                 revision: state.draft.revision(),
-                going: Some((Arc::clone(&watch), Instant::now())),
+                going: Some((Arc::clone(&watch), self.surroundings.seconds())),
                 ..Diagnosis::default()
             };
             (state.draft.text().to_owned(), state.diagnosis.number)
@@ -465,11 +477,7 @@ impl Sitting {
             });
             sitting.ended(number, found);
         };
-        let begun = std::thread::Builder::new()
-            .name("diagnosis".to_owned())
-            .stack_size(STACK)
-            .spawn(work);
-        if let Err(error) = begun {
+        if let Err(error) = self.surroundings.begin(Box::new(work)) {
             self.state().diagnosis.going = None;
             return Err(format!("the diagnosis cannot begin: {error}"));
         }
@@ -521,7 +529,7 @@ impl Sitting {
         let diagnosis = &state.diagnosis;
         let going = diagnosis.going.as_ref().map(|(watch, since)| {
             let mut told = watch.told();
-            told["seconds"] = json!(since.elapsed().as_secs_f64());
+            told["seconds"] = json!(self.surroundings.seconds() - since);
             told
         });
         json!({
@@ -590,15 +598,21 @@ fn read(host: &Host, path: &Path) -> Result<String, FileError> {
 }
 
 /// Derives a text, and measures how long that takes.
-fn derived(host: &Host, path: &Path, text: &str, revision: u64) -> Now {
-    let since = Instant::now();
+fn derived(
+    host: &Host,
+    surroundings: &dyn Surroundings,
+    path: &Path,
+    text: &str,
+    revision: u64,
+) -> Now {
+    let since = surroundings.seconds();
     let found = host
         .load_text(path, text)
         .and_then(|loaded| host.derive(&path.display().to_string(), loaded));
     Now {
         revision,
         found: Arc::new(found),
-        seconds: since.elapsed().as_secs_f64(),
+        seconds: surroundings.seconds() - since,
     }
 }
 

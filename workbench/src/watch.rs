@@ -6,9 +6,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use modelmill::progress::{Job, Progress};
 use serde_json::{Value, json};
 
+use crate::surroundings::Surroundings;
+
 /// Watches the jobs of one verb.
-#[derive(Default)]
 pub(crate) struct Watch {
+    surroundings: Arc<dyn Surroundings>,
     jobs: Mutex<Vec<Going>>,
     is_cancelled: AtomicBool,
 }
@@ -21,6 +23,15 @@ struct Going {
 }
 
 impl Watch {
+    /// Nothing goes on yet; the surroundings hear of every job.
+    pub(crate) fn new(surroundings: Arc<dyn Surroundings>) -> Self {
+        Self {
+            surroundings,
+            jobs: Mutex::default(),
+            is_cancelled: AtomicBool::default(),
+        }
+    }
+
     /// Asks all jobs to stop, those too that have not begun.
     pub(crate) fn cancel(&self) {
         self.is_cancelled.store(true, Ordering::Relaxed);
@@ -57,6 +68,8 @@ impl Progress for Watch {
             total,
             job: Arc::clone(job),
         });
+        drop(jobs);
+        self.surroundings.goes_on(&self.told());
     }
 
     fn ends(&self) {
@@ -67,10 +80,11 @@ impl Progress for Watch {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::shelf::Shelf;
 
     #[test]
     fn what_is_cancelled_stops_every_job() {
-        let watch = Watch::default();
+        let watch = Watch::new(Arc::new(Shelf::new(|| 0.0, |_| {})));
         let [outer, inner, later] = [(); 3].map(|()| Arc::new(Job::default()));
         watch.begins("searching", 10, &outer);
         watch.begins("fitting", 0, &inner);

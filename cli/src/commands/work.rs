@@ -45,6 +45,7 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> Outcome {
         check: files(&args.check)?,
         reading: args.preparation.reading(),
         port: args.port,
+        first: 0,
     };
     let spelled = Spelled::new(host, args);
     serve(host, options, Arc::new(spelled), |link| {
@@ -94,7 +95,7 @@ fn name(path: &Path) -> String {
 }
 
 impl Commands for Spelled {
-    fn same(&self, step: Step) -> String {
+    fn same(&self, step: Step) -> Option<String> {
         let Self {
             model,
             data,
@@ -103,7 +104,7 @@ impl Commands for Spelled {
             libraries,
             ..
         } = self;
-        match step {
+        Some(match step {
             Step::Picture => format!("modelmill check {model} --picture picture.svg{libraries}"),
             Step::Equations => {
                 format!("modelmill equations {model} --format html --out equations.html{libraries}")
@@ -115,13 +116,17 @@ impl Commands for Spelled {
             Step::Diagnose => {
                 format!("modelmill diagnose {model}{data}{check}{reading}{libraries}")
             }
-        }
+        })
     }
 }
 
 impl Spelling for Spelled {
     fn add(&self, model: &Model, effect: &NewEffect) -> String {
         self.flags.add(model, effect)
+    }
+
+    fn add_from(&self, model: &Model, effect: &NewEffect, library: &str) -> String {
+        self.flags.add_from(model, effect, library)
     }
 
     fn identify(&self, model: &Model) -> String {
@@ -179,7 +184,7 @@ mod tests {
             Step::Identify,
             Step::Diagnose,
         ] {
-            let command = spelled.same(step);
+            let command = spelled.same(step).unwrap();
             let cli = Cli::try_parse_from(words(&command));
             let cli = cli.unwrap_or_else(|error| panic!("{command}: {error}"));
             assert_eq!(cli.library, [PathBuf::from("my.toml")]);

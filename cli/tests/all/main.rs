@@ -43,6 +43,7 @@ mod runs;
 mod separate;
 mod simulate;
 mod sound;
+mod try_page;
 mod tx40;
 mod usage;
 mod weights;

@@ -1,8 +1,8 @@
-//! Gives WebAssembly as much stack as a main thread has elsewhere.
+//! Gives WebAssembly as much stack as the program has for a diagnosis.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     if std::env::var("CARGO_CFG_TARGET_FAMILY").is_ok_and(|family| family == "wasm") {
-        println!("cargo::rustc-link-arg-cdylib=-zstack-size=8388608");
+        println!("cargo::rustc-link-arg-cdylib=-zstack-size=16777216");
     }
 }

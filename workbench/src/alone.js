@@ -1,0 +1,242 @@
+// How the page asks where it has the mill in itself: one worker answers, another one diagnoses, so that the text stays alive
+// meanwhile; what takes too long is stopped by ending its worker.
+(() => {
+  'use strict';
+  const by = (id) => document.getElementById(id);
+  const unpacked = (id) => {
+    const bytes = Uint8Array.from(atob(by(id).textContent.trim()), (c) => c.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'));
+    return new Response(stream).arrayBuffer();
+  };
+  const source = URL.createObjectURL(new Blob([by('worker').textContent], { type: 'text/javascript' }));
+  const module = unpacked('module').then((bytes) => WebAssembly.compile(bytes));
+  const bundle = unpacked('bundle').then((bytes) => JSON.parse(new TextDecoder().decode(bytes)));
+  const encode = (words) => new TextEncoder().encode(words);
+
+  // What lies on the desk: the model file as saved, its last text that was answered, recordings.
+  const desk = { model: '', saved: '', text: '', runs: [], others: [] };
+  // Counts go on where another sitting begins; the text has no other editor.
+  let count = 0, revision = 0;
+
+  // A worker with everything of the desk before it.
+  const hired = (heard) => {
+    const worker = new Worker(source);
+    const waiting = new Map();
+    let asked = 0;
+    const fail = (says) => {
+      for (const { reject } of waiting.values()) reject(new Error(says));
+      waiting.clear();
+    };
+    worker.onmessage = ({ data }) => {
+      if (data.goes) { heard(data.goes); return; }
+      const { resolve, reject } = waiting.get(data.id) || {};
+      waiting.delete(data.id);
+      if (data.fault) {
+        one.isOver = true;
+        worker.terminate();
+        if (reject) reject(new Error(`a fault of the program, which is none of yours (${data.fault}); the text is kept`));
+        fail('the mill begins anew');
+      } else if (resolve) resolve(data.answer);
+    };
+    worker.onerror = (event) => { one.isOver = true; fail(event.message); };
+    const send = (message) => new Promise((resolve, reject) => {
+      const id = ++asked;
+      waiting.set(id, { resolve, reject });
+      worker.postMessage({ id, ...message });
+    });
+    const ask = async (question, body) => {
+      const { status, told } = await send({ question, body });
+      if (status === 200) return told;
+      throw Object.assign(new Error(told.says), { status });
+    };
+    const one = {
+      isOver: false,
+      ask,
+      end: () => { one.isOver = true; worker.terminate(); fail('it was stopped'); },
+      // The text as it was saved, then as it stands.
+      open: async () => {
+        await send({ module: await module });
+        for (const { name, bytes } of [...desk.others, ...desk.runs]) await send({ name, bytes });
+        await send({ name: desk.model, bytes: encode(desk.saved) });
+        const named = (isCheck) => desk.runs.filter((run) => run.isCheck === isCheck).map((run) => run.name);
+        let told = await ask('open', { model: desk.model, data: named(false), check: named(false).length ? named(true) : [], first: count });
+        if (desk.text !== desk.saved) told = await ask('edit', { base: told.revision, text: desk.text });
+        return told;
+      },
+    };
+    return one;
+  };
+
+  let answering = null, opening = null, awaited = null, fresh = null;
+  const heard = (told) => {
+    if (told && told.version) {
+      count = Math.max(count, told.version, told.revision);
+      revision = told.revision;
+    }
+    if (told && told.text !== undefined) { desk.text = told.text; if (!told.changed) desk.saved = told.text; }
+    return told;
+  };
+  const begun = () => {
+    if (!answering || answering.isOver) {
+      answering = hired(() => {});
+      opening = answering.open().then(heard);
+    }
+    return opening;
+  };
+  const tell = (told) => {
+    fresh = told;
+    if (awaited) awaited(told);
+    awaited = null;
+  };
+  // Another model or other recordings: a sitting of its own, which the page hears of as news.
+  const anew = () => {
+    if (answering) answering.end();
+    if (finding) finding.end();
+    finding = null;
+    asked = { number: 0 };
+    return begun().then(tell, () => {});
+  };
+
+  // ---- the diagnosis, in a worker of its own
+
+  let finding = null, asked = { number: 0 };
+  const diagnose = async () => {
+    if (asked.going) throw new Error('a diagnosis goes on; wait for it, or cancel it');
+    const number = ++count;
+    const text = desk.text;
+    const mine = { number, text, going: { what: 'beginning', done: 0, total: 0 }, since: performance.now() };
+    asked = mine;
+    if (finding) finding.end();
+    finding = hired((goes) => { mine.going = goes; });
+    const { ask, open } = finding;
+    open().then(() => ask('diagnose')).then(
+      (told) => Object.assign(mine, { found: told.found, failed: told.failed }),
+      (error) => { mine.failed = mine.cancelled ? null : error.message; },
+    ).finally(() => { mine.going = null; });
+    return diagnosis();
+  };
+  const diagnosis = () => ({
+    number: asked.number,
+    going: asked.going ? { ...asked.going, seconds: (performance.now() - asked.since) / 1000 } : null,
+    cancelled: Boolean(asked.cancelled),
+    found: asked.found,
+    failed: asked.failed,
+    of_this_text: asked.text === desk.text,
+  });
+  const cancel = () => {
+    if (asked.going) {
+      asked.cancelled = true;
+      asked.going = null;
+      finding.end();
+    }
+    return diagnosis();
+  };
+  // The text with a finding, by the same edit as `add`.
+  const edit = async ({ text, did }) => heard(await answering.ask('edit', { base: revision, text, did }));
+  const add = async ({ entry }) => {
+    if (!finding || finding.isOver || !asked.found) throw new Error('there is no such finding; diagnose again');
+    const { kind, at } = asked.found.entries[entry];
+    const theirs = await finding.ask('view');
+    await finding.ask('edit', { base: theirs.revision, text: desk.text });
+    const { text } = await finding.ask('add', { entry });
+    return edit({ text, did: `+ ${kind.replaceAll('_', ' ')} (${at.join(', ')})` });
+  };
+  const save = async () => {
+    const told = heard(await answering.ask('save'));
+    const link = document.createElement('a');
+    link.href = URL.createObjectURL(new Blob([told.text], { type: 'application/toml' }));
+    link.download = desk.model;
+    link.click();
+    URL.revokeObjectURL(link.href);
+    return told;
+  };
+
+  const own = { edit, diagnose, diagnosis, cancel, add, save };
+  const ask = async (question, body) => {
+    await begun();
+    if (question in own) return own[question](body);
+    const told = heard(await answering.ask(question, body));
+    // A rung may have come to the ladder.
+    if (question === 'compare') answering.ask('view').then(heard).then(tell, () => {});
+    return told;
+  };
+  // The first view at once, a later one as soon as something else stands.
+  const news = async (version) => {
+    if (!version) return ready.then(() => ask('view'));
+    return fresh && fresh.version > version ? fresh : new Promise((done) => { awaited = done; });
+  };
+
+  // ---- what is put on the desk
+
+  const runs = () => {
+    by('runs').replaceChildren(...desk.runs.map((run, k) => {
+      const item = document.createElement('li');
+      const use = document.createElement('select');
+      use.setAttribute('aria-label', `What ${run.name} is for`);
+      for (const words of ['fit', 'check']) use.append(new Option(words, words, false, run.isCheck === (words === 'check')));
+      use.addEventListener('change', () => { run.isCheck = use.value === 'check'; anew(); });
+      const away = document.createElement('button');
+      Object.assign(away, { type: 'button', textContent: '\u00d7' });
+      away.setAttribute('aria-label', `Take ${run.name} away`);
+      away.addEventListener('click', () => { desk.runs.splice(k, 1); runs(); anew(); });
+      item.append(run.name, ' ', use, ' ', away);
+      return item;
+    }));
+  };
+  const start = (name, bundle) => {
+    const [, text] = bundle.models.find((one) => one[0] === name);
+    const of = bundle.recordings.filter((one) => one[0] === name);
+    Object.assign(desk, {
+      model: name, saved: text, text,
+      runs: of.map(([, run, words, isCheck]) => ({ name: run, bytes: encode(words), isCheck })),
+      others: bundle.models.filter((one) => one[0] !== name).map(([other, words]) => ({ name: other, bytes: encode(words) })),
+    });
+    runs();
+  };
+  const isSafe = () => desk.text === desk.saved || confirm(`${desk.model} has changes that are not saved. Put another model in its place?`);
+  const take = async (files) => {
+    let isNew = false;
+    for (const file of files) {
+      if (file.name.endsWith('.toml')) {
+        if (!isSafe()) continue;
+        const text = await file.text();
+        Object.assign(desk, { model: file.name, saved: text, text });
+        by('bundled').value = '';
+      } else {
+        const bytes = new Uint8Array(await file.arrayBuffer());
+        desk.runs = desk.runs.filter((run) => run.name !== file.name);
+        desk.runs.push({ name: file.name, bytes, isCheck: false });
+      }
+      isNew = true;
+    }
+    runs();
+    if (isNew) await anew();
+  };
+  const ready = bundle.then((all) => {
+    by('bring').hidden = false;
+    by('bundled').append(...all.models.map(([name]) => new Option(name.replace('.toml', ''), name)));
+    const wanted = `${location.hash.slice(1)}.toml`;
+    const first = all.models.some(([name]) => name === wanted) ? wanted : 'spidermill.toml';
+    by('bundled').value = first;
+    start(first, all);
+    by('bundled').addEventListener('change', () => {
+      if (!isSafe()) { by('bundled').value = desk.model; return; }
+      start(by('bundled').value, all);
+      anew();
+    });
+    for (const id of ['model-file', 'run-files']) by(id).addEventListener('change', () => { take([...by(id).files]).finally(() => { by(id).value = ''; }); });
+    document.addEventListener('dragover', (event) => event.preventDefault());
+    document.addEventListener('drop', (event) => {
+      if (!event.dataTransfer.files.length) return;
+      event.preventDefault();
+      take([...event.dataTransfer.files]);
+    });
+    by('stop').addEventListener('click', () => answering.end());
+  });
+  // What takes its time may be stopped.
+  window.mill = {
+    ask, news,
+    slow: (isSlow) => { by('stop').hidden = !isSlow; },
+    hint: 'No recording is here yet: drop one on the page (CSV, Parquet, MCAP, HDF5, \u2026), or choose a file above.',
+  };
+})();

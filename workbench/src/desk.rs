@@ -1,0 +1,158 @@
+//! A desk: a sitting in memory, for a page that has the mill in itself. Files are put on it, then it is asked as the server is.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use modelmill::Host;
+use modelmill::print::{Spelling, Words};
+use serde::Deserialize;
+use serde_json::json;
+
+use crate::answers::{Answer, Refusal, answer, read};
+use crate::options::{Commands, Options, Step};
+use crate::shelf::Shelf;
+use crate::sitting::Sitting;
+
+/// A sitting in memory, and the files for the next one.
+pub struct Desk {
+    shelf: Shelf,
+    sitting: Option<Arc<Sitting>>,
+}
+
+/// What a page opens.
+#[derive(Deserialize)]
+struct Opening {
+    model: PathBuf,
+    #[serde(default)]
+    data: Vec<PathBuf>,
+    #[serde(default)]
+    check: Vec<PathBuf>,
+    /// What counts begin with.
+    #[serde(default)]
+    first: u64,
+}
+
+impl Desk {
+    /// An empty desk. `seconds` is its clock, and `goes_on` gets JSON that says how far long work is (`what`, `done`, `total`).
+    pub fn new(seconds: fn() -> f64, goes_on: fn(&serde_json::Value)) -> Self {
+        Self {
+            shelf: Shelf::new(seconds, goes_on),
+            sitting: None,
+        }
+    }
+
+    /// Puts a file there, in the place of one of that name.
+    pub fn put(&mut self, name: &str, bytes: &[u8]) {
+        self.shelf.put(Path::new(name), bytes);
+    }
+
+    /// Answers a question: JSON with the `status` that a server would give, and what is `told`. `open` (`model`, `data`,
+    /// `check`: names of files) begins a sitting, all other questions are the server's.
+    pub fn ask(&mut self, question: &str, body: &[u8]) -> String {
+        let found = if question == "open" {
+            self.open(body)
+        } else {
+            match &self.sitting {
+                Some(sitting) => answer(sitting, question, body),
+                None => Err("no model is open".to_owned().into()),
+            }
+        };
+        let (status, told) = match found {
+            Ok(Answer::Json(told)) => (200, told),
+            Ok(Answer::Svg(told) | Answer::Html(told)) => (200, json!(told)),
+            Err(Refusal(fault, says)) => (fault.status(), json!({ "says": says })),
+        };
+        json!({ "status": status, "told": told }).to_string()
+    }
+
+    fn open(&mut self, body: &[u8]) -> Result<Answer, Refusal> {
+        let asked: Opening = read(body)?;
+        let alone = |files: Vec<PathBuf>| files.into_iter().map(|file| vec![file]).collect();
+        let options = Options {
+            model: asked.model,
+            data: alone(asked.data),
+            check: alone(asked.check),
+            first: asked.first,
+            ..Options::default()
+        };
+        let shelf = Arc::new(self.shelf.clone());
+        let opened = Sitting::open(&Host::new(), options, Arc::new(Plain), shelf);
+        let sitting = Arc::new(opened.map_err(|error| error.to_string())?);
+        let told = sitting.view();
+        self.sitting = Some(sitting);
+        Ok(Answer::Json(told))
+    }
+}
+
+/// Plain words, where there is no command line.
+struct Plain;
+
+impl Spelling for Plain {
+    fn add(&self, model: &modelmill::Model, effect: &modelmill::edit::NewEffect) -> String {
+        Words.add(model, effect)
+    }
+
+    fn identify(&self, model: &modelmill::Model) -> String {
+        Words.identify(model)
+    }
+
+    fn separate(
+        &self,
+        model: &modelmill::Model,
+        separation: &modelmill::diagnose::Separation,
+    ) -> Option<String> {
+        Words.separate(model, separation)
+    }
+
+    fn held(&self) -> String {
+        Words.held()
+    }
+}
+
+impl Commands for Plain {
+    fn same(&self, _: Step) -> Option<String> {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::Value;
+
+    use super::*;
+
+    fn told(answer: &str) -> (u64, Value) {
+        let mut answer: Value = serde_json::from_str(answer).unwrap();
+        let told = answer["told"].take();
+        (answer["status"].as_u64().unwrap(), told)
+    }
+
+    #[test]
+    fn a_desk_answers_as_the_server_does() {
+        let mut desk = Desk::new(|| 0.0, |_| {});
+        assert_eq!(told(&desk.ask("view", b"")).0, 422);
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../model-spec/models/");
+        for name in ["delta.toml", "delta_tied.toml"] {
+            desk.put(name, &std::fs::read(format!("{folder}{name}")).unwrap());
+        }
+        let (status, view) =
+            told(&desk.ask("open", br#"{ "model": "delta_tied.toml", "first": 40 }"#));
+        assert_eq!((status, &view["valid"]), (200, &json!(true)), "{view}");
+        assert_eq!(
+            (&view["revision"], &view["version"]),
+            (&json!(41), &json!(41))
+        );
+        let edit = |base: u64, text: &str| json!({ "base": base, "text": text }).to_string();
+        let (status, fault) = told(&desk.ask("edit", edit(41, "schema = [").as_bytes()));
+        assert_eq!((status, &fault["valid"]), (200, &json!(false)));
+        assert_eq!(fault["diagnostics"][0]["line"], 1, "{fault}");
+        // Made of a text that is no longer there, or of nothing.
+        assert_eq!(told(&desk.ask("edit", edit(41, "").as_bytes())).0, 409);
+        assert_eq!(told(&desk.ask("edit", b"{}")).0, 400);
+        assert_eq!(told(&desk.ask("compile", b"{}")).0, 404);
+        assert_eq!(
+            told(&desk.ask("open", br#"{ "model": "none.toml" }"#)).0,
+            422
+        );
+    }
+}

@@ -1,0 +1,18 @@
+// How the page asks: a server, which shows the token of the link.
+(() => {
+  'use strict';
+  const token = new URLSearchParams(location.search).get('token');
+  const ask = async (question, body) => {
+    const answer = await fetch(`/api/${question}`, {
+      method: body === undefined ? 'GET' : 'POST',
+      headers: { 'x-modelmill-token': token, 'content-type': 'application/json' },
+      body: body === undefined ? undefined : JSON.stringify(body),
+    });
+    const isJson = (answer.headers.get('content-type') || '').includes('json');
+    const told = isJson ? await answer.json() : await answer.text();
+    if (answer.ok) return told;
+    throw Object.assign(new Error(isJson ? told.says : told), { status: answer.status });
+  };
+  // What stands, as soon as it is another version.
+  window.mill = { ask, news: (version) => ask(`view?since=${version}`), hint: 'No recording is open: give one with --data.' };
+})();
