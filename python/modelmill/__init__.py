@@ -1,0 +1,53 @@
+"""From a model file of a mechanism to base parameters, equations and fast code, and from recordings to parameters and to the
+physical effect that a model lacks.
+
+>>> import modelmill
+>>> m = modelmill.load("arm.toml")            # doctest: +SKIP
+>>> m.p_min                                   # doctest: +SKIP
+>>> m.identify("run.csv")                     # doctest: +SKIP
+>>> m.diagnose("run.csv", check="other.csv")  # doctest: +SKIP
+
+Units are SI (m, rad, kg, s, N, N m). Arrays of states have shape ``(dof,)`` for one state or ``(n, dof)`` for many.
+"""
+
+from ._errors import ModelmillError, ModelmillWarning
+from ._model import BaseParameter, BaseParameters, Equations, Model, Recording, kinds, load, recordings
+from ._results import (
+    Check,
+    Comparison,
+    Diagnosis,
+    Effect,
+    Excitation,
+    Figures,
+    Identification,
+    Page,
+    Parameter,
+    Result,
+    Runs,
+)
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "BaseParameter",
+    "BaseParameters",
+    "Check",
+    "Comparison",
+    "Diagnosis",
+    "Effect",
+    "Equations",
+    "Excitation",
+    "Figures",
+    "Identification",
+    "Model",
+    "ModelmillError",
+    "ModelmillWarning",
+    "Page",
+    "Parameter",
+    "Recording",
+    "Result",
+    "Runs",
+    "kinds",
+    "load",
+    "recordings",
+]

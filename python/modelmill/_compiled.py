@@ -1,0 +1,91 @@
+"""Functions of states compiled by a C compiler, where one is there."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._errors import ModelmillError
+
+Floats = NDArray[np.float64]
+
+# States that one call of the compiled function computes at least; it takes eight at once.
+_FEWEST = 8
+# States from which on cores share the work.
+_MANY = 20_000
+
+
+class Compiled:
+    """A compiled function of states."""
+
+    def __init__(self, source: str, shape: Sequence[int]) -> None:
+        self.shape = shape
+        self._width = int(np.prod(shape))
+        self._reads_load = "read_column(arrays[3]" in source
+        with tempfile.TemporaryDirectory(prefix="modelmill-") as folder:
+            self._library = ctypes.CDLL(str(_built(source, Path(folder))))
+        self._run = self._library.run
+        self._run.restype = ctypes.c_int
+
+    def __call__(self, arrays: Sequence[Floats | None], values: Floats) -> Floats | None:
+        """The numbers of all states, or None where the evaluator must look at them one by one."""
+        first = arrays[0]
+        assert first is not None
+        n = len(first)
+        if n < _FEWEST or (self._reads_load and arrays[3] is None):
+            return None
+        out = np.empty((n, self._width))
+        base = np.ascontiguousarray(values, dtype=np.float64)
+        cores = min(os.cpu_count() or 1, max(1, n // _MANY))
+        ends = np.linspace(0, n, cores + 1, dtype=int)
+        parts = list(zip(ends[:-1], ends[1:]))
+
+        def run(part: tuple[int, int]) -> int:
+            start, end = part
+            return int(self._part([None if a is None else a[start:end] for a in arrays], base, out[start:end]))
+
+        if cores == 1:
+            failed = run(parts[0])
+        else:
+            with ThreadPoolExecutor(cores) as pool:
+                failed = any(pool.map(run, parts))
+        return None if failed else out.reshape(-1)
+
+    def _part(self, arrays: Sequence[Floats | None], base: Floats, out: Floats) -> int:
+        pointers = (ctypes.c_void_p * 4)(*[None if a is None else a.ctypes.data for a in arrays])
+        strides = [(0, 0) if a is None else (a.strides[0] // 8, a.strides[1] // 8) for a in arrays]
+        by_state = (ctypes.c_long * 4)(*[one[0] for one in strides])
+        by_column = (ctypes.c_long * 4)(*[one[1] for one in strides])
+        data = ctypes.c_void_p
+        found: int = self._run(
+            ctypes.c_long(len(out)), pointers, by_state, by_column, data(base.ctypes.data), data(out.ctypes.data)
+        )
+        return found
+
+
+def _built(source: str, folder: Path) -> Path:
+    compiler = os.environ.get("CC") or next((name for name in ("cc", "gcc", "clang") if shutil.which(name)), None)
+    if compiler is None or os.name == "nt":
+        raise ModelmillError("compile() needs GCC or Clang, which is not there; without it programs are evaluated as before")
+    path, library = folder / "model.c", folder / "model.so"
+    path.write_text(source, encoding="utf-8")
+    # Warnings of the calling convention of wide vectors do not concern functions that are inlined.
+    flags = ["-O2", "-march=native", "-fPIC", "-shared", "-fno-math-errno", "-fno-trapping-math", "-w"]
+    try:
+        done = subprocess.run(
+            [*compiler.split(), *flags, str(path), "-o", str(library), "-lm"], capture_output=True, text=True, check=False
+        )
+    except OSError as error:
+        raise ModelmillError(f"the C compiler {compiler} cannot be run: {error}") from None
+    if done.returncode != 0:
+        raise ModelmillError(f"the C compiler {compiler} failed: {done.stderr.strip()[:2000]}")
+    return library

@@ -1,0 +1,69 @@
+"""What goes on while a verb works: one line on standard error, at a terminal or in a notebook."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+Told = Callable[[str, int, int], object]
+
+# A verb that is done sooner says nothing.
+_PATIENCE = 1.0
+
+
+class _Line:
+    """Writes one line over and over."""
+
+    def __init__(self, at_once: bool) -> None:
+        self._begun = time.monotonic() - (_PATIENCE if at_once else 0.0)
+        self._written = 0
+
+    def __call__(self, what: str, done: int, total: int) -> None:
+        if time.monotonic() - self._begun < _PATIENCE:
+            return
+        text = f"{what}: {min(100, 100 * done // total)} %" if total else f"{what} ..."
+        text = text[:100]
+        sys.stderr.write("\r" + text.ljust(self._written))
+        sys.stderr.flush()
+        self._written = len(text)
+
+    def end(self) -> None:
+        if self._written:
+            sys.stderr.write("\r" + " " * self._written + "\r")
+            sys.stderr.flush()
+
+
+def _somebody_reads() -> bool:
+    if "IPython" in sys.modules:
+        shell = sys.modules["IPython"].get_ipython()
+        if shell is not None and type(shell).__name__ == "ZMQInteractiveShell":
+            return True
+    try:
+        return sys.stderr.isatty()
+    except (AttributeError, ValueError):
+        return False
+
+
+@contextmanager
+def told(progress: Told | bool | None) -> Iterator[Told | None]:
+    """The callback that ``progress`` stands for.
+
+    Parameters
+    ----------
+    progress : callable, bool or None
+        Called as ``progress(what, done, total)``, with ``total`` 0 where nobody knows it; True prints, False is silent, None
+        prints where somebody reads it.
+    """
+    if callable(progress):
+        yield progress
+        return
+    if progress is False or (progress is None and not _somebody_reads()):
+        yield None
+        return
+    line = _Line(at_once=progress is True)
+    try:
+        yield line
+    finally:
+        line.end()

@@ -1,0 +1,412 @@
+"""What verbs find: objects with attributes; ``to_dict()`` is the JSON of the program."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._errors import ModelmillError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from . import _core
+    from ._model import Model
+
+Remarks = list[tuple[str, str]]
+
+
+def frame(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
+    """Rows as a table of pandas."""
+    try:
+        import pandas as pd
+    except ImportError:
+        raise ModelmillError("to_pandas() needs pandas: pip install pandas") from None
+    return pd.DataFrame(list(rows))
+
+
+def number(value: float | None) -> str:
+    """A number for people."""
+    return "" if value is None else f"{value:.6g}"
+
+
+def table_html(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table as HTML."""
+    head = "".join(f'<th style="text-align:left">{html.escape(text)}</th>' for text in heads)
+    body = "".join(
+        "<tr>" + "".join(f'<td style="text-align:left">{html.escape(text)}</td>' for text in row) + "</tr>" for row in rows
+    )
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def text_html(text: str) -> str:
+    """A text as HTML."""
+    return f'<pre style="line-height:1.35">{html.escape(text)}</pre>'
+
+
+class Result:
+    """What a verb found.
+
+    Attributes
+    ----------
+    notes : list of (str, str)
+        Remarks: severity (``"info"`` or ``"warning"``) and text.
+    """
+
+    def __init__(self, told: str, text: str, notes: Remarks) -> None:
+        self._object: dict[str, Any] = json.loads(told)
+        self._text = text
+        self.notes = notes
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same as ``modelmill ... --json`` prints it."""
+        copy: dict[str, Any] = json.loads(json.dumps(self._object))
+        return copy
+
+    def save(self, path: str | Path) -> None:
+        """Writes :meth:`to_dict` to a file (JSON)."""
+        Path(path).write_text(json.dumps(self._object, indent=2) + "\n", encoding="utf-8")
+
+    def __str__(self) -> str:
+        return self._text
+
+    def __repr__(self) -> str:
+        return self._text
+
+    def _repr_html_(self) -> str:
+        return text_html(self._text)
+
+
+class Check(Result):
+    """What a model consists of, and its numeric rank beside the exact one."""
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Bodies, joints, loops, drives, parameters, as :meth:`to_dict` has them."""
+        return self.to_dict()
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Error figures.
+
+    Attributes
+    ----------
+    nrms : float or None
+        ``||measured - model|| / ||measured||`` over all drives; None where their units differ.
+    channels : dict of str to dict
+        ``nrms``, ``mean_relative``, ``max_abs`` and more of each drive.
+    """
+
+    nrms: float | None
+    channels: dict[str, dict[str, Any]]
+
+    @classmethod
+    def of(cls, told: dict[str, Any] | None) -> Figures | None:
+        """Of an object of the program's JSON."""
+        return None if told is None else cls(told.get("nrms"), told.get("channels", {}))
+
+
+class Page:
+    """A page that stands by itself; a notebook shows it inline.
+
+    Attributes
+    ----------
+    html : str
+        The whole document.
+    """
+
+    def __init__(self, page: str) -> None:
+        self.html = page
+
+    def save(self, path: str | Path) -> None:
+        """Writes the page to a file."""
+        Path(path).write_text(self.html, encoding="utf-8")
+
+    def __repr__(self) -> str:
+        return f"<page of {len(self.html)} characters; save(path) writes it, a notebook shows it>"
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe srcdoc="{html.escape(self.html, quote=True)}" sandbox="allow-scripts" '
+            'style="width:100%;height:46em;border:1px solid #ccc"></iframe>'
+        )
+
+
+class Comparison(Result):
+    """How far a model is off along recordings, and where."""
+
+    @property
+    def nrms(self) -> float | None:
+        """``||measured - model|| / ||measured||`` over all drives; None where their units differ."""
+        value: float | None = self._object["nrms"]
+        return value
+
+    @property
+    def channels(self) -> dict[str, dict[str, Any]]:
+        """Figures of each drive."""
+        channels: dict[str, dict[str, Any]] = self._object["channels"]
+        return channels
+
+    @property
+    def where(self) -> list[dict[str, Any]]:
+        """Regions that hold more than their share of the squared error."""
+        regions: list[dict[str, Any]] = self._object["where"]
+        return regions
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A row for each drive."""
+        return frame({"drive": name, **figures} for name, figures in self.channels.items())
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An identified base parameter; ``std`` is None where it was held."""
+
+    name: str
+    expression: str
+    value: float
+    std: float | None
+    unit: str
+    nominal: float | None
+
+
+class Identification(Result):
+    """Base parameters from recordings, with deviations and error figures.
+
+    Attributes
+    ----------
+    values : numpy.ndarray, shape (n_base,)
+        Values of the base parameters in the order of ``Model.p_min``, in their units.
+    """
+
+    def __init__(self, found: _core.Found, model: Model) -> None:
+        super().__init__(found.json, found.text, found.notes)
+        self.values: NDArray[np.float64] = found.values
+        self._model = model
+
+    @property
+    def model(self) -> Model:
+        """The model with the identified values in the place of the file's."""
+        return self._model.with_fit(self)
+
+    @property
+    def parameters(self) -> list[Parameter]:
+        """The base parameters."""
+        return [
+            Parameter(one["name"], one["expression"], one["value"], one.get("std"), one["unit"], one.get("nominal"))
+            for one in self._object["parameters"]
+        ]
+
+    @property
+    def samples(self) -> int:
+        """Samples that the fit was made of."""
+        return int(self._object["samples"])
+
+    @property
+    def condition_number(self) -> float:
+        """Condition number of the regressor."""
+        return float(self._object["condition_number"])
+
+    @property
+    def fit(self) -> Figures:
+        """Error figures on the recordings of the fit."""
+        figures = Figures.of(self._object["fit"])
+        assert figures is not None
+        return figures
+
+    @property
+    def check(self) -> Figures | None:
+        """Error figures on recordings that the fit did not see."""
+        return Figures.of(self._object.get("check"))
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A row for each base parameter."""
+        return frame(vars(one) for one in self.parameters)
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (one.name, one.expression, number(one.value), number(one.std), one.unit, number(one.nominal))
+            for one in self.parameters
+        ]
+        heads = ("", "expression", "value", "std", "unit", "nominal")
+        return table_html(heads, rows) + text_html(self._text)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A physical effect.
+
+    Attributes
+    ----------
+    kind : str
+        Such as ``"coulomb_friction"``.
+    at : list of str
+        Where it acts.
+    estimates : list of dict
+        ``name``, ``value``, ``std``, ``unit``.
+    probability : float or None
+        That it is there.
+    indistinguishable_from : list of dict
+        What could stand in its place: ``kind`` and ``at``.
+    """
+
+    kind: str
+    at: list[str]
+    estimates: list[dict[str, Any]]
+    probability: float | None
+    indistinguishable_from: list[dict[str, Any]]
+
+
+class Diagnosis(Result):
+    """Which physical effect a model lacks, and what speaks for it."""
+
+    def __init__(self, found: _core.Found, better: Model | None) -> None:
+        super().__init__(found.json, found.text, found.notes)
+        self._page = found.page or ""
+        self._better = better
+
+    @property
+    def verdict(self) -> str:
+        """``"adequate"``, ``"missing_effect"`` or ``"unexplained"``."""
+        return str(self._object["verdict"])
+
+    @property
+    def noise_floor(self) -> float | None:
+        """Noise relative to the measured forces."""
+        value: float | None = self._object["noise_floor"]
+        return value
+
+    @property
+    def steps(self) -> list[dict[str, Any]]:
+        """The ladder: what was added, step by step, and what error it left."""
+        steps: list[dict[str, Any]] = self._object["steps"]
+        return steps
+
+    @property
+    def effects(self) -> list[Effect]:
+        """What is missing."""
+        return [
+            Effect(one["kind"], one["at"], one["estimates"], one.get("probability"), one.get("indistinguishable_from", []))
+            for one in self._object["effects"]
+        ]
+
+    @property
+    def candidates(self) -> list[dict[str, Any]]:
+        """What was tried, and why it was refused."""
+        candidates: list[dict[str, Any]] = self._object["candidates"]
+        return candidates
+
+    @property
+    def disturbances(self) -> list[dict[str, Any]]:
+        """What recordings have by themselves, which is no effect of the model."""
+        disturbances: list[dict[str, Any]] = self._object["disturbances"]
+        return disturbances
+
+    @property
+    def budget(self) -> dict[str, dict[str, Any]]:
+        """Of each drive's error, what is noise, what does not repeat and what the model does not say."""
+        budget: dict[str, dict[str, Any]] = self._object["budget"]
+        return budget
+
+    @property
+    def model(self) -> Model | None:
+        """The model with the effects that were found; None if nothing is missing."""
+        return self._better
+
+    def report(self) -> Page:
+        """All of it as one page with pictures."""
+        return Page(self._page)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A row for each candidate."""
+        return frame(self.candidates)
+
+
+class Runs(Result):
+    """What changed between recordings of one machine."""
+
+    def __init__(self, found: _core.Found) -> None:
+        super().__init__(found.json, found.text, found.notes)
+        self._page = found.page or ""
+
+    @property
+    def changes(self) -> list[dict[str, Any]]:
+        """What is different in physics: ``kind``, ``at``, ``estimates``, ``between``, ``says``."""
+        changes: list[dict[str, Any]] = self._object["changes"]
+        return changes
+
+    @property
+    def moved(self) -> list[dict[str, Any]]:
+        """Base parameters that moved: ``parameter``, ``sigmas``."""
+        moved: list[dict[str, Any]] = self._object["moved"]
+        return moved
+
+    @property
+    def change_points(self) -> list[dict[str, Any]]:
+        """When base parameters changed and stayed changed."""
+        points: list[dict[str, Any]] = self._object["change_points"]
+        return points
+
+    @property
+    def unread(self) -> list[dict[str, Any]]:
+        """Recordings that could not be read, with the reason."""
+        unread: list[dict[str, Any]] = self._object["unread"]
+        return unread
+
+    def report(self) -> Page:
+        """Base parameters over the runs as one page."""
+        return Page(self._page)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A row for each run and base parameter."""
+        return frame({"file": run["file"], **one} for run in self._object["runs"] for one in run["parameters"])
+
+
+class Excitation(Result):
+    """A periodic motion that tells base parameters, or effects, apart.
+
+    Attributes
+    ----------
+    t : numpy.ndarray, shape (n,)
+        Times of one period, s.
+    q, qd, qdd : numpy.ndarray, shape (n, dof)
+        Positions, rates and accelerations of the coordinates, SI units.
+    picture : str
+        The trajectory as SVG.
+    """
+
+    def __init__(self, found: _core.Excited, coordinates: list[str]) -> None:
+        super().__init__(found.json, found.text, found.notes)
+        self.t, *motion = found.motion()
+        self.q, self.qd, self.qdd = (np.stack(part, axis=1) for part in motion)
+        self.picture = found.picture
+        self._csv = found.csv
+        self._coordinates = coordinates
+
+    @property
+    def condition_number(self) -> float:
+        """Condition number of the regressor along the motion."""
+        return float(self._object["condition_number"])
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Columns ``t``, then each coordinate, with ``_d`` its rate and with ``_dd`` its acceleration."""
+        whole = frame([{"t": float(t)} for t in self.t])
+        for part, ending in ((self.q, ""), (self.qd, "_d"), (self.qdd, "_dd")):
+            for k, name in enumerate(self._coordinates):
+                whole[name + ending] = part[:, k]
+        return whole
+
+    def to_csv(self, path: str | Path) -> None:
+        """Writes one period as the program does: ``t``, coordinates, rates, accelerations."""
+        Path(path).write_text(self._csv, encoding="utf-8")
+
+    def _repr_html_(self) -> str:
+        return self.picture + text_html(self._text)

@@ -1,0 +1,24 @@
+//! Arrays of numpy as the library reads them: where they lie, whether state by state or column by column.
+
+use modelmill::states::Rows;
+use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+
+use crate::errors::refused;
+
+/// The numbers of an array of shape (states, columns), in C or Fortran order.
+pub(crate) fn rows<'a>(py: Python<'_>, array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Rows<'a>> {
+    let by_state = array.is_c_contiguous();
+    let width = array.shape()[1];
+    match array.as_slice() {
+        Ok(numbers) if by_state || array.is_fortran_contiguous() => Ok(Rows {
+            numbers,
+            width,
+            by_state,
+        }),
+        _ => Err(refused(
+            py,
+            "an array lies in memory neither row by row nor column by column",
+        )),
+    }
+}

@@ -1,0 +1,21 @@
+//! The compiled part of the Python package `modelmill`: models, recordings and verbs of the library, with JSON and text of
+//! what they find. The Python part (`modelmill/`) makes objects with attributes of them.
+
+mod arrays;
+mod errors;
+mod model;
+mod options;
+mod results;
+mod spelling;
+mod work;
+
+use pyo3::prelude::*;
+
+/// The compiled part of `modelmill`.
+#[pymodule]
+mod _core {
+    #[pymodule_export]
+    use crate::model::{CoreModel, contents, import_text, kinds, load, load_text};
+    #[pymodule_export]
+    use crate::results::{Excited, Found, Recorded};
+}

@@ -1,0 +1,591 @@
+//! A model and its verbs.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use modelmill::add::{Said, Setting, new_effect};
+use modelmill::diagnose::{Held, Question};
+use modelmill::generate::{Code, Language};
+use modelmill::identify::Instruments;
+use modelmill::model::Format;
+use modelmill::picture::Drawing;
+use modelmill::recording::Recording;
+use modelmill::report::{page, runs_page};
+use modelmill::runs::Unread;
+use modelmill::states::{Function, Functions, Given};
+use modelmill::text::style::Style;
+use modelmill::{Error, Host, Model, Outcome, import, print};
+use numpy::{PyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::arrays::rows;
+use crate::errors::refused;
+use crate::options::{self, EstimationOptions, ExcitationOptions, ReadingOptions, Says};
+use crate::results::{Excited, Found, Recorded, Remarks, Source, remarks};
+use crate::spelling::{self, spelled};
+use crate::work::{Listener, at_once, work};
+
+/// States whose functions are computed in this thread, without looking for interrupts.
+const FEW: usize = 256;
+/// No robot description is longer, bytes.
+const LARGEST_DESCRIPTION: u64 = 16 << 20;
+
+type Callback<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
+
+/// A host whose jobs the listener hears.
+fn host(libraries: Vec<PathBuf>, at_values: bool) -> (Host, Arc<Listener>) {
+    let listener = Arc::new(Listener::default());
+    let host = Host::new()
+        .with_libraries(libraries)
+        .at_values(at_values)
+        .with_progress(Arc::clone(&listener) as Arc<_>);
+    (host, listener)
+}
+
+/// Options that make sense, or an exception.
+fn asked<T>(py: Python<'_>, says: Says<T>) -> PyResult<T> {
+    says.map_err(|says| refused(py, &says))
+}
+
+/// Reads a model file.
+#[pyfunction]
+pub(crate) fn load(
+    py: Python<'_>,
+    path: PathBuf,
+    libraries: Vec<PathBuf>,
+    at_values: bool,
+    progress: Option<Bound<'_, PyAny>>,
+) -> PyResult<CoreModel> {
+    let (host, listener) = host(libraries, at_values);
+    let model = work(py, &listener, progress.as_ref(), || host.model(&path))?;
+    Ok(CoreModel::new(model, listener))
+}
+
+/// Derives a model of the text of a model file.
+#[pyfunction]
+pub(crate) fn load_text(
+    py: Python<'_>,
+    name: &str,
+    text: &str,
+    libraries: Vec<PathBuf>,
+    at_values: bool,
+    progress: Option<Bound<'_, PyAny>>,
+) -> PyResult<CoreModel> {
+    let (host, listener) = host(libraries, at_values);
+    let model = work(py, &listener, progress.as_ref(), || {
+        host.derive(name, host.load_text(Path::new(name), text)?)
+    })?;
+    Ok(CoreModel::new(model, listener))
+}
+
+/// The text of a model file of a robot description, given as its text or as a file, and remarks.
+#[pyfunction]
+#[allow(clippy::too_many_arguments, reason = "each is a keyword of Python")]
+pub(crate) fn import_text(
+    py: Python<'_>,
+    name: &str,
+    text: Option<String>,
+    floating: bool,
+    round_angles: bool,
+    closures: Option<PathBuf>,
+    pose: Vec<(String, f64)>,
+) -> PyResult<(String, Remarks)> {
+    let (host, listener) = host(Vec::new(), false);
+    let read = |path: &Path| {
+        let read = host.files().read_text(path, LARGEST_DESCRIPTION);
+        read.map_err(|error| {
+            Error::input(format!(
+                "{} cannot be read: {}",
+                path.display(),
+                error.fault
+            ))
+        })
+    };
+    let imported = work(py, &listener, None, || {
+        let (text, path) = match text {
+            Some(text) => (text, None),
+            None => (read(Path::new(name))?, Some(Path::new(name))),
+        };
+        let beside = path.filter(|path| path.extension().is_some_and(|e| e == "urdf"));
+        let beside = beside.map(|path| path.with_file_name("robot.yaml"));
+        let closures = closures.or(beside.filter(|path| path.is_file()));
+        let closures = closures.map(|path| read(&path)).transpose()?;
+        let options = import::Options {
+            floating,
+            round_angles,
+            closures: closures.as_deref(),
+            pose: &pose,
+        };
+        host.import(name, &text, &options)
+    })?;
+    Ok((imported.model, remarks(&imported.notes)))
+}
+
+/// A model that was read and derived.
+#[pyclass(frozen, name = "Model")]
+#[derive(Clone)]
+pub(crate) struct CoreModel {
+    model: Model,
+    functions: Arc<Functions>,
+    listener: Arc<Listener>,
+}
+
+impl CoreModel {
+    fn new(model: Model, listener: Arc<Listener>) -> Self {
+        Self {
+            functions: Arc::new(model.functions()),
+            model,
+            listener,
+        }
+    }
+
+    /// Another model of the same host.
+    fn like(&self, model: Model) -> Self {
+        Self::new(model, Arc::clone(&self.listener))
+    }
+
+    fn work<T: Send>(
+        &self,
+        py: Python<'_>,
+        progress: Callback<'_, '_>,
+        job: impl FnOnce() -> Outcome<T> + Send,
+    ) -> PyResult<T> {
+        work(py, &self.listener, progress, job)
+    }
+}
+
+/// A function by the name of its method.
+fn named(py: Python<'_>, function: &str) -> PyResult<Function> {
+    Ok(match function {
+        "inverse_dynamics" => Function::InverseDynamics,
+        "regressor" => Function::Regressor,
+        "mass_matrix" => Function::MassMatrix,
+        "bias" => Function::Bias,
+        "forward_dynamics" => Function::ForwardDynamics,
+        "reactions" => Function::Reactions,
+        other => return Err(refused(py, &format!("there is no function `{other}`"))),
+    })
+}
+
+fn recordings(all: &[PyRef<'_, Recorded>]) -> Vec<Arc<Recording>> {
+    all.iter().map(|one| Arc::clone(&one.recording)).collect()
+}
+
+fn borrowed(all: &[Arc<Recording>]) -> Vec<&Recording> {
+    all.iter().map(|one| &**one).collect()
+}
+
+#[pymethods]
+impl CoreModel {
+    #[getter]
+    fn name(&self) -> &str {
+        &self.model.name
+    }
+
+    #[getter]
+    fn path(&self) -> &str {
+        &self.model.path
+    }
+
+    #[getter]
+    fn text(&self) -> &str {
+        self.model.text()
+    }
+
+    #[getter]
+    fn title(&self) -> Option<&str> {
+        self.model.derivation.mechanism.title.as_deref()
+    }
+
+    #[getter]
+    fn coordinates(&self) -> Vec<String> {
+        self.model.active()
+    }
+
+    #[getter]
+    fn passive(&self) -> Vec<String> {
+        self.model.passive()
+    }
+
+    #[getter]
+    fn drives(&self) -> Vec<String> {
+        self.model.drives()
+    }
+
+    #[getter]
+    fn nominal<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.model.nominal)
+    }
+
+    /// Name, retained product, expression, unit, nominal value, whether that is given.
+    #[getter]
+    fn base(&self) -> Vec<(String, String, String, String, f64, bool)> {
+        let infos = self.model.infos();
+        let all = self.model.base.iter().zip(infos).enumerate();
+        all.map(|(k, (base, info))| {
+            (
+                base.name.clone(),
+                base.retained.clone(),
+                base.expression.clone(),
+                info.unit,
+                self.model.nominal[k],
+                self.model.has_nominal(k),
+            )
+        })
+        .collect()
+    }
+
+    /// Warnings about the model file, and remarks on the model.
+    #[getter]
+    fn notes(&self) -> Remarks {
+        let of_file = self.model.loaded.warnings.iter();
+        let of_file = of_file.map(|one| ("warning", spelled(&one.message).into_owned()));
+        of_file.chain(remarks(&self.model.notes)).collect()
+    }
+
+    /// What there is to know about nominal values that are missing.
+    #[getter]
+    fn nominal_notes(&self) -> Remarks {
+        remarks(&self.model.nominal_values().notes)
+    }
+
+    fn equations(&self, py: Python<'_>, format: &str) -> PyResult<String> {
+        let format = match format {
+            "text" => Some(Format::Text),
+            "markdown" => Some(Format::Markdown),
+            "latex" => Some(Format::Latex),
+            "html" => Some(Format::Html),
+            "json" => None,
+            other => {
+                let says =
+                    format!("format={other:?}: expected text, markdown, latex, html or json");
+                return Err(refused(py, &says));
+            }
+        };
+        let model = &self.model;
+        let written = self.work(py, None, || match format {
+            Some(format) => model.equations(format),
+            None => model.equations_json(),
+        })?;
+        Ok(written.text)
+    }
+
+    fn check(&self, py: Python<'_>) -> PyResult<Found> {
+        let checked = self.work(py, None, || self.model.check())?;
+        Ok(Found::new(
+            &checked.json(),
+            &checked.text(Style::PLAIN),
+            Remarks::new(),
+        ))
+    }
+
+    fn picture(
+        &self,
+        py: Python<'_>,
+        at: Vec<(String, f64)>,
+        view: Option<[f64; 2]>,
+    ) -> PyResult<String> {
+        let drawing = Drawing {
+            at,
+            from: view,
+            ..Drawing::default()
+        };
+        self.work(py, None, || self.model.picture(&drawing, None))
+    }
+
+    /// Names of the components of the reactions, and of those that are not determined.
+    fn reaction_names(&self, py: Python<'_>) -> PyResult<(Vec<String>, Vec<String>)> {
+        self.work(py, None, || self.functions.reactions())
+    }
+
+    /// A function at states, its numbers row by row and state by state, and its shape.
+    #[allow(clippy::too_many_arguments, reason = "each is an array of Python")]
+    fn at<'py>(
+        &self,
+        py: Python<'py>,
+        function: &str,
+        q: PyReadonlyArray2<'py, f64>,
+        qd: Option<PyReadonlyArray2<'py, f64>>,
+        qdd: Option<PyReadonlyArray2<'py, f64>>,
+        forces: Option<PyReadonlyArray2<'py, f64>>,
+        values: Vec<f64>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, [usize; 2])> {
+        let function = named(py, function)?;
+        let given = Given {
+            q: rows(py, &q)?,
+            qd: qd.as_ref().map(|array| rows(py, array)).transpose()?,
+            qdd: qdd.as_ref().map(|array| rows(py, array)).transpose()?,
+            forces: forces.as_ref().map(|array| rows(py, array)).transpose()?,
+        };
+        let few = given.q.numbers.len() <= FEW * given.q.width;
+        let functions = &self.functions;
+        let job = || {
+            let shape = functions.shape(function)?;
+            Ok((functions.at(function, &given, &values)?, shape))
+        };
+        let (found, shape) = if few {
+            at_once(py, job)?
+        } else {
+            self.work(py, None, job)?
+        };
+        Ok((PyArray1::from_vec(py, found), shape))
+    }
+
+    /// A function as C for eight states at once, and its shape.
+    fn vectors_c(&self, py: Python<'_>, function: &str) -> PyResult<(String, [usize; 2])> {
+        let function = named(py, function)?;
+        self.work(py, None, || {
+            Ok((
+                self.functions.vectors_c(function)?,
+                self.functions.shape(function)?,
+            ))
+        })
+    }
+
+    /// Reads a recording.
+    fn recording(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        source: Source<'_>,
+        options: ReadingOptions,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Recorded> {
+        let reading = asked(py, options.reading())?;
+        let model = &self.model;
+        let recording = match source {
+            Source::Files(files) => self.work(py, progress.as_ref(), || {
+                let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+                model.recording_of(&files, &reading)
+            }),
+            Source::Table(columns) => {
+                let columns = columns.into_iter().map(|(name, values)| {
+                    let values = values.as_array().iter().copied().collect();
+                    (name, values)
+                });
+                let columns = columns.collect();
+                self.work(py, progress.as_ref(), || {
+                    model.recording_of_table(name, columns, &reading)
+                })
+            }
+        }?;
+        Ok(Recorded {
+            recording: Arc::new(recording),
+        })
+    }
+
+    fn compare(
+        &self,
+        py: Python<'_>,
+        data: Vec<PyRef<'_, Recorded>>,
+        values: Vec<f64>,
+        name: &str,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Found> {
+        let data = recordings(&data);
+        self.work(py, progress.as_ref(), || {
+            let found = self.model.compare(&borrowed(&data), &values)?;
+            let text = found.text(name, Style::PLAIN);
+            Ok(Found::new(&found.json(name)?, &text, remarks(&found.notes)))
+        })
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "each is a keyword of Python")]
+    fn identify(
+        &self,
+        py: Python<'_>,
+        data: Vec<PyRef<'_, Recorded>>,
+        check: Vec<PyRef<'_, Recorded>>,
+        options: EstimationOptions,
+        instruments: Vec<PyRef<'_, Recorded>>,
+        instrument_period: Option<f64>,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Found> {
+        let estimation = asked(py, options.estimation())?;
+        let (data, check) = (recordings(&data), recordings(&check));
+        let instruments = recordings(&instruments);
+        self.work(py, progress.as_ref(), || {
+            let recorded = borrowed(&instruments);
+            let instruments = match instrument_period {
+                Some(period) => Instruments::Period(period),
+                None if recorded.is_empty() => Instruments::None,
+                None => Instruments::Recordings(&recorded),
+            };
+            let (data, check) = (borrowed(&data), borrowed(&check));
+            let found = self
+                .model
+                .identify_with(&data, &instruments, &check, &estimation)?;
+            let text = found.text(&self.model, Style::PLAIN);
+            let told = Found::new(&found.json(&self.model)?, &text, remarks(&found.notes));
+            Ok(told.with_values(found.values()))
+        })
+    }
+
+    fn diagnose(
+        &self,
+        py: Python<'_>,
+        data: Vec<PyRef<'_, Recorded>>,
+        check: Vec<PyRef<'_, Recorded>>,
+        held: bool,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Found> {
+        let (data, check) = (recordings(&data), recordings(&check));
+        let question = Question {
+            held: if held { Held::All } else { Held::Known },
+            ..Question::default()
+        };
+        self.work(py, progress.as_ref(), || {
+            let found = self
+                .model
+                .diagnose(&borrowed(&data), &borrowed(&check), &question)?;
+            let spelling = spelling::Python;
+            let text = found.text(Style::PLAIN, &spelling).join("\n");
+            let better = match found.entries.as_slice() {
+                [] => None,
+                entries => Some(self.like(self.model.with(entries)?)),
+            };
+            Ok(
+                Found::new(&found.json(&spelling), &text, remarks(&found.notes))
+                    .with_page(page(&found, &spelling)?)
+                    .with_model(better),
+            )
+        })
+    }
+
+    /// Several runs against the first; `unread` are those that could not be read, with the place among all, name and reason.
+    fn runs(
+        &self,
+        py: Python<'_>,
+        data: Vec<PyRef<'_, Recorded>>,
+        unread: Vec<(usize, String, String)>,
+        per_run: Vec<String>,
+        loads: Vec<String>,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Found> {
+        let what = asked(py, options::asked(&per_run, &loads))?;
+        let mut all: Vec<Result<Arc<Recording>, Unread>> =
+            recordings(&data).into_iter().map(Ok).collect();
+        for (place, file, says) in unread {
+            let error = Error::input(says);
+            all.insert(place.min(all.len()), Err(Unread { file, error }));
+        }
+        self.work(py, progress.as_ref(), || {
+            let found = self.model.runs(all, &what)?;
+            let text = found.text(Style::PLAIN);
+            let told = Found::new(&found.json(), &text, remarks(&found.notes));
+            Ok(told.with_page(runs_page(&self.model, &found)?))
+        })
+    }
+
+    fn excite(
+        &self,
+        py: Python<'_>,
+        options: ExcitationOptions,
+        data: Vec<PyRef<'_, Recorded>>,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Excited> {
+        let request = asked(py, options.request())?;
+        let data = recordings(&data);
+        let found = self.work(py, progress.as_ref(), || {
+            self.model.excite(&request, &borrowed(&data))
+        })?;
+        Ok(Excited { found })
+    }
+
+    /// The model with an effect; settings are values, or names of parameters.
+    fn with_effect(
+        &self,
+        py: Python<'_>,
+        kind: &str,
+        at: Vec<String>,
+        values: Vec<(String, f64)>,
+        names: Vec<(String, String)>,
+    ) -> PyResult<Self> {
+        let values = values
+            .into_iter()
+            .map(|(symbol, value)| (symbol, Said::Value(value)));
+        let names = names
+            .into_iter()
+            .map(|(symbol, name)| (symbol, Said::Name(name)));
+        let settings = values.chain(names);
+        let settings: Vec<Setting> = settings
+            .map(|(symbol, said)| Setting { symbol, said })
+            .collect();
+        let model = self.work(py, None, || {
+            let effect = new_effect(&self.model.loaded.kinds, kind, &at, &settings)?;
+            self.model.with(&[effect])
+        })?;
+        Ok(self.like(model))
+    }
+
+    /// The model with other values of its base parameters.
+    fn with_values(&self, py: Python<'_>, values: Vec<f64>) -> PyResult<Self> {
+        if values.len() != self.model.base.len() || values.iter().any(|value| !value.is_finite()) {
+            let says = format!(
+                "{} finite values are expected, one for each base parameter",
+                self.model.base.len()
+            );
+            return Err(refused(py, &says));
+        }
+        Ok(self.like(self.model.with_values(&values)))
+    }
+
+    /// Values of a fit that `identify` wrote to a file.
+    fn values_of_fit(&self, py: Python<'_>, path: PathBuf) -> PyResult<(Vec<f64>, Remarks)> {
+        let found = at_once(py, || {
+            let fit = self.model.host().fit(&path)?;
+            self.model.values_of(&fit, &path.display().to_string())
+        })?;
+        Ok((found.values, remarks(&found.notes)))
+    }
+
+    /// Emitted code: paths and texts.
+    fn generate(
+        &self,
+        py: Python<'_>,
+        language: &str,
+        dynamics: bool,
+        reactions: bool,
+        self_test: bool,
+    ) -> PyResult<Vec<(String, String)>> {
+        let Some(language) = Language::named(language) else {
+            let known: Vec<&str> = Language::all().map(Language::name).collect();
+            let says = format!(
+                "language={language:?}: expected one of {}",
+                known.join(", ")
+            );
+            return Err(refused(py, &says));
+        };
+        let code = Code {
+            language,
+            dynamics,
+            reactions,
+            self_test,
+        };
+        let files = self.work(py, None, || self.model.generate(&code))?;
+        Ok(files
+            .into_iter()
+            .map(|file| (file.path, file.text))
+            .collect())
+    }
+}
+
+/// What a log holds, before a model reads it.
+#[pyfunction]
+pub(crate) fn contents(py: Python<'_>, path: PathBuf) -> PyResult<Found> {
+    let (host, listener) = host(Vec::new(), false);
+    let found = work(py, &listener, None, || host.recordings(&path))?;
+    Ok(Found::new(
+        &found.json(),
+        &found.text(Style::PLAIN),
+        Remarks::new(),
+    ))
+}
+
+/// Kinds of effects that a model may have: name and description.
+#[pyfunction]
+pub(crate) fn kinds(py: Python<'_>, libraries: Vec<PathBuf>) -> PyResult<String> {
+    let (host, _) = host(libraries, false);
+    let kinds = at_once(py, || host.kinds())?;
+    Ok(print::effects::json(&kinds).to_string())
+}

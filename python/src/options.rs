@@ -1,0 +1,248 @@
+//! Keywords of Python as options of the library, refused where they make no sense.
+
+use modelmill::diagnose::Named;
+use modelmill::excite::{Criterion, Limit, Options, Request, Separate};
+use modelmill::identify::{Estimation, Refinement, Weights};
+use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, Preparation, Reading, Smoothing};
+use modelmill::runs::{Asked, KnownLoad, PerRun};
+use pyo3::prelude::*;
+
+/// What is wrong with an option.
+pub(crate) type Says<T> = Result<T, String>;
+
+/// How a recording is read and prepared; the keywords of every method that takes recordings.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct ReadingOptions {
+    columns: Vec<(String, String)>,
+    cutoff_hz: Option<f64>,
+    order: Option<usize>,
+    trim: Option<(usize, usize)>,
+    decimate: usize,
+    source: String,
+    smoothing: String,
+    period: Option<f64>,
+    band_hz: Option<f64>,
+    skip_bad_samples: bool,
+    leave_out_events: bool,
+    between: Option<(f64, f64)>,
+}
+
+impl ReadingOptions {
+    pub(crate) fn reading(&self) -> Says<Reading> {
+        let usual = Preparation::default();
+        let order = self.order.unwrap_or(usual.order);
+        if !(1..=MAX_FILTER_ORDER).contains(&order) {
+            return Err(format!(
+                "order={order}: expected 1 to {MAX_FILTER_ORDER}; 4 is usual"
+            ));
+        }
+        if self.decimate == 0 {
+            return Err(
+                "decimate=0: expected a whole number from 1 on; 1 keeps all samples".to_owned(),
+            );
+        }
+        if let Some((from, to)) = self.between
+            && !(from < to && from.is_finite() && to.is_finite())
+        {
+            return Err(format!(
+                "between=({from}, {to}): expected two times in s, the first before the second"
+            ));
+        }
+        Ok(Reading {
+            columns: self.columns.clone(),
+            preparation: Preparation {
+                cutoff_hz: positive("cutoff_hz", self.cutoff_hz, "a frequency in Hz such as 25")?,
+                order,
+                trim: self.trim,
+                decimate: self.decimate,
+                band_hz: positive("band_hz", self.band_hz, "a frequency in Hz such as 25")?,
+                source: match self.source.as_str() {
+                    "recorded" => DerivativeSource::RecordedFirst,
+                    "positions" => DerivativeSource::Positions,
+                    other => return Err(one_of("source", other, &["recorded", "positions"])),
+                },
+                smoothing: self.smoothing()?,
+                ..usual
+            },
+            skip_bad_samples: self.skip_bad_samples,
+            leave_out_events: self.leave_out_events,
+            between: self.between,
+        })
+    }
+
+    fn smoothing(&self) -> Says<Smoothing> {
+        let period = positive("period", self.period, "a time in s such as 7.29")?;
+        Ok(match (self.smoothing.as_str(), period) {
+            ("auto", None) => Smoothing::Automatic,
+            ("auto" | "fourier", period) => Smoothing::Fourier { period },
+            ("butterworth", _) => Smoothing::Butterworth,
+            ("savitzky_golay", _) => Smoothing::SavitzkyGolay,
+            (other, _) => {
+                let known = ["auto", "butterworth", "savitzky_golay", "fourier"];
+                return Err(one_of("smoothing", other, &known));
+            }
+        })
+    }
+}
+
+/// How parameters are estimated.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct EstimationOptions {
+    weights: String,
+    robust: Option<f64>,
+    prior: Option<f64>,
+    physical: bool,
+    essential: bool,
+    standstill: Option<f64>,
+}
+
+impl EstimationOptions {
+    pub(crate) fn estimation(&self) -> Says<Estimation> {
+        let prior = positive("prior", self.prior, "a relative deviation such as 0.2")?;
+        let refinement = match (prior, self.physical, self.essential) {
+            (None, false, false) => Refinement::None,
+            (Some(sigma), false, false) => Refinement::Prior(sigma),
+            (None, true, false) => Refinement::Physical,
+            (None, false, true) => Refinement::Essential,
+            _ => return Err("prior, physical and essential exclude each other".to_owned()),
+        };
+        if self
+            .standstill
+            .is_some_and(|part| !(part > 0.0 && part < 1.0))
+        {
+            return Err("standstill: expected a number between 0 and 1, such as 0.01".to_owned());
+        }
+        Ok(Estimation {
+            weights: match self.weights.as_str() {
+                "auto" => Weights::Automatic,
+                "none" => Weights::None,
+                "channels" => Weights::Channels,
+                "variance" => Weights::Variance,
+                other => {
+                    return Err(one_of(
+                        "weights",
+                        other,
+                        &["auto", "none", "channels", "variance"],
+                    ));
+                }
+            },
+            robust: positive("robust", self.robust, "a bound such as 1.345")?,
+            refinement,
+            standstill: self.standstill,
+        })
+    }
+}
+
+/// What is asked of an excitation.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct ExcitationOptions {
+    harmonics: usize,
+    period: f64,
+    limits: Vec<String>,
+    criterion: String,
+    random: usize,
+    starts: usize,
+    seed: u64,
+    rate: f64,
+    separate: Option<String>,
+    apart_from: Vec<String>,
+    beside: Vec<String>,
+    noise: Option<f64>,
+}
+
+impl ExcitationOptions {
+    pub(crate) fn request(&self) -> Says<Request> {
+        let within = |name: &str, value: f64, least: f64, most: f64| {
+            if (least..=most).contains(&value) {
+                Ok(())
+            } else {
+                Err(format!("{name}={value}: expected {least} to {most}"))
+            }
+        };
+        within(
+            "harmonics",
+            f64::from(u32::try_from(self.harmonics).unwrap_or(u32::MAX)),
+            1.0,
+            50.0,
+        )?;
+        within("period", self.period, 1e-3, 1e4)?;
+        within("rate", self.rate, 1.0, 1e5)?;
+        for (name, count) in [("random", self.random), ("starts", self.starts)] {
+            if !(1..=1_000_000).contains(&count) {
+                return Err(format!("{name}={count}: expected 1 to 1000000"));
+            }
+        }
+        let named = |all: &[String]| {
+            all.iter()
+                .map(|text| Named::parse(text))
+                .collect::<Says<_>>()
+        };
+        let separate = match &self.separate {
+            None => None,
+            Some(_) if self.apart_from.is_empty() => {
+                return Err(
+                    "separate: say from what, as in apart_from=[\"viscous_friction@motor\"]"
+                        .to_owned(),
+                );
+            }
+            Some(effect) => Some(Separate {
+                effect: Named::parse(effect)?,
+                from: named(&self.apart_from)?,
+                beside: named(&self.beside)?,
+                noise: positive("noise", self.noise, "a standard deviation in N or N m")?,
+            }),
+        };
+        Ok(Request {
+            options: Options {
+                harmonics: self.harmonics,
+                period: self.period,
+                criterion: match self.criterion.as_str() {
+                    "condition" => Criterion::Condition,
+                    "log_det" => Criterion::LogDet,
+                    other => return Err(one_of("criterion", other, &["condition", "log_det"])),
+                },
+                random: self.random,
+                starts: self.starts,
+                seed: self.seed,
+                ..Options::default()
+            },
+            rate: self.rate,
+            limits: self
+                .limits
+                .iter()
+                .map(|text| Limit::parse(text))
+                .collect::<Says<_>>()?,
+            separate,
+        })
+    }
+}
+
+/// What is asked of runs beside what changed.
+pub(crate) fn asked(per_run: &[String], loads: &[String]) -> Says<Asked> {
+    Ok(Asked {
+        per_run: per_run
+            .iter()
+            .map(|text| PerRun::parse(text))
+            .collect::<Says<_>>()?,
+        loads: loads
+            .iter()
+            .map(|text| KnownLoad::parse(text))
+            .collect::<Says<_>>()?,
+    })
+}
+
+fn positive(name: &str, value: Option<f64>, expected: &str) -> Says<Option<f64>> {
+    match value {
+        Some(value) if !(value > 0.0 && value.is_finite()) => {
+            Err(format!("{name}={value}: expected {expected}, above 0"))
+        }
+        value => Ok(value),
+    }
+}
+
+fn one_of(name: &str, given: &str, known: &[&str]) -> String {
+    format!("{name}={given:?}: expected one of {}", known.join(", "))
+}

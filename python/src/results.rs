@@ -1,0 +1,206 @@
+//! What verbs found: JSON as the program writes it, text, pages; and recordings that were read.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use modelmill::recording::Recording;
+use modelmill::{Note, Severity};
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use serde_json::Value;
+
+use crate::model::CoreModel;
+use crate::spelling::{spelled, spelled_in};
+
+/// Remarks: severity and text.
+pub(crate) type Remarks = Vec<(&'static str, String)>;
+
+pub(crate) fn remarks<'a>(notes: impl IntoIterator<Item = &'a Note>) -> Remarks {
+    let one = |note: &Note| {
+        let severity = match note.severity {
+            Severity::Warning => "warning",
+            Severity::Info => "info",
+        };
+        (severity, spelled(&note.says).into_owned())
+    };
+    notes.into_iter().map(one).collect()
+}
+
+/// Where a recording comes from: files of one run, or columns with their names.
+#[derive(FromPyObject)]
+pub(crate) enum Source<'py> {
+    Files(Vec<PathBuf>),
+    Table(Vec<(String, PyReadonlyArray1<'py, f64>)>),
+}
+
+/// A recording that was read and prepared for a model.
+#[pyclass(frozen)]
+pub(crate) struct Recorded {
+    pub(crate) recording: Arc<Recording>,
+}
+
+#[pymethods]
+impl Recorded {
+    #[getter]
+    fn file(&self) -> String {
+        self.recording.file().to_owned()
+    }
+
+    #[getter]
+    fn notes(&self) -> Remarks {
+        remarks(self.recording.notes())
+    }
+
+    /// Times of the prepared samples, then one list per coordinate of positions, rates, accelerations, then forces.
+    fn prepared<'py>(&self, py: Python<'py>) -> Prepared<'py> {
+        let runs = || self.recording.stretches.iter().map(|stretch| &stretch.run);
+        let joined = |of: &dyn Fn(&modelmill::recording::Run) -> &[Vec<f64>]| {
+            let width = runs().next().map_or(0, |run| of(run).len());
+            let column = |k: usize| {
+                let values = runs().flat_map(|run| of(run)[k].iter().copied());
+                PyArray1::from_vec(py, values.collect())
+            };
+            (0..width).map(column).collect()
+        };
+        let time = runs().flat_map(|run| run.time.iter().copied()).collect();
+        (
+            PyArray1::from_vec(py, time),
+            joined(&|run| &run.q),
+            joined(&|run| &run.qd),
+            joined(&|run| &run.qdd),
+        )
+    }
+}
+
+type Columns<'py> = Vec<Bound<'py, PyArray1<f64>>>;
+type Prepared<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Columns<'py>,
+    Columns<'py>,
+    Columns<'py>,
+);
+
+/// What a verb found.
+#[pyclass(frozen)]
+#[derive(Default)]
+pub(crate) struct Found {
+    /// As the program prints it with `--json`.
+    json: String,
+    text: String,
+    /// One page of it, where there is one.
+    page: Option<String>,
+    notes: Remarks,
+    values: Vec<f64>,
+    /// The model with what was found.
+    model: Option<CoreModel>,
+}
+
+impl Found {
+    pub(crate) fn new(json: &Value, text: &str, notes: Remarks) -> Self {
+        Self {
+            json: spelled_in(json).to_string(),
+            text: spelled(text).into_owned(),
+            notes,
+            ..Self::default()
+        }
+    }
+
+    pub(crate) fn with_page(mut self, page: String) -> Self {
+        self.page = Some(page);
+        self
+    }
+
+    pub(crate) fn with_values(mut self, values: Vec<f64>) -> Self {
+        self.values = values;
+        self
+    }
+
+    pub(crate) fn with_model(mut self, model: Option<CoreModel>) -> Self {
+        self.model = model;
+        self
+    }
+}
+
+#[pymethods]
+impl Found {
+    #[getter]
+    fn json(&self) -> &str {
+        &self.json
+    }
+
+    #[getter]
+    fn text(&self) -> &str {
+        &self.text
+    }
+
+    #[getter]
+    fn page(&self) -> Option<&str> {
+        self.page.as_deref()
+    }
+
+    #[getter]
+    fn notes(&self) -> Remarks {
+        self.notes.clone()
+    }
+
+    #[getter]
+    fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.values)
+    }
+
+    #[getter]
+    fn model(&self) -> Option<CoreModel> {
+        self.model.clone()
+    }
+}
+
+/// A trajectory that was found.
+#[pyclass(frozen)]
+pub(crate) struct Excited {
+    pub(crate) found: modelmill::excite::Excited,
+}
+
+#[pymethods]
+impl Excited {
+    #[getter]
+    fn json(&self) -> String {
+        spelled_in(&self.found.json()).to_string()
+    }
+
+    #[getter]
+    fn text(&self) -> String {
+        spelled(&self.found.text(modelmill::text::style::Style::PLAIN)).into_owned()
+    }
+
+    #[getter]
+    fn notes(&self) -> Remarks {
+        remarks(&self.found.notes)
+    }
+
+    #[getter]
+    fn picture(&self) -> &str {
+        &self.found.picture
+    }
+
+    #[getter]
+    fn csv(&self) -> String {
+        self.found.csv()
+    }
+
+    /// Times, then positions, rates and accelerations, a list per coordinate.
+    fn motion<'py>(&self, py: Python<'py>) -> Prepared<'py> {
+        let all = |columns: &[Vec<f64>]| -> Columns<'py> {
+            columns
+                .iter()
+                .map(|column| PyArray1::from_slice(py, column))
+                .collect()
+        };
+        let motion = &self.found.motion;
+        (
+            PyArray1::from_slice(py, &self.found.time),
+            all(&motion.q),
+            all(&motion.qd),
+            all(&motion.qdd),
+        )
+    }
+}

@@ -1,0 +1,133 @@
+//! Long work beside Python: the interpreter lock is given back, an interrupt stops the work, progress is told, and a panic becomes
+//! an exception.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use modelmill::Outcome;
+use modelmill::progress::{Job, Progress};
+use pyo3::prelude::*;
+
+use crate::errors::{of_library, refused};
+
+/// How often an interrupt is looked for and progress is told.
+const TICK: Duration = Duration::from_millis(50);
+
+/// Hears which jobs of a model go on, and stops them.
+#[derive(Default)]
+pub(crate) struct Listener(Mutex<Heard>);
+
+#[derive(Default)]
+struct Heard {
+    jobs: Vec<(String, usize, Arc<Job>)>,
+    stops: bool,
+}
+
+impl Progress for Listener {
+    fn begins(&self, what: &str, total: usize, job: &Arc<Job>) {
+        let mut heard = self.heard();
+        if heard.stops {
+            job.cancel();
+        }
+        heard.jobs.push((what.to_owned(), total, Arc::clone(job)));
+    }
+
+    fn ends(&self) {
+        self.heard().jobs.pop();
+    }
+}
+
+impl Listener {
+    fn heard(&self) -> MutexGuard<'_, Heard> {
+        // What a panic leaves behind is a list of jobs, which is as good as before.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn stop(&self) {
+        let mut heard = self.heard();
+        heard.stops = true;
+        for (_, _, job) in &heard.jobs {
+            job.cancel();
+        }
+    }
+
+    fn forget(&self) {
+        *self.heard() = Heard::default();
+    }
+
+    /// The job that began last: what it is, steps done, steps in all (0 if nobody knows).
+    fn now(&self) -> Option<(String, u64, usize)> {
+        let heard = self.heard();
+        let (what, total, job) = heard.jobs.last()?;
+        Some((what.clone(), job.done(), *total))
+    }
+}
+
+/// Does work in a thread of its own while this one listens for interrupts and tells `progress` what goes on:
+/// `progress(what, done, total)`.
+pub(crate) fn work<T: Send>(
+    py: Python<'_>,
+    listener: &Listener,
+    progress: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce() -> Outcome<T> + Send,
+) -> PyResult<T> {
+    let (sender, mut receiver) = channel::<()>();
+    let (found, stopped) = thread::scope(|scope| {
+        let worker = scope.spawn(move || {
+            // Dropped at the end, however it comes.
+            let _ends = sender;
+            work()
+        });
+        let mut stopped: Option<PyErr> = None;
+        loop {
+            let receiver = &mut receiver;
+            let Err(RecvTimeoutError::Timeout) = py.detach(move || receiver.recv_timeout(TICK))
+            else {
+                break;
+            };
+            let told = match (progress, listener.now()) {
+                (Some(progress), Some(now)) if stopped.is_none() => progress.call1(now).map(|_| ()),
+                _ => Ok(()),
+            };
+            if let Err(error) = told.and_then(|()| py.check_signals()) {
+                listener.stop();
+                stopped.get_or_insert(error);
+            }
+        }
+        (worker.join(), stopped)
+    });
+    if stopped.is_some() {
+        listener.forget();
+    }
+    match (stopped, found) {
+        (Some(error), _) => Err(error),
+        (None, Ok(found)) => found.map_err(|error| of_library(py, &error)),
+        (None, Err(panic)) => Err(of_panic(py, &*panic)),
+    }
+}
+
+/// Does short work in this thread.
+pub(crate) fn at_once<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce() -> Outcome<T> + Send,
+) -> PyResult<T> {
+    match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(found) => found.map_err(|error| of_library(py, &error)),
+        Err(panic) => Err(of_panic(py, &*panic)),
+    }
+}
+
+/// A panic is a defect of the library.
+fn of_panic(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
+    let said = panic.downcast_ref::<&str>().copied();
+    let said = said.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    let says = format!(
+        "modelmill met a defect of its own: {}. Please report it with the model file and the call.",
+        said.unwrap_or("no message")
+    );
+    refused(py, &says)
+}

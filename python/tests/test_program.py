@@ -1,0 +1,180 @@
+"""Every verb says what the program says: its JSON, numbers to 1e-12."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import modelmill
+
+from .conftest import RECORDINGS, ROOT
+
+MODEL = "model-spec/models/spidermill.toml"
+PAPER = "model-spec/models/spidermill-paper.toml"
+RUNS = "recordings/spidermill-mbs"
+DAYS = "recordings/spidermill-days"
+
+#: Texts that tell how to ask for something, in the words of a notebook or of a command line.
+SPELLED = {"says", "separate_by", "separate_command"}
+
+
+def same(ours: Any, program: Any, place: str = "") -> None:
+    """Holds two objects of JSON against each other."""
+    key = place.rsplit(".", 1)[-1]
+    if isinstance(program, dict):
+        assert isinstance(ours, dict) and list(ours) == list(program), place
+        for name in program:
+            same(ours[name], program[name], f"{place}.{name}")
+    elif isinstance(program, list):
+        assert isinstance(ours, list) and len(ours) == len(program), place
+        for k, (a, b) in enumerate(zip(ours, program)):
+            same(a, b, f"{place}[{k}]")
+    elif isinstance(program, float):
+        assert math.isclose(ours, program, rel_tol=1e-12, abs_tol=1e-300), (place, ours, program)
+    elif key in SPELLED and isinstance(program, str):
+        assert isinstance(ours, str), place
+    else:
+        assert ours == program, (place, ours, program)
+
+
+Program = Callable[..., Any]
+
+
+@pytest.fixture(scope="module")
+def m() -> modelmill.Model:
+    return modelmill.load(ROOT / MODEL)
+
+
+def test_equations_and_check(program: Program) -> None:
+    for path in (PAPER, "model-spec/models/scara.toml"):
+        model = modelmill.load(path)
+        same(model.equations().to_dict(), program("equations", path, "--json"))
+        same(model.check().to_dict(), program("check", path, "--json"))
+        told = program("equations", path, "--json")["base"]
+        assert model.p_min.names == [one["name"] for one in told]
+        assert model.p_min.expressions == [one["expression"] for one in told]
+
+
+def test_compare(program: Program, m: modelmill.Model) -> None:
+    run = f"{RUNS}/plain-check.csv"
+    found = m.compare(run)
+    same(found.to_dict(), program("compare", MODEL, "--data", run, "--json"))
+    assert found.nrms == found.to_dict()["nrms"]
+    assert set(found.channels) == {"spindle_left", "spindle_right"}
+    options = ["--cutoff", "20", "--between", "1,6", "--trim", "5,7", "--derivatives", "positions"]
+    options += ["--smoothing", "savitzky-golay", "--decimate", "2", "--band", "8"]
+    found = m.compare(
+        run, cutoff_hz=20, between=(1, 6), trim=(5, 7), source="positions", smoothing="savitzky_golay", decimate=2, band_hz=8
+    )
+    same(found.to_dict(), program("compare", MODEL, "--data", run, "--json", *options))
+
+
+@pytest.mark.parametrize(
+    ("options", "flags"),
+    [
+        ({}, []),
+        ({"weights": "channels", "robust": 1.345}, ["--weights", "channels", "--robust"]),
+        ({"prior": 0.2}, ["--prior", "0.2"]),
+        ({"physical": True}, ["--physical"]),
+        ({"essential": True, "standstill": 0.01}, ["--essential", "--standstill", "0.01"]),
+    ],
+)
+def test_identify(program: Program, m: modelmill.Model, options: dict[str, Any], flags: list[str]) -> None:
+    fit, check = f"{RUNS}/plain-fit.csv", f"{RUNS}/plain-check.csv"
+    found = m.identify(fit, check=check, **options)
+    told = program("identify", MODEL, "--data", fit, "--check", check, "--json", *flags)
+    same(found.to_dict(), told)
+    assert [one.value for one in found.parameters] == [one["value"] for one in told["parameters"]]
+    assert np.array_equal(found.values, [one["value"] for one in told["parameters"]])
+
+
+def test_a_fit_takes_the_place_of_nominal_values(program: Program, m: modelmill.Model, tmp_path: Any) -> None:
+    fit, check = f"{RUNS}/plain-fit.csv", f"{RUNS}/plain-check.csv"
+    identified = m.identify(fit)
+    path = tmp_path / "fit.json"
+    identified.save(path)
+    told = program("compare", MODEL, "--data", check, "--parameters", str(path), "--json")
+    same(m.compare(check, parameters=path).to_dict(), told)
+    by_value = m.compare(check, parameters=identified).to_dict()
+    by_model = identified.model.compare(check).to_dict()
+    # What is left of the forces here is rounding, which a last digit of a parameter changes.
+    for found in (by_value, by_model):
+        assert found["nrms"] == pytest.approx(told["nrms"], rel=1e-6)
+
+
+def test_diagnose_and_what_follows_from_it(program: Program, m: modelmill.Model) -> None:
+    fit, check = f"{RUNS}/with-rods-fit.csv", f"{RUNS}/with-rods-check.csv"
+    found = m.diagnose(fit, check=check)
+    same(found.to_dict(), program("diagnose", MODEL, "--data", fit, "--check", check, "--json"))
+    assert found.verdict == "missing_effect"
+    assert [effect.kind for effect in found.effects] == ["rod_inertia"]
+    assert found.model is not None and "rod_inertia" in found.model.text
+    before, after = (model.identify(fit, check=check).check for model in (m, found.model))
+    assert before is not None and after is not None
+    assert before.nrms is not None and after.nrms is not None and after.nrms < 0.5 * before.nrms
+    page = found.report()
+    assert page.html.startswith("<!") and "</html>" in page.html
+    assert "--data" not in str(found) and "modelmill " not in str(found)
+
+
+def test_runs(program: Program) -> None:
+    path = f"{DAYS}/spidermill-friction.toml"
+    model = modelmill.load(path)
+    days = [f"{DAYS}/{name}.csv" for name in ("monday", "tuesday", "with-load")]
+    found = model.runs(days)
+    same(found.to_dict(), program("runs", path, "--data", *days, "--json"))
+    assert found.changes
+    assert "</html>" in found.report().html
+
+
+def test_runs_that_cannot_be_read_are_named(program: Program, tmp_path: Any) -> None:
+    path = f"{DAYS}/spidermill-friction.toml"
+    days = [f"{DAYS}/monday.csv", "nowhere.csv", f"{DAYS}/tuesday.csv"]
+    found = modelmill.load(path).runs(days)
+    same(found.to_dict(), program("runs", path, "--data", *days, "--json"))
+    assert [one["file"] for one in found.unread] == ["nowhere.csv"]
+
+
+def test_excite(program: Program, tmp_path: Any) -> None:
+    path = "model-spec/models/two_link.toml"
+    limits = {"q1": (-1.0, 1.0), "q1_d": 2.0, "q2": (-1.5, 1.5), "q2_d": 3.0}
+    found = modelmill.load(path).excite(limits=limits, harmonics=3, period=5, random=20, starts=1, rate=100)
+    out = tmp_path / "motion.csv"
+    flags = ["--limits", "q1=-1:1,q1_d=2,q2=-1.5:1.5,q2_d=3", "--harmonics", "3", "--period", "5", "--random", "20"]
+    told = program("excite", path, *flags, "--starts", "1", "--rate", "100", "--out", str(out), "--json")
+    same(found.to_dict(), told)
+    written = np.genfromtxt(out, delimiter=",", names=True)
+    assert np.allclose(found.t, written["t"], atol=1e-12)
+    assert np.allclose(found.q[:, 1], written["q2"], atol=1e-9)
+    assert np.abs(found.q[:, 0]).max() <= 1.0 + 1e-9
+
+
+def test_an_effect_that_is_added(program: Program, m: modelmill.Model, tmp_path: Any) -> None:
+    better = m.with_effect("coulomb_friction", ["spindle_left", "spindle_right"], Fc=25.0)
+    path = tmp_path / "better.toml"
+    program("add", MODEL, "coulomb_friction", "--at", "spindle_left,spindle_right", "--set", "Fc=25.0", "--out", str(path), "--json")
+    assert better.text == path.read_text()
+    same(better.equations().to_dict()["base"], program("equations", str(path), "--json")["base"])
+
+
+def test_states_along_a_recording_have_the_programs_forces(m: modelmill.Model, tmp_path: Any) -> None:
+    """`evaluate` of the program beside `inverse_dynamics` at prepared states."""
+    import subprocess
+
+    from .conftest import ROOT
+
+    run = RECORDINGS / "spidermill-mbs" / "plain-check.csv"
+    out = tmp_path / "forces.csv"
+    binary = ROOT / "target" / "debug" / "modelmill"
+    if not binary.is_file():
+        pytest.skip("the program is not built")
+    subprocess.run([binary, "evaluate", MODEL, "--data", str(run), "--cutoff", "20", "--out", str(out)], check=True, cwd=ROOT)
+    written = np.genfromtxt(out, delimiter=",", names=True)
+    read = m.recording(run, cutoff_hz=20)
+    forces = m.inverse_dynamics(read.q, read.qd, read.qdd)
+    for k, name in enumerate(m.drives):
+        assert np.allclose(forces[:, k], written[name], rtol=1e-9, atol=1e-6)
