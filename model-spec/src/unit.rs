@@ -85,6 +85,8 @@ impl Dimension {
     pub(crate) const ACCELERATION: Self = Self::new([0, 1, -2, 0]);
     pub(crate) const FORCE: Self = Self::new([1, 1, -2, 0]);
     pub(crate) const TORQUE: Self = Self::new([1, 2, -2, 0]);
+    pub(crate) const STIFFNESS: Self = Self::new([1, 0, -2, 0]);
+    pub(crate) const DAMPING: Self = Self::new([1, 0, -1, 0]);
     pub(crate) const VELOCITY: Self = Self::new([0, 1, -1, 0]);
     pub(crate) const RATE: Self = Self::new([0, 0, -1, 0]);
     pub(crate) const ANGULAR_ACCELERATION: Self = Self::new([0, 0, -2, 0]);

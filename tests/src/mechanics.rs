@@ -515,6 +515,13 @@ impl<'a> Numbers<'a> {
                 let (pose, change) = (&poses[lump.frame.0], &displaced[lump.frame.0]);
                 self.add_lump(&mut balance, pose, change, lump, &gravity);
             }
+            if let (Some(Mechanics::Strut), [Place::Point(a), Place::Point(b)]) =
+                (effect.mechanics, effect.places.as_slice())
+            {
+                let ends = self.ends([*a, *b], [&poses, &displaced]);
+                let values = [0, 1, 2].map(|i| self.parameters[effect.terms[i].parameter.0]);
+                add_strut(&mut balance, ends, values);
+            }
             let motions: Vec<Option<Jet>> = (effect.places.iter())
                 .map(|place| match place {
                     Place::Drive(d) => Some(drives[d.0]),
@@ -528,7 +535,10 @@ impl<'a> Numbers<'a> {
                 if let (Some(Mechanics::Rod), Place::Drive(d)) = (effect.mechanics, place) {
                     let [second, first, mass] =
                         [0, 1, 2].map(|i| self.parameters[effect.terms[i].parameter.0]);
-                    let ends = self.ends(d.0, [&poses, &displaced]);
+                    let DriveKind::Linear { from, to } = self.mechanism.drives[d.0].kind else {
+                        panic!("a rod lies along a linear drive");
+                    };
+                    let ends = self.ends([from, to], [&poses, &displaced]);
                     add_rod(&mut balance, ends, [second, first, mass], &gravity);
                 }
                 if effect.mechanics.is_some() {
@@ -602,12 +612,10 @@ impl<'a> Numbers<'a> {
     }
 
     /// Positions of a linear drive's points in several motions.
-    fn ends(&self, drive: usize, motions: [&[Pose]; 2]) -> [[[Jet; 3]; 2]; 2] {
-        let DriveKind::Linear { from, to } = self.mechanism.drives[drive].kind else {
-            panic!("a rod lies along a linear drive");
-        };
+    /// Two points along each of two motions.
+    fn ends(&self, points: [PointIdx; 2], motions: [&[Pose]; 2]) -> [[[Jet; 3]; 2]; 2] {
         motions.map(|poses| {
-            [from, to].map(|point| {
+            points.map(|point| {
                 let point = &self.mechanism.points[point.0];
                 poses[point.frame.0].point(self.vector(&point.at))
             })
@@ -703,6 +711,22 @@ fn add_rod(
             balance.add(particle * change[i].0[1] * (moves[i].0[2] - gravity[i]));
         }
     }
+}
+
+/// The virtual work of what pulls two points together by a constant, by their distance and by its rate.
+fn add_strut(
+    balance: &mut Balance,
+    motions: [[[Jet; 3]; 2]; 2],
+    [constant, stiffness, damping]: [f64; 3],
+) {
+    let [moves, change] = motions.map(|[a, b]| {
+        let d: [Jet; 3] = std::array::from_fn(|i| b[i] - a[i]);
+        (0..3)
+            .fold(Jet::constant(0.0), |sum, i| sum + d[i] * d[i])
+            .sqrt()
+    });
+    let pull = constant + stiffness * moves.0[0] + damping * moves.0[1];
+    balance.add(pull * change.0[1]);
 }
 
 fn quantity(motion: Jet, load: f64, other: Jet) -> impl Fn(PlaceQuantity) -> f64 {

@@ -50,8 +50,8 @@ pub use evidence::Evidence;
 pub use laws::{Factor, Law, Product, Proposal, Shape, Site, Term, Variable};
 pub use noise::{ROUNDING, effective_samples, white_noise};
 pub use problem::{
-    Candidate, Choice, Effect, EffectParameter, Fault, Layout, Nature, NoSupply, Problem, Reading,
-    Sign, Source, Stretch, Supply,
+    Candidate, Carried, Choice, Effect, EffectParameter, Fault, Layout, Nature, NoSupply, Problem,
+    Reading, Sign, Source, Stretch, Supply,
 };
 pub use readings::readings;
 pub use tilt::{Sensitivity, Tilt};

@@ -159,13 +159,24 @@ pub enum Nature {
     Disturbance,
 }
 
+/// Which candidates that depend on what the drives carry are asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Carried {
+    /// All, with few values of their constants.
+    All,
+    /// One, with many values of its constant.
+    Of(usize),
+    /// One, with a value of its constant.
+    At(usize, f64),
+}
+
 /// Columns that are made while the search goes on.
 pub trait Supply {
     /// Columns of a candidate for another value of the constant that is searched for, if they can be had.
     fn finer(&self, candidate: usize, constant: f64) -> Option<Vec<Column>>;
 
-    /// Columns of candidates that depend on what the drives carry: of all, or of one.
-    fn carried(&self, load: &Column, only: Option<usize>) -> Vec<(usize, Vec<Column>)>;
+    /// Columns of candidates that depend on what the drives carry, for each value of a constant that is tried.
+    fn carried(&self, load: &Column, which: Carried) -> Vec<(usize, Vec<Choice>)>;
 
     /// Places on which laws that no library holds may act; asked where something stays unexplained.
     fn sites(&self) -> Vec<Site> {
@@ -181,7 +192,7 @@ impl Supply for NoSupply {
         None
     }
 
-    fn carried(&self, _: &Column, _: Option<usize>) -> Vec<(usize, Vec<Column>)> {
+    fn carried(&self, _: &Column, _: Carried) -> Vec<(usize, Vec<Choice>)> {
         Vec::new()
     }
 }

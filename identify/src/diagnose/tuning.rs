@@ -2,7 +2,7 @@
 
 use super::bench::{Bench, Pick};
 use super::column::Column;
-use super::problem::Source;
+use super::problem::{Carried, Source};
 
 impl Bench<'_> {
     /// Chooses the constants of each effect of a set anew, beside those of the others.
@@ -14,6 +14,13 @@ impl Bench<'_> {
                 let candidate = picks[i].candidate;
                 match &problem.candidates[candidate].source {
                     Source::Columns(choices) if choices.len() > 1 => {}
+                    Source::Carried if !picks[i].constants.is_empty() => {
+                        let rank = picks[i].rank;
+                        if let Some(anew) = self.carried_anew(&picks, i) {
+                            picks[i] = Pick { rank, ..anew };
+                        }
+                        continue;
+                    }
                     _ => continue,
                 }
                 let mut others = picks.clone();
@@ -39,14 +46,22 @@ impl Bench<'_> {
         let supply = self.supply;
         for i in 0..picks.len() {
             let candidate = picks[i].candidate;
-            let Source::Columns(choices) = &problem.candidates[candidate].source else {
-                continue;
-            };
             let [(name, value)] = picks[i].constants.as_slice() else {
                 continue;
             };
             let (name, value) = (name.clone(), *value);
-            let mut grid: Vec<f64> = choices.iter().map(|c| c.constants[0].1).collect();
+            let mut grid: Vec<f64> = match &problem.candidates[candidate].source {
+                Source::Columns(choices) => choices.iter().map(|c| c.constants[0].1).collect(),
+                // Values with what the drives carry by this set.
+                Source::Carried => (self
+                    .supply
+                    .carried(&self.load(&picks), Carried::Of(candidate)))
+                .into_iter()
+                .flat_map(|(_, choices)| choices)
+                .filter_map(|choice| Some(choice.constants.first()?.1))
+                .collect(),
+                _ => continue,
+            };
             grid.sort_by(f64::total_cmp);
             // Between its neighbours on the grid, but not far; beyond the grid's ends there is nothing to look for.
             let below = grid.iter().copied().filter(|x| *x < value);
@@ -71,8 +86,16 @@ impl Bench<'_> {
             let mut others = picks.clone();
             others.remove(i);
             let beside = self.beside(&others);
+            let load = (problem.candidates[candidate].source == Source::Carried)
+                .then(|| self.load(&picks));
             let at = |x: f64| -> Option<(f64, Vec<Column>)> {
-                let columns = supply.finer(candidate, unscale(x))?;
+                let columns = match &load {
+                    Some(load) => {
+                        let made = supply.carried(load, Carried::At(candidate, unscale(x)));
+                        made.into_iter().next()?.1.pop()?.columns
+                    }
+                    None => supply.finer(candidate, unscale(x))?,
+                };
                 Some((self.explained_by(&columns, &beside), columns))
             };
             let Some(best) = golden(scale(low), scale(high), &at) else {

@@ -185,6 +185,9 @@ pub(super) fn common_load(
     if let Some(n) = n_places(kind).filter(|n| *n != names.len()) {
         let (word, why) = match n {
             1 => ("one place", "it acts on one place at a time"),
+            _ if kind.mechanics.is_some() => {
+                ("two places", "it acts along the line between two points")
+            }
             _ if kind.other.is_some() => (
                 "two places",
                 "it acts on the first with the motion of the second",

@@ -237,6 +237,7 @@ fn effect(
             for (name, place) in at.entries.iter().zip(&places) {
                 way.entry().check_place(name, *place, scene, log);
             }
+            way.entry().check_places(&at.entries, &places, scene, log);
             if log.n_errors() > before {
                 return None;
             }

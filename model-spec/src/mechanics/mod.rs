@@ -7,6 +7,7 @@ mod delay;
 mod part;
 mod placement;
 mod rod;
+mod strut;
 mod tilt;
 
 use crate::build::effect_places::Scene;
@@ -14,7 +15,7 @@ use crate::build::symbols::Symbols as Names;
 use crate::diagnostic::Log;
 use crate::exact::Exact;
 use crate::kinds::ActsOn;
-use crate::mechanism::{Bodies, Constant, Effect, EffectTerm, Mechanism, Part, Place};
+use crate::mechanism::{Bodies, Constant, Effect, EffectTerm, Mechanism, Part, Place, PointIdx};
 use crate::schema::EffectEntry;
 use crate::unit::Dimension;
 use crate::values::Name;
@@ -29,6 +30,9 @@ words! {
     /// first order (kg m), and the mass (kg). With `a` the first point and `u` the unit vector along the drive, the
     /// generalised force is `du'(Jr u'' + Sr (a'' - g)) + da'(Sr u'' + mr (a'' - g))` (d'Alembert).
     "rod" => Rod,
+    /// A passive element along the line between two points. The terms are a constant pull (N), one by the distance `l` of
+    /// the points (N/m) and one by its rate (N s/m): the generalised force is `(F0 + k l + Fv l') dl/dq`.
+    "strut" => Strut,
     /// The moments of lumped masses are taken where their forces are.
     "placement" => Placement,
     /// Differences of one part from what the model file says of it.
@@ -44,6 +48,7 @@ impl Mechanics {
     pub(crate) fn entry(self) -> &'static dyn Entry {
         match self {
             Self::Rod => &rod::Rod,
+            Self::Strut => &strut::Strut,
             Self::Placement => &placement::Placement,
             Self::Part => &part::Difference,
             Self::Tilt => &tilt::Tilt,
@@ -85,6 +90,11 @@ impl Mechanics {
     /// Which of some places it acts on as one, by their positions in the list; `None` if on each by itself.
     pub fn groups(self, mechanism: &Mechanism, places: &[Place]) -> Option<Vec<Vec<usize>>> {
         self.entry().groups(mechanism, places)
+    }
+
+    /// Pairs of points between which it may act; `None` if it acts on single places.
+    pub fn pairs(self, mechanism: &Mechanism) -> Option<Vec<[PointIdx; 2]>> {
+        self.entry().pairs(mechanism)
     }
 
     /// Whether it is one property of the whole mechanism, which it can have only once.
@@ -129,6 +139,10 @@ pub(crate) trait Entry: Sync {
 
     /// Reports a place of an effect where there is nothing to act on.
     fn check_place(&self, _name: &Name, _place: Place, _scene: &Scene<'_>, _log: &mut Log) {}
+
+    /// Reports places of an effect that do not go together.
+    fn check_places(&self, _names: &[Name], _places: &[Place], _scene: &Scene<'_>, _log: &mut Log) {
+    }
 
     /// See [`Mechanics::parameters_at`].
     fn parameters_at(&self, _place: Place, _parts: &[Part]) -> Option<Vec<&'static str>> {
@@ -180,6 +194,11 @@ pub(crate) trait Entry: Sync {
     /// See [`Mechanics::has_effect_at`].
     fn has_effect_at(&self, _mechanism: &Mechanism, _place: Place) -> bool {
         true
+    }
+
+    /// See [`Mechanics::pairs`].
+    fn pairs(&self, _mechanism: &Mechanism) -> Option<Vec<[PointIdx; 2]>> {
+        None
     }
 
     /// See [`Mechanics::groups`].

@@ -290,6 +290,7 @@ fn every_kind_can_be_added() {
     for kind in library() {
         let at: &[&str] = match kind.mechanics {
             Some(Mechanics::Placement) => &["R3m"],
+            Some(Mechanics::Strut) => &["B_left", "R3m"],
             Some(Mechanics::Part) => &["crank_left"],
             Some(Mechanics::Tilt) => &["base"],
             Some(Mechanics::Delay) => &["force"],

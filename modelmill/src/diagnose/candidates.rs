@@ -32,6 +32,15 @@ pub(crate) struct Single {
     pub given: Vec<(String, f64)>,
 }
 
+impl Single {
+    /// The symbol of the constant whose value is tried.
+    pub(crate) fn range(&self) -> Option<&str> {
+        let is_range = |c: &&(String, String, Search)| matches!(c.2, Search::Range { .. });
+        let found = self.constants.iter().find(is_range);
+        found.map(|(symbol, _, _)| symbol.as_str())
+    }
+}
+
 /// A candidate: entries whose columns add up, since they share their parameters.
 pub(crate) struct Entry {
     pub singles: Vec<usize>,

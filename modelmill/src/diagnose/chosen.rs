@@ -269,7 +269,8 @@ impl Chosen {
         all: &Runs<'_>,
         load: &Column,
     ) -> Outcome<Option<(Candidate, Vec<Choice>)>> {
-        let made = columns(&self.candidates, model, all)?;
+        let mut made = columns(&self.candidates, model, all)?;
+        let grids = std::mem::take(&mut made.grids);
         if let Some(effect) = made.undefined.first() {
             return Err(Error::input(format!(
                 "`{}` at {} has no finite value somewhere along the motion; look at the quotients, roots and exponentials \
@@ -290,10 +291,11 @@ impl Chosen {
         let choices = match &candidate.source {
             Source::Columns(choices) => choices.clone(),
             Source::Carried => {
-                let made = carried(&self.candidates, model, all, load, None)?;
+                let tried = |single: usize| grids[single].clone();
+                let made = carried(&self.candidates, model, all, load, None, &tried)?;
                 made.into_iter()
                     .next()
-                    .map_or_else(Vec::new, |(_, c)| only(c))
+                    .map_or_else(Vec::new, |(_, choices)| choices)
             }
             Source::Tilt(tilt) => {
                 let level = vec![0.0; tilt.axes.len()];

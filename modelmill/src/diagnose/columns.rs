@@ -22,17 +22,8 @@ const CONSTANT: &str = "force_offset";
 
 /// Candidates with their columns; where each comes from is said in the same order.
 pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) -> Outcome<Made> {
-    let is_known = |single: &Single| single.sort == Sort::Known;
     let is_linear = |single: &Single| single.constants.iter().any(|c| c.2 == Search::Linear);
-    let grids: Vec<Vec<f64>> = if candidates.singles.iter().all(is_known) {
-        vec![vec![1.0]; candidates.singles.len()]
-    } else {
-        let motions = Motions::new(model, all)?;
-        let scales = shared_scales(candidates, &motions);
-        (candidates.singles.iter().zip(scales))
-            .map(|(single, scale)| grid(single, scale))
-            .collect()
-    };
+    let grids = grids(candidates, model, all)?;
     // Nothing changes in a second round where no constant does.
     let of_known = if candidates.singles.iter().any(is_linear) {
         2
@@ -118,7 +109,20 @@ pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) ->
         candidates: made,
         origins,
         undefined,
+        grids,
     })
+}
+
+/// Values that are tried for the constant of each single candidate; one where it has none.
+fn grids(candidates: &Candidates, model: &Model, all: &Runs<'_>) -> Outcome<Vec<Vec<f64>>> {
+    let is_known = |single: &Single| single.constants.is_empty();
+    if candidates.singles.iter().all(is_known) {
+        return Ok(vec![vec![1.0]; candidates.singles.len()]);
+    }
+    let motions = Motions::new(model, all)?;
+    let scales = shared_scales(candidates, &motions);
+    let singles = candidates.singles.iter().zip(scales);
+    Ok(singles.map(|(single, scale)| grid(single, scale)).collect())
 }
 
 /// Whether a column holds numbers only.
@@ -166,6 +170,8 @@ pub(crate) struct Made {
     pub(crate) origins: Vec<Origin>,
     /// Effects whose expressions have no finite value somewhere along the recordings.
     pub(crate) undefined: Vec<Effect>,
+    /// Values that are tried for the constant of each single candidate.
+    pub(crate) grids: Vec<Vec<f64>>,
 }
 
 /// The entry of the candidates that a candidate in numbers comes from, and which of its parameters have an effect; `None`
@@ -296,7 +302,7 @@ fn candidate(
         let candidate = Candidate {
             effect,
             parameters,
-            searched: 0,
+            searched: usize::from(first.range().is_some()),
             is_part_of_load,
             refines: kind.refines.clone(),
             nature: Nature::Effect,
@@ -315,12 +321,11 @@ fn candidate(
         }
         columns
     };
-    let is_range = |c: &&(String, String, Search)| matches!(c.2, Search::Range { .. });
-    let searched = first.constants.iter().find(is_range);
+    let searched = first.range();
     let mut choices: Vec<Choice> = match searched {
-        Some((symbol, _, _)) => (grids[entry.singles[0]].iter().enumerate())
+        Some(symbol) => (grids[entry.singles[0]].iter().enumerate())
             .map(|(round, value)| Choice {
-                constants: vec![(symbol.clone(), *value)],
+                constants: vec![(symbol.to_owned(), *value)],
                 columns: sum(round),
             })
             .collect(),
@@ -376,18 +381,19 @@ fn candidate(
 
 /// Whether what a kind adds is part of what the drives carry.
 fn is_part_of_load(kind: &EffectKind) -> bool {
-    kind.on.contains(&ActsOn::Point) || kind.mechanics.is_some_and(Mechanics::is_part_of_load)
+    (kind.mechanics).map_or(kind.on.contains(&ActsOn::Point), Mechanics::is_part_of_load)
 }
 
 /// Columns of candidates that depend on what the drives carry, of all or of one entry, for loads that are stacked and decimated
-/// like the forces.
+/// like the forces, and for some values of each single candidate's constant.
 pub(crate) fn carried(
     candidates: &Candidates,
     model: &Model,
     all: &Runs<'_>,
     load: &Column,
     only: Option<usize>,
-) -> Outcome<Vec<(usize, Vec<Column>)>> {
+    tried: &dyn Fn(usize) -> Vec<f64>,
+) -> Outcome<Vec<(usize, Vec<Choice>)>> {
     let is_wanted = |k: &usize| only.is_none_or(|e| candidates.entries[e].singles.contains(k));
     let which: Vec<usize> = (0..candidates.singles.len())
         .filter(|k| candidates.singles[*k].sort == Sort::Carried && is_wanted(k))
@@ -413,28 +419,58 @@ pub(crate) fn carried(
         start += kept;
     }
     let all: Vec<(&Stretch, bool)> = loaded.iter().map(|(one, check)| (one, *check)).collect();
-    let value = |_: usize, search: &Search| match search {
-        Search::Linear => 0.0,
-        Search::Range { from, to, .. } => 0.5 * (from + to),
-    };
-    let found = singles(candidates, &which, model, &all, Sort::Carried, &value)?;
+    let tried: Vec<Vec<f64>> = which.iter().map(|k| tried(*k)).collect();
+    let place = |single: usize| which.iter().position(|w| *w == single);
+    // `found[single][round]`.
+    let mut found: Vec<Vec<Vec<Column>>> = vec![Vec::new(); which.len()];
+    for round in 0..tried.iter().map(Vec::len).max().unwrap_or(0) {
+        let takes_part = |k: &usize| round < tried[*k].len();
+        let of_round: Vec<usize> = (0..which.len()).filter(takes_part).collect();
+        let value = |single: usize, search: &Search| match search {
+            Search::Linear => 0.0,
+            Search::Range { .. } => place(single).map_or(1.0, |k| tried[k][round]),
+        };
+        let singles_of_round: Vec<usize> = of_round.iter().map(|k| which[*k]).collect();
+        let columns = singles(
+            candidates,
+            &singles_of_round,
+            model,
+            &all,
+            Sort::Carried,
+            &value,
+        )?;
+        for (k, columns) in of_round.into_iter().zip(columns) {
+            found[k].push(columns);
+        }
+    }
     let mut made = Vec::new();
     let wanted = candidates.entries.iter().enumerate();
     for (k, entry) in wanted.filter(|(k, _)| only.is_none_or(|only| only == *k)) {
-        let place = |single: &usize| which.iter().position(|w| w == single);
-        let mut places = entry.singles.iter().filter_map(place);
-        let Some(first) = places.next() else { continue };
-        let mut columns = found[first].clone();
-        for other in places {
-            for (column, more) in columns.iter_mut().zip(&found[other]) {
-                column.add(1.0, more);
+        let places: Vec<usize> = entry.singles.iter().filter_map(|s| place(*s)).collect();
+        let Some((first, others)) = places.split_first() else {
+            continue;
+        };
+        let symbol = candidates.singles[entry.singles[0]].range();
+        let choice = |(round, value): (usize, &f64)| {
+            let mut columns = found[*first][round].clone();
+            for other in others {
+                for (column, more) in columns.iter_mut().zip(&found[*other][round]) {
+                    column.add(1.0, more);
+                }
             }
-        }
-        // Along these loads it says nothing.
-        if !columns.iter().all(is_finite) {
-            columns.fill(Column(vec![None; model.drives().len()]));
-        }
-        made.push((k, columns));
+            // Along these loads it says nothing.
+            if !columns.iter().all(is_finite) {
+                columns.fill(Column(vec![None; model.drives().len()]));
+            }
+            Choice {
+                constants: symbol
+                    .map(|one| (one.to_owned(), *value))
+                    .into_iter()
+                    .collect(),
+                columns,
+            }
+        };
+        made.push((k, tried[*first].iter().enumerate().map(choice).collect()));
     }
     Ok(made)
 }

@@ -1,7 +1,8 @@
 //! Places at which effects of a kind may act, alone, in pairs, and alike at several.
 
 use modelmill_spec::{
-    ActsOn, Carries, DriveIdx, DriveKind, EffectKind, Mechanism, PartIdx, Place, PointIdx,
+    ActsOn, Carries, DriveIdx, DriveKind, EffectKind, Mechanics, Mechanism, PartIdx, Place,
+    PointIdx,
 };
 
 use crate::recording::free::free_bodies;
@@ -46,12 +47,9 @@ pub(crate) fn spots(mechanism: &Mechanism) -> Vec<Spot> {
             spots.push(spot(&coordinate.name, carries, ActsOn::Coordinate, place));
         }
     }
-    // What is fixed to the base feels nothing.
     for (i, point) in mechanism.points.iter().enumerate() {
-        if point.frame.0 != 0 {
-            let place = Place::Point(PointIdx(i));
-            spots.push(spot(&point.name, Carries::Mass, ActsOn::Point, place));
-        }
+        let place = Place::Point(PointIdx(i));
+        spots.push(spot(&point.name, Carries::Mass, ActsOn::Point, place));
     }
     for (i, part) in mechanism.parts.iter().enumerate() {
         let place = Place::Part(PartIdx(i));
@@ -81,6 +79,14 @@ pub(crate) fn fits(mechanism: &Mechanism, kind: &EffectKind, spot: &Spot) -> boo
     let has_unit = |units: &[(Carries, String)]| units.iter().any(|(c, _)| *c == spot.carries);
     let has_units = kind.parameters.iter().all(|p| has_unit(&p.units));
     if !kind.on.contains(&spot.sort) {
+        return false;
+    }
+    let joins_points = |mechanics: Mechanics| mechanics.pairs(mechanism).is_some();
+    if let Place::Point(point) = spot.place
+        && mechanism.points[point.0].frame.0 == 0
+        && !kind.mechanics.is_some_and(joins_points)
+    {
+        // What is fixed to the base feels nothing.
         return false;
     }
     if let Some(mechanics) = kind.mechanics {
@@ -135,6 +141,13 @@ pub(crate) fn sets<'a>(
             apart.map(|other| vec![one, *other]).collect::<Vec<_>>()
         };
         let pairs: Vec<Vec<&Spot>> = spots.iter().flat_map(with_others).collect();
+        let sets = (0..pairs.len()).map(|k| vec![k]).collect();
+        return (pairs, sets);
+    }
+    if let Some(joined) = kind.mechanics.and_then(|one| one.pairs(mechanism)) {
+        let at = |point: PointIdx| spots.iter().find(|spot| spot.place == Place::Point(point));
+        let pair = |[one, other]: [PointIdx; 2]| Some(vec![*at(one)?, *at(other)?]);
+        let pairs: Vec<Vec<&Spot>> = joined.into_iter().filter_map(pair).collect();
         let sets = (0..pairs.len()).map(|k| vec![k]).collect();
         return (pairs, sets);
     }

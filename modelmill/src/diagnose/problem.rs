@@ -2,8 +2,8 @@
 
 use modelmill_codegen::Evaluator;
 use modelmill_identify::diagnose::{
-    Column, Considered, Diagnosis, Disturbance, Effect, Problem, ROUNDING, Site, Source, Supply,
-    diagnose, drifts, readings, white_noise,
+    Carried, Choice, Column, Considered, Diagnosis, Disturbance, Problem, ROUNDING, Site, Source,
+    Supply, diagnose, drifts, readings, white_noise,
 };
 
 use crate::along::drive_rates;
@@ -15,7 +15,7 @@ use crate::stretch::Stretch;
 use crate::text::table::count;
 
 use super::candidates::{Candidates, candidates};
-use super::columns::{Origin, carried, columns, finer};
+use super::columns::{self, Origin, carried, finer};
 use super::constants::constants;
 use super::encoders::{self, encoders};
 use super::faults::take_off;
@@ -83,12 +83,13 @@ pub(crate) fn find(
     let all: Vec<(&Stretch, bool)> = (fit.iter().map(|one| (one, false)))
         .chain(check.iter().map(|one| (one, true)))
         .collect();
-    let (mut problem, mut origins, undefined) =
+    let (mut problem, made) =
         model
             .host()
             .watched("computing what each would add", 0, |_| {
                 problem(&candidates, model, &all)
             })??;
+    let mut origins = made.origins;
     hold(&mut problem, model, held);
     take_off(&mut problem, model, &all, asked.between)?;
     let units: Vec<String> = (0..model.drives().len())
@@ -111,6 +112,7 @@ pub(crate) fn find(
     let supply = Made {
         candidates: &candidates,
         origins: &origins,
+        grids: &made.grids,
         model,
         all: &all,
     };
@@ -124,7 +126,7 @@ pub(crate) fn find(
     }
     diagnosis
         .candidates
-        .extend(undefined.into_iter().map(|effect| Considered {
+        .extend(made.undefined.into_iter().map(|effect| Considered {
             effect,
             explained: 0.0,
             gain: 0.0,
@@ -156,6 +158,8 @@ fn tell(one: &mut Disturbance, model: &Model) {
 struct Made<'a> {
     candidates: &'a Candidates,
     origins: &'a [Origin],
+    /// Values that are tried for the constant of each single candidate.
+    grids: &'a [Vec<f64>],
     model: &'a Model,
     all: &'a Runs<'a>,
 }
@@ -174,21 +178,39 @@ impl Supply for Made<'_> {
         sites(self.candidates, self.model, self.all).unwrap_or_default()
     }
 
-    fn carried(&self, load: &Column, only: Option<usize>) -> Vec<(usize, Vec<Column>)> {
-        let only = match only.map(|candidate| self.origins[candidate].as_ref()) {
-            Some(Some((entry, _))) => Some(*entry),
-            Some(None) => return Vec::new(),
-            None => None,
+    fn carried(&self, load: &Column, which: Carried) -> Vec<(usize, Vec<Choice>)> {
+        let only = match which {
+            Carried::All => None,
+            Carried::Of(candidate) | Carried::At(candidate, _) => {
+                let Some((entry, _)) = &self.origins[candidate] else {
+                    return Vec::new();
+                };
+                Some(*entry)
+            }
+        };
+        let tried = |single: usize| match which {
+            Carried::All => few(&self.grids[single]),
+            Carried::Of(_) => self.grids[single].clone(),
+            Carried::At(_, value) => vec![value],
         };
         // Poses without answer were reported when the recordings were evaluated for the first time.
-        let made = carried(self.candidates, self.model, self.all, load, only).unwrap_or_default();
+        let made = carried(self.candidates, self.model, self.all, load, only, &tried);
+        let made = made.unwrap_or_default();
         let place = |entry: usize| {
             let is_its = |origin: &Origin| origin.as_ref().is_some_and(|(k, _)| *k == entry);
             self.origins.iter().position(is_its)
         };
         made.into_iter()
-            .filter_map(|(entry, columns)| Some((place(entry)?, columns)))
+            .filter_map(|(entry, choices)| Some((place(entry)?, choices)))
             .collect()
+    }
+}
+
+/// Every fourth value of a grid, from its second on: near enough to see whether anything is there.
+fn few(grid: &[f64]) -> Vec<f64> {
+    match grid {
+        [only] => vec![*only],
+        _ => grid.iter().copied().skip(1).step_by(4).collect(),
     }
 }
 
@@ -197,7 +219,7 @@ fn problem(
     candidates: &Candidates,
     model: &Model,
     all: &Runs<'_>,
-) -> Outcome<(Problem, Vec<Origin>, Vec<Effect>)> {
+) -> Outcome<(Problem, columns::Made)> {
     let measured = stack(all, |one| Ok(one.run.measured()?.to_vec()))?;
     if measured.iter().flatten().all(|force| *force == 0.0) {
         let file = all.first().map(|(one, _)| one.run.file.as_str());
@@ -216,20 +238,20 @@ fn problem(
             )));
         }
     }
-    let made = columns(candidates, model, all)?;
+    let mut made = columns::columns(candidates, model, all)?;
     let problem = Problem {
         layout: layout(model, all),
         noise: noises(&measured, all)?,
         measured: Column::new(measured),
         base: regressor(all, &Evaluator::new(&model.derivation), model)?,
-        candidates: made.candidates,
+        candidates: std::mem::take(&mut made.candidates),
         base_is_part_of_load: (0..model.base.len()).map(|k| !model.is_effect(k)).collect(),
         friction: friction(model, all)?,
         variables: variables(model, all),
         held: None,
         ..Problem::default()
     };
-    Ok((problem, made.origins, made.undefined))
+    Ok((problem, made))
 }
 
 /// Whether a base parameter keeps its nominal value.

@@ -351,3 +351,59 @@ fn a_rod_in_space_obeys_dalembert() {
     assert!(matches!(reduction.method, Method::Exact { .. }));
     assert!(reduction.without_effect.is_empty());
 }
+
+/// An element between the base and a body three joints away, and one between two bodies of loops.
+#[test]
+fn what_pulls_two_points_together_obeys_virtual_power() {
+    let values = [("F0", -240.0), ("k", 900.0), ("Fv", 35.0)];
+    let points = "[[point]]\nname = \"hook\"\non = \"base\"\nat = [0.2, -0.3, 0.4]\n\
+                  [[point]]\nname = \"eye\"\non = \"link3\"\nat = [0.1, 0.25, -0.05]\n";
+    let arm = format!(
+        "{points}{}",
+        effect("two_point_element", &["hook", "eye"], &values, &[])
+    );
+    let robot = effect("two_point_element", &["B_left", "R3m"], &values, &[]);
+    for (model, more, reach) in [("puma560", arm, 1.5), ("spidermill", robot, 0.3)] {
+        let mechanism = with(model, &more);
+        let plain = derive(&with(model, ""));
+        let case = if reach > 1.0 {
+            Case::new(&mechanism, 120, reach)
+        } else {
+            Case::near_nominal(&mechanism, 120, reach)
+        };
+        let case = case.expect("a case");
+        for figure in [
+            case.exact_rank_is_numeric_rank(),
+            case.reduction_keeps_the_forces(),
+            case.forces_satisfy_dalembert(40),
+        ] {
+            figure.unwrap_or_else(|breach| panic!("{model}: {breach}"));
+        }
+        let reduction = &case.derivation.reduction;
+        assert!(matches!(reduction.method, Method::Exact { .. }), "{model}");
+        // Nothing else pulls along that line.
+        let more = reduction.retained.len() - plain.reduction.retained.len();
+        assert_eq!(more, 3, "{model}");
+    }
+}
+
+/// Points whose distance never changes are refused at their place.
+#[test]
+fn an_element_needs_two_bodies() {
+    let path = model_file("spidermill");
+    let text = std::fs::read_to_string(&path).expect("a model");
+    for (at, says) in [
+        (
+            &["R2m", "A_left"][..],
+            "lies in the same frame as the first one",
+        ),
+        (&["R2m"][..], "takes two places"),
+        (&["R2m", "spindle_left"][..], "cannot act here"),
+    ] {
+        let more = effect("two_point_element", at, &[], &[]);
+        let file = path.to_string_lossy();
+        let failure = modelmill_spec::load(&file, &format!("{text}\n{more}"), &Disk::default());
+        let told = failure.map(|_| ()).expect_err("a refusal").to_string();
+        assert!(told.contains(says), "{told}");
+    }
+}

@@ -1,6 +1,7 @@
 //! Effects with mechanics of their own, see [`Mechanics`]: what those need that need forces, one file for each.
 
 mod rod;
+mod strut;
 
 use modelmill_spec::{Effect, Mechanics, Mechanism, PointIdx};
 
@@ -24,6 +25,7 @@ pub(crate) fn generalised_forces(
         Some(Mechanics::Rod) => {
             rod::generalised_forces(graph, mechanism, tree, projection, gravity, effect)
         }
+        Some(Mechanics::Strut) => strut::generalised_forces(graph, mechanism, tree, effect),
         // Their bodies are among those of the mechanism, and gravity is turned already.
         Some(Mechanics::Placement | Mechanics::Part | Mechanics::Tilt | Mechanics::Delay)
         | None => Ok(Vec::new()),
@@ -45,6 +47,7 @@ pub(crate) fn point_forces(
         Some(Mechanics::Rod) => {
             rod::point_forces(graph, mechanism, tree, projection, gravity, effect, values)
         }
+        Some(Mechanics::Strut) => strut::point_forces(graph, mechanism, tree, effect, values),
         Some(Mechanics::Placement | Mechanics::Part | Mechanics::Tilt | Mechanics::Delay)
         | None => Ok(Vec::new()),
     }

@@ -1,0 +1,99 @@
+//! Passive elements along the line between two points: what one that pulls its points together needs as generalised forces.
+//!
+//! With the points `a` and `b`, `d = b - a` and `l = |d|`, the pull `F0 + k l + Fv l'` needs `(F0 + k l + Fv l') dl/dq`
+//! (virtual power), where `l dl/dq = d . dd/dq` and `l l' = d . d'`.
+
+use modelmill_spec::{Effect, Mechanism, Place, PointIdx};
+
+use crate::DeriveError;
+use crate::expr::vector::Vector;
+use crate::expr::{Atom, ExprId, Graph, Unary};
+use crate::loops::stretch::position_in_base;
+use crate::tree::Tree;
+
+/// The line between the points of an effect.
+struct Line {
+    ends: [PointIdx; 2],
+    /// From the first point to the second.
+    across: Vector,
+    length: ExprId,
+}
+
+/// Model files are checked for other places; a mechanism made by a program has no element there.
+fn line(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    tree: &Tree,
+    effect: &Effect,
+) -> Result<Option<Line>, DeriveError> {
+    let [Place::Point(from), Place::Point(to)] = effect.places[..] else {
+        return Ok(None);
+    };
+    let a = position_in_base(graph, mechanism, tree, from.0)?;
+    let b = position_in_base(graph, mechanism, tree, to.0)?;
+    let across = graph.sub_vectors(&b, &a);
+    let square = graph.dot(&across, &across);
+    let length = graph.unary(Unary::Sqrt, square);
+    Ok(Some(Line {
+        ends: [from, to],
+        across,
+        length,
+    }))
+}
+
+/// Generalised forces for `F0`, `k` and `Fv` of one each.
+pub(super) fn generalised_forces(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    tree: &Tree,
+    effect: &Effect,
+) -> Result<Vec<Vec<Vec<ExprId>>>, DeriveError> {
+    let Some(line) = line(graph, mechanism, tree, effect)? else {
+        return Ok(Vec::new());
+    };
+    let per_length = graph.pow(line.length, -1);
+    let rate = rate(graph, &line);
+    let per_rate = graph.mul(rate, per_length);
+    let mut forces = vec![Vec::new(); 3];
+    for coordinate in 0..mechanism.coordinates.len() {
+        let slopes = graph.differentiate(&line.across, Atom::Coordinate(coordinate));
+        let stretched = graph.dot(&[slopes[0], slopes[1], slopes[2]], &line.across);
+        forces[0].push(graph.mul(stretched, per_length));
+        forces[1].push(stretched);
+        forces[2].push(graph.mul(stretched, per_rate));
+    }
+    Ok(vec![forces])
+}
+
+/// Forces at both ends that hold an element with given parameters.
+pub(super) fn point_forces(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    tree: &Tree,
+    effect: &Effect,
+    values: &[ExprId],
+) -> Result<Vec<(PointIdx, Vector)>, DeriveError> {
+    let Some(line) = line(graph, mechanism, tree, effect)? else {
+        return Ok(Vec::new());
+    };
+    let [constant, stiffness, damping] =
+        [0, 1, 2].map(|k| values.get(k).copied().unwrap_or(Graph::ZERO));
+    let rate = rate(graph, &line);
+    let by_distance = graph.mul(stiffness, line.length);
+    let by_rate = graph.mul(damping, rate);
+    let pull = graph.add(constant, by_distance);
+    let pull = graph.add(pull, by_rate);
+    let per_length = graph.pow(line.length, -1);
+    let pull = graph.mul(pull, per_length);
+    let at_second = graph.scale_vector(pull, &line.across);
+    let at_first = graph.sub_vectors(&[Graph::ZERO; 3], &at_second);
+    Ok(line.ends.into_iter().zip([at_first, at_second]).collect())
+}
+
+/// The rate of the distance.
+fn rate(graph: &mut Graph, line: &Line) -> ExprId {
+    let across = graph.time_derivative(&line.across);
+    let along = graph.dot(&line.across, &[across[0], across[1], across[2]]);
+    let per_length = graph.pow(line.length, -1);
+    graph.mul(along, per_length)
+}
