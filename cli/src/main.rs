@@ -68,6 +68,7 @@ fn run(host: &Host, command: &Command) -> Outcome {
         Command::Simulate(args) => commands::simulate::run(host, args),
         Command::Reduce(args) => commands::reduce::run(host, args),
         Command::Import(args) => commands::import::run(host, args),
+        Command::Export(args) => commands::export::run(host, args),
         Command::Runs(args) => commands::runs::run(host, args),
         Command::Interpret(args) => commands::interpret::run(host, args),
         Command::Excite(args) => commands::excite::run(host, args),

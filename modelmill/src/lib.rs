@@ -49,6 +49,7 @@
 //! | [`Host::simulate`] | a full-body rig along a trajectory |
 //! | [`Host::reduce`] | a rig to a planar model |
 //! | [`Host::import`] | a model file from a URDF, MJCF or SDF |
+//! | [`Model::export`] | a URDF or MJCF from a model |
 //! | [`Model::interpret`] | physical parameters from base parameters |
 //! | [`Model::excite`] | the motion that tells base parameters, or effects, apart best |
 //!
@@ -168,6 +169,7 @@ pub mod diagnose;
 pub mod error;
 pub mod evaluate;
 pub mod excite;
+pub mod export;
 pub mod generate;
 pub mod host;
 pub mod identify;

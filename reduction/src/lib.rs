@@ -9,10 +9,12 @@
 //! 3. symmetry: what shares a symbol - `draft`;
 //! 4. drives - `drive`.
 //!
-//! Beside it, [`import`](fn@import) makes a model file of a robot description of other programs.
+//! Beside it, [`import`](fn@import) makes a model file of a robot description of other programs, and [`export`](fn@export) a
+//! description of a model.
 
 mod draft;
 mod drive;
+mod export;
 mod import;
 mod names;
 mod part;
@@ -26,6 +28,7 @@ mod report;
 mod samples;
 mod write;
 
+pub use export::{ExportError, Exported, Format as ExportFormat, export};
 pub use import::{
     ImportError, Imported, ImportedJoint, LARGEST_DESCRIPTION, Options as ImportOptions, import,
 };

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use modelmill::model::Values;
 use modelmill::{Host, Model};
 
 use crate::args::estimation::{EstimatorArgs, StandstillArgs};
@@ -39,6 +40,10 @@ impl ParameterSource {
 
     /// The values of the base parameters of a model, with remarks.
     pub(crate) fn values(&self, host: &Host, model: &Model) -> Outcome<Vec<f64>> {
+        Ok(self.told(host, model)?.values)
+    }
+
+    fn told(&self, host: &Host, model: &Model) -> Outcome<Values> {
         let values = match self {
             Self::Nominal => model.nominal_values(),
             Self::Fit(path) => {
@@ -49,14 +54,14 @@ impl ParameterSource {
         for note in &values.notes {
             terminal::remark(note);
         }
-        Ok(values.values)
+        Ok(values)
     }
 
     /// The model with these values in the place of the file's.
     pub(crate) fn in_model(&self, host: &Host, model: Model) -> Outcome<Model> {
         Ok(match self {
             Self::Nominal => model,
-            Self::Fit(_) => model.with_values(&self.values(host, &model)?),
+            Self::Fit(_) => model.with_fit(&self.told(host, &model)?),
         })
     }
 
@@ -178,7 +183,7 @@ pub(crate) struct AskArgs {
     /// Hold all parameters at their nominal values, so that what is wrong with them shows too
     #[arg(long)]
     pub(crate) held: bool,
-    /// What takes the place of the nominal values: a file that `identify` wrote; with --held it is what is held
+    /// What takes the place of the nominal values, and is held: a file that `identify` wrote, as of a run without a load
     #[arg(long, value_name = "nominal|FIT.json", default_value = "nominal", value_parser = ParameterSource::parse)]
     pub(crate) parameters: ParameterSource,
     #[command(flatten)]

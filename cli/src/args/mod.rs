@@ -27,7 +27,7 @@ pub(crate) use data::{
     ParameterSource, RecordingsArgs, ReportArgs,
 };
 pub(crate) use motion::{CriterionArg, ExciteArgs, ExperimentArgs, SimulateArgs};
-pub(crate) use rig::{ImportArgs, ReduceArgs};
+pub(crate) use rig::{ExportArgs, ImportArgs, ReduceArgs};
 
 /// From a model file to base parameters, equations, fast Rust, and parameters from measurements.
 #[derive(Debug, Parser)]
@@ -183,7 +183,7 @@ pub(crate) enum Command {
         modelmill reduce linkage.toml --out model.toml --json"
     )]
     Reduce(ReduceArgs),
-    /// Make a model file of a URDF, as a starting point
+    /// Make a model file of a URDF, MJCF or SDF, as a starting point
     #[command(
         after_help = "Macros (xacro) must be expanded first. Links behind fixed joints join the body that carries \
         them; every body gets its ten linear parameters.\n\n\
@@ -192,6 +192,15 @@ pub(crate) enum Command {
         modelmill check robot.toml"
     )]
     Import(ImportArgs),
+    /// Write a model as a URDF or MJCF, for simulators
+    #[command(
+        after_help = "Bodies have the nominal values of the file, or with --parameters the physical ones of a fit made by `identify --physical`. \
+        What the format cannot say is told: loops and drives between two points need MJCF.\n\n\
+        Examples (from the project's root):\n  \
+        modelmill export model-spec/models/panda.toml --out panda.urdf\n  \
+        modelmill export model-spec/models/five_bar.toml --out five_bar.xml"
+    )]
+    Export(ExportArgs),
     /// Write an atlas of mechanisms: picture, joints, loops, base parameters with and without gravity, operations
     #[command(
         after_help = "Base parameters are counted for the bodies alone; a page of its own for each mechanism has them as expressions.\n\n\

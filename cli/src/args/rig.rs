@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use modelmill::export::Format;
 
 use super::drawing::parse_value;
 
@@ -43,4 +44,26 @@ pub(crate) struct ImportArgs {
     /// Write the model to this file
     #[arg(long, value_name = "MODEL.toml")]
     pub(crate) out: PathBuf,
+}
+
+/// `export`.
+#[derive(Debug, Args)]
+pub(crate) struct ExportArgs {
+    /// Model file (TOML)
+    pub(crate) model: PathBuf,
+    /// Values of a fit by `identify --physical` in the place of the nominal ones
+    #[arg(long, value_name = "FIT.json")]
+    pub(crate) parameters: Option<PathBuf>,
+    /// Format; by the ending of --out if not given (.urdf, .xml)
+    #[arg(long, value_name = "urdf|mjcf", value_parser = parse_format)]
+    pub(crate) format: Option<Format>,
+    /// Write the description to this file
+    #[arg(long, value_name = "FILE.urdf|FILE.xml")]
+    pub(crate) out: PathBuf,
+}
+
+fn parse_format(text: &str) -> Result<Format, String> {
+    let named = |one: &Format| one.name() == text;
+    let found = Format::ALL.into_iter().find(named);
+    found.ok_or_else(|| "expected `urdf` or `mjcf`".to_owned())
 }

@@ -13,6 +13,7 @@ pub(crate) mod equations;
 pub(crate) mod evaluate;
 pub(crate) mod excite;
 pub(crate) mod experiment;
+pub(crate) mod export;
 pub(crate) mod generate;
 pub(crate) mod identify;
 pub(crate) mod import;
@@ -33,7 +34,7 @@ use modelmill::model::Loaded;
 use modelmill::recording::{Reading, Recording};
 use modelmill::{Host, Model};
 
-use crate::args::AskArgs;
+use crate::args::{AskArgs, ParameterSource};
 use crate::failure::{Failure, Outcome};
 use crate::terminal;
 
@@ -121,9 +122,14 @@ pub(crate) fn diagnose(host: &Host, args: &AskArgs, question: Question) -> Outco
 }
 
 impl AskArgs {
-    /// Which parameters are held.
+    /// Which parameters are held: with those of a fit, what is different from then is asked for, and free ones would take it up.
     pub(crate) fn held(&self) -> Held {
-        if self.held { Held::All } else { Held::Known }
+        let is_fit = matches!(self.parameters, ParameterSource::Fit(_));
+        if self.held || is_fit {
+            Held::All
+        } else {
+            Held::Known
+        }
     }
 }
 

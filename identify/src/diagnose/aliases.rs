@@ -46,7 +46,7 @@ impl Bench<'_> {
                 // What takes nothing off cannot be stood in for.
                 let own = left - squares;
                 let stands_in = own > NOTHING * left && left - trial.squares > STANDS_IN * own;
-                (worse < APART && stands_in && trial.wrong_sign.is_empty()).then_some(worse)
+                (worse < APART && stands_in && trial.is_possible()).then_some(worse)
             };
             let mut found: Vec<Alias> = Vec::new();
             for candidate in self.present.clone().iter().flatten() {

@@ -15,6 +15,9 @@ use super::problem::{Candidate, Choice, EffectParameter, Problem, Sign, Source, 
 /// If an estimate of the wrong sign takes off less than this share of the squared error, the sign is chance.
 const SIGN_IS_CHANCE: f64 = 0.05;
 
+/// Two effects of which so much of the squares of either is left together are one, badly written.
+const CANCELLED: f64 = 0.25;
+
 /// An effect that was picked, with the columns that it has for its choice of constants.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Pick {
@@ -41,8 +44,17 @@ pub(crate) struct Trial {
     pub(crate) freedoms: usize,
     /// Effects whose estimates have the wrong sign, by position.
     pub(crate) wrong_sign: Vec<usize>,
+    /// Effects that do little but cancel another one at their place, by position.
+    pub(crate) cancelling: Vec<usize>,
     /// The information criterion by which sets are compared; less is better.
     pub(crate) score: f64,
+}
+
+impl Trial {
+    /// Whether a machine could be so.
+    pub(crate) fn is_possible(&self) -> bool {
+        self.wrong_sign.is_empty() && self.cancelling.is_empty()
+    }
 }
 
 /// Columns, weights, and what every candidate looks like at present.
@@ -71,6 +83,7 @@ impl<'a> Bench<'a> {
     pub(crate) fn new(problem: &'a Problem, supply: &'a dyn Supply) -> Self {
         let mut pool = Pool::new(&problem.layout).without(&problem.undecided());
         let base = problem.base.iter().map(|c| pool.add(c)).collect();
+        pool.prior.clone_from(&problem.prior);
         let measured = pool.add(&problem.measured);
         let zero = pool.add(Column(vec![None; problem.layout.channels.len()]));
         let friction = problem.friction.iter().map(|c| pool.add(c)).collect();
@@ -271,13 +284,50 @@ impl<'a> Bench<'a> {
         let mut wrong_sign: Vec<usize> = wrong.into_iter().map(|(i, _)| i).collect();
         wrong_sign.dedup();
         let freedoms = picks.iter().map(|p| self.freedoms(p)).sum();
+        let cancelling = self.cancelling(&picks, factors);
         Trial {
             picks,
             squares,
             freedoms,
             wrong_sign,
+            cancelling,
             score: f64::INFINITY,
         }
+    }
+
+    /// Effects at the place of an earlier one whose forces together are less than half of what either has alone: nearly the
+    /// same curve twice, of which only the difference is seen.
+    fn cancelling(&self, picks: &[Pick], factors: &[f64]) -> Vec<usize> {
+        let first = factors.len() - n_columns(picks);
+        let starts: Vec<usize> = (picks.iter())
+            .scan(first, |at, pick| {
+                let start = *at;
+                *at += pick.columns.len();
+                Some(start)
+            })
+            .collect();
+        let product = |i: usize, j: usize| -> f64 {
+            let (one, other) = (&picks[i].columns, &picks[j].columns);
+            let rows = one.iter().zip(&factors[starts[i]..]);
+            rows.map(|(a, x)| {
+                let columns = other.iter().zip(&factors[starts[j]..]);
+                columns
+                    .map(|(b, y)| x * y * self.pool.product(*a, *b, &self.weights))
+                    .sum::<f64>()
+            })
+            .sum()
+        };
+        let effect = |i: usize| &self.candidate(&picks[i]).effect;
+        let cancels = |j: &usize| {
+            (0..*j).any(|i| {
+                if effect(i).at != effect(*j).at || effect(i).kind == effect(*j).kind {
+                    return false;
+                }
+                let (a, b) = (product(i, i), product(*j, *j));
+                a + 2.0 * product(i, *j) + b < CANCELLED * a.max(b)
+            })
+        };
+        (0..picks.len()).filter(cancels).collect()
     }
 
     /// Estimates whose sign makes no physical sense, by position of effect and parameter.

@@ -64,6 +64,9 @@ use reproducible::reproducible;
 /// Kinds of friction of which a drift is a change.
 const FRICTION: [&str; 2] = ["viscous_friction", "coulomb_friction"];
 
+/// Why an effect is refused that does nothing but take back another.
+const CANCELS: &str = "it would only cancel another effect at its place";
+
 /// The answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -445,6 +448,8 @@ impl Bench<'_> {
             } else if let Some(refused) = found.refused.iter().find(|r| r.pick.candidate == k) {
                 let why = if refused.wrong_sign {
                     "sign"
+                } else if refused.cancels {
+                    CANCELS
                 } else {
                     refused
                         .evidence
@@ -463,6 +468,8 @@ impl Bench<'_> {
                 };
                 let why = if trial.wrong_sign.contains(&picks.len()) {
                     "sign"
+                } else if trial.cancelling.contains(&picks.len()) {
+                    CANCELS
                 } else if gain < LEAST_GAIN {
                     "explains nothing that is left"
                 } else {

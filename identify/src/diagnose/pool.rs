@@ -35,6 +35,8 @@ pub(crate) struct Pool<'a> {
     lost: Vec<Vec<bool>>,
     /// Samples that are left out of every product, by channel and in order; the lost ones are among them.
     left_out: Vec<Vec<usize>>,
+    /// What is known of the factors of the first columns beforehand, as further equations: the inverse of their covariance.
+    pub(crate) prior: Option<DMatrix<f64>>,
 }
 
 impl<'a> Pool<'a> {
@@ -50,6 +52,7 @@ impl<'a> Pool<'a> {
             folds: layout.blocks(FOLDS),
             lost: layout.left_out.clone(),
             left_out: layout.left_out.iter().map(|out| places(out)).collect(),
+            prior: None,
         }
     }
 
@@ -176,12 +179,19 @@ impl<'a> Pool<'a> {
         let mut gram = DMatrix::zeros(n, n);
         for i in 0..n {
             for j in 0..=i {
-                let sum = self.weighted(which[i], which[j], weights, on);
+                let sum = self.weighted(which[i], which[j], weights, on)
+                    + self.known_beforehand(which[i], which[j]);
                 gram[(i, j)] = sum;
                 gram[(j, i)] = sum;
             }
         }
         gram
+    }
+
+    /// What is known of two factors before any sample, as part of their inner product.
+    fn known_beforehand(&self, a: usize, b: usize) -> f64 {
+        let entry = self.prior.as_ref().and_then(|prior| prior.get((a, b)));
+        entry.copied().unwrap_or(0.0)
     }
 
     /// Weighted inner products of some columns on each fold.
@@ -197,6 +207,12 @@ impl<'a> Pool<'a> {
         for i in 0..n {
             for j in 0..=i {
                 let (a, b) = (which[i].max(which[j]), which[i].min(which[j]));
+                // Each fold has its share of it.
+                let before = self.known_beforehand(a, b) / self.folds.len() as f64;
+                for gram in &mut grams {
+                    gram[(i, j)] = before;
+                    gram[(j, i)] = before;
+                }
                 if !self.meet(a, b) {
                     continue;
                 }
@@ -211,9 +227,9 @@ impl<'a> Pool<'a> {
                     self.folds.iter().flat_map(of_fold).collect()
                 });
                 for (gram, part) in grams.iter_mut().zip(known.chunks(common.len())) {
-                    let sum = part.iter().zip(&common).map(|(p, w)| p * w).sum();
-                    gram[(i, j)] = sum;
-                    gram[(j, i)] = sum;
+                    let sum: f64 = part.iter().zip(&common).map(|(p, w)| p * w).sum();
+                    gram[(i, j)] = sum + before;
+                    gram[(j, i)] = sum + before;
                 }
             }
         }

@@ -1,5 +1,7 @@
 //! What a diagnosis starts from: measured forces, the columns that the model has, and those that effects would add.
 
+use nalgebra::DMatrix;
+
 use super::body::Body;
 use super::column::Column;
 use super::constant::Constant;
@@ -229,6 +231,9 @@ pub struct Problem {
     pub held: Option<Column>,
     /// Columns of the parameters that are free.
     pub base: Vec<Column>,
+    /// What is known of these parameters beforehand, beside that zero is expected: the inverse of their covariance. Without it
+    /// they are free.
+    pub prior: Option<DMatrix<f64>>,
     /// Which of them are part of what the drives carry.
     pub base_is_part_of_load: Vec<bool>,
     /// Friction of every drive by itself, beside which the load is estimated.

@@ -141,8 +141,8 @@ impl Bench<'_> {
             let rest = self.rest(&other.picks, &factors);
             let channels: Vec<usize> = (0..rest.len()).collect();
             let better = self.worth(&rest, &channels) * (best.squares / other.squares).ln();
-            let has_signs = other.wrong_sign.is_empty();
-            if !best.wrong_sign.is_empty() || has_signs && better > APART {
+            let has_signs = other.is_possible();
+            if !best.is_possible() || has_signs && better > APART {
                 best = other;
             }
         }

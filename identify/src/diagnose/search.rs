@@ -53,6 +53,7 @@ pub(crate) struct Refused {
     pub(crate) pick: Pick,
     pub(crate) evidence: Evidence,
     pub(crate) wrong_sign: bool,
+    pub(crate) cancels: bool,
 }
 
 /// What the search found.
@@ -80,7 +81,7 @@ impl Bench<'_> {
             };
             beam = trials
                 .iter()
-                .filter(|other| other.wrong_sign.is_empty())
+                .filter(|other| other.is_possible())
                 .take(BEAM)
                 .map(|other| other.picks.clone())
                 .collect();
@@ -130,7 +131,7 @@ impl Bench<'_> {
             let refreshed = self.refresh(polished);
             let settled = self.trial(refreshed);
             let evidence = self.between(accepted, &settled.picks);
-            if settled.wrong_sign.is_empty() && evidence.holds() {
+            if settled.is_possible() && evidence.holds() {
                 return Some(Step {
                     picks: settled.picks,
                     evidence: Some(evidence),
@@ -207,11 +208,10 @@ impl Bench<'_> {
             let tried = members(&trial.picks);
             let trial = self.settled(trial);
             // What turns out impossible once its columns have its own size was no test.
-            tested += usize::from(trial.wrong_sign.is_empty());
+            tested += usize::from(trial.is_possible());
             let news: Vec<Pick> = difference(&trial.picks, accepted);
             let evidence = self.evidence(accepted, &trial.picks, &self.acted_on(&news));
-            let wrong_sign = !trial.wrong_sign.is_empty();
-            if evidence.holds() && !wrong_sign {
+            if evidence.holds() && trial.is_possible() {
                 return Some(Next {
                     tried,
                     trial,
@@ -222,7 +222,8 @@ impl Bench<'_> {
                 refused.push(Refused {
                     pick: pick.clone(),
                     evidence,
-                    wrong_sign,
+                    wrong_sign: !trial.wrong_sign.is_empty(),
+                    cancels: !trial.cancelling.is_empty(),
                 });
             }
         }
@@ -270,7 +271,7 @@ impl Bench<'_> {
                 .collect::<Vec<Trial>>(),
         );
         // The best set says what is noise: beside what it explains, neighbours resemble each other less.
-        let best = trials.iter().filter(|trial| trial.wrong_sign.is_empty());
+        let best = trials.iter().filter(|trial| trial.is_possible());
         let worth = best
             .min_by(|a, b| a.squares.total_cmp(&b.squares))
             .map_or(worth, |best| {
@@ -421,7 +422,7 @@ impl Bench<'_> {
                 }
                 let tuned = self.refine(tuned);
                 let trial = self.trial(tuned);
-                if trial.wrong_sign.is_empty() && trial.squares < best.squares {
+                if trial.is_possible() && trial.squares < best.squares {
                     best = trial;
                 }
             }
@@ -466,7 +467,7 @@ impl Bench<'_> {
                     picks.push((*pick).clone());
                     self.try_in(&table, picks)
                 })
-                .filter(|trial| trial.wrong_sign.is_empty());
+                .filter(|trial| trial.is_possible());
             let next = trials.min_by(|a, b| a.squares.total_cmp(&b.squares))?;
             set.clone_from(&next.picks);
             first.get_or_insert_with(|| next.clone());
@@ -503,7 +504,7 @@ impl Bench<'_> {
             let [own] = bests.as_slice() else {
                 return false;
             };
-            trial.wrong_sign.is_empty()
+            trial.is_possible()
                 && Self::replaced(accepted, &trial.picks).is_empty()
                 && simple.rank < own.rank
                 && self.candidate(simple).searched <= self.candidate(own).searched
@@ -531,7 +532,7 @@ impl Bench<'_> {
             chosen = simple;
         }
         for trial in trials.iter().take(40) {
-            if trial.freedoms >= chosen.0.freedoms || !trial.wrong_sign.is_empty() {
+            if trial.freedoms >= chosen.0.freedoms || !trial.is_possible() {
                 continue;
             }
             let news = difference(&trial.picks, accepted);
@@ -557,11 +558,7 @@ impl Bench<'_> {
 
 /// The information criterion of a set, with as many samples as the residual is worth; sets with impossible signs come last.
 pub(crate) fn criterion(problem: &Problem, trial: &Trial, worth: f64) -> f64 {
-    let wrong = if trial.wrong_sign.is_empty() {
-        0.0
-    } else {
-        1e12
-    };
+    let wrong = if trial.is_possible() { 0.0 } else { 1e12 };
     worth * trial.squares.max(f64::MIN_POSITIVE).ln()
         + trial.freedoms as f64 * worth.ln().max(1.0)
         + overlap(problem, &trial.picks)

@@ -2,10 +2,13 @@
 
 use super::bench::{Bench, Pick, n_columns};
 use super::pool::On;
+use super::problem::{Fault, Reading, Source};
 use super::search::criterion;
 
 /// By how much the criterion must fall for an exchange of members.
 const EXCHANGED: f64 = 1.0;
+/// Within so much of the criterion two members are equally good.
+const AS_GOOD: f64 = 5.0;
 
 impl Bench<'_> {
     /// Takes simpler kinds where nothing speaks for what they lack.
@@ -31,7 +34,7 @@ impl Bench<'_> {
                 set[i] = simple;
                 let trial = self.trial(set);
                 // What takes the place of a wider effect must be worth something by itself.
-                if trial.wrong_sign.is_empty()
+                if trial.is_possible()
                     && !self.evidence(&trial.picks, &picks, &channels).holds()
                     && self.evidence(&others, &trial.picks, &channels).holds()
                 {
@@ -41,6 +44,15 @@ impl Bench<'_> {
             }
         }
         picks
+    }
+
+    /// Whether a reading that is too large comes before friction by the load which is the same: where a drive carries little
+    /// but friction, friction of friction and a wrong scale are one curve.
+    fn leads(&self, rival: &Pick, member: &Pick) -> bool {
+        let is_scale = |reading: &Reading| reading.fault == Fault::Scaled;
+        matches!(&self.candidate(rival).source, Source::Reading(one) if is_scale(one))
+            && self.candidate(member).source == Source::Carried
+            && self.candidate(rival).effect.at == self.candidate(member).effect.at
     }
 
     /// Takes out, one by one, what is no longer needed.
@@ -101,7 +113,7 @@ impl Bench<'_> {
                 let mut set = others.clone();
                 set.insert(i, same);
                 let trial = self.trial(set);
-                if trial.wrong_sign.is_empty() {
+                if trial.is_possible() {
                     picks = trial.picks;
                     return self.join(picks);
                 }
@@ -124,7 +136,7 @@ impl Bench<'_> {
             let table = self.table(&picks);
             let now = self.trial(picks.clone());
             let bound = criterion(self.problem, &now, worth) - EXCHANGED;
-            let mut best = (bound, None);
+            let mut best = (bound, 0.0, None);
             for rival in self.present.iter().flatten() {
                 if picks.iter().any(|p| p.candidate == rival.candidate) {
                     continue;
@@ -133,15 +145,22 @@ impl Bench<'_> {
                 set[i] = rival.clone();
                 let trial = self.try_in(&table, set);
                 let score = criterion(self.problem, &trial, worth);
+                let ahead = if self.leads(rival, &picks[i]) {
+                    AS_GOOD
+                } else {
+                    0.0
+                };
+                let score = score - ahead;
                 if trial.freedoms <= now.freedoms && score < best.0 {
-                    best = (score, Some(trial));
+                    best = (score, ahead, Some(trial));
                 }
             }
-            if let (score, Some(trial)) = best {
+            if let (score, ahead, Some(trial)) = best {
                 let settled = self.settled(&trial);
                 let changes = settled.picks != trial.picks;
                 // A column that is made anew may no longer say what it promised.
-                if !changes || criterion(self.problem, &settled, worth) < score.max(bound) {
+                let kept = criterion(self.problem, &settled, worth) - ahead;
+                if !changes || kept < score.max(bound) {
                     let refined = self.refine(settled.picks);
                     picks = self.refresh(refined);
                 }

@@ -103,7 +103,7 @@ pub(crate) fn find(
     further.extend(encoders(model, &all, &problem, &slopes));
     further.extend(gears(model, &all, &values, &slopes)?);
     further.extend(constants(model, &all, &|k| is_held(model, held, k)));
-    if asked.with_payloads && problem.base.is_empty() {
+    if asked.with_payloads && (held == Held::All || problem.base.is_empty()) {
         further.extend(payloads(model, &all)?);
     }
     problem.candidates.extend(further);
@@ -259,15 +259,23 @@ fn is_held(model: &Model, held: Held, k: usize) -> bool {
     held == Held::All || model.is_known(k)
 }
 
-/// Takes what is not free off the measured forces.
+/// Takes what is not free off the measured forces. What a fit knows to its own deviations stays in the base, and is expected
+/// to be off by no more than these.
 fn hold(problem: &mut Problem, model: &Model, held: Held) {
     let is_held = |k: usize| is_held(model, held, k);
+    let fitted: Vec<usize> = (0..model.base.len())
+        .filter(|k| held == Held::All && !model.is_known(*k))
+        .collect();
+    problem.prior = model.information(&fitted);
+    let has_prior = problem.prior.is_some();
+    let is_fitted = |k: usize| has_prior && fitted.contains(&k);
     let mut known = Column(vec![None; model.drives().len()]);
     let (mut free, mut is_part_of_load) = (Vec::new(), Vec::new());
     for (k, column) in std::mem::take(&mut problem.base).into_iter().enumerate() {
         if is_held(k) {
             known.add(model.nominal[k], &column);
-        } else {
+        }
+        if !is_held(k) || is_fitted(k) {
             free.push(column);
             is_part_of_load.push(problem.base_is_part_of_load[k]);
         }

@@ -17,6 +17,7 @@ use modelmill_identify::{Note, ParameterInfo};
 use modelmill_spec::{
     EffectKind, Exact, Inertial, Mechanism, ParameterIdx, PlaceQuantity, Sign, Symbol,
 };
+use nalgebra::DMatrix;
 
 use crate::error::{Error, Outcome};
 use crate::host::Host;
@@ -46,6 +47,8 @@ pub struct Model {
     pub nominal: Vec<f64>,
     /// What was found on the way that may not be intended, beside the warnings of `loaded`.
     pub notes: Vec<Note>,
+    /// Covariance of the values in `nominal`, where they are those of a fit that tells it.
+    covariance: Option<Arc<DMatrix<f64>>>,
     /// Whether the value in `nominal` was identified, in the file or in a fit that was given.
     identified: Vec<bool>,
     /// The sign that each dynamic parameter must have.
@@ -129,6 +132,7 @@ impl Host {
             path: path.to_owned(),
             base: base(&derivation),
             nominal: derivation.nominal_base_values(),
+            covariance: None,
             identified,
             signs: signs(mechanism, &loaded.kinds),
             loaded: Arc::new(loaded),
@@ -423,9 +427,36 @@ impl Model {
         );
         Self {
             nominal: values.to_vec(),
+            covariance: None,
             identified: vec![true; values.len()],
             ..self.clone()
         }
+    }
+
+    /// The model with the values of a fit, see [`Model::values_of`]. Where the fit tells how well it knows them, what
+    /// [`Model::diagnose`] holds may be off by as much.
+    #[must_use]
+    pub fn with_fit(&self, fit: &Values) -> Self {
+        Self {
+            covariance: fit.covariance.clone().map(Arc::new),
+            ..self.with_values(&fit.values)
+        }
+    }
+
+    /// How well the values of some base parameters are known: the inverse of their covariance, if it has one.
+    pub(crate) fn information(&self, parameters: &[usize]) -> Option<DMatrix<f64>> {
+        let covariance = self.covariance.as_ref()?;
+        let n = parameters.len();
+        let part = DMatrix::from_fn(n, n, |i, j| covariance[(parameters[i], parameters[j])]);
+        // Parameters differ by orders of magnitude.
+        let scale = part.diagonal().map(|variance| variance.sqrt().recip());
+        let scaled = DMatrix::from_fn(n, n, |i, j| part[(i, j)] * scale[i] * scale[j]);
+        let inverse = scaled.cholesky()?.inverse();
+        let information = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        information
+            .iter()
+            .all(|x| x.is_finite())
+            .then_some(information)
     }
 
     /// The model with the values of another one for all base parameters that both have.

@@ -1,6 +1,7 @@
 //! Values of base parameters: the file's nominal ones, or those of a fit.
 
-use modelmill_identify::{FitFile, Note};
+use modelmill_identify::{FitFile, FitParameter, Note};
+use nalgebra::DMatrix;
 
 use crate::error::Outcome;
 use crate::model::Model;
@@ -10,6 +11,8 @@ use crate::model::Model;
 pub struct Values {
     /// The values, in the units of the base parameters.
     pub values: Vec<f64>,
+    /// Their covariance where a fit tells it; rows and columns of what the model file knows are zero.
+    pub covariance: Option<DMatrix<f64>>,
     /// Remarks.
     pub notes: Vec<Note>,
 }
@@ -31,6 +34,7 @@ impl Model {
         }
         Values {
             values: self.nominal.clone(),
+            covariance: None,
             notes,
         }
     }
@@ -56,7 +60,28 @@ impl Model {
         });
         Ok(Values {
             values,
+            covariance: self.covariance_of(fit),
             notes: notes.collect(),
         })
+    }
+
+    /// The covariance of a fit's values in the order of the model; `None` where a deviation is not known.
+    fn covariance_of(&self, fit: &FitFile) -> Option<DMatrix<f64>> {
+        let unknown: Vec<usize> = (0..self.base.len())
+            .filter(|k| !self.is_known(*k))
+            .collect();
+        let place = |k: &usize| {
+            let named = |one: &FitParameter| one.name == self.base[*k].name;
+            fit.parameters.iter().position(named)
+        };
+        let places: Vec<usize> = unknown.iter().map(place).collect::<Option<_>>()?;
+        let (found, _) = fit.covariance_of(&places)?;
+        let mut covariance = DMatrix::zeros(self.base.len(), self.base.len());
+        for (i, a) in unknown.iter().enumerate() {
+            for (j, b) in unknown.iter().enumerate() {
+                covariance[(*a, *b)] = found[(i, j)];
+            }
+        }
+        Some(covariance)
     }
 }

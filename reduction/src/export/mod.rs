@@ -1,0 +1,116 @@
+//! A model as a robot description of other programs, URDF or MJCF: the way back of [`import`](fn@crate::import).
+//!
+//! A mechanism with the nominal values of its parameters goes in. `tree` makes one link of all frames that move as one, with
+//! joints between links; `inertia` adds up what they carry; `mjcf` and `urdf` write both down. What a format cannot say is a
+//! remark, never dropped; what would give other forces without a word is an error.
+
+mod friction;
+mod inertia;
+mod mjcf;
+mod tree;
+mod urdf;
+
+use std::fmt;
+
+use modelmill_spec::Mechanism;
+
+/// A format of robot descriptions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Of ROS: trees without loops.
+    Urdf,
+    /// Of MuJoCo: loops, linear drives as tendons, inertia of drives, springs.
+    Mjcf,
+}
+
+impl Format {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Urdf, Self::Mjcf];
+
+    /// Its name in lower case.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Urdf => "urdf",
+            Self::Mjcf => "mjcf",
+        }
+    }
+
+    /// The format that an ending of a file's name (without the dot) stands for.
+    pub fn of_ending(ending: &str) -> Option<Self> {
+        match ending {
+            "urdf" => Some(Self::Urdf),
+            "xml" | "mjcf" => Some(Self::Mjcf),
+            _ => None,
+        }
+    }
+}
+
+/// A robot description that was made of a model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exported {
+    /// Its text.
+    pub text: String,
+    /// What the format does not say, or says otherwise.
+    pub remarks: Vec<String>,
+}
+
+/// Why a model cannot be written down in a format.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ExportError(String);
+
+impl fmt::Display for ExportError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for ExportError {}
+
+/// Writes a mechanism with its nominal values as a robot description.
+///
+/// Fails where a joint moves in a way that the format does not know, or a mass sits at different places for the balances of
+/// forces and of moments.
+pub fn export(mechanism: &Mechanism, format: Format) -> Result<Exported, ExportError> {
+    let mut remarks = Vec::new();
+    // Closed loops are shown as they stand; the zeros of a tree are its own.
+    let at: Vec<f64> = match format {
+        Format::Mjcf if !mechanism.loops.is_empty() => {
+            mechanism.coordinates.iter().map(|c| c.nominal).collect()
+        }
+        _ => vec![0.0; mechanism.coordinates.len()],
+    };
+    let tree = tree::tree(mechanism, &at)?;
+    let mut bodies = inertia::bodies(mechanism, &tree)?;
+    inertia::complete(&tree, &mut bodies, &mut remarks);
+    inertia::judge(&tree, &bodies, &mut remarks);
+    if !mechanism.identified_base.is_empty() {
+        remarks.push(
+            "the values under `[identified]` are those of base parameters, which say nothing of single bodies: bodies have \
+             their nominal values here; identify with option `physical` and let verb `adopt` write that fit for a description of the real machine"
+                .to_owned(),
+        );
+    }
+    let friction = friction::friction(mechanism, format, &mut remarks);
+    let text = match format {
+        Format::Urdf => urdf::write(mechanism, &tree, &bodies, &friction, &mut remarks),
+        Format::Mjcf => mjcf::write(mechanism, &tree, &bodies, &friction, &at, &mut remarks),
+    };
+    Ok(Exported { text, remarks })
+}
+
+/// Numbers with spaces between them, each with as many digits as it needs.
+fn list(values: &[f64]) -> String {
+    let words: Vec<String> = values.iter().map(|x| number(*x)).collect();
+    words.join(" ")
+}
+
+/// A number with as many digits as it needs; rounding below 1e-15 is zero.
+fn number(value: f64) -> String {
+    if value.abs() < 1e-15 {
+        return "0".to_owned();
+    }
+    if value.fract() == 0.0 && value.abs() < 1e15 {
+        return format!("{value:.0}");
+    }
+    format!("{value:?}")
+}

@@ -1,0 +1,221 @@
+//! URDF: a tree of links; a coordinate that moves several joints moves one, which the others mimic.
+
+use modelmill_spec::{DriveKind, Mechanism};
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+use super::friction::{Friction, Passive};
+use super::inertia::Body;
+use super::tree::{Joint, Link, Placed, Tree};
+use super::{list, number};
+
+/// How far a joint may go that has no limits, m.
+const FAR: f64 = 1000.0;
+
+pub(super) fn write(
+    mechanism: &Mechanism,
+    tree: &Tree,
+    bodies: &[Body],
+    friction: &Friction,
+    remarks: &mut Vec<String>,
+) -> String {
+    tell(mechanism, remarks);
+    let mut text = format!(
+        "<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n",
+        mechanism.name
+    );
+    text += &link(&tree.links[0].name, None);
+    for (one, body) in tree.links.iter().zip(bodies).skip(1) {
+        text += &branch(mechanism, tree, one, body, friction);
+    }
+    text += "</robot>\n";
+    text
+}
+
+/// What URDF has no words for.
+fn tell(mechanism: &Mechanism, remarks: &mut Vec<String>) {
+    if !mechanism.loops.is_empty() {
+        let names: Vec<&str> = mechanism
+            .loops
+            .iter()
+            .map(|one| one.name.as_str())
+            .collect();
+        remarks.push(format!(
+            "URDF has no loops: {} left open, and passive joints move by themselves; MJCF has loops",
+            names.join(", ")
+        ));
+    }
+    let is_line = |kind: &DriveKind| matches!(kind, DriveKind::Linear { .. });
+    let drives = mechanism.drives.iter().chain(&mechanism.shared_drives);
+    let lines: Vec<&str> = drives
+        .filter(|drive| is_line(&drive.kind))
+        .map(|drive| drive.name.as_str())
+        .collect();
+    if !lines.is_empty() {
+        remarks.push(format!(
+            "URDF has no drives between two points: {} left out; MJCF has tendons",
+            lines.join(", ")
+        ));
+    }
+    let gravity: [f64; 3] =
+        std::array::from_fn(|k| mechanism.gravity[k].evaluate(&|s| mechanism.symbol_nominal(s)));
+    remarks.push(format!(
+        "URDF does not say gravity: it is {} m/s^2 along x, y and z of `{}`",
+        list(&gravity),
+        mechanism.frames[0].name
+    ));
+}
+
+/// A link with the joints that lead to it; between several of them stand links without mass.
+fn branch(
+    mechanism: &Mechanism,
+    tree: &Tree,
+    one: &Link,
+    body: &Body,
+    friction: &Friction,
+) -> String {
+    let mut text = String::new();
+    let mut parent = (
+        tree.links[one.parent].name.clone(),
+        tree.links[one.parent].placed,
+    );
+    if one.joints.is_empty() {
+        let origin = origin(&parent.1.sees(&one.placed));
+        text += &format!(
+            "  <joint name=\"{0}_floating\" type=\"floating\">\n    {origin}\n    <parent link=\"{1}\"/>\n    <child link=\"{0}\"/>\n  \
+             </joint>\n",
+            one.name, parent.0
+        );
+    }
+    for (k, moving) in one.joints.iter().enumerate() {
+        let is_last = k + 1 == one.joints.len();
+        let (name, placed) = if is_last {
+            (one.name.clone(), one.placed)
+        } else {
+            let placed = Placed {
+                rotation: one.placed.rotation,
+                origin: moving.origin,
+            };
+            let name = format!("{}_{}", one.name, k + 1);
+            text += &link(&name, None);
+            (name, placed)
+        };
+        text += &joint(
+            mechanism,
+            moving,
+            &parent,
+            &(name.clone(), placed),
+            friction,
+        );
+        parent = (name, placed);
+    }
+    text + &link(&one.name, Some(body))
+}
+
+fn joint(
+    mechanism: &Mechanism,
+    moving: &Joint,
+    (parent, from): &(String, Placed),
+    (child, to): &(String, Placed),
+    friction: &Friction,
+) -> String {
+    let coordinate = &mechanism.coordinates[moving.coordinate].name;
+    let limits = mechanism.limits.coordinates.iter();
+    let limits = limits.clone().find(|(i, _)| i.0 == moving.coordinate);
+    let range = limits.and_then(|(_, one)| one.position);
+    let rate = limits.and_then(|(_, one)| one.rate);
+    let effort = mechanism.limits.forces.iter().find_map(|(d, range)| {
+        let drives_it =
+            matches!(mechanism.drives[d.0].kind, DriveKind::Joint(i) if i.0 == moving.coordinate);
+        drives_it.then(|| range[0].abs().max(range[1].abs()))
+    });
+    let kind = match (moving.is_rotation, range) {
+        (true, None) => "continuous",
+        (true, Some(_)) => "revolute",
+        (false, _) => "prismatic",
+    };
+    let axis = to.rotation.transpose() * moving.axis;
+    let mut text = format!(
+        "  <joint name=\"{}\" type=\"{kind}\">\n    {}\n    <parent link=\"{parent}\"/>\n    <child link=\"{child}\"/>\n    <axis \
+         xyz=\"{}\"/>\n",
+        moving.name,
+        origin(&from.sees(to)),
+        list(clean(axis).as_slice()),
+    );
+    let scaled = |range: [f64; 2]| {
+        let [a, b] = range.map(|x| x * moving.ratio);
+        [a.min(b), a.max(b)]
+    };
+    if kind != "continuous" || rate.is_some() || effort.is_some() {
+        let [low, high] = scaled(range.unwrap_or([-FAR, FAR]));
+        let bounds = if kind == "continuous" {
+            String::new()
+        } else {
+            format!("lower=\"{}\" upper=\"{}\" ", number(low), number(high))
+        };
+        let most = |range: Option<[f64; 2]>| range.map_or(FAR, |r| r[0].abs().max(r[1].abs()));
+        text += &format!(
+            "    <limit {bounds}effort=\"{}\" velocity=\"{}\"/>\n",
+            number(effort.unwrap_or(FAR)),
+            number(most(rate.map(scaled)))
+        );
+    }
+    let own = friction.joints[moving.coordinate];
+    if moving.name != *coordinate {
+        text += &format!(
+            "    <mimic joint=\"{coordinate}\" multiplier=\"{}\" offset=\"0\"/>\n",
+            number(moving.ratio)
+        );
+    } else if own != Passive::default() {
+        text += &format!(
+            "    <dynamics damping=\"{}\" friction=\"{}\"/>\n",
+            number(own.damping),
+            number(own.friction)
+        );
+    }
+    text + "  </joint>\n"
+}
+
+fn link(name: &str, body: Option<&Body>) -> String {
+    let Some(body) = body.filter(|body| !body.is_none()) else {
+        return format!("  <link name=\"{name}\"/>\n");
+    };
+    let i = body.central();
+    format!(
+        "  <link name=\"{name}\">\n    <inertial>\n      <origin xyz=\"{}\" rpy=\"0 0 0\"/>\n      <mass value=\"{}\"/>\n      \
+         <inertia ixx=\"{}\" ixy=\"{}\" ixz=\"{}\" iyy=\"{}\" iyz=\"{}\" izz=\"{}\"/>\n    </inertial>\n  </link>\n",
+        list(body.centre().as_slice()),
+        number(body.mass),
+        number(i[(0, 0)]),
+        number(i[(0, 1)]),
+        number(i[(0, 2)]),
+        number(i[(1, 1)]),
+        number(i[(1, 2)]),
+        number(i[(2, 2)]),
+    )
+}
+
+/// Fixed axes x, y, z: roll, pitch and yaw.
+fn origin(placed: &Placed) -> String {
+    let (roll, pitch, yaw) = Rotation3::from_matrix_unchecked(placed.rotation).euler_angles();
+    format!(
+        "<origin xyz=\"{}\" rpy=\"{}\"/>",
+        list(clean(placed.origin).as_slice()),
+        list(&[roll, pitch, yaw])
+    )
+}
+
+/// Components of rounding size beside the others are zero.
+pub(super) fn clean(v: Vector3<f64>) -> Vector3<f64> {
+    let size = v.norm();
+    v.map(|x| if x.abs() < 1e-14 * size { 0.0 } else { x })
+}
+
+/// A rotation that is exact to rounding again.
+pub(super) fn orthonormal(rotation: &Matrix3<f64>) -> Rotation3<f64> {
+    Rotation3::from_matrix_eps(
+        rotation,
+        1e-15,
+        20,
+        Rotation3::from_matrix_unchecked(*rotation),
+    )
+}
