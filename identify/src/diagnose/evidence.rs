@@ -179,13 +179,14 @@ impl Bench<'_> {
     }
 
     /// Whether squares that a change takes off are more than what smoothing the positions may have made, where parameters are
-    /// held and cannot take that up.
+    /// held and cannot take that up; those of a fit have taken it up.
     fn is_beyond_smoothing(&self, less: f64, channels: &[usize]) -> bool {
         let squares = |d: &usize| {
             let force = self.problem.force(*d);
             self.weights[*d] * dot(&force, &force)
         };
-        self.problem.held.is_none() || less > OF_FORCE * channels.iter().map(squares).sum::<f64>()
+        let is_exact = self.problem.held.is_some() && self.problem.prior.is_none();
+        !is_exact || less > OF_FORCE * channels.iter().map(squares).sum::<f64>()
     }
 
     /// Squares of a residual relative to those of the white noise, over some channels.
