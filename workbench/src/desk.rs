@@ -113,6 +113,10 @@ impl Commands for Plain {
     fn same(&self, _: Step) -> Option<String> {
         None
     }
+
+    fn variant(&self, _: &Path) -> Option<String> {
+        None
+    }
 }
 
 #[cfg(test)]

@@ -24,6 +24,9 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> Outcome {
         // This says what is wrong with the path, and which models are near.
         commands::load_quietly(host, &args.model)?;
     }
+    if let Some(beside) = &args.beside {
+        commands::load_quietly(host, beside)?;
+    }
     let files = |paths: &[PathBuf]| -> Outcome<Vec<Vec<PathBuf>>> {
         let runs = paths.iter().map(|path| commands::files_of(path));
         let is_there = |file: &PathBuf| {
@@ -43,6 +46,7 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> Outcome {
         model: args.model.clone(),
         data: files(&args.data)?,
         check: files(&args.check)?,
+        beside: args.beside.clone(),
         reading: args.preparation.reading(),
         port: args.port,
         first: 0,
@@ -67,6 +71,8 @@ struct Spelled {
     model: String,
     data: String,
     check: String,
+    /// The recordings of both as data, where all count alike.
+    all: String,
     /// How recordings are read.
     reading: String,
     /// How models are read.
@@ -84,6 +90,7 @@ impl Spelled {
             model: name(&args.model),
             data: named("data", &args.data),
             check: named("check", &args.check),
+            all: named("data", &[&*args.data, &*args.check].concat()),
             reading: args.preparation.spelled(),
             libraries: libraries(host),
         }
@@ -117,6 +124,20 @@ impl Commands for Spelled {
                 format!("modelmill diagnose {model}{data}{check}{reading}{libraries}")
             }
         })
+    }
+
+    fn variant(&self, before: &Path) -> Option<String> {
+        let Self {
+            model,
+            all,
+            reading,
+            libraries,
+            ..
+        } = self;
+        let before = name(before);
+        Some(format!(
+            "modelmill diff {before} {model}{all}{reading}{libraries}"
+        ))
     }
 }
 
