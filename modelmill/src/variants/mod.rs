@@ -90,8 +90,10 @@ impl Variants {
         let motions = stretches(runs[0]);
         let mut notes = counterparts.notes.clone();
         notes.extend(by_load(models));
-        for model in models {
-            notes.extend(model.nominal_values().notes);
+        for note in models.into_iter().flat_map(|m| m.nominal_values().notes) {
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
         }
         let mut terms = Terms::between(models);
         let mut limits = limits::Limits::of(models);
