@@ -78,7 +78,8 @@ pub(crate) enum Command {
         modelmill diff model-spec/models/spidermill.toml model-spec/models/spidermill-paper.toml\n  \
         modelmill diff model-spec/models/spidermill.toml model-spec/models/spidermill-paper.toml \\\n      \
         --data recordings/spidermill-mbs/plain-check.csv\n  \
-        modelmill diff model-spec/models/arm_four_bar.toml model-spec/models/arm_parallelogram.toml --picture both.svg"
+        modelmill diff model-spec/models/arm_four_bar.toml model-spec/models/arm_parallelogram.toml \\\n      \
+        --picture both.svg"
     )]
     Diff(DiffArgs),
     /// List the effects that a model may have, or explain one of them

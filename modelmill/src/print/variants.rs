@@ -9,6 +9,8 @@ use crate::variants::{Crossing, DriveVariants, Effort, LimitUse, TermShare, Vari
 
 /// Summands of a drive's difference that are shown, at most; the rest is told in one line.
 const MOST_TERMS: usize = 6;
+/// Products of p_g that are named, at most.
+const MOST_PRODUCTS: usize = 4;
 /// Summands below this share of the largest one are not shown by themselves.
 const LEAST_SHARE: f64 = 0.01;
 
@@ -254,6 +256,17 @@ fn shares(one: &DriveVariants) -> Vec<String> {
         significant(size.rms, 4),
         unit = one.unit
     )];
+    if one.products.len() > 1 {
+        let most = one.products.iter().take(MOST_PRODUCTS);
+        let most = most.map(|p| format!("{} {}", p.product, signed_percent(p.share)));
+        let more = if one.products.len() > MOST_PRODUCTS {
+            ", ..."
+        } else {
+            ""
+        };
+        let all: Vec<String> = most.collect();
+        lines.push(format!("    by product of p_g: {}{more}", all.join(", ")));
+    }
     let mut terms: Vec<&TermShare> = one.products.iter().flat_map(|p| &p.terms).collect();
     terms.sort_by(|a, b| b.share.abs().total_cmp(&a.share.abs()));
     let least = terms
@@ -272,15 +285,7 @@ fn shares(one: &DriveVariants) -> Vec<String> {
                     format!("in {}", term.retained)
                 },
                 value(term),
-                if (term.share - term.by_value).abs() > LEAST_SHARE * term.share.abs() {
-                    format!(
-                        "{} by its value, {} by its column",
-                        signed_percent(term.by_value),
-                        signed_percent(term.share - term.by_value)
-                    )
-                } else {
-                    String::new()
-                },
+                by_column(term),
             ]
         })
         .collect();
@@ -297,7 +302,7 @@ fn shares(one: &DriveVariants) -> Vec<String> {
         lines.push(format!(
             "    {} by {}",
             signed_percent(rest),
-            count(terms.len() - n, "other summand", "others")
+            count(terms.len() - n, "other summand", "other summands")
         ));
     }
     lines
@@ -312,6 +317,22 @@ fn signed_percent(share: f64) -> String {
     }
 }
 
+/// What of a share is the column's and not the value's; nothing where there is no such part.
+fn by_column(term: &TermShare) -> String {
+    let by_column = term.share - term.by_value;
+    if by_column.abs() <= LEAST_SHARE * term.share.abs() {
+        String::new()
+    } else if term.by_value == 0.0 {
+        "by its column alone".to_owned()
+    } else {
+        format!(
+            "{} by its value, {} by its column",
+            signed_percent(term.by_value),
+            signed_percent(by_column)
+        )
+    }
+}
+
 /// A summand's value, and what it was.
 fn value(term: &TermShare) -> String {
     let unit = match term.unit.as_str() {
@@ -320,9 +341,8 @@ fn value(term: &TermShare) -> String {
     };
     match (term.before, term.after) {
         (Some(before), Some(after)) if before == after => format!("{}{unit}", number(after)),
-        (before, after) => {
-            let text = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), number);
-            format!("{} -> {}{unit}", text(before), text(after))
-        }
+        (Some(before), Some(after)) => format!("{} -> {}{unit}", number(before), number(after)),
+        (Some(before), None) => format!("{}{unit}, then gone", number(before)),
+        (None, after) => format!("new, {}{unit}", number(after.unwrap_or(0.0))),
     }
 }
