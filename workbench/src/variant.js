@@ -17,43 +17,57 @@
     box.createTBody().append(...rows);
     return box;
   };
+  // Four digits are enough to look at.
   const short = (v) => (v === null || v === undefined ? '\u2014' : Number(v.toPrecision(4)).toString().replace('-', '\u2212'));
   const signed = (v) => (v < 0 ? `\u2212${percent(-v)}` : `+${percent(v)}`);
   const is_same = (a, b) => a === b || Math.abs(b - a) < 5e-6 * Math.abs(a);
-  // What is after, and below it what was before and by how much it changed; more of anything but net work is worse.
-  const change = (row, before, after) => {
-    const box = cell(row, short(after), 'number');
-    if (is_same(before, after)) { box.append(make('small', 'the same')); return; }
-    const by_ = before ? `, ${signed((after - before) / Math.abs(before))}` : '';
-    box.append(make('small', `was ${short(before)}${by_}`, Math.abs(after) > Math.abs(before) ? 'worse' : 'better'));
+  const noted = (row, words, note, cls) => {
+    const box = cell(row, undefined);
+    box.append(words);
+    if (note) box.append(make('small', note, cls));
+    return box;
   };
 
-  const efforts = (drives) => {
-    const figures = ['peak', 'rms', 'peak_power', 'rms_power', 'work', 'net_work'];
-    const heads = ['drive', 'peak force', 'rms force', 'peak power, W', 'rms power, W', 'work given, J', 'net work, J'];
-    return table('What the drives give', heads, drives.map((one) => {
-      const row = make('tr');
-      cell(row, `${one.drive}, ${one.unit}`);
-      for (const figure of figures) change(row, one.before[figure], one.after[figure]);
-      return row;
-    }));
-  };
+  // ---- a drive: what it gives before and after, and what makes the difference
+
+  const FIGURES = [
+    ['peak force', 'peak', true], ['rms force', 'rms', true], ['peak power', 'peak_power', 'W'], ['rms power', 'rms_power', 'W'],
+    ['work given', 'work', 'J'], ['net work', 'net_work', 'J'],
+  ];
+  const efforts = (one) => table(`${one.drive}`, ['', 'before', 'after', 'change'], FIGURES.map(([words, figure, unit]) => {
+    const [before, after] = [one.before[figure], one.after[figure]];
+    const row = make('tr');
+    cell(row, `${words}, ${unit === true ? one.unit : unit}`);
+    cell(row, short(before), 'number');
+    cell(row, short(after), 'number');
+    const isMore = Math.abs(after) > Math.abs(before);
+    if (is_same(before, after)) cell(row, 'none', 'number');
+    else cell(row, before ? signed((after - before) / Math.abs(before)) : 'new', `number ${isMore ? 'worse' : 'better'}`);
+    return row;
+  }));
 
   const MOST = 6;
+  const by_column = (term) => {
+    const by_ = term.share - term.by_value;
+    if (Math.abs(by_) <= 0.01 * Math.abs(term.share)) return '';
+    return term.by_value === 0 ? ', by its column alone' : `, ${signed(term.by_value)} by its value, ${signed(by_)} by its column`;
+  };
+  const value = ({ before, after, unit }) => {
+    const of = unit === '1' ? '' : ` ${unit}`;
+    if (before === null) return `new, ${number(after)}${of}`;
+    if (after === null) return `${number(before)}${of}, then gone`;
+    return before === after ? `${number(after)}${of}` : `${number(before)} \u2192 ${number(after)}${of}`;
+  };
   const shares = (one) => {
-    const size = `${one.drive}: ${short(one.difference.rms)} ${one.unit} rms, ${short(one.difference.peak)} ${one.unit} at most`;
     const terms = one.products.flatMap((product) => product.terms).sort((a, b) => Math.abs(b.share) - Math.abs(a.share));
-    if (!terms.length) return make('p', `${one.drive}: no difference.`);
+    if (!terms.length) return make('p', `No difference at ${one.drive}.`);
     const least = 0.01 * Math.abs(terms[0].share);
     const main = terms.filter((term, i) => i < MOST && Math.abs(term.share) >= least);
     const rows = main.map((term) => {
       const row = make('tr');
-      row.appendChild(make('td')).appendChild(make('code', term.term));
+      const where = term.term === term.retained ? '' : `in ${term.retained}: `;
+      noted(row, make('code', term.term), `${where}${value(term)}${by_column(term)}`);
       cell(row, signed(term.share), 'number');
-      row.appendChild(make('td', undefined, 'number')).appendChild(make('code', term.retained));
-      cell(row, `${number(term.before)} \u2192 ${number(term.after)} ${term.unit === '1' ? '' : term.unit}`, 'number');
-      const isOfColumn = Math.abs(term.share - term.by_value) > 0.01 * Math.abs(term.share);
-      cell(row, isOfColumn ? `${signed(term.by_value)} by its value, ${signed(term.share - term.by_value)} by its column` : '', 'number');
       return row;
     });
     if (main.length < terms.length) {
@@ -62,22 +76,41 @@
       cell(row, signed(terms.slice(main.length).reduce((sum, term) => sum + term.share, 0)), 'number');
       rows.push(row);
     }
-    return table(`What makes the difference of ${size}`, ['summand of p_min', 'share', 'in', 'value', ''], rows);
+    const size = `${short(one.difference.rms)} ${one.unit} rms, ${short(one.difference.peak)} ${one.unit} at most`;
+    return table(`What makes the difference, ${size}`, ['summand of p_min', 'share'], rows);
   };
 
+  const drives = (all) => {
+    const box = make('div', undefined, 'drives');
+    box.append(...all.map((one) => {
+      const drive = make('section');
+      drive.setAttribute('aria-label', one.drive);
+      drive.append(efforts(one), shares(one));
+      return drive;
+    }));
+    return box;
+  };
+
+  // ---- both models as wholes
+
+  // Close to the limit more digits say on which side.
+  const part = (used) => {
+    if (used === null) return '\u2014';
+    return `${Number((100 * used).toPrecision(Math.abs(used - 1) < 0.01 ? 6 : 3))} %`;
+  };
   const limits = (all) => {
     const says = { now_exceeded: 'now exceeded', still_exceeded: 'exceeded by both', no_longer_exceeded: 'no longer exceeded', kept: 'kept' };
     const order = Object.keys(says);
     const marks = { now_exceeded: 'worse', no_longer_exceeded: 'better' };
     const rows = [...all].sort((a, b) => order.indexOf(a.crossing) - order.indexOf(b.crossing)).map((one) => {
-      const row = make('tr', undefined, marks[one.crossing]);
-      cell(row, one.limit);
-      for (const side of [one.before, one.after]) cell(row, side.range ? side.range.map(short).join(' to ') : '\u2014', 'number');
-      for (const side of [one.before, one.after]) cell(row, percent(side.used), 'number');
-      cell(row, says[one.crossing], 'number');
+      const row = make('tr');
+      const [before, after] = [one.before, one.after].map(({ range }) => range && range.map(short).join(' to '));
+      const ranges = before === after ? before : `${before || 'none'}, then ${after || 'none'}`;
+      noted(row, one.limit, [says[one.crossing], ranges].filter(Boolean).join('; '), marks[one.crossing]);
+      for (const side of [one.before, one.after]) cell(row, part(side.used), 'number');
       return row;
     });
-    return table('Limits', ['limit', 'range before', 'range after', 'used before', 'used after', ''], rows);
+    return table('What is used of the limits', ['limit', 'before', 'after'], rows);
   };
 
   const errors = ({ before, after }) => {
@@ -97,8 +130,7 @@
     const row = make('tr');
     const words = (count) => Object.entries(count).filter(([, n]) => n).map(([what, n]) => `${n} ${what}`).join(', ');
     cell(row, name.replaceAll('_', ' '));
-    cell(row, words(before), 'number');
-    cell(row, words(after), 'number');
+    for (const count of [before, after]) cell(row, words(count));
     return row;
   }));
 
@@ -159,8 +191,9 @@
       if (told.refused) pieces.push(make('p', told.refused, 'alias'));
       if (along) {
         for (const note of along.notes) pieces.push(make('p', note.says, note.severity === 'warning' ? 'alias' : ''));
+        const seconds = `${short(along.seconds)} s of ${along.recordings.join(', ')}`;
+        pieces.push(make('p', `Along ${seconds}:`), drives(along.drives));
         if (along.limits.length) pieces.push(limits(along.limits));
-        pieces.push(efforts(along.drives), ...along.drives.map(shares));
         if (along.errors.before || along.errors.after) pieces.push(errors(along.errors));
       } else if (!told.refused) pieces.push(make('p', window.mill.hint));
       pieces.push(...entries(told), operations(told.operations));

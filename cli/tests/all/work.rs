@@ -610,8 +610,8 @@ fn two_variants_stand_side_by_side() {
          document.execCommand('insertText', false, '92.4560');
          await until('the cost', () => at('costs').textContent.includes('1/2*d3*m4') && at('costs').textContent.includes('now exceeded'));
          const told = await window.mill.ask('variant', { beside: null });
-         const rows = [...at('costs').querySelectorAll('table')].find((t) => t.caption.textContent === 'What the drives give').tBodies[0].rows;
-         return [told.along, rows[0].cells[1].textContent, at('command').parentElement.hidden];",
+         const rows = [...at('costs').querySelectorAll('table')].find((t) => t.caption.textContent === 'spindle_left').tBodies[0].rows;
+         return [told.along, [...rows[0].cells].map((one) => one.textContent), at('command').parentElement.hidden];",
     );
     let told = common::json(&[
         "diff",
@@ -633,8 +633,17 @@ fn two_variants_stand_side_by_side() {
             "{pointer}: {here}, {there}"
         );
     }
-    let cell = edited[1].as_str().expect("a text");
-    assert!(cell.contains("was ") && cell.contains('+'), "{cell}");
+    let cells: Vec<String> = serde_json::from_value(edited[1].clone()).expect("texts");
+    let shown = |k: usize| cells[k].parse::<f64>().expect("a number");
+    let peak = |side: &str| number(&told["along"], &format!("/drives/0/{side}/peak"));
+    assert_eq!(cells[0], "peak force, N");
+    for (k, side) in [(1, "before"), (2, "after")] {
+        assert!(
+            (shown(k) - peak(side)).abs() < 1e-3 * peak(side),
+            "{cells:?}"
+        );
+    }
+    assert!(cells[3].starts_with('+'), "{cells:?}");
     assert_eq!(edited[2], true, "no command reads what is not saved");
 
     // The one of the folder is what was typed, by another name.
@@ -671,7 +680,7 @@ fn shows_what_the_command_says(browser: &mut Browser, window: &Window) {
         "await until('the command', () => at('command').textContent.startsWith('modelmill diff '));
          const table = (name) => [...at('costs').querySelectorAll('table')].find((t) => t.caption.textContent.startsWith(name));
          const cells = (t, k) => [...t.tBodies[0].rows[k].cells].map((one) => one.textContent);
-         return [at('command').textContent, cells(table('Error'), 0), cells(table('What makes'), 0)];",
+         return [at('command').textContent, cells(table('Error'), 0), table('What makes').tBodies[0].rows[0].cells[0].firstChild.textContent];",
     );
     let command = shown[0].as_str().expect("a command");
     let mut words: Vec<&str> = command.split(' ').skip(1).collect();
@@ -691,5 +700,5 @@ fn shows_what_the_command_says(browser: &mut Browser, window: &Window) {
             .abs()
             .total_cmp(&number(b, "/share").abs())
     });
-    assert_eq!(shown[2][0], largest.expect("a summand")["term"]);
+    assert_eq!(shown[2], largest.expect("a summand")["term"]);
 }

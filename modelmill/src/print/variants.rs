@@ -159,7 +159,7 @@ fn drive(one: &DriveVariants) -> Value {
 fn limit(one: &LimitUse) -> String {
     let used = one
         .used
-        .map(|used| used.map_or_else(|| "no limit".to_owned(), |used| percent(Some(used))));
+        .map(|used| used.map_or_else(|| "no limit".to_owned(), part));
     let range =
         |m: usize| one.ranges[m].map(|[low, high]| format!("{} to {}", number(low), number(high)));
     let range = match (range(0), range(1)) {
@@ -177,6 +177,12 @@ fn limit(one: &LimitUse) -> String {
         Crossing::Kept => "",
     };
     format!("{}{range} {says}{} -> {}", one.limit, used[0], used[1])
+}
+
+/// The part of a limit that is used; close to the limit with more digits, which say on which side.
+fn part(used: f64) -> String {
+    let digits = if (used - 1.0).abs() < 0.01 { 6 } else { 3 };
+    format!("{} %", significant(100.0 * used, digits))
 }
 
 /// Figures of all drives, three lines each: before, after, and the change.
