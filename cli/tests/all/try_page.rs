@@ -115,6 +115,30 @@ fn the_mill_in_a_page_gives_the_figures_of_the_program() {
         "{errors}"
     );
 
+    // What the addition costs, beside the file as it was.
+    let costs = browser.run(
+        &window,
+        "tab('variant');
+         await until('costs', () => at('costs').textContent.includes('What makes the difference') && at('both').querySelector('svg .joint'), 120000);
+         const { along, entries } = await window.mill.ask('variant', { beside: null });
+         const shares = along.drives.map((one) => one.products.reduce((sum, product) => sum + product.share, 0));
+         return { shares, errors: along.errors, entries, models: [...at('beside').options].map((one) => one.value) };",
+    );
+    for k in 0..2 {
+        let share = number(&costs, &format!("/shares/{k}"));
+        assert!((share - 1.0).abs() < 1e-6, "{costs}");
+    }
+    assert!(
+        costs["entries"].to_string().contains("rod_inertia"),
+        "{costs}"
+    );
+    assert!(
+        costs["models"]
+            .to_string()
+            .contains("spidermill-paper.toml"),
+        "{costs}"
+    );
+
     // Another model from the list.
     let seconds = browser.run(
         &window,

@@ -9,6 +9,8 @@ use crate::variants::{Crossing, DriveVariants, Effort, LimitUse, TermShare, Vari
 
 /// Summands of a drive's difference that are shown, at most; the rest is told in one line.
 const MOST_TERMS: usize = 6;
+/// Relative changes up to this are none.
+const UNCHANGED: f64 = 5e-6;
 /// Products of p_g that are named, at most.
 const MOST_PRODUCTS: usize = 4;
 /// Summands below this share of the largest one are not shown by themselves.
@@ -235,18 +237,15 @@ fn numbers(effort: &Effort) -> [f64; 6] {
 
 /// A change relative to what was, `+12.3 %`.
 fn change(before: f64, after: f64) -> String {
-    if before == after {
-        return "-".to_owned();
-    }
-    if before == 0.0 {
-        return format!("{:+}", number(after).parse::<f64>().unwrap_or(after));
-    }
-    let by = (after - before) / before.abs();
-    if by.abs() < 5e-6 {
+    let by = after - before;
+    if by.abs() <= UNCHANGED * before.abs() {
         return "-".to_owned();
     }
     let sign = if by > 0.0 { "+" } else { "-" };
-    format!("{sign}{}", percent(Some(by.abs())))
+    if before == 0.0 {
+        return format!("{sign}{}", significant(by.abs(), 4));
+    }
+    format!("{sign}{}", percent(Some((by / before).abs())))
 }
 
 /// What makes the difference of a drive.
@@ -263,9 +262,13 @@ fn shares(one: &DriveVariants) -> Vec<String> {
         unit = one.unit
     )];
     if one.products.len() > 1 {
-        let most = one.products.iter().take(MOST_PRODUCTS);
-        let most = most.map(|p| format!("{} {}", p.product, signed_percent(p.share)));
-        let more = if one.products.len() > MOST_PRODUCTS {
+        let least = LEAST_SHARE * one.products[0].share.abs();
+        let large = (one.products.iter()).take_while(|p| p.share.abs() >= least);
+        let most = large
+            .clone()
+            .take(MOST_PRODUCTS)
+            .map(|p| format!("{} {}", p.product, signed_percent(p.share)));
+        let more = if large.clone().count() > MOST_PRODUCTS {
             ", ..."
         } else {
             ""
@@ -346,7 +349,9 @@ fn value(term: &TermShare) -> String {
         unit => format!(" {unit}"),
     };
     match (term.before, term.after) {
-        (Some(before), Some(after)) if before == after => format!("{}{unit}", number(after)),
+        (Some(before), Some(after)) if number(before) == number(after) => {
+            format!("{}{unit}", number(after))
+        }
         (Some(before), Some(after)) => format!("{} -> {}{unit}", number(before), number(after)),
         (Some(before), None) => format!("{}{unit}, then gone", number(before)),
         (None, after) => format!("new, {}{unit}", number(after.unwrap_or(0.0))),

@@ -128,7 +128,7 @@ impl Variants {
                 .map_or(0.0, |(end, start)| end - start);
         }
         let drives = (counterparts.drives.iter().enumerate()).map(|(k, [d, _])| {
-            let [before, after] = gathered[k].map(|one| one.effort());
+            let [before, after] = gathered[k].map(Gathered::effort);
             let (peak, squares) = differences[k];
             let rms = (squares / samples.max(1) as f64).sqrt();
             let is_rounding = rms <= ROUNDING * before.rms.max(after.rms);
