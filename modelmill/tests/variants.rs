@@ -478,3 +478,29 @@ fn what_has_no_counterpart_is_said() {
         "{warned:?}"
     );
 }
+
+/// What nothing drives has no power: it is left out, with a word.
+#[test]
+fn what_nothing_drives_is_left_out() {
+    let loose = arm(&[
+        (
+            "q2 = { nominal = 0.8 }",
+            "q2 = { nominal = 0.8, driven = false }",
+        ),
+        ("[[drive]]\nname = \"boom\"\njoint = \"q2\"\n", ""),
+        ("boom = { force = 100 }", ""),
+    ]);
+    let found = along(&arm(&[]), &loose, &recording("loose", &[]));
+    assert_eq!(found.drives.len(), 1);
+    assert_eq!(found.drives[0].drive, "shoulder");
+    let found = along(&loose, &loose.clone(), &recording("loose", &[]));
+    assert_eq!(found.drives.len(), 1);
+    assert!(
+        found
+            .notes
+            .iter()
+            .any(|note| note.says.starts_with("Nothing drives on_q2")),
+        "{:?}",
+        found.notes
+    );
+}

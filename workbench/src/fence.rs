@@ -46,7 +46,7 @@ impl Fence {
             match host.load(model) {
                 Ok(loaded) => loaded.sources.paths().for_each(|path| fence.admit(path)),
                 Err(Error::Model(fault)) => {
-                    fault.sources.paths().for_each(|path| fence.admit(path))
+                    fault.sources.paths().for_each(|path| fence.admit(path));
                 }
                 Err(_) => {}
             }

@@ -18,28 +18,39 @@ const LONGEST: u64 = 4 << 20;
 /// What was read and derived of variants, kept while nothing changes on which it depends.
 #[derive(Default)]
 pub(crate) struct Variant {
-    /// The other model with its files as they were.
-    kept: Mutex<Option<(PathBuf, Vec<Option<Vec<u8>>>, Model)>>,
+    kept: Mutex<Option<Kept>>,
     readings: Readings,
+}
+
+/// The other model, with its files as they were.
+#[derive(Clone)]
+struct Kept {
+    path: PathBuf,
+    files: Vec<Option<Vec<u8>>>,
+    model: Model,
 }
 
 impl Variant {
     /// A model file beside the text, derived anew when any file of it has changed.
     pub(crate) fn model(&self, host: &Host, path: &Path) -> Outcome<Model> {
         let known = self.kept().clone();
-        if let Some((of, files, model)) = known
-            && of == path
-            && contents(host, &model) == files
+        if let Some(known) = known
+            && known.path == path
+            && known.files == contents(host, &known.model)
         {
-            return Ok(model);
+            return Ok(known.model);
         }
         let model = host.model(path)?;
         let files = contents(host, &model);
-        *self.kept() = Some((path.to_owned(), files, model.clone()));
+        *self.kept() = Some(Kept {
+            path: path.to_owned(),
+            files,
+            model: model.clone(),
+        });
         Ok(model)
     }
 
-    fn kept(&self) -> MutexGuard<'_, Option<(PathBuf, Vec<Option<Vec<u8>>>, Model)>> {
+    fn kept(&self) -> MutexGuard<'_, Option<Kept>> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

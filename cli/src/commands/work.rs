@@ -217,5 +217,17 @@ mod tests {
             };
             assert_eq!((data, preparation), (&args.data, &args.preparation));
         }
+        let command = spelled.variant(Path::new("before this.toml")).unwrap();
+        let cli = Cli::try_parse_from(words(&command));
+        let cli = cli.unwrap_or_else(|error| panic!("{command}: {error}"));
+        let Command::Diff(other) = &cli.command else {
+            panic!("{command}");
+        };
+        assert_eq!(
+            [&other.before, &other.after],
+            [&PathBuf::from("before this.toml"), &args.model]
+        );
+        assert_eq!(other.data, [&*args.data, &*args.check].concat());
+        assert_eq!(other.preparation, args.preparation);
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use modelmill_in_browser::make;
 use serde_json::Value;
 
-use crate::common::browser::Browser;
+use crate::common::browser::{Browser, Window};
 use crate::common::{self, model, number, run, scratch};
 
 /// The page around a module that tests have built anyway; `None`, with the reason, where none can be built. `MODELMILL_PAGE`
@@ -115,9 +115,31 @@ fn the_mill_in_a_page_gives_the_figures_of_the_program() {
         "{errors}"
     );
 
-    // What the addition costs, beside the file as it was.
-    let costs = browser.run(
+    tells_what_the_addition_costs(&mut browser, &window);
+
+    // Another model from the list.
+    let seconds = browser.run(
         &window,
+        "window.confirm = () => true;
+         at('bundled').value = 'panda.toml'; at('bundled').dispatchEvent(new Event('change'));
+         await until('the Panda', () => at('file').textContent === 'panda.toml' && at('base').tBodies[0].rows.length > 30, 120000);
+         return parseFloat(at('state').textContent.match(/derived in ([0-9.]+) ms/)[1]) / 1000;",
+    );
+    let base = browser.run(
+        &window,
+        "return [...at('base').tBodies[0].rows].map((row) => row.cells[1].textContent);",
+    );
+    let checked = common::json(&["check", &model("panda.toml"), "--json"]);
+    let rows = base.as_array().expect("rows").len();
+    assert_eq!(checked["base_parameters"], rows);
+    eprintln!("try.html derives the Panda in {seconds} s");
+    assert_eq!(browser.heard, Vec::<String>::new());
+}
+
+/// The pane of variants: the text with what was added, beside the file as it was.
+fn tells_what_the_addition_costs(browser: &mut Browser, window: &Window) {
+    let costs = browser.run(
+        window,
         "tab('variant');
          await until('costs', () => at('costs').textContent.includes('What makes the difference') && at('both').querySelector('svg .joint'), 120000);
          const { along, entries } = await window.mill.ask('variant', { beside: null });
@@ -138,24 +160,6 @@ fn the_mill_in_a_page_gives_the_figures_of_the_program() {
             .contains("spidermill-paper.toml"),
         "{costs}"
     );
-
-    // Another model from the list.
-    let seconds = browser.run(
-        &window,
-        "window.confirm = () => true;
-         at('bundled').value = 'panda.toml'; at('bundled').dispatchEvent(new Event('change'));
-         await until('the Panda', () => at('file').textContent === 'panda.toml' && at('base').tBodies[0].rows.length > 30, 120000);
-         return parseFloat(at('state').textContent.match(/derived in ([0-9.]+) ms/)[1]) / 1000;",
-    );
-    let base = browser.run(
-        &window,
-        "return [...at('base').tBodies[0].rows].map((row) => row.cells[1].textContent);",
-    );
-    let checked = common::json(&["check", &model("panda.toml"), "--json"]);
-    let rows = base.as_array().expect("rows").len();
-    assert_eq!(checked["base_parameters"], rows);
-    eprintln!("try.html derives the Panda in {seconds} s");
-    assert_eq!(browser.heard, Vec::<String>::new());
 }
 
 /// Compares numbers and texts, and counts the numbers: sines come from another library in the page, and what is told of a rest

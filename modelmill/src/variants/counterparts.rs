@@ -24,14 +24,22 @@ impl Counterparts {
     pub(super) fn between(models: [&Model; 2]) -> Outcome<Self> {
         let coordinates = coordinates(models)?;
         let [before, after] = models.map(|model| &model.derivation.mechanism.drives);
+        let is_shared = models
+            .iter()
+            .all(|model| !model.derivation.mechanism.shared_drives.is_empty());
         let mut notes = Vec::new();
+        if is_shared {
+            notes.push(Note::info(
+                "There are more drives than degrees of freedom: figures are of what all of them do together along each coordinate.",
+            ));
+        }
         let mut drives = Vec::new();
         for (d, drive) in before.iter().enumerate() {
             let Some(e) = after.iter().position(|other| other.name == drive.name) else {
                 continue;
             };
             let units = [models[0].force_unit(d), models[1].force_unit(e)];
-            if !(drive.is_driven && after[e].is_driven) {
+            if !(drive.is_driven && after[e].is_driven || is_shared) {
                 notes.push(Note::info(format!(
                     "Nothing drives {}, so that it is left out.",
                     drive.name
