@@ -35,6 +35,7 @@
 //! |---|---|
 //! | [`Model::check`] | what the model consists of, and its numeric rank beside the exact one |
 //! | [`model::Changes::between`] | what a variant changes |
+//! | [`variants::Variants::along`] | what it costs along recordings: forces, power, work, limits, error |
 //! | [`Host::kinds`] | the kinds of effects that a model may have |
 //! | [`Model::with`] | the model with effects added to its file |
 //! | [`Model::picture`] | the mechanism at a pose, as SVG |
@@ -157,7 +158,7 @@
 //!
 //! In the order of the flow, each standing on those before it: [`text`], [`error`], [`progress`], [`host`], [`model`],
 //! [`stretch`], [`along`], [`audit`], [`recording`], [`compare`], [`evaluate`], [`states`], [`identify`], [`diagnose`], [`add`], [`adopt`],
-//! [`runs`], [`interpret`], [`excite`], [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@print`], [`report`].
+//! [`runs`], [`interpret`], [`excite`], [`variants`], [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@print`], [`report`].
 
 pub mod add;
 pub mod adopt;
@@ -188,6 +189,7 @@ pub mod simulate;
 pub mod states;
 pub mod stretch;
 pub mod text;
+pub mod variants;
 
 pub use modelmill_boundary::files;
 pub use modelmill_identify::{Note, Severity};

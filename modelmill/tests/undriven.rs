@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use modelmill::Model;
 use modelmill::identify::Estimation;
 use modelmill::recording::Reading;
+use modelmill::variants::Variants;
 use modelmill_codegen::{Dynamics, Evaluator, States};
 use modelmill_spec::{FreeBody, Step, TwistAxes};
 
@@ -521,4 +522,15 @@ fn cables_are_more_than_freedoms() {
         let error = (parameter.value - truth).abs() / 0.05;
         assert!(error < 1e-2, "{} instead of {truth}", parameter.value);
     }
+
+    // Beside a variant, figures are those of the rows.
+    let found =
+        Variants::along([&model, &model.clone()], [&[&recording], &[&recording]]).expect("figures");
+    let drives: Vec<&str> = found.drives.iter().map(|one| &*one.drive).collect();
+    assert_eq!(drives, model.drives());
+    assert!(
+        found.notes[0].says.contains("more drives than"),
+        "{:?}",
+        found.notes
+    );
 }

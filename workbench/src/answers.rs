@@ -79,6 +79,12 @@ struct Curves {
 }
 
 #[derive(Deserialize)]
+struct Variant {
+    /// The model that is held beside the text, as `models` names it; the text as it was saved if there is none.
+    beside: Option<String>,
+}
+
+#[derive(Deserialize)]
 struct Add {
     entry: usize,
 }
@@ -112,6 +118,8 @@ pub(crate) fn answer(
             return Ok(Answer::Html(sitting.curves(identified)?));
         }
         "motion" => sitting.motion()?,
+        "models" => sitting.models(),
+        "variant" => sitting.variant(read::<Variant>(body)?.beside.as_deref())?,
         "diagnosis" => sitting.diagnosis(),
         "diagnose" => sitting.diagnose()?,
         "cancel" => sitting.cancel(),

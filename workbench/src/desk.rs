@@ -113,6 +113,10 @@ impl Commands for Plain {
     fn same(&self, _: Step) -> Option<String> {
         None
     }
+
+    fn variant(&self, _: &Path) -> Option<String> {
+        None
+    }
 }
 
 #[cfg(test)]
@@ -146,6 +150,18 @@ mod tests {
         let (status, fault) = told(&desk.ask("edit", edit(41, "schema = [").as_bytes()));
         assert_eq!((status, &fault["valid"]), (200, &json!(false)));
         assert_eq!(fault["diagnostics"][0]["line"], 1, "{fault}");
+        // Beside the file as saved, and beside a model that is there.
+        let text = view["text"].as_str().unwrap();
+        let saved = desk.ask("edit", edit(42, text).as_bytes());
+        assert_eq!(told(&saved).1["valid"], true, "{saved}");
+        let (_, models) = told(&desk.ask("models", b"{}"));
+        assert_eq!(models, json!({ "models": ["delta.toml"], "named": null }));
+        for beside in [json!(null), json!("delta.toml")] {
+            let body = json!({ "beside": beside }).to_string();
+            let (status, variant) = told(&desk.ask("variant", body.as_bytes()));
+            assert_eq!((status, &variant["same"]), (200, &json!(beside.is_null())));
+            assert_eq!(variant["along"], json!(null), "there is no recording");
+        }
         // Made of a text that is no longer there, or of nothing.
         assert_eq!(told(&desk.ask("edit", edit(41, "").as_bytes())).0, 409);
         assert_eq!(told(&desk.ask("edit", b"{}")).0, 400);

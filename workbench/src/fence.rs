@@ -1,4 +1,4 @@
-//! Files that a sitting may read: those of the model's folder, and those that were named when it began. A text that is edited in
+//! Files that a sitting may read: those of the model's folder, and those that were named when it began with what they are made of. A text that is edited in
 //! a page may name any path.
 
 use std::io::ErrorKind;
@@ -36,12 +36,20 @@ impl Fence {
         let fence = Self::around(&options.model);
         let named = (options.data.iter().chain(&options.check).flatten())
             .chain(host.libraries())
-            .chain([&options.model]);
+            .chain([&options.model])
+            .chain(&options.beside);
         named.for_each(|path| fence.admit(path));
-        match host.load(&options.model) {
-            Ok(loaded) => loaded.sources.paths().for_each(|path| fence.admit(path)),
-            Err(Error::Model(fault)) => fault.sources.paths().for_each(|path| fence.admit(path)),
-            Err(_) => {}
+        for model in [Some(&options.model), options.beside.as_ref()]
+            .into_iter()
+            .flatten()
+        {
+            match host.load(model) {
+                Ok(loaded) => loaded.sources.paths().for_each(|path| fence.admit(path)),
+                Err(Error::Model(fault)) => {
+                    fault.sources.paths().for_each(|path| fence.admit(path));
+                }
+                Err(_) => {}
+            }
         }
         fence
     }

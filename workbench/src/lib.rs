@@ -3,7 +3,7 @@
 //!
 //! `options` is what is put on it, `draft` the text beside what the disk holds, `readings` recordings as a model reads them,
 //! `surroundings` what a sitting needs of where it takes place, `watch` the progress of a diagnosis; `sitting` is the text with
-//! what was derived of it and asked about it, `told` the answers as JSON, `answers` what a page may ask, `page` the page.
+//! what was derived of it and asked about it, `variant` the model that it is held beside, `told` the answers as JSON, `answers` what a page may ask, `page` the page.
 //!
 //! It takes place on this machine, where `machine` has the disk behind a `fence` and a `server` lets the page ask; or on a
 //! `desk` in memory (its files on a `shelf`), which WebAssembly carries into the page itself. All of the work is the library's:
@@ -18,6 +18,7 @@ mod shelf;
 mod sitting;
 mod surroundings;
 mod told;
+mod variant;
 mod watch;
 
 #[cfg(not(target_family = "wasm"))]

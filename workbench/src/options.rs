@@ -1,6 +1,6 @@
 //! What is put on the workbench, and the words in which its steps are said.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use modelmill::print::Spelling;
 use modelmill::recording::Reading;
@@ -14,6 +14,8 @@ pub struct Options {
     pub data: Vec<Vec<PathBuf>>,
     /// Recordings that a fit does not see.
     pub check: Vec<Vec<PathBuf>>,
+    /// A model file beside the model, which may lie in another folder.
+    pub beside: Option<PathBuf>,
     /// How recordings are read.
     pub reading: Reading,
     /// What revisions and versions are counted from, so that a page which opens one sitting after the other never takes one's
@@ -27,6 +29,9 @@ pub struct Options {
 pub trait Commands: Spelling + Send + Sync {
     /// Does what a pane of the workbench does; `None` where nothing else does.
     fn same(&self, step: Step) -> Option<String>;
+
+    /// Holds the model of the workbench against another model file, as it was before.
+    fn variant(&self, before: &Path) -> Option<String>;
 }
 
 /// What a pane of the workbench does.

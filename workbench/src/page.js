@@ -243,6 +243,9 @@
     };
   };
 
+  // What panes in files of their own share; they hear `stands` when there is something new to show.
+  window.bench = { make, number, percent, cell, asker, say };
+
   let errors = null, drawn = null, from = null;
   const at = {};
 
@@ -281,6 +284,7 @@
   const refresh = () => {
     draw();
     compare();
+    document.dispatchEvent(new CustomEvent('stands', { detail: { view, pane, seen: { at: Object.entries(at), from } } }));
     for (const old of ['curves', 'where', 'written', 'found']) by(old).classList.toggle('stale', by(old).dataset.revision !== String(view.revision));
   };
 

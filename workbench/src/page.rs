@@ -25,6 +25,7 @@ pub(crate) fn page(nonce: &str) -> String {
         include_str!("served.js"),
         report::SCRIPT,
         include_str!("page.js"),
+        include_str!("variant.js"),
     ];
     written("", &format!(" nonce=\"{nonce}\""), "", &scripts)
 }
@@ -53,6 +54,7 @@ pub fn alone(module: &[u8], bundle: &Bundle) -> String {
         include_str!("alone.js"),
         report::SCRIPT,
         include_str!("page.js"),
+        include_str!("variant.js"),
     ];
     written(policy, "", &carried, &scripts)
 }

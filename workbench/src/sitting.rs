@@ -21,6 +21,7 @@ use crate::options::{Commands, Options, Step};
 use crate::readings::{Read, Readings};
 use crate::surroundings::Surroundings;
 use crate::told;
+use crate::variant::{self, Variant};
 use crate::watch::Watch;
 
 /// Longest model file that is edited, bytes.
@@ -38,6 +39,7 @@ pub(crate) struct Sitting {
     /// Counts everything that pages should hear of.
     version: AtomicU64,
     readings: Readings,
+    variant: Variant,
 }
 
 struct State {
@@ -94,6 +96,8 @@ pub(crate) struct Seeing {
     frames: bool,
     /// The saved model below it as a shadow.
     shadow: bool,
+    /// Another model as the shadow, as `models` names it.
+    beside: Option<String>,
 }
 
 impl Sitting {
@@ -143,6 +147,7 @@ impl Sitting {
             surroundings,
             version,
             readings: Readings::default(),
+            variant: Variant::default(),
         })
     }
 
@@ -336,11 +341,16 @@ impl Sitting {
                 ..Style::default()
             },
         };
-        let saved = self.state().saved.clone();
-        let shadow = saved.filter(|saved| seeing.shadow && saved.text() != model.text());
+        let shadow = match &seeing.beside {
+            Some(name) => Some(self.beside(Some(name))?),
+            None => {
+                let saved = self.state().saved.clone();
+                saved.filter(|saved| seeing.shadow && saved.text() != model.text())
+            }
+        };
         let told = |error| self.said(&error);
         match model.picture(&drawing, shadow.as_ref()) {
-            // The saved mechanism may have other coordinates, or not reach that pose.
+            // The other mechanism may have other coordinates, or not reach that pose.
             Err(_) if shadow.is_some() => model.picture(&drawing, None).map_err(told),
             drawn => drawn.map_err(told),
         }
@@ -425,6 +435,63 @@ impl Sitting {
             }
             _ => report::curves(&edited, None, ["model", ""]),
         })
+    }
+
+    /// Models that the text can be held beside: those of the model's folder, and the one that was named when the workbench
+    /// began.
+    pub(crate) fn models(&self) -> Value {
+        let named = self
+            .options
+            .beside
+            .as_ref()
+            .map(|path| path.display().to_string());
+        let mut models = variant::models_near(&self.host, &self.options.model);
+        models.retain(|name| {
+            let near = self.options.model.with_file_name(name);
+            self.options.beside.as_ref() != Some(&near)
+        });
+        models.splice(0..0, named.clone());
+        json!({ "models": models, "named": named })
+    }
+
+    /// The model that the text is held beside, by its name of [`Self::models`]; the saved one without a name.
+    fn beside(&self, name: Option<&str>) -> Result<Model, String> {
+        let Some(name) = name else {
+            let saved = self.state().saved.clone();
+            return saved.ok_or_else(|| "the file as it was saved has no meaning".to_owned());
+        };
+        let path = self.path_of(name);
+        let found = self.variant.model(&self.host, &path);
+        found.map_err(|error| self.said(&error))
+    }
+
+    /// The file of a model of [`Self::models`].
+    fn path_of(&self, name: &str) -> PathBuf {
+        match &self.options.beside {
+            Some(path) if path.display().to_string() == name => path.clone(),
+            _ => self.options.model.with_file_name(name),
+        }
+    }
+
+    /// What changes from another model, or from the saved one, to the text, and what it costs along the recordings.
+    pub(crate) fn variant(&self, beside: Option<&str>) -> Result<Value, String> {
+        let (model, revision) = self.model()?;
+        let other = self.beside(beside)?;
+        let told = self.variant.told(
+            &other,
+            &model,
+            || self.recordings(&other),
+            || {
+                let read = || self.recordings(&model);
+                Ok(self.readings.of(&model, false, read)?.0)
+            },
+        );
+        let told = told.map_err(|error| self.said(&error))?;
+        let mut told = told::spelled(told, &*self.commands);
+        told["revision"] = json!(revision);
+        told["same"] = json!(other.text() == model.text());
+        told["command"] = json!(beside.and_then(|name| self.commands.variant(&self.path_of(name))));
+        Ok(told)
     }
 
     /// Poses along the recordings, in time.

@@ -18,6 +18,7 @@ use clap::{Args, Parser, Subcommand};
 
 use drawing::DrawingArgs;
 use effects::{AddArgs, EffectsArgs};
+use preparation::PreparationArgs;
 use runs::RunsArgs;
 use work::WorkArgs;
 
@@ -66,10 +67,20 @@ pub(crate) enum Command {
         modelmill check model-spec/models/panda.toml --picture panda.svg --at q2=0.6,q4=-1.2 --view 60,20"
     )]
     Check(CheckArgs),
-    /// Say what a variant changes: entries, p_g, dependencies, p_min, operation counts
-    #[command(after_help = "Examples (from the project's root):\n  \
+    /// Say what a variant changes: entries, p_g, dependencies, p_min, operation counts; along recordings what it costs: forces,
+    /// power, work, limits, error
+    #[command(
+        after_help = "With --data both models move as the first one reads the recordings, each with the values of its file. \
+        A share is what a summand of p_min projects on the whole difference of a drive's force: shares add up to 100 %, and one \
+        that works against the difference is negative. Its column changes where geometry does. Forces need not be recorded; \
+        where they are, each model's error is that of `compare`.\n\n\
+        Examples (from the project's root):\n  \
         modelmill diff model-spec/models/spidermill.toml model-spec/models/spidermill-paper.toml\n  \
-        modelmill diff model-spec/models/arm_four_bar.toml model-spec/models/arm_parallelogram.toml --picture both.svg")]
+        modelmill diff model-spec/models/spidermill.toml model-spec/models/spidermill-paper.toml \\\n      \
+        --data recordings/spidermill-mbs/plain-check.csv\n  \
+        modelmill diff model-spec/models/arm_four_bar.toml model-spec/models/arm_parallelogram.toml \\\n      \
+        --picture both.svg"
+    )]
     Diff(DiffArgs),
     /// List the effects that a model may have, or explain one of them
     #[command(after_help = "Examples (from the project's root):\n  \
@@ -266,11 +277,16 @@ pub(crate) struct DiffArgs {
     pub(crate) before: PathBuf,
     /// Model file as it is now
     pub(crate) after: PathBuf,
+    /// Recordings along which both are held beside each other (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2); may be repeated
+    #[arg(long, value_name = "RUN", num_args = 1..)]
+    pub(crate) data: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) drawing: DrawingArgs,
     /// Print one JSON object on standard output
-    #[arg(long)]
+    #[arg(long, help_heading = None)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) preparation: PreparationArgs,
 }
 
 /// `completions`.

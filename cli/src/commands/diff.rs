@@ -1,23 +1,63 @@
-//! `diff`: what a variant changes, for people who review it.
+//! `diff`: what a variant changes, for people who review it; along recordings, what it costs.
 
-use modelmill::Host;
+use std::sync::Arc;
+
 use modelmill::model::Changes;
+use modelmill::recording::Recording;
+use modelmill::variants::Variants;
+use modelmill::{Host, Model, Note};
 
 use crate::args::DiffArgs;
 use crate::failure::Outcome;
+use crate::terminal::progress::WithoutRemarks;
 use crate::{commands, terminal};
 
 /// Prints what changed between two models.
 pub(crate) fn run(host: &Host, args: &DiffArgs) -> Outcome {
     let before = commands::model(host, &args.before)?;
-    let after = commands::model(host, &args.after)?;
+    let quiet = host.clone().with_progress(Arc::new(WithoutRemarks::new()));
+    let after = commands::model(&quiet, &args.after)?;
     let inputs = before.files().chain(after.files());
     if let Some(target) = args.drawing.target(inputs)? {
         args.drawing.draw(&target, &after, Some(&before))?;
     }
     let changes = Changes::between(&before, &after);
+    let variants = variants(args, &before, &after)?;
     if args.json {
-        return terminal::print_json(&changes.json(&before, &after));
+        let mut object = changes.json(&before, &after);
+        if let Some(variants) = variants {
+            object["along"] = variants.json();
+        }
+        return terminal::print_json(&object);
     }
-    terminal::print(&changes.text(&before, &after, terminal::style()))
+    let style = terminal::style();
+    let mut text = changes.text(&before, &after, style);
+    if let Some(variants) = variants {
+        text = format!("{text}\n\n{}", variants.text(style));
+    }
+    terminal::print(&text)
+}
+
+/// Both models along the recordings, if there are any.
+fn variants(args: &DiffArgs, before: &Model, after: &Model) -> Outcome<Option<Variants>> {
+    if args.data.is_empty() {
+        return Ok(None);
+    }
+    Variants::check([before, after])?;
+    let reading = args.preparation.reading();
+    let first = commands::recordings(before, &args.data, &reading)?;
+    let second = commands::recordings(after, &args.data, &reading)?;
+    // What both models find odd about a recording is told once.
+    let told: Vec<&Note> = first.iter().flat_map(Recording::notes).collect();
+    for note in second.iter().flat_map(Recording::notes) {
+        if !told.contains(&note) {
+            terminal::remark(note);
+        }
+    }
+    let [first, second] = [&first, &second].map(|runs| runs.iter().collect::<Vec<_>>());
+    let variants = Variants::along([before, after], [&first, &second])?;
+    for note in &variants.notes {
+        terminal::remark(note);
+    }
+    Ok(Some(variants))
 }

@@ -24,6 +24,9 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> Outcome {
         // This says what is wrong with the path, and which models are near.
         commands::load_quietly(host, &args.model)?;
     }
+    if let Some(beside) = &args.beside {
+        commands::load_quietly(host, beside)?;
+    }
     let files = |paths: &[PathBuf]| -> Outcome<Vec<Vec<PathBuf>>> {
         let runs = paths.iter().map(|path| commands::files_of(path));
         let is_there = |file: &PathBuf| {
@@ -43,6 +46,7 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> Outcome {
         model: args.model.clone(),
         data: files(&args.data)?,
         check: files(&args.check)?,
+        beside: args.beside.clone(),
         reading: args.preparation.reading(),
         port: args.port,
         first: 0,
@@ -67,6 +71,8 @@ struct Spelled {
     model: String,
     data: String,
     check: String,
+    /// The recordings of both as data, where all count alike.
+    all: String,
     /// How recordings are read.
     reading: String,
     /// How models are read.
@@ -84,6 +90,7 @@ impl Spelled {
             model: name(&args.model),
             data: named("data", &args.data),
             check: named("check", &args.check),
+            all: named("data", &[&*args.data, &*args.check].concat()),
             reading: args.preparation.spelled(),
             libraries: libraries(host),
         }
@@ -117,6 +124,20 @@ impl Commands for Spelled {
                 format!("modelmill diagnose {model}{data}{check}{reading}{libraries}")
             }
         })
+    }
+
+    fn variant(&self, before: &Path) -> Option<String> {
+        let Self {
+            model,
+            all,
+            reading,
+            libraries,
+            ..
+        } = self;
+        let before = name(before);
+        Some(format!(
+            "modelmill diff {before} {model}{all}{reading}{libraries}"
+        ))
     }
 }
 
@@ -196,5 +217,17 @@ mod tests {
             };
             assert_eq!((data, preparation), (&args.data, &args.preparation));
         }
+        let command = spelled.variant(Path::new("before this.toml")).unwrap();
+        let cli = Cli::try_parse_from(words(&command));
+        let cli = cli.unwrap_or_else(|error| panic!("{command}: {error}"));
+        let Command::Diff(other) = &cli.command else {
+            panic!("{command}");
+        };
+        assert_eq!(
+            [&other.before, &other.after],
+            [&PathBuf::from("before this.toml"), &args.model]
+        );
+        assert_eq!(other.data, [&*args.data, &*args.check].concat());
+        assert_eq!(other.preparation, args.preparation);
     }
 }

@@ -90,6 +90,25 @@ impl Progress for Terminal {
     }
 }
 
+/// As [`Terminal`], for whoever tells remarks at another time.
+pub(crate) struct WithoutRemarks(Terminal);
+
+impl WithoutRemarks {
+    pub(crate) fn new() -> Self {
+        Self(Terminal::new())
+    }
+}
+
+impl Progress for WithoutRemarks {
+    fn begins(&self, what: &str, total: usize, job: &Arc<Job>) {
+        self.0.begins(what, total, job);
+    }
+
+    fn ends(&self) {
+        self.0.ends();
+    }
+}
+
 fn new_bar(message: &str, total: usize) -> ProgressBar {
     let target = ProgressDrawTarget::stderr();
     let (bar, template) = if total > 0 {

@@ -46,5 +46,6 @@ mod sound;
 mod try_page;
 mod tx40;
 mod usage;
+mod variants;
 mod weights;
 mod work;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use modelmill_in_browser::make;
 use serde_json::Value;
 
-use crate::common::browser::Browser;
+use crate::common::browser::{Browser, Window};
 use crate::common::{self, model, number, run, scratch};
 
 /// The page around a module that tests have built anyway; `None`, with the reason, where none can be built. `MODELMILL_PAGE`
@@ -115,6 +115,8 @@ fn the_mill_in_a_page_gives_the_figures_of_the_program() {
         "{errors}"
     );
 
+    tells_what_the_addition_costs(&mut browser, &window);
+
     // Another model from the list.
     let seconds = browser.run(
         &window,
@@ -132,6 +134,32 @@ fn the_mill_in_a_page_gives_the_figures_of_the_program() {
     assert_eq!(checked["base_parameters"], rows);
     eprintln!("try.html derives the Panda in {seconds} s");
     assert_eq!(browser.heard, Vec::<String>::new());
+}
+
+/// The pane of variants: the text with what was added, beside the file as it was.
+fn tells_what_the_addition_costs(browser: &mut Browser, window: &Window) {
+    let costs = browser.run(
+        window,
+        "tab('variant');
+         await until('costs', () => at('costs').textContent.includes('What makes the difference') && at('both').querySelector('svg .joint'), 120000);
+         const { along, entries } = await window.mill.ask('variant', { beside: null });
+         const shares = along.drives.map((one) => one.products.reduce((sum, product) => sum + product.share, 0));
+         return { shares, errors: along.errors, entries, models: [...at('beside').options].map((one) => one.value) };",
+    );
+    for k in 0..2 {
+        let share = number(&costs, &format!("/shares/{k}"));
+        assert!((share - 1.0).abs() < 1e-6, "{costs}");
+    }
+    assert!(
+        costs["entries"].to_string().contains("rod_inertia"),
+        "{costs}"
+    );
+    assert!(
+        costs["models"]
+            .to_string()
+            .contains("spidermill-paper.toml"),
+        "{costs}"
+    );
 }
 
 /// Compares numbers and texts, and counts the numbers: sines come from another library in the page, and what is told of a rest

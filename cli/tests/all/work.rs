@@ -558,3 +558,147 @@ fn equations_follow_while_one_types() {
         );
     }
 }
+
+/// The text beside the file as saved, beside a model that was named, and beside one of its folder.
+#[test]
+fn two_variants_stand_side_by_side() {
+    let Some(mut browser) = Browser::start(&scratch("variants-browser")) else {
+        return;
+    };
+    let (fit, check) = (run("with-rods-fit.csv"), run("with-rods-check.csv"));
+    let paper = common::model("spidermill-paper.toml");
+    let given = ["--data", &*fit, "--check", &*check, "--beside", &*paper];
+    let bench = Workbench::open("variants", "spidermill.toml", &given);
+    let original = bench.text();
+    let heavy = bench.model.with_file_name("heavy.toml");
+    let heavier = original.replace("12.4560", "92.4560");
+    std::fs::write(&heavy, &heavier).expect("a variant");
+    // What is no model is no choice.
+    std::fs::write(bench.model.with_file_name("notes.toml"), "a = 1\n").expect("a file");
+
+    // No other file is read for it.
+    for name in ["../../variants.toml", "/etc/hostname", "none.toml"] {
+        let (status, told) = bench.ask("variant", &json!({ "beside": name }));
+        assert_eq!(status, 422, "{told}");
+    }
+
+    let window = browser.open(&bench.link);
+    browser.front(&window);
+    // The one that was named comes first.
+    let chosen = browser.run(
+        &window,
+        "await until('equations', () => at('base').tBodies[0].rows.length === 4);
+         tab('variant');
+         await until('costs', () => at('costs').dataset.revision);
+         return [at('beside').value, [...at('beside').options].map((one) => one.value), at('both').querySelectorAll('svg .shadow').length];",
+    );
+    assert_eq!(chosen[0], paper.as_str());
+    assert_eq!(chosen[1], json!(["", paper, "heavy.toml"]));
+    assert!(
+        number(&chosen, "/2") > 0.0,
+        "the other one lies below: {chosen}"
+    );
+    shows_what_the_command_says(&mut browser, &window);
+
+    // As saved and as edited: nothing at first, then what the edit costs.
+    let edited = browser.run(
+        &window,
+        "const choose = (name) => { at('beside').value = name; at('beside').dispatchEvent(new Event('change')); };
+         choose('');
+         await until('no difference', () => at('costs').textContent.includes('Both texts are the same'));
+         select('12.4560');
+         document.execCommand('insertText', false, '92.4560');
+         await until('the cost', () => at('costs').textContent.includes('1/2*d3*m4') && at('costs').textContent.includes('now exceeded'));
+         const told = await window.mill.ask('variant', { beside: null });
+         const rows = [...at('costs').querySelectorAll('table')].find((t) => t.caption.textContent === 'spindle_left').tBodies[0].rows;
+         return [told.along, [...rows[0].cells].map((one) => one.textContent), at('command').parentElement.hidden];",
+    );
+    let told = common::json(&[
+        "diff",
+        bench.path(),
+        heavy.to_str().expect("plain text"),
+        "--data",
+        &fit,
+        &check,
+        "--json",
+    ]);
+    for pointer in [
+        "/drives/0/after/peak",
+        "/drives/1/difference/rms",
+        "/errors/after/nrms",
+    ] {
+        let [here, there] = [number(&told["along"], pointer), number(&edited[0], pointer)];
+        assert!(
+            (here - there).abs() <= 1e-12 * here.abs(),
+            "{pointer}: {here}, {there}"
+        );
+    }
+    let cells: Vec<String> = serde_json::from_value(edited[1].clone()).expect("texts");
+    let shown = |k: usize| cells[k].parse::<f64>().expect("a number");
+    let peak = |side: &str| number(&told["along"], &format!("/drives/0/{side}/peak"));
+    assert_eq!(cells[0], "peak force, N");
+    for (k, side) in [(1, "before"), (2, "after")] {
+        assert!(
+            (shown(k) - peak(side)).abs() < 1e-3 * peak(side),
+            "{cells:?}"
+        );
+    }
+    assert!(cells[3].starts_with('+'), "{cells:?}");
+    assert_eq!(edited[2], true, "no command reads what is not saved");
+
+    // The one of the folder is what was typed, by another name.
+    browser.run(
+        &window,
+        "at('beside').value = 'heavy.toml'; at('beside').dispatchEvent(new Event('change'));
+         await until('the other', () => at('costs').dataset.beside === 'heavy.toml');
+         if (!at('costs').textContent.includes('Both texts are the same')) throw new Error(at('costs').textContent);",
+    );
+    browser.run(
+        &window,
+        "at('text').focus(); document.execCommand('undo');
+         await until('the difference', () => !at('costs').textContent.includes('Both texts are the same') && !at('costs').classList.contains('stale'));",
+    );
+    shows_what_the_command_says(&mut browser, &window);
+
+    // A text without a meaning leaves the last figures in sight; a model that moves otherwise is refused with a word.
+    let panda = bench.model.with_file_name("panda.toml");
+    std::fs::copy(common::model("panda.toml"), panda).expect("a copy");
+    let (status, told) = bench.ask("variant", &json!({ "beside": "panda.toml" }));
+    assert_eq!(status, 200, "{told}");
+    assert!(
+        told["refused"].to_string().contains("no active coordinate"),
+        "{told}"
+    );
+    assert_eq!(bench.text(), original, "nothing was saved");
+    assert_eq!(browser.heard, Vec::<String>::new());
+}
+
+/// The pane's errors and shares are those of the command at its foot.
+fn shows_what_the_command_says(browser: &mut Browser, window: &Window) {
+    let shown = browser.run(
+        window,
+        "await until('the command', () => at('command').textContent.startsWith('modelmill diff '));
+         const table = (name) => [...at('costs').querySelectorAll('table')].find((t) => t.caption.textContent.startsWith(name));
+         const cells = (t, k) => [...t.tBodies[0].rows[k].cells].map((one) => one.textContent);
+         return [at('command').textContent, cells(table('Error'), 0), table('What makes').tBodies[0].rows[0].cells[0].firstChild.textContent];",
+    );
+    let command = shown[0].as_str().expect("a command");
+    let mut words: Vec<&str> = command.split(' ').skip(1).collect();
+    words.push("--json");
+    let told = common::json(&words);
+    let errors = ["before", "after"]
+        .map(|side| percent(number(&told["along"], &format!("/errors/{side}/nrms"))));
+    assert_eq!(shown[1], json!(["all drives", errors[0], errors[1]]));
+    let products = told["along"]["drives"][0]["products"]
+        .as_array()
+        .expect("products");
+    let terms = products
+        .iter()
+        .flat_map(|one| one["terms"].as_array().expect("terms"));
+    let largest = terms.max_by(|a, b| {
+        number(a, "/share")
+            .abs()
+            .total_cmp(&number(b, "/share").abs())
+    });
+    assert_eq!(shown[2], largest.expect("a summand")["term"]);
+}

@@ -64,6 +64,24 @@ pub fn base_grouped(derivation: &Derivation, k: usize) -> Formula {
     Formula::sum(terms)
 }
 
+/// What a product of p_g, by its position, brings into base parameter `k`: `d1*m2`, with its factor of eq. (6). A product that
+/// goes by others, as in long chains, stands alone, since its factor is longer than what it would tell; so does the retained one.
+pub fn base_summand(derivation: &Derivation, k: usize, product_idx: usize) -> Formula {
+    let Derivation {
+        mechanism,
+        reduction,
+        ..
+    } = derivation;
+    let what = product(mechanism, &reduction.products[product_idx]);
+    let mut lines = reduction.dependencies.iter();
+    let line = lines.find(|line| line.product == product_idx && line.via.is_empty());
+    let factor = line.and_then(|line| line.equals.iter().find(|(at, _)| *at == k));
+    match factor {
+        Some((_, factor)) => Formula::product(Rational::ONE, [factor.formula(mechanism), what]),
+        None => what,
+    }
+}
+
 /// A factor of eq. (6) as expanded text.
 pub(super) fn factor_text(mechanism: &Mechanism, factor: &RationalFunction) -> String {
     factor.expanded(mechanism).text()

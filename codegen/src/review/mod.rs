@@ -21,7 +21,7 @@ mod render_text;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use base_parameters::{base_expression, base_grouped};
+pub use base_parameters::{base_expression, base_grouped, base_summand};
 pub use equations::{BaseLine, DependencyLine, Equations, NumericMethod, Operations, Rank};
 pub use rank::NumericRank;
 pub use render_html::STYLE;

@@ -474,6 +474,11 @@ impl Model {
         self
     }
 
+    /// Whether the value of a base parameter was identified as a whole, in the file or in a fit, rather than made of parameters.
+    pub fn is_identified(&self, k: usize) -> bool {
+        self.identified[k]
+    }
+
     /// Whether the file gives a nominal value for anything that a base parameter consists of, or its value was identified.
     pub fn has_nominal(&self, k: usize) -> bool {
         if self.identified[k] {

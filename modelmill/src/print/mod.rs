@@ -17,6 +17,7 @@ mod runs;
 mod spelling;
 mod summary;
 pub mod tables;
+mod variants;
 
 pub use spelling::{Advised, Spelling, Words, spelled};
 pub use summary::{faults, refusal, warnings};

@@ -167,7 +167,7 @@ impl Stretch {
 
     fn check_load(&self, model: &Model) -> Outcome {
         let effects = model.load_dependent();
-        if effects.is_empty() || self.run.force.is_some() {
+        if effects.is_empty() || self.load.is_some() || self.run.force.is_some() {
             return Ok(());
         }
         Err(Error::input(format!(

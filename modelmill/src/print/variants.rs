@@ -1,0 +1,359 @@
+//! What a variant costs along motions, as JSON and for people.
+
+use serde_json::{Value, json};
+
+use crate::print::tables;
+use crate::text::Style;
+use crate::text::table::{Align, count, number, percent, significant, table};
+use crate::variants::{Crossing, DriveVariants, Effort, LimitUse, TermShare, Variants};
+
+/// Summands of a drive's difference that are shown, at most; the rest is told in one line.
+const MOST_TERMS: usize = 6;
+/// Relative changes up to this are none.
+const UNCHANGED: f64 = 5e-6;
+/// Products of p_g that are named, at most.
+const MOST_PRODUCTS: usize = 4;
+/// Summands below this share of the largest one are not shown by themselves.
+const LEAST_SHARE: f64 = 0.01;
+
+impl Variants {
+    /// All figures as one JSON object.
+    pub fn json(&self) -> Value {
+        let limits = self.limits.iter().map(|one| {
+            let side = |m: usize| json!({ "range": one.ranges[m], "used": one.used[m] });
+            json!({
+                "limit": one.limit,
+                "crossing": crossing(one.crossing()),
+                "before": side(0),
+                "after": side(1),
+            })
+        });
+        json!({
+            "recordings": self.recordings,
+            "samples": self.samples,
+            "seconds": self.seconds,
+            "drives": self.drives.iter().map(drive).collect::<Vec<_>>(),
+            "limits": limits.collect::<Vec<_>>(),
+            "errors": { "before": self.errors[0], "after": self.errors[1] },
+            "notes": self.notes,
+        })
+    }
+
+    /// The same for people, but for the notes.
+    pub fn text(&self, style: Style) -> String {
+        let mut lines = vec![style.bold(&format!(
+            "along {}: {} in {} s",
+            self.recordings.join(", "),
+            count(self.samples, "sample", "samples"),
+            significant(self.seconds, 3)
+        ))];
+        lines.push(String::new());
+        lines.push(style.bold("what the drives give"));
+        lines.extend(efforts(&self.drives));
+        lines.push(String::new());
+        lines.push(style.bold("what makes the difference"));
+        for drive in &self.drives {
+            lines.extend(shares(drive));
+        }
+        lines.push(String::new());
+        lines.push(style.bold("limits"));
+        lines.extend(self.limits_text(style));
+        if self.errors.iter().any(Option::is_some) {
+            lines.push(String::new());
+            lines.push(style.bold("error against measured forces"));
+            let named = ["before", "after"].into_iter().zip(&self.errors);
+            let named = named.filter_map(|(name, figures)| Some((name, figures.as_ref()?)));
+            lines.extend(tables::figures(&named.collect::<Vec<_>>()));
+        }
+        lines.join("\n")
+    }
+
+    fn limits_text(&self, style: Style) -> Vec<String> {
+        if self.limits.is_empty() {
+            return vec!["  the files have no `[limits]`".to_owned()];
+        }
+        let mut lines = Vec::new();
+        for crossing in [
+            Crossing::NowExceeded,
+            Crossing::StillExceeded,
+            Crossing::NoLongerExceeded,
+        ] {
+            for one in self.limits.iter().filter(|l| l.crossing() == crossing) {
+                let line = format!("  {}", limit(one));
+                lines.push(match crossing {
+                    Crossing::NowExceeded => style.red(&line),
+                    Crossing::StillExceeded | Crossing::Kept => line,
+                    Crossing::NoLongerExceeded => style.green(&line),
+                });
+            }
+        }
+        let kept = self
+            .limits
+            .iter()
+            .filter(|l| l.crossing() == Crossing::Kept);
+        let most = kept.clone().max_by(|a, b| {
+            let used = |one: &LimitUse| one.used.into_iter().flatten().fold(0.0, f64::max);
+            used(a).total_cmp(&used(b))
+        });
+        if let Some(most) = most {
+            lines.push(format!(
+                "  kept: {}; most is used of {}",
+                count(kept.count(), "limit", "limits"),
+                limit(most)
+            ));
+        }
+        lines
+    }
+}
+
+/// What the JSON calls it.
+fn crossing(crossing: Crossing) -> &'static str {
+    match crossing {
+        Crossing::NowExceeded => "now_exceeded",
+        Crossing::StillExceeded => "still_exceeded",
+        Crossing::NoLongerExceeded => "no_longer_exceeded",
+        Crossing::Kept => "kept",
+    }
+}
+
+/// A drive as JSON.
+fn drive(one: &DriveVariants) -> Value {
+    let effort = |effort: &Effort| {
+        let [peak, rms, peak_power, rms_power, work, net_work] = numbers(effort);
+        json!({
+            "peak": peak,
+            "rms": rms,
+            "peak_power": peak_power,
+            "rms_power": rms_power,
+            "work": work,
+            "net_work": net_work,
+        })
+    };
+    let term = |term: &TermShare| {
+        json!({
+            "term": term.term,
+            "retained": term.retained,
+            "unit": term.unit,
+            "before": term.before,
+            "after": term.after,
+            "share": term.share,
+            "by_value": term.by_value,
+        })
+    };
+    let products = one.products.iter().map(|product| {
+        json!({
+            "product": product.product,
+            "share": product.share,
+            "terms": product.terms.iter().map(term).collect::<Vec<_>>(),
+        })
+    });
+    json!({
+        "drive": one.drive,
+        "unit": one.unit,
+        "before": effort(&one.before),
+        "after": effort(&one.after),
+        "difference": { "peak": one.difference.peak, "rms": one.difference.rms },
+        "products": products.collect::<Vec<_>>(),
+    })
+}
+
+/// One line of a limit: what each model uses of it.
+fn limit(one: &LimitUse) -> String {
+    let used = one
+        .used
+        .map(|used| used.map_or_else(|| "no limit".to_owned(), part));
+    let range =
+        |m: usize| one.ranges[m].map(|[low, high]| format!("{} to {}", number(low), number(high)));
+    let range = match (range(0), range(1)) {
+        (Some(a), Some(b)) if a == b => format!(" ({a})"),
+        (None, None) => String::new(),
+        (a, b) => {
+            let text = |range: Option<String>| range.unwrap_or_else(|| "none".to_owned());
+            format!(" ({}, then {})", text(a), text(b))
+        }
+    };
+    let says = match one.crossing() {
+        Crossing::NowExceeded => "is now exceeded: ",
+        Crossing::StillExceeded => "is exceeded by both: ",
+        Crossing::NoLongerExceeded => "is no longer exceeded: ",
+        Crossing::Kept => "",
+    };
+    format!("{}{range} {says}{} -> {}", one.limit, used[0], used[1])
+}
+
+/// The part of a limit that is used; close to the limit with more digits, which say on which side.
+fn part(used: f64) -> String {
+    let digits = if (used - 1.0).abs() < 0.01 { 6 } else { 3 };
+    format!("{} %", significant(100.0 * used, digits))
+}
+
+/// Figures of all drives, three lines each: before, after, and the change.
+fn efforts(drives: &[DriveVariants]) -> Vec<String> {
+    let mut rows = Vec::new();
+    for one in drives {
+        let row = |drive: &str, which: &str, cells: [String; 6]| {
+            let mut row = vec![drive.to_owned(), which.to_owned()];
+            row.extend(cells);
+            row.insert(4, one.unit.to_owned());
+            row
+        };
+        let shown = |effort: &Effort| numbers(effort).map(|x| significant(x, 4));
+        rows.push(row(&one.drive, "before", shown(&one.before)));
+        rows.push(row("", "after", shown(&one.after)));
+        let (before, after) = (numbers(&one.before), numbers(&one.after));
+        let changes = std::array::from_fn(|i| change(before[i], after[i]));
+        let mut row = row("", "change", changes);
+        row[4].clear();
+        rows.push(row);
+    }
+    table(
+        2,
+        &[
+            ("drive", Align::Left),
+            ("", Align::Left),
+            ("peak", Align::Right),
+            ("rms", Align::Right),
+            ("", Align::Left),
+            ("peak, W", Align::Right),
+            ("rms, W", Align::Right),
+            ("work given, J", Align::Right),
+            ("net, J", Align::Right),
+        ],
+        &rows,
+    )
+}
+
+fn numbers(effort: &Effort) -> [f64; 6] {
+    let Effort {
+        peak,
+        rms,
+        peak_power,
+        rms_power,
+        work,
+        net_work,
+    } = *effort;
+    [peak, rms, peak_power, rms_power, work, net_work]
+}
+
+/// A change relative to what was, `+12.3 %`.
+fn change(before: f64, after: f64) -> String {
+    let by = after - before;
+    if by.abs() <= UNCHANGED * before.abs() {
+        return "-".to_owned();
+    }
+    let sign = if by > 0.0 { "+" } else { "-" };
+    if before == 0.0 {
+        return format!("{sign}{}", significant(by.abs(), 4));
+    }
+    format!("{sign}{}", percent(Some((by / before).abs())))
+}
+
+/// What makes the difference of a drive.
+fn shares(one: &DriveVariants) -> Vec<String> {
+    let size = one.difference;
+    if one.products.is_empty() {
+        return vec![format!("  {}: no difference", one.drive)];
+    }
+    let mut lines = vec![format!(
+        "  {}: {} {unit} where they differ most, {} {unit} in the mean square",
+        one.drive,
+        significant(size.peak, 4),
+        significant(size.rms, 4),
+        unit = one.unit
+    )];
+    if one.products.len() > 1 {
+        let least = LEAST_SHARE * one.products[0].share.abs();
+        let large = (one.products.iter()).take_while(|p| p.share.abs() >= least);
+        let most = large
+            .clone()
+            .take(MOST_PRODUCTS)
+            .map(|p| format!("{} {}", p.product, signed_percent(p.share)));
+        let more = if large.clone().count() > MOST_PRODUCTS {
+            ", ..."
+        } else {
+            ""
+        };
+        let all: Vec<String> = most.collect();
+        lines.push(format!("    by product of p_g: {}{more}", all.join(", ")));
+    }
+    let mut terms: Vec<&TermShare> = one.products.iter().flat_map(|p| &p.terms).collect();
+    terms.sort_by(|a, b| b.share.abs().total_cmp(&a.share.abs()));
+    let least = terms
+        .first()
+        .map_or(0.0, |first| LEAST_SHARE * first.share.abs());
+    let shown = terms.iter().take_while(|term| term.share.abs() >= least);
+    let n = shown.take(MOST_TERMS).count();
+    let rows: Vec<Vec<String>> = (terms[..n].iter())
+        .map(|term| {
+            vec![
+                signed_percent(term.share),
+                term.term.clone(),
+                if term.term == term.retained {
+                    String::new()
+                } else {
+                    format!("in {}", term.retained)
+                },
+                value(term),
+                by_column(term),
+            ]
+        })
+        .collect();
+    let columns = [
+        ("", Align::Right),
+        ("", Align::Left),
+        ("", Align::Left),
+        ("", Align::Left),
+        ("", Align::Left),
+    ];
+    lines.extend(table(4, &columns, &rows).into_iter().skip(1));
+    let rest: f64 = terms[n..].iter().map(|term| term.share).sum();
+    if n < terms.len() {
+        lines.push(format!(
+            "    {} by {}",
+            signed_percent(rest),
+            count(terms.len() - n, "other summand", "other summands")
+        ));
+    }
+    lines
+}
+
+fn signed_percent(share: f64) -> String {
+    let size = percent(Some(share.abs()));
+    if share < 0.0 {
+        format!("-{size}")
+    } else {
+        size
+    }
+}
+
+/// What of a share is the column's and not the value's; nothing where there is no such part.
+fn by_column(term: &TermShare) -> String {
+    let by_column = term.share - term.by_value;
+    if by_column.abs() <= LEAST_SHARE * term.share.abs() {
+        String::new()
+    } else if term.by_value == 0.0 {
+        "by its column alone".to_owned()
+    } else {
+        format!(
+            "{} by its value, {} by its column",
+            signed_percent(term.by_value),
+            signed_percent(by_column)
+        )
+    }
+}
+
+/// A summand's value, and what it was.
+fn value(term: &TermShare) -> String {
+    let unit = match term.unit.as_str() {
+        "1" | "" => String::new(),
+        unit => format!(" {unit}"),
+    };
+    match (term.before, term.after) {
+        (Some(before), Some(after)) if number(before) == number(after) => {
+            format!("{}{unit}", number(after))
+        }
+        (Some(before), Some(after)) => format!("{} -> {}{unit}", number(before), number(after)),
+        (Some(before), None) => format!("{}{unit}, then gone", number(before)),
+        (None, after) => format!("new, {}{unit}", number(after.unwrap_or(0.0))),
+    }
+}

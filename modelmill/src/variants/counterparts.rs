@@ -1,0 +1,179 @@
+//! What of one model is what of another: coordinates and drives of the same name.
+
+use modelmill_identify::{Note, Run};
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::recording::free::free_bodies;
+use crate::stretch::Stretch;
+
+/// Coordinates and drives that two models share.
+pub(super) struct Counterparts {
+    /// For each active coordinate of the second model its place among those of the first.
+    coordinates: Vec<usize>,
+    /// Drives that both have, by their places in the first and in the second model.
+    pub(super) drives: Vec<[usize; 2]>,
+    /// What is left out.
+    pub(super) notes: Vec<Note>,
+}
+
+impl Counterparts {
+    /// Matches by names.
+    ///
+    /// Fails when one model moves where the other does not, or no drive is in both.
+    pub(super) fn between(models: [&Model; 2]) -> Outcome<Self> {
+        let coordinates = coordinates(models)?;
+        let [before, after] = models.map(|model| &model.derivation.mechanism.drives);
+        let is_shared = models
+            .iter()
+            .all(|model| !model.derivation.mechanism.shared_drives.is_empty());
+        let mut notes = Vec::new();
+        if is_shared {
+            notes.push(Note::info(
+                "There are more drives than degrees of freedom: figures are of what all of them do together along each coordinate.",
+            ));
+        }
+        let mut drives = Vec::new();
+        for (d, drive) in before.iter().enumerate() {
+            let Some(e) = after.iter().position(|other| other.name == drive.name) else {
+                continue;
+            };
+            let units = [models[0].force_unit(d), models[1].force_unit(e)];
+            if !(drive.is_driven && after[e].is_driven || is_shared) {
+                notes.push(Note::info(format!(
+                    "Nothing drives {}, so that it is left out.",
+                    drive.name
+                )));
+            } else if units[0] == units[1] {
+                drives.push([d, e]);
+            } else {
+                notes.push(Note::warning(format!(
+                    "{} is left out: its force is in {} in {} and in {} in {}.",
+                    drive.name, units[0], models[0].path, units[1], models[1].path
+                )));
+            }
+        }
+        for (here, there) in [(0, 1), (1, 0)] {
+            let all = models.map(Model::drives);
+            let alone = all[here].iter().filter(|name| !all[there].contains(name));
+            let alone: Vec<&str> = alone.map(String::as_str).collect();
+            if !alone.is_empty() {
+                notes.push(Note::warning(format!(
+                    "Left out, since only {} has them: drives {}.",
+                    models[here].path,
+                    alone.join(", ")
+                )));
+            }
+        }
+        if drives.is_empty() {
+            return Err(Error::input(format!(
+                "{} and {} have no drive in common ({}; {}); give a drive the same name in both files",
+                models[0].path,
+                models[1].path,
+                models[0].drives().join(", "),
+                models[1].drives().join(", ")
+            )));
+        }
+        Ok(Self {
+            coordinates,
+            drives,
+            notes,
+        })
+    }
+
+    /// The states of a motion as each model takes them, with the load that it makes for itself.
+    pub(super) fn own_states(
+        &self,
+        models: [&Model; 2],
+        motion: &Stretch,
+    ) -> Outcome<[Stretch; 2]> {
+        let in_order = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
+            let places = self.coordinates.iter();
+            places.map(|i| columns[*i].clone()).collect()
+        };
+        let before = without_forces(&motion.run);
+        let after = Run {
+            q: in_order(&before.q),
+            qd: in_order(&before.qd),
+            qdd: in_order(&before.qdd),
+            ..before.clone()
+        };
+        Ok([
+            with_own_load(models[0], before.into())?,
+            with_own_load(models[1], after.into())?,
+        ])
+    }
+}
+
+/// The motion of a run alone.
+fn without_forces(run: &Run) -> Run {
+    Run {
+        force: None,
+        left_out: Vec::new(),
+        notes: Vec::new(),
+        ..run.clone()
+    }
+}
+
+/// The states with what the drives carry where effects depend on it: the model's forces without these effects.
+fn with_own_load(model: &Model, mut states: Stretch) -> Outcome<Stretch> {
+    if !model.load_dependent().is_empty() {
+        states.load = Some(vec![vec![0.0; states.samples()]; model.drives().len()]);
+        states.load = Some(super::forces_of(model, &states)?);
+    }
+    Ok(states)
+}
+
+/// For each active coordinate of the second model its place among those of the first.
+fn coordinates(models: [&Model; 2]) -> Outcome<Vec<usize>> {
+    let motions = models.map(Model::motions);
+    let place = |of: &[(String, bool)], name: &str| of.iter().position(|(other, _)| other == name);
+    for (here, there) in [(0, 1), (1, 0)] {
+        let names = motions[here].iter().map(|(name, _)| name.as_str());
+        let alone: Vec<&str> = names
+            .filter(|name| place(&motions[there], name).is_none())
+            .collect();
+        if !alone.is_empty() {
+            return Err(Error::input(format!(
+                "{} has no active {} {}, which {} moves along: two models are held beside each other along one motion of \
+                 the same coordinates; give them the same names in both files",
+                models[there].path,
+                if alone.len() == 1 {
+                    "coordinate"
+                } else {
+                    "coordinates"
+                },
+                alone.join(", "),
+                models[here].path
+            )));
+        }
+    }
+    let mut places = Vec::new();
+    for (name, is_angle) in &motions[1] {
+        let Some(i) = place(&motions[0], name) else {
+            continue;
+        };
+        if motions[0][i].1 != *is_angle {
+            let unit = |is_angle: bool| if is_angle { "rad" } else { "m" };
+            return Err(Error::input(format!(
+                "`{name}` is in {} in {} and in {} in {}: they cannot share a motion",
+                unit(motions[0][i].1),
+                models[0].path,
+                unit(*is_angle),
+                models[1].path
+            )));
+        }
+        places.push(i);
+    }
+    let has_free_bodies = models
+        .iter()
+        .any(|model| free_bodies(&model.derivation.mechanism).next().is_some());
+    // A twist stands in the places of a pose, which only its own order explains.
+    if has_free_bodies && !places.is_sorted() {
+        return Err(Error::input(format!(
+            "{} and {} have a free body and name their coordinates in different orders; use one order in both files",
+            models[0].path, models[1].path
+        )));
+    }
+    Ok(places)
+}

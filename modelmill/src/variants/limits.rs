@@ -1,0 +1,198 @@
+//! Limits of the model files along motions: which the variant exceeds, and which both do.
+
+use modelmill_identify::excite::{Margin, Motion, Plant};
+
+use crate::error::{Error, Outcome};
+use crate::excite::plant::{AXES, ModelPlant, used};
+use crate::model::Model;
+use crate::stretch::{BLOCK, Stretch};
+
+/// The part beyond 1 that is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// How two models keep a limit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Crossing {
+    /// The second model exceeds it, the first one does not.
+    NowExceeded,
+    /// Both exceed it.
+    StillExceeded,
+    /// The first model exceeds it, the second one does not.
+    NoLongerExceeded,
+    /// Neither exceeds it.
+    Kept,
+}
+
+/// How far two models go within a limit. Each is held against the limit of its own file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LimitUse {
+    /// What is limited, named as `excite` names it: `theta1`, `theta1_d`, `spindle_left`, `R3m.x`, `singularity of the loops`.
+    pub limit: String,
+    /// The ranges of both files, in the unit of what is limited; none where a file says none, and for singularities.
+    pub ranges: [Option<[f64; 2]>; 2],
+    /// The part of the limit that each uses, 1 at the limit, counted from the middle of its range; none without a limit.
+    pub used: [Option<f64>; 2],
+}
+
+impl LimitUse {
+    /// Whether it is exceeded, and by which.
+    pub fn crossing(&self) -> Crossing {
+        let is_beyond = self
+            .used
+            .map(|used| used.is_some_and(|used| used > 1.0 + ROUNDING));
+        match is_beyond {
+            [false, true] => Crossing::NowExceeded,
+            [true, true] => Crossing::StillExceeded,
+            [true, false] => Crossing::NoLongerExceeded,
+            [false, false] => Crossing::Kept,
+        }
+    }
+}
+
+/// The limits of two models, as far as they were used.
+pub(super) struct Limits {
+    found: Vec<LimitUse>,
+    /// The limits that poses tell, without those of forces: these come from forces under the model's own load.
+    of_poses: [modelmill_spec::Limits; 2],
+}
+
+impl Limits {
+    /// The limits of both files, without motion yet.
+    pub(super) fn of(models: [&Model; 2]) -> Self {
+        let of_poses = models.map(|model| modelmill_spec::Limits {
+            forces: Vec::new(),
+            ..model.derivation.mechanism.limits.clone()
+        });
+        Self {
+            found: Vec::new(),
+            of_poses,
+        }
+    }
+
+    /// Adds a motion: the states of each model, and its forces `[drive][sample]`.
+    pub(super) fn add(
+        &mut self,
+        models: [&Model; 2],
+        states: &[Stretch; 2],
+        forces: [&[Vec<f64>]; 2],
+    ) -> Outcome {
+        for (m, model) in models.into_iter().enumerate() {
+            let mechanism = &model.derivation.mechanism;
+            let run = &states[m].run;
+            let (active, _) = model.derivation.coordinates();
+            for (i, limits) in &mechanism.limits.coordinates {
+                let Some(k) = active.iter().position(|a| *a == i.0) else {
+                    continue;
+                };
+                let name = &mechanism.coordinates[i.0].name;
+                let ranges = [
+                    (name.clone(), limits.position, &run.q[k]),
+                    (format!("{name}_d"), limits.rate, &run.qd[k]),
+                    (format!("{name}_dd"), limits.acceleration, &run.qdd[k]),
+                ];
+                for (name, range, values) in ranges {
+                    if let Some(range) = range {
+                        self.see(m, &name, Some(range), within(values, range));
+                    }
+                }
+            }
+            for (drive, range) in &mechanism.limits.forces {
+                let name = &mechanism.drives[drive.0].name;
+                let values = &forces[m][drive.0];
+                self.see(m, name, Some(*range), within(values, *range));
+            }
+            self.add_poses(m, model, &states[m])?;
+        }
+        Ok(())
+    }
+
+    /// Passive coordinates, points and distances from singular poses.
+    fn add_poses(&mut self, m: usize, model: &Model, states: &Stretch) -> Outcome {
+        let limits = self.of_poses[m].clone();
+        let plant = ModelPlant::new(model, &limits);
+        let names = plant.limits();
+        if names.is_empty() {
+            return Ok(());
+        }
+        let what = format!("holding {} against its limits", model.name);
+        let run = &states.run;
+        let samples = states.samples();
+        let found = model.host().watched(&what, samples, |job| {
+            let mut most = vec![f64::NEG_INFINITY; names.len()];
+            for start in (0..samples).step_by(BLOCK) {
+                let end = (start + BLOCK).min(samples);
+                job.step(end - start)?;
+                let piece =
+                    |all: &[Vec<f64>]| all.iter().map(|one| one[start..end].to_vec()).collect();
+                let motion = Motion {
+                    q: piece(&run.q),
+                    qd: piece(&run.qd),
+                    qdd: piece(&run.qdd),
+                };
+                let excess = plant.excess(&motion).ok_or_else(|| {
+                    Error::input(format!(
+                        "{} cannot follow the motion of {}",
+                        model.path, run.file
+                    ))
+                })?;
+                for (most, excess) in most.iter_mut().zip(excess) {
+                    *most = excess.into_iter().fold(*most, f64::max);
+                }
+            }
+            Ok::<_, Error>(most)
+        })??;
+        for (name, excess) in names.into_iter().zip(found) {
+            let range = range_of(model, &limits, &name);
+            let margin = Margin {
+                name,
+                excess,
+                proven: false,
+            };
+            self.see(m, &margin.name, range, used(&margin));
+        }
+        Ok(())
+    }
+
+    /// Keeps the largest part of a limit that a model uses.
+    fn see(&mut self, m: usize, name: &str, range: Option<[f64; 2]>, used: f64) {
+        let known = self.found.iter().position(|one| one.limit == name);
+        let k = known.unwrap_or_else(|| {
+            self.found.push(LimitUse {
+                limit: name.to_owned(),
+                ranges: [None; 2],
+                used: [None; 2],
+            });
+            self.found.len() - 1
+        });
+        let one = &mut self.found[k];
+        one.ranges[m] = range;
+        one.used[m] = Some(one.used[m].map_or(used, |before| before.max(used)));
+    }
+
+    /// All limits.
+    pub(super) fn found(self) -> Vec<LimitUse> {
+        self.found
+    }
+}
+
+/// The part of a range that values use, from its middle.
+fn within(values: &[f64], [low, high]: [f64; 2]) -> f64 {
+    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+    let far = values.iter().map(|v| (v - middle).abs() / half);
+    far.fold(0.0, f64::max)
+}
+
+/// The range of a passive coordinate or of a point along an axis.
+fn range_of(model: &Model, limits: &modelmill_spec::Limits, name: &str) -> Option<[f64; 2]> {
+    let mechanism = &model.derivation.mechanism;
+    let coordinates = limits.coordinates.iter();
+    let mut coordinates = coordinates.filter(|(i, _)| mechanism.coordinates[i.0].name == name);
+    if let Some((_, limits)) = coordinates.next() {
+        return limits.position;
+    }
+    let (point, axis) = name.rsplit_once('.')?;
+    let axis = AXES.iter().position(|a| *a == axis)?;
+    let mut points = limits.points.iter();
+    let (_, ranges) = points.find(|(i, _)| mechanism.points[i.0].name == point)?;
+    ranges[axis]
+}
