@@ -57,22 +57,16 @@ impl Entry for Strut {
         false
     }
 
-    /// Pairs with a point that nothing else stands on: whoever declares one says that something may be attached there.
+    /// Pairs of points on which nothing else stands: whoever declares such says that something may be attached there.
     fn pairs(&self, mechanism: &Mechanism) -> Option<Vec<[PointIdx; 2]>> {
         let points = &mechanism.points;
         let is_free =
             |p: &PointIdx| !is_joined(&mechanism.loops, *p) && !is_end(&mechanism.drives, *p);
-        // Of the points that a loop joins one is enough.
-        let is_second = |p: &PointIdx| mechanism.loops.iter().any(|one| one.joins[1] == *p);
-        let all: Vec<PointIdx> = (0..points.len())
-            .map(PointIdx)
-            .filter(|p| !is_second(p))
-            .collect();
+        let free: Vec<PointIdx> = (0..points.len()).map(PointIdx).filter(is_free).collect();
         let mut pairs = Vec::new();
-        for (i, one) in all.iter().enumerate() {
-            for other in &all[i + 1..] {
-                let are_apart = points[one.0].frame != points[other.0].frame;
-                if are_apart && (is_free(one) || is_free(other)) {
+        for (i, one) in free.iter().enumerate() {
+            for other in &free[i + 1..] {
+                if points[one.0].frame != points[other.0].frame {
                     pairs.push([*one, *other]);
                 }
             }
