@@ -9,7 +9,7 @@ use serde::Deserialize;
 use serde_json::json;
 
 use crate::answers::{Answer, Refusal, answer, read};
-use crate::options::{Commands, Options, Step};
+use crate::options::{Commands, Excitation, Options, Step};
 use crate::shelf::Shelf;
 use crate::sitting::Sitting;
 
@@ -111,6 +111,10 @@ impl Spelling for Plain {
 
 impl Commands for Plain {
     fn same(&self, _: Step) -> Option<String> {
+        None
+    }
+
+    fn excite(&self, _: &Excitation) -> Option<String> {
         None
     }
 }

@@ -115,6 +115,8 @@ fn the_mill_in_a_page_gives_the_figures_of_the_program() {
         "{errors}"
     );
 
+    crate::pages::check(&mut browser, &window, "the page with the mill");
+
     // Another model from the list.
     let seconds = browser.run(
         &window,

@@ -3,18 +3,14 @@
 use std::fmt::Write as _;
 
 use crate::Experiment;
+use modelmill::report;
 use modelmill::text::svg::escape;
 
 /// The page's text.
 pub(crate) fn render(experiment: &Experiment) -> String {
-    let mut page = Page(String::new());
-    page.0.push_str(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>The paper's experiment, reproduced and explained</title>\n<style>\n",
-    );
-    page.0.push_str(include_str!("page.css"));
-    page.0.push_str("</style>\n</head>\n<body>\n<main>\n<h1>The paper's experiment, reproduced and explained</h1>\n");
+    let mut page = Page(report::begin_page(
+        "The paper's experiment, reproduced and explained",
+    ));
     page.summary(experiment);
     page.setting(experiment);
     page.table_2(experiment);
@@ -24,7 +20,7 @@ pub(crate) fn render(experiment: &Experiment) -> String {
     page.table_1(experiment);
     page.differences(experiment);
     page.coefficients(experiment);
-    page.0.push_str("</main>\n</body>\n</html>\n");
+    page.0.push_str(&report::end_page(&[]));
     page.0
 }
 
