@@ -57,7 +57,11 @@ fn packed(bytes: &[u8]) -> String {
 }
 
 /// Scripts of the workbench alone, in the order in which they run.
-const SCRIPTS: [&str; 1] = [include_str!("page.js")];
+const SCRIPTS: [&str; 3] = [
+    include_str!("page.js"),
+    include_str!("completion.js"),
+    include_str!("excitation.js"),
+];
 
 /// `who` is the script that knows who answers.
 fn written(head: &str, attributes: &str, carried: &str, who: &'static str) -> String {

@@ -31,8 +31,9 @@
     say(`${what || text} is copied`);
   };
 
-  const isNumber = (cell) => cell.matches && cell.matches('tbody td.number') && cell.textContent.trim() !== '';
-  const digits = (cell) => (cell.dataset.value === undefined ? cell.textContent.trim().replace('\u2212', '-') : String(Number(cell.dataset.value)));
+  const NUMBER = /^[-+\u2212]?\d[\d.]*(e[-+\u2212]?\d+)?( %)?$/;
+  const isNumber = (cell) => cell.matches && cell.matches('tbody td') && (cell.dataset.value !== undefined || NUMBER.test(cell.textContent.trim()));
+  const digits = (cell) => (cell.dataset.value === undefined ? cell.textContent.trim().replaceAll('\u2212', '-') : String(Number(cell.dataset.value)));
   const copy = (cell) => window.copied(digits(cell));
   document.addEventListener('click', (event) => {
     const cell = event.target.closest && event.target.closest('td');

@@ -28,7 +28,7 @@
   // Lets a reader zoom what lies in `element`. `shown` does it: `zoom(factor, x, y)` shows `factor` times as much around a place,
   // `move(dx, dy)` goes on by shares of what is seen, `whole()` shows all, `isWhole()` says whether all is seen, `part(x0, y0, x1, y1)`
   // shows what was marked and `marking(x0, y0, x1, y1)` what is being marked; `turn(dx, dy)`, where there is one, is what
-  // dragging and arrows do in the place of moving.
+  // dragging and arrows do in the place of moving; a key goes on by `step`.
   window.zoomable = (element, shown, place) => {
     if (place) buttons(place, shown);
     if (!element.hasAttribute('tabindex')) element.setAttribute('tabindex', '0');
@@ -86,10 +86,10 @@
     element.addEventListener('pointerup', up);
     element.addEventListener('pointercancel', up);
     element.addEventListener('keydown', (event) => {
-      const go = shown.turn || shown.move;
+      const go = shown.turn || shown.move, step = shown.step || 0.2;
       const act = {
         '+': () => shown.zoom(0.5, 0.5, 0.5), '=': () => shown.zoom(0.5, 0.5, 0.5), '-': () => shown.zoom(2, 0.5, 0.5),
-        ArrowLeft: () => go(-0.2, 0), ArrowRight: () => go(0.2, 0), ArrowUp: () => go(0, -0.2), ArrowDown: () => go(0, 0.2),
+        ArrowLeft: () => go(-step, 0), ArrowRight: () => go(step, 0), ArrowUp: () => go(0, -step), ArrowDown: () => go(0, step),
         0: () => shown.whole(), Escape: () => shown.whole(), Home: () => shown.whole(),
       }[event.key];
       if (!act || event.ctrlKey || event.metaKey || event.target !== element) return;
@@ -141,7 +141,7 @@
   // Pictures of a part of the page that stand as they are.
   window.enlivenPictures = (part) => {
     for (const svg of part.querySelectorAll('figure:not(.plot) svg')) {
-      if (svg.dataset.zooms || !svg.getAttribute('viewBox')) continue;
+      if ('zooms' in svg.dataset || !svg.getAttribute('viewBox')) continue;
       svg.dataset.zooms = '';
       const figure = svg.closest('figure');
       window.zoomable(svg, window.seen(() => svg), figure.querySelector('figcaption') || figure);
