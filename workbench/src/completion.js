@@ -232,11 +232,15 @@
     }));
     list.hidden = false;
     text.setAttribute('aria-expanded', 'true');
+    settle();
+    mark(0);
+  };
+  // The list stands below its word, or above it where there is no room.
+  const settle = () => {
     const { x, y, height } = spot(place.start);
     const box = list.getBoundingClientRect();
     list.style.left = `${Math.max(4, Math.min(x, innerWidth - box.width - 4))}px`;
     list.style.top = `${y + box.height + 4 > innerHeight ? Math.max(4, y - height - box.height) : y}px`;
-    mark(0);
   };
   const take = () => {
     const offer = offers[chosen];
@@ -268,7 +272,7 @@
     if (isWord && event.data !== '"' && place && !place.word.slice(1)) close();
   });
   text.addEventListener('blur', close);
-  text.addEventListener('scroll', () => { if (!list.hidden) close(); });
+  text.addEventListener('scroll', () => { if (!list.hidden) settle(); });
   text.addEventListener('pointerdown', close);
   const start = () => fetched().catch(() => setTimeout(start, 2000));
   start();

@@ -12,7 +12,7 @@ window.measure = (isPaper) => {
   for (const one of document.body.querySelectorAll('*')) {
     if (!one.checkVisibility({ contentVisibilityAuto: true, visibilityProperty: true })) continue;
     // The text field of an editor moves under its caret; what stands inside pictures has no box of its own.
-    if (one.closest('textarea, select, option, script, style') || one.closest('#editor')) continue;
+    if (one.closest('textarea, option, script, style') || one.closest('#editor')) continue;
     if (one.closest('svg') && one.localName !== 'svg') continue;
     if (one.closest('math') && one.localName !== 'math') continue;
     const style = getComputedStyle(one);

@@ -21,8 +21,8 @@ const STYLE: &str = "\
 .figure .zero{stroke:var(--line)}
 .figure .mark{stroke:var(--faint);stroke-dasharray:3 3}
 .figure polyline{fill:none;stroke-width:1.2}
-.figure .c0{stroke:var(--c0)}.figure .c1{stroke:var(--c1)}.figure .c2{stroke:var(--c2)}
-.figure text{font-size:13px;fill:var(--ink);stroke:none}
+.figure polyline.c0{stroke:var(--c0)}.figure polyline.c1{stroke:var(--c1)}.figure polyline.c2{stroke:var(--c2)}
+.figure text{font-size:13px;fill:var(--ink)}
 .figure text.c0{fill:var(--c0)}.figure text.c1{fill:var(--c1)}.figure text.c2{fill:var(--c2)}
 .figure text.title{font-size:17px}
 .figure text.scale{font-size:11px;fill:var(--faint)}

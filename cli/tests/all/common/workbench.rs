@@ -6,7 +6,7 @@ use std::net::TcpStream;
 use std::path::PathBuf;
 use std::process::{Child, Stdio};
 
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::{modelmill, scratch};
 
@@ -28,6 +28,25 @@ impl Workbench {
         let file = folder.join(model);
         std::fs::copy(super::model(model), &file).expect("a copy");
         let path = file.to_str().expect("plain text");
+        let (child, link, port, token) = Self::served(path, recordings);
+        Self {
+            port,
+            token,
+            child,
+            link,
+            model: file,
+        }
+    }
+
+    /// Opens the same file once more, after the program has ended.
+    pub(crate) fn again(&mut self) {
+        let path = self.path().to_owned();
+        (self.child, self.link, self.port, self.token) = Self::served(&path, &[]);
+    }
+
+    /// The program with its link, port and token.
+    #[track_caller]
+    fn served(path: &str, recordings: &[&str]) -> (Child, String, u16, String) {
         let mut child = modelmill(&["work", path, "--json"])
             .args(recordings)
             .stdout(Stdio::piped())
@@ -42,13 +61,25 @@ impl Workbench {
         let link = told["url"].as_str().expect("a link").to_owned();
         let rest = link.strip_prefix("http://127.0.0.1:").expect("loopback");
         let (port, token) = rest.split_once("/?token=").expect("a token");
-        Self {
-            port: port.parse().expect("a port"),
-            token: token.to_owned(),
-            child,
-            link,
-            model: file,
-        }
+        let (port, token) = (port.parse().expect("a port"), token.to_owned());
+        (child, link, port, token)
+    }
+
+    /// What a question is answered; `None` where the program ended meanwhile, or says no.
+    pub(crate) fn told(port: u16, own: &[String], question: &str, body: &str) -> Option<Value> {
+        let mut stream = TcpStream::connect(("127.0.0.1", port)).ok()?;
+        let head = format!(
+            "POST /api/{question} HTTP/1.1\r\nConnection: close\r\nContent-Type: application/json\r\nContent-Length: {}\r\n{}\r\n\r\n",
+            body.len(),
+            own.join("\r\n")
+        );
+        stream.write_all(head.as_bytes()).ok()?;
+        stream.write_all(body.as_bytes()).ok()?;
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).ok()?;
+        let (head, body) = answer.split_once("\r\n\r\n")?;
+        head.starts_with("HTTP/1.1 200").then_some(())?;
+        serde_json::from_str(body).ok()
     }
 
     pub(crate) fn path(&self) -> &str {
