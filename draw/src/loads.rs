@@ -47,9 +47,13 @@ pub(crate) fn arrow(
             // A positive force pushes the ends apart.
             straight(b, along, force) + &straight(a, along.map(|x| -x), force)
         }
-        Shape::Joint(joint) if joint.drive.as_deref() == Some(load.drive.as_str()) => {
-            of_joint(joint, at(&joint.at), direction(&joint.axis), towards(&joint.axis), force)
-        }
+        Shape::Joint(joint) if joint.drive.as_deref() == Some(load.drive.as_str()) => of_joint(
+            joint,
+            at(&joint.at),
+            direction(&joint.axis),
+            towards(&joint.axis),
+            force,
+        ),
         _ => return String::new(),
     };
     let error = if load.error.is_finite() {
@@ -118,5 +122,8 @@ fn around(at: [f64; 2], force: f64) -> String {
 fn head(tip: [f64; 2], along: [f64; 2]) -> String {
     let across = [-along[1], along[0]];
     let corner = |back: f64, side: f64| [0, 1].map(|k| tip[k] + back * along[k] + side * across[k]);
-    polygon("head", &[corner(5.0, 0.0), corner(-5.0, 4.5), corner(-5.0, -4.5)])
+    polygon(
+        "head",
+        &[corner(5.0, 0.0), corner(-5.0, 4.5), corner(-5.0, -4.5)],
+    )
 }

@@ -180,7 +180,13 @@ fn forces_are_arrows_at_their_drives() {
         let text = modelmill_draw::loaded_svg(&[&scene], &scene.view(), &Style::default(), &[load]);
         let group = text.split("<g class=\"load e5\">").nth(1).expect("arrows");
         let d = group.split("d=\"M").nth(1).expect("a path");
-        let numbers: Vec<f64> = d.split('"').next().expect("a path").split(['L', ' ']).map(|n| n.parse().expect("a number")).collect();
+        let numbers: Vec<f64> = d
+            .split('"')
+            .next()
+            .expect("a path")
+            .split(['L', ' '])
+            .map(|n| n.parse().expect("a number"))
+            .collect();
         (numbers[2] - numbers[0]).hypot(numbers[3] - numbers[1])
     };
     assert!((length(1.0) - 2.0 * length(0.5)).abs() < 0.3);

@@ -53,7 +53,10 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> Outcome {
         });
     }
     let write = |name: &str, text: &str| {
-        let target = Target::new(&args.out.join(name), args.models.iter().map(PathBuf::as_path))?;
+        let target = Target::new(
+            &args.out.join(name),
+            args.models.iter().map(PathBuf::as_path),
+        )?;
         target.write(text)
     };
     write(TABLE, &atlas::page(&entries))?;

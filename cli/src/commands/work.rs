@@ -124,7 +124,11 @@ impl Commands for Spelled {
         let usual = Excitation::default();
         let mut words = format!("modelmill excite {}", self.model);
         let options = [
-            ("harmonics", asked.harmonics.to_string(), usual.harmonics.to_string()),
+            (
+                "harmonics",
+                asked.harmonics.to_string(),
+                usual.harmonics.to_string(),
+            ),
             ("period", asked.period.to_string(), usual.period.to_string()),
             ("random", asked.random.to_string(), usual.random.to_string()),
             ("starts", asked.starts.to_string(), usual.starts.to_string()),
@@ -215,7 +219,12 @@ mod tests {
         let Command::Excite(excite) = &excite.command else {
             panic!("another command");
         };
-        let told = (excite.harmonics, excite.period, excite.limits.len(), excite.starts);
+        let told = (
+            excite.harmonics,
+            excite.period,
+            excite.limits.len(),
+            excite.starts,
+        );
         assert_eq!(told, (3, 2.5, 2, asked.starts), "{command}");
         for step in [
             Step::Picture,

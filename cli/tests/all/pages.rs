@@ -67,7 +67,9 @@ fn written_pages_fit_every_screen_and_paper() {
     }
     let delta = model("five_bar.toml");
     printed(&["atlas", &robot, &delta, &arm, "--out", &folder]);
-    printed(&["report", &robot, "--data", &fit, "--check", &other, "--out", &folder]);
+    printed(&[
+        "report", &robot, "--data", &fit, "--check", &other, "--out", &folder,
+    ]);
     printed(&["runs", &robot, "--data", &fit, &other, "--out", &folder]);
     let small = format!("experiment --out {folder} --random 40 --starts 1 --rate 60");
     printed(&small.split(' ').collect::<Vec<_>>());

@@ -404,7 +404,6 @@ fn equations_follow_while_one_types() {
         return;
     };
     let fit = run("with-rods-fit.csv");
-    // Bounds hold for a program that was optimised.
     let cases = [
         (
             "spidermill.toml",
@@ -450,10 +449,9 @@ fn equations_follow_while_one_types() {
         );
         eprintln!("{model}: equations and error within {times} ms (p95 of 40 keystrokes)");
         let most = number(&times, "/0").max(number(&times, "/1"));
-        assert!(
-            cfg!(debug_assertions) || most < bound,
-            "{model}: {times} ms"
-        );
+        // Less optimised, and beside other tests, a program is allowed several times as much.
+        let slower = if cfg!(debug_assertions) { 8.0 } else { 1.0 };
+        assert!(most < slower * bound, "{model}: {times} ms");
     }
 }
 
@@ -492,7 +490,9 @@ fn a_motion_is_planned_as_the_command_does_it() {
     );
     assert_eq!(said[0], "The search was cancelled.");
     assert!(
-        said[1].as_str().is_some_and(|says| says.contains("theta1 has no limits")),
+        said[1]
+            .as_str()
+            .is_some_and(|says| says.contains("theta1 has no limits")),
         "{said}"
     );
     let found = browser.run(
@@ -533,9 +533,13 @@ fn a_motion_is_planned_as_the_command_does_it() {
     );
     let beside = bench.model.with_file_name("excitation.csv");
     assert_eq!(std::fs::read_to_string(beside).expect("the file"), csv);
-    for (k, part) in ["is there already", "a file of the model's folder", "a file of the model's folder"]
-        .into_iter()
-        .enumerate()
+    for (k, part) in [
+        "is there already",
+        "a file of the model's folder",
+        "a file of the model's folder",
+    ]
+    .into_iter()
+    .enumerate()
     {
         assert!(
             kept[k].as_str().is_some_and(|says| says.contains(part)),
@@ -599,12 +603,18 @@ fn what_is_typed_is_completed() {
     assert_eq!(kinds[..known.len()], known[..]);
     // Escape closes and takes nothing; arrows choose.
     browser.press(&window, "Escape", false);
-    let closed = browser.run(&window, "return at('offers').hidden && at('text').value.endsWith('kind = \"coulomb');");
+    let closed = browser.run(
+        &window,
+        "return at('offers').hidden && at('text').value.endsWith('kind = \"coulomb');",
+    );
     assert_eq!(closed, true);
     open(&mut browser, "_friction\"\nat = [\"");
     let places = offered(&mut browser);
     assert_eq!(places[..2], ["spindle_left", "spindle_right"]);
-    assert!(places.contains(&"theta1".to_owned()) && !places.contains(&"R3m".to_owned()), "{places:?}");
+    assert!(
+        places.contains(&"theta1".to_owned()) && !places.contains(&"R3m".to_owned()),
+        "{places:?}"
+    );
     browser.press(&window, "ArrowDown", false);
     browser.press(&window, "Tab", false);
     browser.write(&window, "\"]\n");
@@ -677,7 +687,10 @@ fn numbers_are_copied_with_all_their_digits() {
     assert!(value(1) > 0.0 && value(1) != value(0), "{copied}");
     assert_eq!(copied["stops"], 1, "Tab stops once at a table");
     let says = copied["says"].as_str().expect("a word");
-    assert!(says.contains(copied["texts"][0].as_str().expect("a text")), "{says}");
+    assert!(
+        says.contains(copied["texts"][0].as_str().expect("a text")),
+        "{says}"
+    );
 }
 
 /// Every picture zooms in the same way, the mechanism too, which is drawn anew all the time.
@@ -713,7 +726,10 @@ fn the_mechanism_zooms_turns_and_shows_forces() {
          return { whole, near, kept, again, loads, told: await window.mill.ask('motion', {}) };",
     );
     assert_ne!(seen["whole"], seen["near"], "{}", seen["near"]);
-    assert_eq!(seen["near"], seen["kept"], "a new picture is seen as the old one was");
+    assert_eq!(
+        seen["near"], seen["kept"],
+        "a new picture is seen as the old one was"
+    );
     assert_eq!(seen["whole"], seen["again"]);
     assert_eq!(seen["loads"].as_array().map(Vec::len), Some(2));
     // Measured less error is what the model says; here both are those of the comparison.
@@ -727,7 +743,10 @@ fn the_mechanism_zooms_turns_and_shows_forces() {
     let share = root("error") / root("measured");
     let drive = seen["told"]["drives"][0].as_str().expect("a drive");
     let expected = number(&compared, &format!("/channels/{drive}/nrms"));
-    assert!((share - expected).abs() < 0.03 * expected, "{share} {expected}");
+    assert!(
+        (share - expected).abs() < 0.03 * expected,
+        "{share} {expected}"
+    );
     assert_eq!(browser.heard, Vec::<String>::new());
 }
 
@@ -773,7 +792,9 @@ fn a_workbench_that_is_killed_leaves_the_file_whole() {
     let text = bench.text();
     // Long enough that writing takes its time.
     let filler = "# a line of a long file\n".repeat(60_000);
-    let texts: Vec<String> = (0..2).map(|k| format!("# text {k}\n{text}{filler}")).collect();
+    let texts: Vec<String> = (0..2)
+        .map(|k| format!("# text {k}\n{text}{filler}"))
+        .collect();
     for round in 0..8_u64 {
         let mut base = bench.view()["revision"].clone();
         let (port, own) = (bench.port, bench.own());

@@ -40,7 +40,11 @@ pub fn atlas(mechanisms: &[Pictured]) -> String {
 fn emphasized(text: &str) -> String {
     let mut html = String::new();
     for (mark, tag) in [('*', "em"), ('`', "code")] {
-        let source = if html.is_empty() { escape(text) } else { std::mem::take(&mut html) };
+        let source = if html.is_empty() {
+            escape(text)
+        } else {
+            std::mem::take(&mut html)
+        };
         for (k, piece) in source.split(mark).enumerate() {
             let _ = match k % 2 {
                 0 => write!(html, "{piece}"),

@@ -20,6 +20,8 @@ const STYLE: &str = "\
 .figure .box{fill:none;stroke:var(--faint)}
 .figure .zero{stroke:var(--line)}
 .figure .mark{stroke:var(--faint);stroke-dasharray:3 3}
+.figure .part{fill:#c9a227;fill-opacity:.2}
+.figure circle.c0{fill:var(--c0)}.figure circle.c1{fill:var(--c1)}.figure circle.c2{fill:var(--c2)}
 .figure polyline{fill:none;stroke-width:1.2}
 .figure polyline.c0{stroke:var(--c0)}.figure polyline.c1{stroke:var(--c1)}.figure polyline.c2{stroke:var(--c2)}
 .figure text{font-size:13px;fill:var(--ink)}
@@ -149,22 +151,30 @@ impl<'a> Figure<'a> {
             self.time.first().copied().unwrap_or(0.0),
             self.time.last().copied().unwrap_or(0.0),
         );
-        format!(
-            r#"<svg xmlns="http://www.w3.org/2000/svg" class="figure" role="img" aria-label="{0}" viewBox="0 0 {WIDTH} {height}">
-<style>
-{STYLE}</style>
-<rect class="paper" width="{WIDTH}" height="{height}"/>
-<text class="title" x="{LEFT}" y="26">{0}</text>
-{1}<text x="{LEFT}" y="{2:.1}" class="scale">{first} s</text>
-<text x="{3:.1}" y="{2:.1}" text-anchor="end" class="scale">{last} s</text>
-</svg>
+        let body = format!(
+            r#"{0}<text x="{LEFT}" y="{1:.1}" class="scale">{first} s</text>
+<text x="{2:.1}" y="{1:.1}" text-anchor="end" class="scale">{last} s</text>
 "#,
-            self.title,
             self.body,
             bottom - GAP + 16.0,
             WIDTH - RIGHT,
-        )
+        );
+        sheet(&self.title, LEFT, height, &body)
     }
+}
+
+/// A sheet of 900 units with a title, in the colours of all figures: classes `c0`, `c1` and `c2` of curves, discs and their names,
+/// `zero` of lines, `scale` of small text, `part` of what is marked. `title` and `body` are SVG.
+pub fn sheet(title: &str, left: f64, height: f64, body: &str) -> String {
+    format!(
+        r#"<svg xmlns="http://www.w3.org/2000/svg" class="figure" role="img" aria-label="{title}" viewBox="0 0 {WIDTH} {height:.0}">
+<style>
+{STYLE}</style>
+<rect class="paper" width="{WIDTH}" height="{height:.0}"/>
+<text class="title" x="{left}" y="26">{title}</text>
+{body}</svg>
+"#
+    )
 }
 
 /// Least and largest value of each of half as many stretches as points are wanted, with their places; all values where

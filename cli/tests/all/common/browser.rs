@@ -161,7 +161,8 @@ impl Browser {
 
     /// Shows a window at a width, on a screen that is light or dark or on paper.
     pub(crate) fn show(&mut self, window: &Window, width: u32, medium: Medium) {
-        let size = json!({ "width": width, "height": 900, "deviceScaleFactor": 1, "mobile": false });
+        let size =
+            json!({ "width": width, "height": 900, "deviceScaleFactor": 1, "mobile": false });
         self.ask(Some(window), "Emulation.setDeviceMetricsOverride", &size);
         let (media, scheme) = match medium {
             Medium::Light => ("screen", "light"),
@@ -172,7 +173,10 @@ impl Browser {
         let media = json!({ "media": media, "features": scheme });
         self.ask(Some(window), "Emulation.setEmulatedMedia", &media);
         // Pictures are drawn anew in the frame after next, where they are at all.
-        self.run(window, "await new Promise((done) => setTimeout(done, 250));");
+        self.run(
+            window,
+            "await new Promise((done) => setTimeout(done, 250));",
+        );
     }
 
     /// Presses a key of a name, such as `Enter`, with letters that it types.

@@ -199,7 +199,12 @@ fn words(markup: &str) -> String {
 #[test]
 fn long_formulas_can_be_parted_within_parentheses_fractions_and_roots() {
     let sum = |letter: &str| {
-        let terms = (1..9).map(|k| Formula::product(Rational::integer(1), [name(&format!("{letter}{k}")), name("d1")]));
+        let terms = (1..9).map(|k| {
+            Formula::product(
+                Rational::integer(1),
+                [name(&format!("{letter}{k}")), name("d1")],
+            )
+        });
         Formula::sum(terms)
     };
     let quotient = Formula::quotient(sum("m"), sum("k"));
