@@ -109,9 +109,10 @@ fn mechanism(one: &Pictured) -> String {
     } = one;
     let rows: Vec<Vec<Cell>> = (model.base.iter().zip(&model.nominal).enumerate())
         .map(|(k, (base, value))| {
-            let value = match model.has_nominal(k) {
-                true => Cell::number(&significant(*value, 6), *value),
-                false => Cell::text(""),
+            let value = if model.has_nominal(k) {
+                Cell::number(&significant(*value, 6), *value)
+            } else {
+                Cell::text("")
             };
             vec![
                 Cell::html(format!("<code>{}</code>", escape(&base.name))),
