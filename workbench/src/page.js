@@ -291,10 +291,16 @@
     say('', 'errors');
   };
 
+  // What was asked for by a button stays until it is asked for again, with a mark once the text is another one.
+  const mark_stale = (id) => {
+    const one = by(id);
+    one.classList.toggle('stale', one.childElementCount > 0 && one.dataset.revision !== String(view.revision));
+  };
+  const made_of = (id, revision) => { by(id).dataset.revision = revision; mark_stale(id); };
   const refresh = () => {
     draw();
     compare();
-    for (const old of ['curves', 'where', 'written', 'found']) by(old).classList.toggle('stale', by(old).dataset.revision !== String(view.revision));
+    for (const old of ['curves', 'where', 'written', 'found']) mark_stale(old);
   };
 
   const figures = (told) => {
@@ -429,14 +435,14 @@
     by('written').replaceChildren(...page.querySelector('main').childNodes);
     window.enliven(by('written'));
     window.enlivenTables(by('written'));
-    by('written').dataset.revision = revision;
+    made_of('written', revision);
   }).then((isDone) => { if (!isDone) by('written').textContent = ''; }));
   by('draw').addEventListener('click', () => tried(async () => {
     by('curves').textContent = 'comparing\u2026';
     const { revision } = view;
     const html = await ask('curves', { identified: by('identified').checked });
     put(by('curves'), html);
-    by('curves').dataset.revision = revision;
+    made_of('curves', revision);
     say('');
   }).then((isDone) => { if (!isDone) by('curves').textContent = ''; }));
   by('identified').addEventListener('change', told_command);
@@ -445,7 +451,7 @@
     const places = told.compared.where;
     by('where').replaceChildren(...(places.length ? places : [{ says: 'No region of coordinates, rates, loads or time stands out' }])
       .map((one) => make('li', `${one.says}.`)));
-    by('where').dataset.revision = told.revision;
+    made_of('where', told.revision);
     say('');
   }));
 
