@@ -2,7 +2,7 @@
 //!
 //! A [`Mechanism`](modelmill_spec::Mechanism) and the values of its coordinates become a [`Scene`]: what stands where, in
 //! metres. A [`View`] looks at it, flat where all motion is in one plane, else from a direction that can be chosen, and
-//! [`svg`] draws it. Nothing here knows of dynamics.
+//! [`svg`] draws it. [`page`] is what all pages with pictures have in common. Nothing here knows of dynamics.
 //!
 //! ```
 //! # let text = r#"
@@ -34,12 +34,15 @@
 //! ```
 
 mod labels;
+mod loads;
+pub mod page;
 mod paint;
 mod plane;
 mod scene;
 mod symbols;
 mod view;
 
-pub use paint::{Style, inline_svg, svg};
+pub use loads::Load;
+pub use paint::{Style, inline_svg, loaded_svg, svg};
 pub use scene::{Joint, Mark, Scene, Shape, Use};
 pub use view::View;

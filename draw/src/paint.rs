@@ -6,6 +6,7 @@ use modelmill_boundary::text::html as escape;
 use nalgebra::Vector3;
 
 use crate::labels::{Labels, SIZE};
+use crate::loads::{Load, arrow};
 use crate::scene::{Mark, Scene, Shape};
 use crate::symbols::{self, Spot};
 use crate::view::View;
@@ -49,6 +50,11 @@ impl Default for Style {
 ///
 /// The text begins with `<svg`, carries its style, and can stand in a page or a file.
 pub fn svg(scenes: &[&Scene], view: &View, style: &Style) -> String {
+    loaded_svg(scenes, view, style, &[])
+}
+
+/// The same with forces of drives as arrows over the last scene.
+pub fn loaded_svg(scenes: &[&Scene], view: &View, style: &Style, loads: &[Load]) -> String {
     let paper = Paper::new(scenes, view, style);
     let mut body = String::new();
     let [shadows @ .., scene] = scenes else {
@@ -59,6 +65,7 @@ pub fn svg(scenes: &[&Scene], view: &View, style: &Style) -> String {
         _ = write!(body, "<g class=\"shadow\">{inner}</g>");
     }
     body.push_str(&paper.paint(scene));
+    body.push_str(&paper.loads(scene, loads));
     body.push_str(&paper.furniture(scene));
     body.push_str(&paper.labels(scene));
     let names = if style.names { " named" } else { "" };
@@ -190,6 +197,24 @@ impl<'a> Paper<'a> {
         }
         drawn.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         drawn.into_iter().map(|(.., group)| group).collect()
+    }
+
+    /// Arrows of forces.
+    fn loads(&self, scene: &Scene, loads: &[Load]) -> String {
+        let towards = self.view.towards();
+        let mut out = String::new();
+        for mark in &scene.marks {
+            for load in loads {
+                out.push_str(&arrow(
+                    mark,
+                    load,
+                    |at| self.at(at),
+                    |axis| self.direction(axis),
+                    |axis| axis.dot(&towards),
+                ));
+            }
+        }
+        out
     }
 
     fn mark(&self, scene: &Scene, mark: &Mark) -> String {

@@ -76,6 +76,8 @@ pub struct Joint {
     pub slides: bool,
     /// Who moves it.
     pub moved_by: Use,
+    /// The drive on it.
+    pub drive: Option<String>,
 }
 
 /// Who moves a joint.
@@ -295,6 +297,7 @@ impl Builder<'_> {
             turns,
             slides,
             moved_by,
+            drive: drive.map(|drive| drive.name.clone()),
         };
         self.anchors[*body].push(at);
         if slides {

@@ -166,3 +166,29 @@ fn what_is_wrong_is_seen() {
     let text = svg(&[&closed, &open], &closed.view(), &Style::default());
     assert_eq!(text.matches("class=\"shadow\"").count(), 1);
 }
+
+/// A force is seen at its drive, pointing where it pushes, and longer where it is larger.
+#[test]
+fn forces_are_arrows_at_their_drives() {
+    let scene = nominal(&load("spidermill"));
+    let length = |force: f64| {
+        let load = modelmill_draw::Load {
+            drive: "spindle_left".to_owned(),
+            force,
+            error: 1.0,
+        };
+        let text = modelmill_draw::loaded_svg(&[&scene], &scene.view(), &Style::default(), &[load]);
+        let group = text.split("<g class=\"load e5\">").nth(1).expect("arrows");
+        let d = group.split("d=\"M").nth(1).expect("a path");
+        let numbers: Vec<f64> = d
+            .split('"')
+            .next()
+            .expect("a path")
+            .split(['L', ' '])
+            .map(|n| n.parse().expect("a number"))
+            .collect();
+        (numbers[2] - numbers[0]).hypot(numbers[3] - numbers[1])
+    };
+    assert!((length(1.0) - 2.0 * length(0.5)).abs() < 0.3);
+    assert!((length(-1.0) - length(1.0)).abs() < 0.3);
+}

@@ -123,7 +123,7 @@ impl Model {
 }
 
 impl Entry {
-    fn in_words(&self) -> String {
+    pub(crate) fn in_words(&self) -> String {
         let [turning, sliding] = self.joints;
         let mut parts = Vec::new();
         for (n, one, many) in [
@@ -140,7 +140,7 @@ impl Entry {
         parts.join(", ")
     }
 
-    fn joints_in_letters(&self) -> String {
+    pub(crate) fn joints_in_letters(&self) -> String {
         let [turning, sliding] = self.joints;
         let mut parts = Vec::new();
         for (n, letter) in [(self.free, "free"), (turning, "R"), (sliding, "P")] {
@@ -178,20 +178,26 @@ impl Entry {
     }
 }
 
+/// What the atlas is, and what its columns are.
+pub(crate) const ABOUT: [&str; 2] = [
+    "How many parameters the inverse dynamics of a mechanism has, and what they are: the columns of `H` eliminated and \
+     regrouped exactly, eqs. (6) to (16).",
+    "Counts are of the bodies alone: *general* for constants in general with gravity, *weightless* without gravity, *at \
+     values* the rank in numbers at the values of the model file, where lengths that are zero or equal let fewer remain. \
+     *With effects* is the number with the effects of the file, such as friction. Operations are additions and \
+     multiplications of one call at one state, effects included. Joints: R turns, P slides, free hangs on nothing; \
+     *passive* are coordinates that loops settle. Seconds are those of one derivation on the machine that wrote this \
+     page.",
+];
+
 /// The atlas as a page in Markdown; pictures and pages of the mechanisms stand in the folder `atlas` beside it.
 pub fn page(entries: &[Entry]) -> String {
-    let mut text = "# Atlas of mechanisms\n\n\
-        How many parameters the inverse dynamics of a mechanism has, and what they are: the columns of `H` eliminated and \
-        regrouped exactly, eqs. (6) to (16).\n\n\
-        Counts are of the bodies alone: *general* for constants in general with gravity, *weightless* without gravity, *at \
-        values* the rank in numbers at the values of the model file, where lengths that are zero or equal let fewer remain. \
-        *With effects* is the number with the effects of the file, such as friction. Operations are additions and \
-        multiplications of one call at one state, effects included. Joints: R turns, P slides, free hangs on nothing; \
-        *passive* are coordinates that loops settle. Seconds are those of one derivation on the machine that wrote this \
-        page.\n\n\
+    let mut text = format!(
+        "# Atlas of mechanisms\n\n{}\n\n\
         | | mechanism | joints | passive | loops | drives | general | weightless | at values | with effects | regressor | \
-        inverse dynamics | s |\n|---|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n"
-        .to_owned();
+        inverse dynamics | s |\n|---|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n",
+        ABOUT.join("\n\n")
+    );
     for entry in entries {
         text.push_str(&entry.row());
         text.push('\n');

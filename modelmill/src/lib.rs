@@ -193,7 +193,10 @@ pub mod variants;
 
 pub use modelmill_boundary::files;
 pub use modelmill_identify::{Note, Severity};
-pub use modelmill_spec::edit;
+pub use modelmill_spec::{EffectKind, edit};
+
+/// The JSON Schema of model files, by which editors complete and explain them; a test of `model-spec` keeps it true.
+pub const SCHEMA: &str = include_str!("../../model-spec/schema/modelmill.schema.json");
 
 pub use error::{Error, Outcome};
 pub use host::Host;

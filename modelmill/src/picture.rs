@@ -1,9 +1,9 @@
 //! Pictures of a model: its mechanism at a pose, as SVG, or over another one.
 
 use modelmill_codegen::{Evaluator, States};
-use modelmill_draw::{Scene, View, svg};
+use modelmill_draw::{Scene, View, loaded_svg};
 
-pub use modelmill_draw::Style;
+pub use modelmill_draw::{Load, Style};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
@@ -18,6 +18,8 @@ pub struct Drawing {
     pub from: Option<[f64; 2]>,
     /// Size, names and frames.
     pub style: Style,
+    /// Forces of drives that are shown as arrows.
+    pub loads: Vec<Load>,
 }
 
 impl Model {
@@ -83,6 +85,6 @@ impl Model {
         };
         let shadow = before.map(|model| model.scene(&drawing.at)).transpose()?;
         let scenes: Vec<&Scene> = shadow.iter().chain(Some(&scene)).collect();
-        Ok(svg(&scenes, &view, &drawing.style))
+        Ok(loaded_svg(&scenes, &view, &drawing.style, &drawing.loads))
     }
 }

@@ -380,7 +380,7 @@ fn what_changed_and_stayed_is_told_with_its_run() {
     };
     assert_eq!(*drive, model.drives()[0]);
     is_near(dry, 5.0, 0.2);
-    let page = modelmill::report::runs_page(&model, &found).expect("a page");
+    let page = modelmill::report::runs_page(&found);
     assert!(
         page.contains("From run 8 on") && page.contains("friction of"),
         "{}",

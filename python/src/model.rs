@@ -473,7 +473,7 @@ impl CoreModel {
             let found = self.model.runs(all, &what)?;
             let text = found.text(Style::PLAIN);
             let told = Found::new(&found.json(), &text, remarks(&found.notes));
-            Ok(told.with_page(runs_page(&self.model, &found)?))
+            Ok(told.with_page(runs_page(&found)))
         })
     }
 

@@ -91,51 +91,65 @@
   // Another model or other recordings: a sitting of its own, which the page hears of as news.
   const anew = () => {
     if (answering) answering.end();
-    if (finding) finding.end();
-    finding = null;
-    asked = { number: 0 };
+    diagnosis.forget();
+    excitation.forget();
     return begun().then(tell, () => {});
   };
 
-  // ---- the diagnosis, in a worker of its own
+  // ---- long work, each kind in a worker of its own
 
-  let finding = null, asked = { number: 0 };
-  const diagnose = async () => {
-    if (asked.going) throw new Error('a diagnosis goes on; wait for it, or cancel it');
-    const number = ++count;
-    const text = desk.text;
-    const mine = { number, text, going: { what: 'beginning', done: 0, total: 0 }, since: performance.now() };
-    asked = mine;
-    if (finding) finding.end();
-    finding = hired((goes) => { mine.going = goes; });
-    const { ask, open } = finding;
-    open().then(() => ask('diagnose')).then(
-      (told) => Object.assign(mine, { found: told.found, failed: told.failed }),
-      (error) => { mine.failed = mine.cancelled ? null : error.message; },
-    ).finally(() => { mine.going = null; });
-    return diagnosis();
+  // `question` is asked there; the worker is ended to cancel, and kept for what is asked about the answer.
+  const long = (question, words) => {
+    let worker = null, asked = { number: 0 };
+    const told = () => ({
+      number: asked.number,
+      going: asked.going ? { ...asked.going, seconds: (performance.now() - asked.since) / 1000 } : null,
+      cancelled: Boolean(asked.cancelled),
+      found: asked.found,
+      failed: asked.failed,
+      of_this_text: asked.text === desk.text,
+    });
+    return {
+      told,
+      begin: async (body) => {
+        if (asked.going) throw new Error(`${words} goes on; wait for it, or cancel it`);
+        const mine = { number: ++count, text: desk.text, going: { what: 'beginning', done: 0, total: 0 }, since: performance.now() };
+        asked = mine;
+        if (worker) worker.end();
+        worker = hired((goes) => { mine.going = goes; });
+        const { ask, open } = worker;
+        open().then(() => ask(question, body)).then(
+          (answer) => Object.assign(mine, { found: answer.found, failed: answer.failed }),
+          (error) => { mine.failed = mine.cancelled ? null : error.message; },
+        ).finally(() => { mine.going = null; });
+        return told();
+      },
+      cancel: () => {
+        if (asked.going) {
+          asked.cancelled = true;
+          asked.going = null;
+          worker.end();
+        }
+        return told();
+      },
+      // The worker that has the answer.
+      holder: (says) => {
+        if (!worker || worker.isOver || !asked.found) throw new Error(says);
+        return worker;
+      },
+      forget: () => {
+        if (worker) worker.end();
+        worker = null;
+        asked = { number: asked.number };
+      },
+    };
   };
-  const diagnosis = () => ({
-    number: asked.number,
-    going: asked.going ? { ...asked.going, seconds: (performance.now() - asked.since) / 1000 } : null,
-    cancelled: Boolean(asked.cancelled),
-    found: asked.found,
-    failed: asked.failed,
-    of_this_text: asked.text === desk.text,
-  });
-  const cancel = () => {
-    if (asked.going) {
-      asked.cancelled = true;
-      asked.going = null;
-      finding.end();
-    }
-    return diagnosis();
-  };
+  const diagnosis = long('diagnose', 'a diagnosis'), excitation = long('excite', 'a search');
   // The text with a finding, by the same edit as `add`.
   const edit = async ({ text, did }) => heard(await answering.ask('edit', { base: revision, text, did }));
   const add = async ({ entry }) => {
-    if (!finding || finding.isOver || !asked.found) throw new Error('there is no such finding; diagnose again');
-    const { kind, at } = asked.found.entries[entry];
+    const finding = diagnosis.holder('there is no such finding; diagnose again');
+    const { kind, at } = diagnosis.told().found.entries[entry];
     const theirs = await finding.ask('view');
     await finding.ask('edit', { base: theirs.revision, text: desk.text });
     const { text } = await finding.ask('add', { entry });
@@ -151,7 +165,12 @@
     return told;
   };
 
-  const own = { edit, diagnose, diagnosis, cancel, add, save };
+  const own = {
+    edit, add, save,
+    diagnose: diagnosis.begin, diagnosis: diagnosis.told, cancel: diagnosis.cancel,
+    excite: excitation.begin, excitation: excitation.told, stop_excitation: excitation.cancel,
+    trajectory: () => excitation.holder('there is no trajectory; search for one first').ask('trajectory', {}),
+  };
   const ask = async (question, body) => {
     await begun();
     if (question in own) return own[question](body);

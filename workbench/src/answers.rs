@@ -6,7 +6,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::sitting::{Seeing, Sitting};
+use crate::sitting::{Keeping, Seeing, Sitting};
 
 /// What a page gets.
 pub(crate) enum Answer {
@@ -124,6 +124,13 @@ pub(crate) fn answer(
         "diagnose" => sitting.diagnose()?,
         "cancel" => sitting.cancel(),
         "add" => sitting.add(read::<Add>(body)?.entry)?,
+        "words" => sitting.words()?,
+        "limits" => sitting.limits()?,
+        "excite" => sitting.excite(read(body)?)?,
+        "excitation" => sitting.excitation(),
+        "stop_excitation" => sitting.stop_excitation(),
+        "trajectory" => sitting.trajectory()?,
+        "keep_trajectory" => sitting.keep_trajectory(&read::<Keeping>(body)?)?,
         other => {
             let says = format!("nothing called `{other}` can be asked");
             return Err(Refusal(Fault::Unknown, says));

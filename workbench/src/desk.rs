@@ -9,7 +9,7 @@ use serde::Deserialize;
 use serde_json::json;
 
 use crate::answers::{Answer, Refusal, answer, read};
-use crate::options::{Commands, Options, Step};
+use crate::options::{Commands, Excitation, Options, Step};
 use crate::shelf::Shelf;
 use crate::sitting::Sitting;
 
@@ -115,6 +115,10 @@ impl Commands for Plain {
     }
 
     fn variant(&self, _: &Path) -> Option<String> {
+        None
+    }
+
+    fn excite(&self, _: &Excitation) -> Option<String> {
         None
     }
 }

@@ -31,7 +31,7 @@ mod page;
 mod server;
 
 pub use desk::Desk;
-pub use options::{Commands, Options, Step};
+pub use options::{Commands, Excitation, Options, Step};
 #[cfg(not(target_family = "wasm"))]
 pub use page::{Bundle, alone};
 

@@ -2,8 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use modelmill::excite::Request;
 use modelmill::print::Spelling;
 use modelmill::recording::Reading;
+use serde::Deserialize;
 
 /// What is put on the workbench.
 #[derive(Clone, Debug, Default)]
@@ -32,6 +34,44 @@ pub trait Commands: Spelling + Send + Sync {
 
     /// Holds the model of the workbench against another model file, as it was before.
     fn variant(&self, before: &Path) -> Option<String>;
+
+    /// Plans the motion that was asked for; `None` where nothing else does.
+    fn excite(&self, asked: &Excitation) -> Option<String>;
+}
+
+/// What is asked of an excitation; what is not named is as `excite` has it.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Excitation {
+    /// Harmonics of each coordinate's series.
+    pub harmonics: usize,
+    /// Period, s.
+    pub period: f64,
+    /// Random trajectories that are tried first.
+    pub random: usize,
+    /// How many of them the search starts from.
+    pub starts: usize,
+    /// The same seed gives the same trajectory.
+    pub seed: u64,
+    /// Samples per second of the file, Hz.
+    pub rate: f64,
+    /// Limits beside those of the model file, or in their place, such as `theta1=1.5:2.1`.
+    pub limits: Vec<String>,
+}
+
+impl Default for Excitation {
+    fn default() -> Self {
+        let usual = Request::default();
+        Self {
+            harmonics: usual.options.harmonics,
+            period: usual.options.period,
+            random: usual.options.random,
+            starts: usual.options.starts,
+            seed: usual.options.seed,
+            rate: usual.rate,
+            limits: Vec::new(),
+        }
+    }
 }
 
 /// What a pane of the workbench does.

@@ -37,6 +37,11 @@
   const number = (v) => (v === null || v === undefined ? '\u2014' : Number(v.toPrecision(6)).toString().replace('-', '\u2212'));
   const percent = (v) => (v === null || v === undefined ? '\u2014' : `${Number((100 * v).toPrecision(3))} %`);
   const cell = (row, words, cls) => row.appendChild(make('td', words, cls));
+  // A number of a table, all digits of which can be copied.
+  const amount = (row, words, value) => {
+    const one = cell(row, words, 'number');
+    if (value !== null && value !== undefined) one.dataset.value = value;
+  };
   const put = (element, html) => { element.innerHTML = html; window.enliven(element); };
 
   // ---- the text
@@ -166,16 +171,19 @@
     for (const one of document.querySelectorAll('.pane')) one.classList.toggle('stale', !view.valid);
     if (view.model) { equations(); sliders(); by('equations').dataset.revision = view.derived; }
     rungs();
+    for (const hear of window.workbench.heard) hear(view);
     if (opened !== view.opened) { opened = view.opened; brought(); }
     told_command();
     if (view.valid && view.derived === view.revision) refresh();
   };
 
+  // Commands of panes that have a script of their own.
+  const others = {};
   const command = () => {
     const { commands } = view;
     const step = { mechanism: 'picture', equations: 'equations', comparison: 'compare', diagnosis: 'diagnose', ladder: 'identify' };
     if (pane === 'comparison' && by('identified').checked) return commands.identify;
-    return commands[step[pane]];
+    return pane in others ? others[pane](commands) : commands[step[pane]];
   };
   const told_command = () => {
     const words = command();
@@ -185,7 +193,8 @@
   // Another model or other recordings than before.
   const brought = () => {
     say('');
-    errors = motion = null;
+    errors = motion = recorded = planned = null;
+    loads = [];
     by('diagnose').disabled = !view.data;
     for (const id of ['places', 'draw']) by(id).disabled = !view.data;
     for (const id of ['curves', 'where', 'written', 'found']) by(id).replaceChildren();
@@ -201,11 +210,12 @@
       const row = make('tr', undefined, one.change);
       cell(row, one.name);
       row.appendChild(make('td')).appendChild(make('code', one.expression));
-      cell(row, number(one.value), 'number');
+      amount(row, number(one.value), one.value);
       cell(row, one.unit === '1' ? '' : one.unit);
-      cell(row, one.change === 'changed' ? number(one.was) : '', 'number');
+      if (one.change === 'changed') amount(row, number(one.was), one.was); else cell(row, '', 'number');
       return row;
     }));
+    window.enlivenTables(by('base'));
     by('gone').textContent = model.gone.join('; ');
     by('summary').textContent = model.summary;
   };
@@ -215,7 +225,7 @@
       const one = make('tr');
       cell(one, what);
       for (const whose of ['nominal', 'identified'])
-        for (const of of ['fit', 'check']) cell(one, percent(errors[whose][of]), 'number');
+        for (const of of ['fit', 'check']) amount(one, percent(errors[whose][of]), errors[whose][of]);
       return one;
     };
     const rows = view.ladder.map((one) => row(one.what, one.errors));
@@ -224,6 +234,7 @@
       rows.push(row('now', { nominal: brief(errors.nominal), identified: brief(errors.identified) }));
     }
     by('rungs').tBodies[0].replaceChildren(...rows);
+    window.enlivenTables(by('rungs'));
   };
 
   // ---- panes that ask
@@ -243,18 +254,17 @@
     };
   };
 
-  // What panes in files of their own share; they hear `stands` when there is something new to show.
-  window.bench = { make, number, percent, cell, asker, say };
-
-  let errors = null, drawn = null, from = null;
+  let errors = null, from = null, loads = [];
   const at = {};
 
   const draw = asker('picture', async () => {
     if (pane !== 'mechanism' || !view || !view.valid) return;
     const svg = await ask('picture', {
-      at: Object.entries(at), from, names: by('names').checked, frames: by('frames').checked, shadow: by('shadow').checked,
+      at: Object.entries(at), from, names: by('names').checked, frames: by('frames').checked, shadow: by('shadow').checked, loads,
     });
     by('picture').innerHTML = svg;
+    looked.again();
+    by('picture').dataset.drawn = Number(by('picture').dataset.drawn || 0) + 1;
     say('', 'picture');
   });
 
@@ -281,27 +291,34 @@
     say('', 'errors');
   };
 
+  // What was asked for by a button stays until it is asked for again, with a mark once the text is another one.
+  const mark_stale = (id) => {
+    const one = by(id);
+    one.classList.toggle('stale', one.childElementCount > 0 && one.dataset.revision !== String(view.revision));
+  };
+  const made_of = (id, revision) => { by(id).dataset.revision = revision; mark_stale(id); };
   const refresh = () => {
     draw();
     compare();
     document.dispatchEvent(new CustomEvent('stands', { detail: { view, pane, seen: { at: Object.entries(at), from } } }));
-    for (const old of ['curves', 'where', 'written', 'found']) by(old).classList.toggle('stale', by(old).dataset.revision !== String(view.revision));
+    for (const old of ['curves', 'where', 'written', 'found']) mark_stale(old);
   };
 
   const figures = (told) => {
     const table = make('table');
     const head = table.createTHead().insertRow();
     for (const words of ['error relative to the force', 'fit', 'check', 'identified, fit', 'identified, check'])
-      head.appendChild(make('th', words, words.startsWith('error') ? '' : 'number'));
+      head.appendChild(make('th', words, words.startsWith('error') ? '' : 'number')).scope = 'col';
     const all = [told.nominal.fit, told.nominal.check, told.identified.fit, told.identified.check];
     const body = table.createTBody();
     const row = (name, value) => {
       const one = body.insertRow();
       cell(one, name);
-      for (const figures of all) cell(one, figures ? percent(value(figures)) : '\u2014', 'number');
+      for (const figures of all) amount(one, figures ? percent(value(figures)) : '\u2014', figures && value(figures));
     };
     row('all drives', (f) => f.nrms);
     for (const drive of Object.keys(told.nominal.fit.channels)) row(drive, (f) => f.channels[drive].nrms);
+    window.enlivenTables(table);
     return table;
   };
 
@@ -334,58 +351,76 @@
   for (const id of ['azimuth', 'elevation']) by(id).addEventListener('input', () => turn(...angles()));
   by('flat').addEventListener('click', () => { from = null; draw(); });
   for (const id of ['names', 'frames', 'shadow']) by(id).addEventListener('change', draw);
-  let held = null;
-  by('picture').addEventListener('pointerdown', (event) => {
-    held = { x: event.clientX, y: event.clientY, angles: angles() };
-    by('picture').setPointerCapture(event.pointerId);
-  });
-  by('picture').addEventListener('pointermove', (event) => {
-    if (held) turn(held.angles[0] - (event.clientX - held.x) / 2, held.angles[1] + (event.clientY - held.y) / 2);
-  });
-  for (const end of ['pointerup', 'pointercancel']) by('picture').addEventListener(end, () => { held = null; });
-  by('picture').addEventListener('keydown', (event) => {
-    const by_ = { ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, 10], ArrowDown: [0, -10] }[event.key];
-    if (!by_) return;
-    event.preventDefault();
-    const [a, e] = angles();
-    turn(a + by_[0], e + by_[1]);
-  });
+  // Dragging turns the view; all else is as with every picture.
+  const looked = {
+    ...window.seen(() => by('picture').querySelector('svg')),
+    turn: (dx, dy) => turn(angles()[0] + 200 * dx, angles()[1] - 200 * dy),
+    step: 0.05,
+  };
+  window.zoomable(by('picture'), looked, by('view'));
 
   // ---- along a recording
 
-  let motion = null, playing = null;
+  // Recordings, and a trajectory that was planned.
+  let motion = null, recorded = null, planned = null, playing = null;
+  const chosen = () => motion.runs[by('run').selectedIndex];
+  // The last place of a rising list that is not behind a value.
+  const place = (all, value) => {
+    let [low, high] = [0, all.length - 1];
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (all[middle] <= value) low = middle; else high = middle - 1;
+    }
+    return low;
+  };
+  const largest = (all) => Math.max(...all.map((one) => one.reduce((most, v) => Math.max(most, Math.abs(v)), 0)), 1e-300);
+  // Forces and errors at a time, as shares of the largest of the run.
+  const shares = (run, time) => {
+    if (!run.forces || !by('forces').checked) return [];
+    run.largest = run.largest || [largest(run.forces.measured), largest(run.forces.error)];
+    const k = place(run.forces.time, time);
+    return motion.drives.map((drive, d) => [drive, (run.forces.measured[d][k] || 0) / run.largest[0], Math.abs(run.forces.error[d][k] || 0) / run.largest[1]]);
+  };
   const pose = (k) => {
-    const run = motion.runs[by('run').selectedIndex];
+    const run = chosen();
     motion.names.forEach((name, i) => {
       at[name] = run.q[i][k];
       const input = by('coordinates').querySelector(`input[data-name="${CSS.escape(name)}"]`);
       if (input) { input.value = at[name]; input.nextElementSibling.textContent = number(at[name]); }
     });
     by('moment').textContent = `${run.time[k].toFixed(2)} s`;
+    loads = shares(run, run.time[k]);
     draw();
   };
   const choose = () => {
-    by('time').max = motion.runs[by('run').selectedIndex].time.length - 1;
+    const run = chosen();
+    by('time').max = run.time.length - 1;
     by('time').value = 0;
+    by('with-forces').hidden = !run.forces;
+  };
+  const offer = () => {
+    const runs = [...(recorded ? recorded.runs : []), ...(planned ? planned.runs : [])];
+    motion = runs.length ? { names: (recorded || planned).names, drives: recorded ? recorded.drives : [], runs } : null;
+    by('motion').hidden = !motion;
+    by('run').replaceChildren(...runs.map((run) => make('option', run.file)));
+    if (motion) choose();
   };
   const load = () => tried(async () => {
-    motion = await ask('motion', {});
-    by('motion').hidden = !motion.runs.length;
-    by('run').replaceChildren(...motion.runs.map((run) => make('option', run.file)));
-    if (motion.runs.length) choose();
+    recorded = await ask('motion', {});
+    offer();
   });
+  by('forces').addEventListener('change', () => pose(Number(by('time').value)));
   by('run').addEventListener('change', () => { choose(); pose(0); });
   by('time').addEventListener('input', () => pose(Number(by('time').value)));
   by('play').addEventListener('click', () => {
     by('play').textContent = playing ? 'Play' : 'Stop';
     if (playing) { clearInterval(playing); playing = null; return; }
-    const run = motion.runs[by('run').selectedIndex];
+    const run = chosen();
     const start = performance.now() - 1000 * (run.time[Number(by('time').value)] - run.time[0]);
     playing = setInterval(() => {
       const span = run.time[run.time.length - 1] - run.time[0];
       const t = run.time[0] + ((performance.now() - start) / 1000) % Math.max(span, 0.1);
-      let k = run.time.findIndex((one) => one >= t);
-      if (k < 0) k = run.time.length - 1;
+      const k = place(run.time, t);
       by('time').value = k;
       pose(k);
     }, 33);
@@ -397,16 +432,18 @@
     by('written').textContent = 'writing\u2026';
     const { revision } = view;
     const page = new DOMParser().parseFromString(await ask('equations', {}), 'text/html');
-    for (const one of page.querySelectorAll('nav, h1, figure.picture')) one.remove();
+    for (const one of page.querySelectorAll('nav, h1, figure.picture, script')) one.remove();
     by('written').replaceChildren(...page.querySelector('main').childNodes);
-    by('written').dataset.revision = revision;
+    window.enliven(by('written'));
+    window.enlivenTables(by('written'));
+    made_of('written', revision);
   }).then((isDone) => { if (!isDone) by('written').textContent = ''; }));
   by('draw').addEventListener('click', () => tried(async () => {
     by('curves').textContent = 'comparing\u2026';
     const { revision } = view;
     const html = await ask('curves', { identified: by('identified').checked });
     put(by('curves'), html);
-    by('curves').dataset.revision = revision;
+    made_of('curves', revision);
     say('');
   }).then((isDone) => { if (!isDone) by('curves').textContent = ''; }));
   by('identified').addEventListener('change', told_command);
@@ -415,7 +452,7 @@
     const places = told.compared.where;
     by('where').replaceChildren(...(places.length ? places : [{ says: 'No region of coordinates, rates, loads or time stands out' }])
       .map((one) => make('li', `${one.says}.`)));
-    by('where').dataset.revision = told.revision;
+    made_of('where', told.revision);
     say('');
   }));
 
@@ -456,6 +493,7 @@
     figure.innerHTML = found.ladder;
     figure.prepend(make('figcaption', `Error relative to the force, judged ${found.judged}`));
     box.append(figure);
+    window.enlivenPictures(box);
     const list = make('ul');
     for (const one of found.where) list.append(make('li', `${one.says}.`));
     box.append(list);
@@ -498,12 +536,13 @@
   });
   by('theirs').addEventListener('click', () => tried(async () => follow(await ask('choose', { theirs: true }))));
   by('mine').addEventListener('click', () => tried(async () => show(await ask('choose', { theirs: false }))));
-  by('copy').addEventListener('click', () => navigator.clipboard.writeText(by('command').textContent));
+  by('copy').addEventListener('click', () => window.copied(by('command').textContent, 'the command'));
   const open = (name) => {
     pane = name;
     for (const one of document.querySelectorAll('.pane')) one.hidden = one.id !== pane;
     for (const tab of by('tabs').children) tab.setAttribute('aria-selected', String(tab.dataset.pane === pane));
     if (view) { told_command(); refresh(); }
+    document.dispatchEvent(new CustomEvent('pane', { detail: pane }));
   };
   for (const tab of by('tabs').children) tab.addEventListener('click', () => open(tab.dataset.pane));
   by('tabs').addEventListener('keydown', (event) => {
@@ -517,6 +556,23 @@
   text.addEventListener('input', () => { lines(); isTyped = true; send(); });
   text.addEventListener('scroll', () => { by('lines').scrollTop = text.scrollTop; });
   window.addEventListener('beforeunload', (event) => { if (view && (view.changed || sent !== text.value)) event.preventDefault(); });
+
+  // What scripts of single panes need of the page.
+  window.workbench = {
+    ask, make, number, percent, cell, amount, asker, say, tried, others, send, told_command,
+    view: () => view,
+    // A trajectory that the mechanism can be moved along; `true` plays it.
+    animate: (names, run, isShown) => {
+      planned = { names, runs: [run] };
+      offer();
+      if (!isShown) return;
+      open('mechanism');
+      by('run').selectedIndex = motion.runs.length - 1;
+      choose();
+      if (!playing) by('play').click();
+    },
+    heard: [],
+  };
 
   const watch = async () => {
     for (;;) {

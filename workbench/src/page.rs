@@ -21,13 +21,8 @@ pub struct Bundle {
 
 /// The page that a server sends; `nonce` is what lets its scripts run, and no other.
 pub(crate) fn page(nonce: &str) -> String {
-    let scripts = [
-        include_str!("served.js"),
-        report::SCRIPT,
-        include_str!("page.js"),
-        include_str!("variant.js"),
-    ];
-    written("", &format!(" nonce=\"{nonce}\""), "", &scripts)
+    let who = include_str!("served.js");
+    written("", &format!(" nonce=\"{nonce}\""), "", who)
 }
 
 /// The page that has the mill in itself and needs neither server nor network. `module` is the mill as WebAssembly, with the
@@ -50,13 +45,7 @@ pub fn alone(module: &[u8], bundle: &Bundle) -> String {
         carried,
         "<script type=\"text/plain\" id=\"worker\">\n{worker}</script>\n"
     );
-    let scripts = [
-        include_str!("alone.js"),
-        report::SCRIPT,
-        include_str!("page.js"),
-        include_str!("variant.js"),
-    ];
-    written(policy, "", &carried, &scripts)
+    written(policy, "", &carried, include_str!("alone.js"))
 }
 
 /// Gzip in Base64.
@@ -67,17 +56,26 @@ fn packed(bytes: &[u8]) -> String {
     STANDARD.encode(packer.finish().unwrap_or_default())
 }
 
-fn written(head: &str, attributes: &str, carried: &str, scripts: &[&str]) -> String {
+/// Scripts of the workbench alone, in the order in which they run.
+const SCRIPTS: [&str; 4] = [
+    include_str!("page.js"),
+    include_str!("completion.js"),
+    include_str!("excitation.js"),
+    include_str!("variant.js"),
+];
+
+/// `who` is the script that knows who answers.
+fn written(head: &str, attributes: &str, carried: &str, who: &'static str) -> String {
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n{head}\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"color-scheme\" content=\"light dark\">\n\
          <title>modelmill</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{}{}</style>\n</head>\n{}{carried}",
-        report::style(),
+        report::STYLE,
         include_str!("page.css"),
         include_str!("page.html"),
     );
-    for script in scripts {
+    for script in [who].into_iter().chain(report::scripts()).chain(SCRIPTS) {
         let _ = write!(page, "\n<script{attributes}>\n{script}</script>");
     }
     page.push_str("\n</body>\n</html>\n");

@@ -14,5 +14,5 @@
     throw Object.assign(new Error(isJson ? told.says : told), { status: answer.status });
   };
   // What stands, as soon as it is another version.
-  window.mill = { ask, news: (version) => ask(`view?since=${version}`), hint: 'No recording is open: give one with --data.' };
+  window.mill = { ask, news: (version) => ask(`view?since=${version}`), keeps: true, hint: 'No recording is open: give one with --data.' };
 })();

@@ -10,14 +10,20 @@ use modelmill::edit::NewEffect;
 use modelmill::files::FileError;
 use modelmill::identify::Estimation;
 use modelmill::model::Format;
-use modelmill::picture::{Drawing, Style};
+use modelmill::picture::{Drawing, Load, Style};
 use modelmill::recording::Recording;
+use modelmill::stretch::Stretch;
 use modelmill::{Error, Host, Model, Outcome, report};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
+mod excitation;
+
+pub(crate) use excitation::Keeping;
+use excitation::Planning;
+
 use crate::draft::Draft;
-use crate::options::{Commands, Options, Step};
+use crate::options::{Commands, Excitation, Options, Step};
 use crate::readings::{Read, Readings};
 use crate::surroundings::Surroundings;
 use crate::told;
@@ -35,6 +41,7 @@ pub(crate) struct Sitting {
     options: Options,
     commands: Arc<dyn Commands>,
     state: Mutex<State>,
+    planning: Mutex<Planning>,
     surroundings: Arc<dyn Surroundings>,
     /// Counts everything that pages should hear of.
     version: AtomicU64,
@@ -98,6 +105,8 @@ pub(crate) struct Seeing {
     shadow: bool,
     /// Another model as the shadow, as `models` names it.
     beside: Option<String>,
+    /// Drives with their forces and errors, as shares of the largest.
+    loads: Vec<(String, f64, f64)>,
 }
 
 impl Sitting {
@@ -141,6 +150,7 @@ impl Sitting {
         };
         Ok(Self {
             host,
+            planning: Mutex::new(Planning::new(options.first)),
             options,
             commands,
             state: Mutex::new(state),
@@ -194,6 +204,7 @@ impl Sitting {
             "compare": self.commands.same(Step::Compare),
             "identify": self.commands.same(Step::Identify),
             "diagnose": self.commands.same(Step::Diagnose),
+            "excite": self.commands.excite(&Excitation::default()),
         });
         told
     }
@@ -340,6 +351,13 @@ impl Sitting {
                 frames: seeing.frames,
                 ..Style::default()
             },
+            loads: (seeing.loads.iter())
+                .map(|(drive, force, error)| Load {
+                    drive: drive.clone(),
+                    force: *force,
+                    error: *error,
+                })
+                .collect(),
         };
         let shadow = match &seeing.beside {
             Some(name) => Some(self.beside(Some(name))?),
@@ -494,20 +512,35 @@ impl Sitting {
         Ok(told)
     }
 
-    /// Poses along the recordings, in time.
+    /// Poses along the recordings, in time, with measured forces and what the model misses of them where it can be run.
     pub(crate) fn motion(&self) -> Result<Value, String> {
         let (model, _) = self.model()?;
-        let recordings = self.recordings(&model).map_err(|e| self.said(&e))?;
+        let [fit, check] = self.recordings(&model).map_err(|e| self.said(&e))?;
         let names = model.active();
-        let runs = recordings.iter().flatten().flat_map(|one| &one.stretches);
-        let runs = runs.map(|one| {
-            let run = &one.run;
-            let step = run.time.len().div_ceil(POSES).max(1);
-            let thin = |all: &[f64]| all.iter().copied().step_by(step).collect::<Vec<f64>>();
-            let q: Vec<_> = run.q.iter().map(|q| thin(q)).collect();
-            json!({ "file": run.file, "time": thin(&run.time), "q": q })
-        });
-        Ok(json!({ "names": names, "runs": runs.collect::<Vec<_>>() }))
+        let drives = model.drives();
+        let stretches = |all: Vec<Recording>| -> Vec<Stretch> {
+            all.into_iter().flat_map(|one| one.stretches).collect()
+        };
+        let [fit, check] = [fit, check].map(stretches);
+        let mut runs: Vec<Value> = (fit.iter().chain(&check))
+            .map(|one| {
+                let run = &one.run;
+                let q: Vec<_> = run.q.iter().map(|q| thinned(q)).collect();
+                json!({ "file": run.file, "time": thinned(&run.time), "q": q })
+            })
+            .collect();
+        // A picture without arrows is better than none.
+        if let Ok(version) = Version::new(model, fit, check, Held::All) {
+            for (told, run) in runs.iter_mut().zip(&version.runs) {
+                let all = 0..drives.len();
+                told["forces"] = json!({
+                    "time": thinned(&run.time),
+                    "measured": run.measured.iter().map(|f| thinned(f)).collect::<Vec<_>>(),
+                    "error": all.map(|d| thinned(&run.error(d))).collect::<Vec<_>>(),
+                });
+            }
+        }
+        Ok(json!({ "names": names, "drives": drives, "runs": runs }))
     }
 
     /// Begins a diagnosis of the text as it stands.
@@ -658,6 +691,12 @@ impl State {
             self.done.push(what.to_owned());
         }
     }
+}
+
+/// As many values as a moving picture needs.
+fn thinned(all: &[f64]) -> Vec<f64> {
+    let step = all.len().div_ceil(POSES).max(1);
+    all.iter().copied().step_by(step).collect()
 }
 
 fn read(host: &Host, path: &Path) -> Result<String, FileError> {

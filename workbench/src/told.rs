@@ -5,7 +5,7 @@ use modelmill::identify::Identification;
 use modelmill::model::Checked;
 use modelmill::print::{self, Spelling, edit};
 use modelmill::recording::Recording;
-use modelmill::{Error, Model, Note, report};
+use modelmill::{EffectKind, Error, Model, Note, report};
 use serde_json::{Value, json};
 
 use crate::options::Commands;
@@ -120,6 +120,12 @@ pub(crate) fn findings(findings: &Findings, commands: &dyn Commands) -> Value {
         })
         .collect();
     told
+}
+
+/// What an editor offers while one types: the schema of a model file, and the kinds of effects that are known.
+pub(crate) fn words(kinds: &[EffectKind]) -> Value {
+    let schema: Value = serde_json::from_str(modelmill::SCHEMA).unwrap_or_default();
+    json!({ "schema": schema, "kinds": print::effects::json(kinds)["kinds"] })
 }
 
 /// A JSON value with all its texts spelled as the reader asks for what they advise.

@@ -2,8 +2,7 @@
 // changed, and what that costs along the recordings.
 (() => {
   'use strict';
-  const { ask } = window.mill;
-  const { make, number, percent, cell, asker, say } = window.bench;
+  const { ask, make, number, percent, cell, asker, say, others, told_command } = window.workbench;
   const by = (id) => document.getElementById(id);
   let stands = null, opened = null, isListed = false, command = null, shown = null;
 
@@ -150,11 +149,8 @@
 
   // ---- what is asked
 
-  const footer = () => {
-    if (!stands || stands.pane !== 'variant') return;
-    by('command').textContent = command || '';
-    by('command').parentElement.hidden = !command;
-  };
+  others.variant = () => command;
+  const footer = () => { if (stands && stands.pane === 'variant') told_command(); };
 
   const list = async () => {
     const { models, named } = await ask('models', {});

@@ -81,7 +81,7 @@ pub(crate) struct AtlasArgs {
     /// Model files
     #[arg(required = true)]
     pub(crate) models: Vec<PathBuf>,
-    /// Write `atlas.md` and the folder `atlas` into this folder
+    /// Write `atlas.md`, `atlas.html` and the folder `atlas` into this folder
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
 }

@@ -51,6 +51,7 @@ impl DrawingArgs {
                 frames: self.frames,
                 ..Style::default()
             },
+            ..Drawing::default()
         };
         target.write(&model.picture(&drawing, before)?)
     }

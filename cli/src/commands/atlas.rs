@@ -1,4 +1,4 @@
-//! `atlas`: pictures, base parameters and counts of many mechanisms, as one table with a page for each.
+//! `atlas`: pictures, base parameters and counts of many mechanisms, as one table with a page for each, and as one page of HTML.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -7,14 +7,16 @@ use std::time::Instant;
 use modelmill::Host;
 use modelmill::atlas;
 use modelmill::picture::Drawing;
+use modelmill::report::{self, Pictured};
 
 use crate::args::AtlasArgs;
 use crate::failure::{Failure, Outcome};
 use crate::output::{self, Target};
 use crate::{commands, terminal};
 
-/// Name of the table in its folder, and of the folder of what it links to.
+/// Name of the table in its folder, of all in one page, and of the folder of what the table links to.
 const TABLE: &str = "atlas.md";
+const PAGE: &str = "atlas.html";
 const PAGES: &str = "atlas";
 
 /// Derives all models and writes the atlas.
@@ -23,6 +25,7 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> Outcome {
     output::make_folder(&folder)?;
     let mut names = BTreeSet::new();
     let mut entries = Vec::new();
+    let mut mechanisms = Vec::new();
     for path in &args.models {
         let start = Instant::now();
         let model = commands::model(host, path)?;
@@ -39,15 +42,30 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> Outcome {
             let file = folder.join(format!("{}.{ending}", model.name));
             Target::new(&file, args.models.iter().map(PathBuf::as_path))
         };
-        file("svg")?.write(&model.picture(&Drawing::default(), None)?)?;
+        let picture = model.picture(&Drawing::default(), None)?;
+        file("svg")?.write(&picture)?;
         file("md")?.write(&model.atlas_page(&entry))?;
-        entries.push(entry);
+        entries.push(entry.clone());
+        mechanisms.push(Pictured {
+            entry,
+            model,
+            picture: picture.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1),
+        });
     }
+    let write = |name: &str, text: &str| {
+        let target = Target::new(
+            &args.out.join(name),
+            args.models.iter().map(PathBuf::as_path),
+        )?;
+        target.write(text)
+    };
+    write(TABLE, &atlas::page(&entries))?;
+    write(PAGE, &report::atlas(&mechanisms))?;
     let table = args.out.join(TABLE);
-    Target::new(&table, args.models.iter().map(PathBuf::as_path))?.write(&atlas::page(&entries))?;
     terminal::print(&format!(
-        "{} holds {}.",
+        "{} holds {}; {} shows them in one page.",
         table.display(),
-        modelmill::text::table::count(entries.len(), "mechanism", "mechanisms")
+        modelmill::text::table::count(entries.len(), "mechanism", "mechanisms"),
+        args.out.join(PAGE).display()
     ))
 }

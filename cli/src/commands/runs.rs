@@ -53,7 +53,7 @@ pub(crate) fn run(host: &Host, args: &RunsArgs) -> Outcome {
     });
     let found = model.runs(recordings, &args.asked())?;
     match &written {
-        Some((target, Form::Page)) => target.write(&runs_page(&model, &found)?)?,
+        Some((target, Form::Page)) => target.write(&runs_page(&found))?,
         Some((target, Form::Json)) => target.write(&format!("{:#}\n", found.json()))?,
         None => {}
     }

@@ -1,6 +1,7 @@
 //! `work`: the workbench in the browser.
 
 use std::borrow::Cow;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,7 +10,7 @@ use modelmill::edit::NewEffect;
 use modelmill::files::Kind;
 use modelmill::print::Spelling;
 use modelmill::{Host, Model};
-use modelmill_workbench::{Commands, Options, Step, serve};
+use modelmill_workbench::{Commands, Excitation, Options, Step, serve};
 use serde_json::json;
 
 use crate::args::work::WorkArgs;
@@ -139,7 +140,37 @@ impl Commands for Spelled {
             "modelmill diff {before} {model}{all}{reading}{libraries}"
         ))
     }
+
+    fn excite(&self, asked: &Excitation) -> Option<String> {
+        let usual = Excitation::default();
+        let mut words = format!("modelmill excite {}", self.model);
+        let options = [
+            (
+                "harmonics",
+                asked.harmonics.to_string(),
+                usual.harmonics.to_string(),
+            ),
+            ("period", asked.period.to_string(), usual.period.to_string()),
+            ("random", asked.random.to_string(), usual.random.to_string()),
+            ("starts", asked.starts.to_string(), usual.starts.to_string()),
+            ("seed", asked.seed.to_string(), usual.seed.to_string()),
+            ("rate", asked.rate.to_string(), usual.rate.to_string()),
+        ];
+        for (name, value, usual) in options {
+            if value != usual {
+                let _ = write!(words, " --{name} {value}");
+            }
+        }
+        if !asked.limits.is_empty() {
+            let _ = write!(words, " --limits {}", quoted(&asked.limits.join(",")));
+        }
+        let _ = write!(words, " --out {TRAJECTORY}{}", self.libraries);
+        Some(words)
+    }
 }
+
+/// Where the commands of the page let a trajectory go.
+const TRAJECTORY: &str = "excitation.csv";
 
 impl Spelling for Spelled {
     fn add(&self, model: &Model, effect: &NewEffect) -> String {
@@ -198,6 +229,24 @@ mod tests {
             panic!("another command");
         };
         let spelled = Spelled::new(&host, args);
+        let asked = Excitation {
+            harmonics: 3,
+            period: 2.5,
+            limits: vec!["q=-1:2".to_owned(), "q_d=3".to_owned()],
+            ..Excitation::default()
+        };
+        let command = spelled.excite(&asked).unwrap();
+        let excite = Cli::try_parse_from(words(&command)).unwrap();
+        let Command::Excite(excite) = &excite.command else {
+            panic!("another command");
+        };
+        let told = (
+            excite.harmonics,
+            excite.period,
+            excite.limits.len(),
+            excite.starts,
+        );
+        assert_eq!(told, (3, 2.5, 2, asked.starts), "{command}");
         for step in [
             Step::Picture,
             Step::Equations,

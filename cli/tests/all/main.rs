@@ -33,6 +33,7 @@ mod hostile;
 mod interpret;
 mod json;
 mod languages;
+mod pages;
 mod pictures;
 mod plausible;
 mod preparation;

@@ -116,6 +116,7 @@ fn the_mill_in_a_page_gives_the_figures_of_the_program() {
     );
 
     tells_what_the_addition_costs(&mut browser, &window);
+    crate::pages::check(&mut browser, &window, "the page with the mill");
 
     // Another model from the list.
     let seconds = browser.run(

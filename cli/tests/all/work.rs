@@ -1,112 +1,10 @@
 //! The workbench: who may ask, what happens to the file, and a whole sitting in a browser, with the figures that the commands give.
 
-use std::fmt::Write as _;
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::TcpStream;
-use std::path::PathBuf;
-use std::process::{Child, Stdio};
-
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::common::browser::{Browser, Window};
-use crate::common::{self, modelmill, number, printed, refused, run, scratch};
-
-/// A workbench that serves a copy of a bundled model. It ends with this value.
-struct Workbench {
-    child: Child,
-    link: String,
-    port: u16,
-    token: String,
-    model: PathBuf,
-}
-
-impl Workbench {
-    #[track_caller]
-    fn open(name: &str, model: &str, recordings: &[&str]) -> Self {
-        let folder = PathBuf::from(scratch(name));
-        let _ = std::fs::remove_dir_all(&folder);
-        std::fs::create_dir_all(&folder).expect("a folder");
-        let file = folder.join(model);
-        std::fs::copy(common::model(model), &file).expect("a copy");
-        let path = file.to_str().expect("plain text");
-        let mut child = modelmill(&["work", path, "--json"])
-            .args(recordings)
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("the program starts");
-        let mut out = BufReader::new(child.stdout.take().expect("a pipe"));
-        let mut told = String::new();
-        while !told.contains('}') {
-            assert!(out.read_line(&mut told).expect("a line") > 0, "{told}");
-        }
-        let told: Value = serde_json::from_str(&told).expect("JSON");
-        let link = told["url"].as_str().expect("a link").to_owned();
-        let rest = link.strip_prefix("http://127.0.0.1:").expect("loopback");
-        let (port, token) = rest.split_once("/?token=").expect("a token");
-        Self {
-            port: port.parse().expect("a port"),
-            token: token.to_owned(),
-            child,
-            link,
-            model: file,
-        }
-    }
-
-    fn path(&self) -> &str {
-        self.model.to_str().expect("plain text")
-    }
-
-    fn text(&self) -> String {
-        std::fs::read_to_string(&self.model).expect("the model")
-    }
-
-    /// Status and text of a bare request.
-    fn request(&self, head: &str, headers: &[String], body: &str) -> (u16, String) {
-        let mut stream = TcpStream::connect(("127.0.0.1", self.port)).expect("it listens");
-        let mut text =
-            format!("{head} HTTP/1.1\r\nConnection: close\r\nContent-Type: application/json\r\n");
-        let _ = write!(text, "Content-Length: {}\r\n", body.len());
-        for header in headers {
-            text.push_str(header);
-            text.push_str("\r\n");
-        }
-        stream
-            .write_all(format!("{text}\r\n{body}").as_bytes())
-            .expect("it reads");
-        let mut answer = String::new();
-        stream.read_to_string(&mut answer).expect("it answers");
-        let (head, body) = answer.split_once("\r\n\r\n").expect("a head");
-        let status = head.split(' ').nth(1).expect("a status");
-        (status.parse().expect("a number"), body.to_owned())
-    }
-
-    fn own(&self) -> [String; 2] {
-        let host = format!("Host: 127.0.0.1:{}", self.port);
-        [host, format!("X-Modelmill-Token: {}", self.token)]
-    }
-
-    /// What the page would be told.
-    #[track_caller]
-    fn ask(&self, path: &str, body: &Value) -> (u16, Value) {
-        let head = format!("POST /api/{path}");
-        let (status, text) = self.request(&head, &self.own(), &body.to_string());
-        let told = serde_json::from_str(&text).unwrap_or_else(|_| panic!("{path}: {text}"));
-        (status, told)
-    }
-
-    fn view(&self) -> Value {
-        let (status, text) = self.request("GET /api/view?since=0", &self.own(), "");
-        assert_eq!(status, 200);
-        serde_json::from_str(&text).expect("JSON")
-    }
-}
-
-impl Drop for Workbench {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
+use crate::common::workbench::Workbench;
+use crate::common::{self, number, printed, refused, run, scratch};
 
 #[test]
 fn only_its_own_page_is_answered() {
@@ -506,7 +404,6 @@ fn equations_follow_while_one_types() {
         return;
     };
     let fit = run("with-rods-fit.csv");
-    // Bounds hold for a program that was optimised.
     let cases = [
         (
             "spidermill.toml",
@@ -552,10 +449,383 @@ fn equations_follow_while_one_types() {
         );
         eprintln!("{model}: equations and error within {times} ms (p95 of 40 keystrokes)");
         let most = number(&times, "/0").max(number(&times, "/1"));
+        // Less optimised, and beside other tests, a program is allowed several times as much.
+        let slower = if cfg!(debug_assertions) { 8.0 } else { 1.0 };
+        assert!(most < slower * bound, "{model}: {times} ms");
+    }
+}
+
+/// A trajectory is planned within limits that were typed, by the numbers of the program, and kept in a file that was not there.
+#[test]
+fn a_motion_is_planned_as_the_command_does_it() {
+    let Some(mut browser) = Browser::start(&scratch("planning-browser")) else {
+        return;
+    };
+    let bench = Workbench::open("planning", "spidermill.toml", &[]);
+    let window = browser.open(&bench.link);
+    browser.run(
+        &window,
+        "await until('equations', () => at('base').tBodies[0].rows.length === 4);
+         tab('excitation');
+         await until('limits', () => at('limits').tBodies[0].rows.length === 2);
+         at('random').value = 60; at('starts').value = 2; at('harmonics').value = 3; at('rate').value = 50;",
+    );
+    // Cancelled, it says so; without limits, what is missing.
+    let said = browser.run(
+        &window,
+        "at('random').value = 1000000; at('excite').click();
+         await until('a search', () => !at('stop-excitation').hidden && at('excitation-going').textContent);
+         at('stop-excitation').click();
+         await until('its end', () => at('stop-excitation').hidden && at('planned').textContent);
+         const says = [at('planned').textContent];
+         at('random').value = 60;
+         const low = at('limits').querySelector('input');
+         const was = low.value;
+         low.value = '';
+         at('excite').click();
+         await until('a word of it', () => !at('says').hidden);
+         says.push(at('says').textContent);
+         low.value = was;
+         return says;",
+    );
+    assert_eq!(said[0], "The search was cancelled.");
+    assert!(
+        said[1]
+            .as_str()
+            .is_some_and(|says| says.contains("theta1 has no limits")),
+        "{said}"
+    );
+    let found = browser.run(
+        &window,
+        "const rate = at('limits').querySelectorAll('input')[2];
+         rate.value = '0.9';
+         at('excite').click();
+         await until('a trajectory', () => at('planned').querySelector('svg.figure'), 120000);
+         const told = await window.mill.ask('excitation', {});
+         const { csv } = await window.mill.ask('trajectory', {});
+         return { command: at('command').textContent, condition: told.found.condition_number, csv };",
+    );
+    let command = found["command"].as_str().expect("a command");
+    assert!(command.contains("--limits theta1_d=0.9"), "{command}");
+    let out = scratch("by-command.csv");
+    let mut words: Vec<&str> = command.split(' ').skip(1).collect();
+    let place = words.iter().position(|word| *word == "excitation.csv");
+    words[place.expect("a file")] = &out;
+    words.push("--json");
+    let by_command = common::json(&words);
+    assert_eq!(by_command["condition_number"], found["condition"]);
+    let csv = std::fs::read_to_string(&out).expect("the trajectory");
+    assert_eq!(found["csv"], json!(csv));
+    // Kept beside the model, once, and nowhere else.
+    let kept = browser.run(
+        &window,
+        "const button = [...at('planned').querySelectorAll('button')].find((one) => one.textContent.startsWith('Save'));
+         button.click();
+         await until('a word of it', () => at('says').textContent.includes('is written'));
+         const says = [];
+         for (const name of ['excitation.csv', '../outside.csv', 'model.toml']) {
+           try { await window.mill.ask('keep_trajectory', { name }); says.push(''); } catch (error) { says.push(error.message); }
+         }
+         return says;",
+    );
+    let beside = bench.model.with_file_name("excitation.csv");
+    assert_eq!(std::fs::read_to_string(beside).expect("the file"), csv);
+    for (k, part) in [
+        "is there already",
+        "a file of the model's folder",
+        "a file of the model's folder",
+    ]
+    .into_iter()
+    .enumerate()
+    {
         assert!(
-            cfg!(debug_assertions) || most < bound,
-            "{model}: {times} ms"
+            kept[k].as_str().is_some_and(|says| says.contains(part)),
+            "{kept}"
         );
+    }
+    // The mechanism moves along it.
+    let moves = browser.run(
+        &window,
+        "at('animate').click();
+         await until('a picture', () => !at('mechanism').hidden && at('picture').querySelector('svg'));
+         const first = at('picture').innerHTML;
+         await until('another one', () => at('picture').innerHTML !== first);
+         at('play').click();
+         return at('run').value;",
+    );
+    assert_eq!(moves, "planned motion");
+    let heard = browser.heard.iter().filter(|says| !says.contains("422"));
+    assert_eq!(heard.collect::<Vec<_>>(), Vec::<&String>::new());
+}
+
+/// Keys, kinds and places are offered where they may stand, and taken by keys alone.
+#[test]
+fn what_is_typed_is_completed() {
+    let Some(mut browser) = Browser::start(&scratch("completing-browser")) else {
+        return;
+    };
+    let bench = Workbench::open("completing", "spidermill.toml", &[]);
+    let window = browser.open(&bench.link);
+    browser.front(&window);
+    browser.run(
+        &window,
+        "await until('equations', () => at('base').tBodies[0].rows.length === 4);
+         at('text').focus(); at('text').setSelectionRange(at('text').value.length, at('text').value.length);",
+    );
+    let offered = |browser: &mut Browser| -> Vec<String> {
+        let all = browser.run(
+            &window,
+            "await until('offers', () => !at('offers').hidden);
+             return [...at('offers').querySelectorAll('b')].map((one) => one.textContent);",
+        );
+        serde_json::from_value(all).expect("texts")
+    };
+    let open = |browser: &mut Browser, words: &str| {
+        browser.write(&window, words);
+        browser.press(&window, " ", true);
+    };
+    open(&mut browser, "\n[[eff");
+    assert_eq!(offered(&mut browser), ["effect", "effect_kind"]);
+    browser.press(&window, "Enter", false);
+    open(&mut browser, "\nki");
+    assert_eq!(offered(&mut browser)[0], "kind");
+    browser.press(&window, "Enter", false);
+    open(&mut browser, "\"coulomb");
+    let kinds = offered(&mut browser);
+    let library = common::json(&["effects", "--json"]);
+    let known: Vec<&str> = (library["kinds"].as_array().expect("kinds").iter())
+        .filter_map(|kind| kind["name"].as_str())
+        .filter(|name| name.starts_with("coulomb"))
+        .collect();
+    assert_eq!(kinds[..known.len()], known[..]);
+    // Escape closes and takes nothing; arrows choose.
+    browser.press(&window, "Escape", false);
+    let closed = browser.run(
+        &window,
+        "return at('offers').hidden && at('text').value.endsWith('kind = \"coulomb');",
+    );
+    assert_eq!(closed, true);
+    open(&mut browser, "_friction\"\nat = [\"");
+    let places = offered(&mut browser);
+    assert_eq!(places[..2], ["spindle_left", "spindle_right"]);
+    assert!(
+        places.contains(&"theta1".to_owned()) && !places.contains(&"R3m".to_owned()),
+        "{places:?}"
+    );
+    browser.press(&window, "ArrowDown", false);
+    browser.press(&window, "Tab", false);
+    browser.write(&window, "\"]\n");
+    let text = browser.run(
+        &window,
+        "await until('the effect', () => !at('faults').querySelector('.error') && at('base').tBodies[0].rows.length === 5);
+         return at('text').value;",
+    );
+    let text = text.as_str().expect("text");
+    assert!(
+        text.ends_with("[[effect]]\nkind = \"coulomb_friction\"\nat = [\"spindle_right\"]\n"),
+        "{}",
+        &text[text.len() - 120..]
+    );
+    // Frames where a frame is expected, fields of a table within braces.
+    for (line, expected) in [
+        ("[[point]]\nname = \"new\"\non = \"S", "S1"),
+        ("\"\n[[drive]]\nlinear = { fr", "from"),
+        ("om = \"R3", "R3m"),
+        ("\" }\n[[part]]\ninertia = { z", "zz"),
+    ] {
+        open(&mut browser, line);
+        let all = offered(&mut browser);
+        assert!(all.contains(&expected.to_owned()), "{line}: {all:?}");
+        browser.press(&window, "Escape", false);
+    }
+    // While one types, without being asked.
+    browser.write(&window, "z = 1 }\n[[frame]]\n");
+    for letter in ["o", "n", " ", "=", " ", "\"", "S"] {
+        browser.write(&window, letter);
+    }
+    browser.write(&window, "1");
+    let heard = browser.heard.clone();
+    assert_eq!(heard, Vec::<String>::new());
+}
+
+/// A click on a number copies all of its digits and says so; the keyboard does the same.
+#[test]
+fn numbers_are_copied_with_all_their_digits() {
+    let Some(mut browser) = Browser::start(&scratch("copying-browser")) else {
+        return;
+    };
+    let fit = run("with-rods-fit.csv");
+    let bench = Workbench::open("copying", "spidermill.toml", &["--data", &fit]);
+    let compared = common::json(&["compare", bench.path(), "--data", &fit, "--json"]);
+    let window = browser.open(&bench.link);
+    browser.front(&window);
+    let copied = browser.run(
+        &window,
+        "await until('errors', () => at('comparison').dataset.revision && at('comparison').dataset.revision === at('equations').dataset.revision);
+         const texts = [];
+         navigator.clipboard.writeText = async (text) => { texts.push(text); };
+         tab('comparison');
+         const cell = at('errors').querySelector('td.number');
+         cell.click();
+         await until('a word of it', () => document.querySelector('.told').textContent.includes('copied'));
+         const says = document.querySelector('.told').textContent;
+         cell.focus();
+         cell.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowDown', bubbles: true, cancelable: true }));
+         document.activeElement.dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter', bubbles: true, cancelable: true }));
+         await until('two texts', () => texts.length === 2);
+         return { texts, says, stops: at('errors').querySelectorAll('td[tabindex=\"0\"]').length };",
+    );
+    let value = |k: usize| -> f64 {
+        let text = copied["texts"][k].as_str().expect("a text");
+        text.parse().expect("a number")
+    };
+    let all = number(&compared, "/nrms");
+    assert!((value(0) - all).abs() < 1e-12 * all, "{copied} {all}");
+    assert!(
+        value(1) > 0.0 && copied["texts"][1] != copied["texts"][0],
+        "{copied}"
+    );
+    assert_eq!(copied["stops"], 1, "Tab stops once at a table");
+    let says = copied["says"].as_str().expect("a word");
+    assert!(
+        says.contains(copied["texts"][0].as_str().expect("a text")),
+        "{says}"
+    );
+}
+
+/// Every picture zooms in the same way, the mechanism too, which is drawn anew all the time.
+#[test]
+fn the_mechanism_zooms_turns_and_shows_forces() {
+    let Some(mut browser) = Browser::start(&scratch("zooming-browser")) else {
+        return;
+    };
+    let fit = run("with-rods-fit.csv");
+    let bench = Workbench::open("zooming", "spidermill.toml", &["--data", &fit]);
+    let window = browser.open(&bench.link);
+    browser.front(&window);
+    let seen = browser.run(
+        &window,
+        "await until('a recording', () => !at('motion').hidden && !at('with-forces').hidden);
+         const box = () => at('picture').querySelector('svg').getAttribute('viewBox');
+         const key = (key) => at('picture').dispatchEvent(new KeyboardEvent('keydown', { key, bubbles: true, cancelable: true }));
+         await until('a picture', () => at('picture').querySelector('svg'));
+         const whole = box();
+         key('+');
+         const near = box();
+         at('time').value = 250;
+         at('time').dispatchEvent(new Event('input'));
+         await until('arrows', () => at('picture').querySelectorAll('.load path').length >= 4);
+         const kept = box();
+         const loads = [...at('picture').querySelectorAll('.load')].map((one) => one.getAttribute('class'));
+         key('0');
+         const again = box();
+         key('ArrowLeft');
+         await until('another side', () => at('azimuth').value === '-70');
+         at('forces').click();
+         await until('no arrows', () => !at('picture').querySelector('.load'));
+         return { whole, near, kept, again, loads, told: await window.mill.ask('motion', {}) };",
+    );
+    assert_ne!(seen["whole"], seen["near"], "{}", seen["near"]);
+    assert_eq!(
+        seen["near"], seen["kept"],
+        "a new picture is seen as the old one was"
+    );
+    assert_eq!(seen["whole"], seen["again"]);
+    assert_eq!(seen["loads"].as_array().map(Vec::len), Some(2));
+    // Measured less error is what the model says; here both are those of the comparison.
+    let compared = common::json(&["compare", bench.path(), "--data", &fit, "--json"]);
+    let forces = &seen["told"]["runs"][0]["forces"];
+    let root = |name: &str| -> f64 {
+        let values = forces[name][0].as_array().expect("values");
+        let squares = values.iter().map(|v| v.as_f64().expect("a number").powi(2));
+        (squares.sum::<f64>() / values.len() as f64).sqrt()
+    };
+    let share = root("error") / root("measured");
+    let drive = seen["told"]["drives"][0].as_str().expect("a drive");
+    let expected = number(&compared, &format!("/channels/{drive}/nrms"));
+    assert!(
+        (share - expected).abs() < 0.03 * expected,
+        "{share} {expected}"
+    );
+    assert_eq!(browser.heard, Vec::<String>::new());
+}
+
+/// A mechanism of thirty links is drawn thirty times a second, as a page that plays a motion sees it.
+#[test]
+fn thirty_links_are_drawn_thirty_times_a_second() {
+    let Some(mut browser) = Browser::start(&scratch("frames-browser")) else {
+        return;
+    };
+    let bench = Workbench::open("frames", "humanoid.toml", &[]);
+    let window = browser.open(&bench.link);
+    browser.front(&window);
+    let frames = browser.run(
+        &window,
+        "await until('a picture', () => at('picture').querySelectorAll('svg .joint').length >= 30, 300000);
+         const input = at('coordinates').querySelector('input');
+         let isOver = false, k = 0;
+         const move = () => {
+           if (isOver) return;
+           input.value = Number(input.min) + (Number(input.max) - Number(input.min)) * (0.5 + 0.1 * Math.sin(++k / 9));
+           input.dispatchEvent(new Event('input'));
+           setTimeout(move, 10);
+         };
+         move();
+         await new Promise((done) => setTimeout(done, 500));
+         const first = Number(at('picture').dataset.drawn), start = performance.now();
+         await new Promise((done) => setTimeout(done, 3000));
+         const rate = 1000 * (Number(at('picture').dataset.drawn) - first) / (performance.now() - start);
+         isOver = true;
+         return rate;",
+    );
+    let frames = frames.as_f64().expect("a number");
+    eprintln!("humanoid.toml: {frames:.0} pictures a second");
+    // Bounds hold for a program that was optimised.
+    let least = if cfg!(debug_assertions) { 8.0 } else { 30.0 };
+    assert!(frames >= least, "{frames} pictures a second");
+}
+
+/// Killed in the midst of saving, again and again, the file is one of the texts as a whole.
+#[test]
+fn a_workbench_that_is_killed_leaves_the_file_whole() {
+    let mut bench = Workbench::open("killed", "two_link.toml", &[]);
+    let text = bench.text();
+    // Long enough that writing takes its time.
+    let filler = "# a line of a long file\n".repeat(60_000);
+    let texts: Vec<String> = (0..2)
+        .map(|k| format!("# text {k}\n{text}{filler}"))
+        .collect();
+    for round in 0..8_u64 {
+        let mut base = bench.view()["revision"].clone();
+        let (port, own) = (bench.port, bench.own());
+        let texts_sent = texts.clone();
+        // Saves go on until nobody answers any more.
+        let saving = std::thread::spawn(move || {
+            let mut saves = 0;
+            loop {
+                let text = &texts_sent[saves % 2];
+                let edit = json!({ "base": base, "text": text }).to_string();
+                let Some(told) = Workbench::told(port, &own, "edit", &edit) else {
+                    return saves;
+                };
+                base = told["revision"].clone();
+                if Workbench::told(port, &own, "save", "{}").is_none() {
+                    return saves;
+                }
+                saves += 1;
+            }
+        });
+        std::thread::sleep(std::time::Duration::from_millis(400 + 37 * round));
+        bench.child.kill().expect("a signal");
+        bench.child.wait().expect("its end");
+        let saves = saving.join().expect("no panic");
+        let now = bench.text();
+        assert!(
+            now == text || texts.contains(&now),
+            "round {round}, after {saves} saves: {} bytes",
+            now.len()
+        );
+        bench.again();
     }
 }
 

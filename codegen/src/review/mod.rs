@@ -24,7 +24,6 @@ pub(crate) mod tests;
 pub use base_parameters::{base_expression, base_grouped, base_summand};
 pub use equations::{BaseLine, DependencyLine, Equations, NumericMethod, Operations, Rank};
 pub use rank::NumericRank;
-pub use render_html::STYLE;
 
 use modelmill_draw::{Scene, Style, inline_svg};
 use modelmill_spec::Mechanism;

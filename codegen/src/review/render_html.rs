@@ -1,24 +1,16 @@
-//! A page as one self-contained HTML file: MathML for the formulas, no scripts, light and dark.
+//! A page as one self-contained HTML file in the style of all pages: MathML for the formulas, parted so that lines can end.
 
 use std::fmt::Write;
 
 use modelmill_boundary::text::html as escape;
+use modelmill_draw::page;
 
-use super::document::{Block, Document, Equation, Inline, Line, terms};
+use super::document::{Block, Document, Equation, Inline, Line};
 use crate::expr::print::Formula;
-
-/// The style of all pages; those of others stand on it.
-pub const STYLE: &str = include_str!("page.css");
 
 /// `picture` is an SVG of the mechanism.
 pub(super) fn render(document: &Document, picture: &str) -> String {
-    let title = escape(&document.title);
-    let mut out = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta name=\"color-scheme\" content=\"light dark\">\n\
-         <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n<h1>{title}</h1>\n"
-    );
+    let mut out = page::begin(&document.title);
     let headings: Vec<&String> = document
         .blocks
         .iter()
@@ -33,7 +25,7 @@ pub(super) fn render(document: &Document, picture: &str) -> String {
     }
     _ = writeln!(out, "</nav>\n<figure class=\"picture\">{picture}</figure>");
     blocks(&mut out, &document.blocks);
-    out.push_str("</main>\n</body>\n</html>\n");
+    out.push_str(&page::end(&[]));
     out
 }
 
@@ -59,7 +51,7 @@ fn blocks(out: &mut String, blocks: &[Block]) {
             Block::Table(table) => {
                 out.push_str("<div class=\"wide\"><table>\n<thead><tr>");
                 for head in &table.head {
-                    _ = write!(out, "<th>{}</th>", escape(head));
+                    _ = write!(out, "<th scope=\"col\">{}</th>", escape(head));
                 }
                 out.push_str("</tr></thead>\n<tbody>\n");
                 for row in &table.rows {
@@ -87,27 +79,13 @@ fn blocks(out: &mut String, blocks: &[Block]) {
     }
 }
 
-/// Terms are formulas of their own, so that the browser can break a long sum between them.
 fn write_equation(out: &mut String, equation: &Equation) {
     _ = write!(
         out,
-        "<div class=\"equation\"><span class=\"left\">{}</span><span class=\"right\">",
-        math(&format!("{}<mo>=</mo>", equation.left.mathml()))
+        "<div class=\"equation\"><span class=\"left\">{}</span> <span class=\"right\">{}",
+        math(&format!("{}<mo>=</mo>", equation.left.mathml())),
+        parted(&equation.right)
     );
-    for (i, term) in terms(&equation.right).iter().enumerate() {
-        let (sign, term) = match (i, term.is_negative()) {
-            (0, _) => ("", term.clone()),
-            (_, true) => (
-                "<mo lspace=\"0\" rspace=\"0.22em\">&#x2212;</mo>",
-                term.clone().negated(),
-            ),
-            (_, false) => ("<mo lspace=\"0\" rspace=\"0.22em\">+</mo>", term.clone()),
-        };
-        if i > 0 {
-            out.push(' ');
-        }
-        out.push_str(&math(&format!("{sign}{}", term.mathml())));
-    }
     if let Some(text) = &equation.unit {
         _ = write!(out, " <span class=\"unit\">{}</span>", unit(text));
     }
@@ -147,6 +125,13 @@ fn math(content: &str) -> String {
     format!("<math>{content}</math>")
 }
 
+/// Stretches of a formula are formulas of their own, so that the browser can break a long sum between them.
+fn parted(formula: &Formula) -> String {
+    let stretches = formula.mathml_stretches();
+    let stretches: Vec<String> = stretches.iter().map(|one| math(one)).collect();
+    stretches.join(" ")
+}
+
 fn inlines(line: &Line) -> String {
     line.iter()
         .map(|inline| match inline {
@@ -154,7 +139,7 @@ fn inlines(line: &Line) -> String {
             Inline::Unit(text) => unit(text),
             Inline::Code(text) => format!("<code>{}</code>", escape(text)),
             Inline::Math(Formula::Number(n)) => n.to_string().replace('-', "\u{2212}"),
-            Inline::Math(formula) => math(&formula.mathml()),
+            Inline::Math(formula) => parted(formula),
         })
         .collect()
 }

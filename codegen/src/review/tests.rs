@@ -218,8 +218,17 @@ fn pages_are_whole_and_the_same_every_time() {
             assert!(text.ends_with('\n'));
         }
         let html = page(&one, Format::Html, None);
-        assert!(markup_is_balanced(&html), "{name}");
-        assert!(!html.contains("<script") && !html.contains("http") && !html.contains("<link"));
+        let without_scripts: String = html
+            .split("<script>")
+            .map(|piece| {
+                piece
+                    .split_once("</script>")
+                    .map_or(piece, |(_, rest)| rest)
+            })
+            .collect();
+        assert!(markup_is_balanced(&without_scripts), "{name}");
+        // Nothing is fetched.
+        assert!(!html.contains("src=") && !html.contains("http") && !html.contains("url("));
         let latex = page(&one, Format::Latex, None);
         assert!(latex_is_balanced(
             &latex.replace("\\{", "").replace("\\}", "")

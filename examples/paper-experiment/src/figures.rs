@@ -6,7 +6,7 @@ use crate::Experiment;
 use crate::lengths::Length;
 use crate::runs::Periodic;
 use crate::study::{Along, Columns};
-use modelmill::text::svg::{Figure, Look};
+use modelmill::text::svg::{Figure, Look, sheet};
 
 /// Largest relative error that is drawn.
 const RELATIVE: f64 = 1.0;
@@ -186,9 +186,9 @@ pub(crate) fn on_the_way(experiment: &Experiment) -> String {
         experiment.benches[1].fits[0].values(),
     ];
     let series: [(&str, &str, &[f64]); 3] = [
-        ("the paper's estimate, Table 1", "#c2452d", estimated),
-        ("ours, rig as in Table 1", "#1f5fa8", &ours[0]),
-        ("ours, rig with spindle rods", "#2f7d4f", &ours[1]),
+        ("the paper's estimate, Table 1", "c1", estimated),
+        ("ours, rig as in Table 1", "c0", &ours[0]),
+        ("ours, rig with spindle rods", "c2", &ours[1]),
     ];
     let x = |share: f64| 150.0 + 220.0 * (share + 0.2);
     let bottom = 70.0 + ROW * calculated.len() as f64;
@@ -200,7 +200,7 @@ pub(crate) fn on_the_way(experiment: &Experiment) -> String {
     ] {
         let _ = writeln!(
             body,
-            r##"<line x1="{0:.1}" x2="{0:.1}" y1="62" y2="{bottom:.1}" stroke="#ccc"/><text x="{0:.1}" y="54" text-anchor="middle" class="scale">{label}</text>"##,
+            r#"<line class="zero" x1="{0:.1}" x2="{0:.1}" y1="62" y2="{bottom:.1}"/><text x="{0:.1}" y="54" text-anchor="middle" class="scale">{label}</text>"#,
             x(share)
         );
     }
@@ -208,7 +208,7 @@ pub(crate) fn on_the_way(experiment: &Experiment) -> String {
         let y = 90.0 + ROW * k as f64;
         let _ = writeln!(
             body,
-            r##"<text x="30" y="{:.1}">p{},min</text><line x1="{:.1}" x2="{:.1}" y1="{y:.1}" y2="{y:.1}" stroke="#eee"/>"##,
+            r#"<text x="30" y="{:.1}">p{},min</text><line class="zero" x1="{:.1}" x2="{:.1}" y1="{y:.1}" y2="{y:.1}"/>"#,
             y + 4.0,
             k + 1,
             x(-0.1),
@@ -219,7 +219,7 @@ pub(crate) fn on_the_way(experiment: &Experiment) -> String {
             let share = ((values[k] - calculated[k]) / span).clamp(-0.1, 3.0);
             let _ = writeln!(
                 body,
-                r#"<circle cx="{:.1}" cy="{:.1}" r="6" fill="{colour}"/>"#,
+                r#"<circle cx="{:.1}" cy="{:.1}" r="6" class="{colour}"/>"#,
                 x(share),
                 y + 9.0 * (i as f64 - 1.0)
             );
@@ -229,7 +229,7 @@ pub(crate) fn on_the_way(experiment: &Experiment) -> String {
         let at = 40.0 + 280.0 * i as f64;
         let _ = writeln!(
             body,
-            r#"<circle cx="{at:.1}" cy="{0:.1}" r="6" fill="{colour}"/><text x="{1:.1}" y="{2:.1}">{name}</text>"#,
+            r#"<circle cx="{at:.1}" cy="{0:.1}" r="6" class="{colour}"/><text x="{1:.1}" y="{2:.1}">{name}</text>"#,
             bottom + 24.0,
             at + 12.0,
             bottom + 28.0
@@ -257,7 +257,7 @@ pub(crate) fn lengths(lengths: &[Length], paper: [f64; 2]) -> String {
     let mut body = String::new();
     let _ = writeln!(
         body,
-        r##"<rect x="{left}" y="{:.1}" width="{width}" height="{:.1}" fill="#f3dcd6"/><text x="{:.1}" y="{:.1}" class="scale">the paper's calculated 7.8 to 10.2 % (mean relative)</text>"##,
+        r#"<rect class="part" x="{left}" y="{:.1}" width="{width}" height="{:.1}"/><text x="{:.1}" y="{:.1}" class="scale">the paper's calculated 7.8 to 10.2 % (mean relative)</text>"#,
         y(paper[1]),
         y(paper[0]) - y(paper[1]),
         left + 8.0,
@@ -267,7 +267,7 @@ pub(crate) fn lengths(lengths: &[Length], paper: [f64; 2]) -> String {
         let share = most * f64::from(k) / 7.0;
         let _ = writeln!(
             body,
-            r##"<line x1="{left}" x2="{:.1}" y1="{1:.1}" y2="{1:.1}" stroke="#ddd"/><text x="{2:.1}" y="{3:.1}" text-anchor="end" class="scale">{4:.0} %</text>"##,
+            r#"<line class="zero" x1="{left}" x2="{:.1}" y1="{1:.1}" y2="{1:.1}"/><text x="{2:.1}" y="{3:.1}" text-anchor="end" class="scale">{4:.0} %</text>"#,
             left + width,
             y(share),
             left - 6.0,
@@ -284,7 +284,7 @@ pub(crate) fn lengths(lengths: &[Length], paper: [f64; 2]) -> String {
             length.distance
         );
     }
-    for (d, (name, colour)) in [("left spindle", "#1f5fa8"), ("right spindle", "#2f7d4f")]
+    for (d, (name, colour)) in [("left spindle", "c0"), ("right spindle", "c2")]
         .into_iter()
         .enumerate()
     {
@@ -297,7 +297,7 @@ pub(crate) fn lengths(lengths: &[Length], paper: [f64; 2]) -> String {
             .collect();
         let _ = writeln!(
             body,
-            r#"<polyline points="{}" fill="none" stroke="{colour}" stroke-width="1.5"/><text x="{:.1}" y="52" fill="{colour}">{name}</text>"#,
+            r#"<polyline class="{colour}" points="{}"/><text class="{colour}" x="{:.1}" y="52">{name}</text>"#,
             points.join(" "),
             left + 560.0 + 120.0 * d as f64
         );
@@ -316,12 +316,5 @@ pub(crate) fn lengths(lengths: &[Length], paper: [f64; 2]) -> String {
 }
 
 fn frame(title: &str, height: f64, body: &str) -> String {
-    format!(
-        r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 900 {height:.0}" font-family="sans-serif" font-size="13">
-<style>.scale {{ font-size: 11px; fill: #555 }}</style>
-<rect width="900" height="{height:.0}" fill="#fff"/>
-<text x="30" y="26" font-size="17">{title}</text>
-{body}</svg>
-"##
-    )
+    sheet(title, 30.0, height, body)
 }

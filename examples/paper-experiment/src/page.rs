@@ -3,18 +3,14 @@
 use std::fmt::Write as _;
 
 use crate::Experiment;
+use modelmill::report;
 use modelmill::text::svg::escape;
 
 /// The page's text.
 pub(crate) fn render(experiment: &Experiment) -> String {
-    let mut page = Page(String::new());
-    page.0.push_str(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>The paper's experiment, reproduced and explained</title>\n<style>\n",
-    );
-    page.0.push_str(include_str!("page.css"));
-    page.0.push_str("</style>\n</head>\n<body>\n<main>\n<h1>The paper's experiment, reproduced and explained</h1>\n");
+    let mut page = Page(report::begin_page(
+        "The paper's experiment, reproduced and explained",
+    ));
     page.summary(experiment);
     page.setting(experiment);
     page.table_2(experiment);
@@ -24,7 +20,7 @@ pub(crate) fn render(experiment: &Experiment) -> String {
     page.table_1(experiment);
     page.differences(experiment);
     page.coefficients(experiment);
-    page.0.push_str("</main>\n</body>\n</html>\n");
+    page.0.push_str(&report::end_page(&[]));
     page.0
 }
 
@@ -49,16 +45,28 @@ impl Page {
     }
 
     pub(crate) fn table(&mut self, head: &[&str], rows: &[Vec<String>]) {
-        let class = |k: usize| match head.get(k) {
-            Some(name) if name.starts_with('*') => " class=\"paper\"",
-            _ => "",
+        let is_number = |cell: &String| cell.starts_with(|c: char| c.is_ascii_digit() || c == '-');
+        let class = |k: usize, cell: Option<&String>| {
+            let mut classes = Vec::new();
+            if head.get(k).is_some_and(|name| name.starts_with('*')) {
+                classes.push("paper");
+            }
+            if k > 0 && cell.is_some_and(is_number) {
+                classes.push("number");
+            }
+            match classes.as_slice() {
+                [] => String::new(),
+                classes => format!(" class=\"{}\"", classes.join(" ")),
+            }
         };
+        // A column is what its first row is.
+        let first = |k: usize| rows.first().and_then(|row| row.get(k));
         self.0.push_str("<div class=\"wide\"><table>\n<thead><tr>");
         for (k, name) in head.iter().enumerate() {
             let _ = write!(
                 self.0,
-                "<th{}>{}</th>",
-                class(k),
+                "<th scope=\"col\"{}>{}</th>",
+                class(k, first(k)),
                 escape(name.trim_start_matches('*'))
             );
         }
@@ -66,7 +74,7 @@ impl Page {
         for row in rows {
             self.0.push_str("<tr>");
             for (k, cell) in row.iter().enumerate() {
-                let _ = write!(self.0, "<td{}>{}</td>", class(k), escape(cell));
+                let _ = write!(self.0, "<td{}>{}</td>", class(k, Some(cell)), escape(cell));
             }
             self.0.push_str("</tr>\n");
         }

@@ -1,10 +1,11 @@
 //! `report`: what a diagnosis found as one self-contained page.
 //!
-//! [`runs_page`] is the page of what differs between runs.
+//! [`runs_page`] is the page of what differs between runs, [`atlas()`] that of many mechanisms.
 //!
 //! `words`, `tables`, and pictures (`ladder`, `curves`, `maps`, `regions`, `spectrum`) -> `page`. The pictures stand by
 //! themselves; `page.js` makes curves that can be zoomed and tables that can be sorted out of them.
 
+mod atlas;
 mod curves;
 mod draw;
 mod ladder;
@@ -18,8 +19,10 @@ mod units;
 
 use crate::diagnose::{Findings, Version, words};
 
+pub use atlas::{Pictured, atlas};
 pub use curves::section as curves;
-pub use page::{SCRIPT, page, style};
+pub use modelmill_draw::page::{begin as begin_page, end as end_page};
+pub use page::{STYLE, page, scripts};
 pub use runs::runs_page;
 
 /// The ladder of a diagnosis as a picture: errors of fit and check step by step, beside the noise.

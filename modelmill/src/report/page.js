@@ -1,7 +1,7 @@
-// Curves that can be zoomed and moved, and tables that can be sorted. Without this script the pictures stand as they are.
+// Curves that are drawn anew for the stretch of time that is seen, and tables that can be sorted. Without this script the pictures
+// stand as they are.
 (() => {
   'use strict';
-  document.documentElement.classList.add('scripted');
   const SVG = 'http://www.w3.org/2000/svg';
   const HEIGHT = 210, LEFT = 66, RIGHT = 14, TOP = 8, BOTTOM = 34;
 
@@ -109,12 +109,10 @@
       this.curves = panel.curves.map(unpack);
       this.unit = panel.unit;
       this.legend(figure);
-      this.tools(figure);
       this.readout = document.createElement('output');
       this.readout.className = 'readout';
       figure.appendChild(this.readout);
-      this.svg.setAttribute('tabindex', '0');
-      this.listen();
+      this.listen(figure);
     }
 
     legend(figure) {
@@ -132,24 +130,6 @@
         });
         key.replaceWith(button);
       }
-    }
-
-    tools(figure) {
-      const tools = document.createElement('span');
-      tools.className = 'tools';
-      const button = (text, says, act) => {
-        const one = document.createElement('button');
-        one.type = 'button';
-        one.textContent = text;
-        one.title = says;
-        one.setAttribute('aria-label', says);
-        one.addEventListener('click', act);
-        tools.appendChild(one);
-      };
-      button('+', 'zoom in', () => this.run.zoom(0.5));
-      button('\u2212', 'zoom out', () => this.run.zoom(2));
-      button('\u27F2', 'the whole recording', () => this.run.reset());
-      figure.querySelector('figcaption').prepend(tools);
     }
 
     draw() {
@@ -227,70 +207,28 @@
       return this.run.from + Math.min(Math.max(share, 0), 1) * (this.run.to - this.run.from);
     }
 
-    listen() {
-      const svg = this.svg, run = this.run, down = new Map();
-      let start = null;
-      svg.addEventListener('wheel', (event) => {
-        // A page that is being scrolled goes on scrolling although a picture comes under the pointer.
-        if (performance.now() - scrolled < 250 && document.activeElement !== svg) return;
-        event.preventDefault();
-        if (Math.abs(event.deltaX) > Math.abs(event.deltaY)) run.move(event.deltaX / 600);
-        else run.zoom(Math.pow(1.0018, Math.max(-240, Math.min(240, event.deltaY))), this.time(event));
-      }, { passive: false });
-      svg.addEventListener('dblclick', (event) => { event.preventDefault(); run.reset(); });
-      svg.addEventListener('pointerdown', (event) => {
-        if (event.button > 0) return;
-        try { svg.setPointerCapture(event.pointerId); } catch { /* A made-up pointer cannot be captured. */ }
-        down.set(event.pointerId, event.clientX);
-        start = { time: this.time(event), x: event.clientX, from: run.from, to: run.to, marks: event.shiftKey };
-        if (down.size === 2) {
-          const [a, b] = [...down.values()];
-          start.apart = Math.max(Math.abs(a - b), 10);
-        }
-      });
-      svg.addEventListener('pointermove', (event) => {
-        this.tell(event);
-        if (!down.has(event.pointerId) || !start) return;
-        down.set(event.pointerId, event.clientX);
-        const inner = svg.getBoundingClientRect().width - LEFT - RIGHT;
-        if (down.size === 2) {
-          const [a, b] = [...down.values()];
-          const length = (start.to - start.from) * (start.apart || 10) / Math.max(Math.abs(a - b), 10);
-          const middle = (start.from + start.to) / 2;
-          run.show(middle - length / 2, middle + length / 2);
-        } else if (start.marks) {
-          const [a, b] = [this.x(start.time), this.x(this.time(event))];
+    // Time is what is zoomed, the scale of forces follows by itself.
+    listen(figure) {
+      const { svg, run } = this;
+      const share = (x) => this.time({ clientX: svg.getBoundingClientRect().left + x * svg.getBoundingClientRect().width });
+      const shown = {
+        zoom: (factor, x) => run.zoom(factor, x === 0.5 ? undefined : share(x)),
+        move: (dx) => run.move(dx * (this.width || 1) / ((this.width || 1) - LEFT - RIGHT)),
+        whole: () => run.reset(),
+        isWhole: () => run.to - run.from >= (run.whole[1] - run.whole[0]) * (1 - 1e-9),
+        part: (x0, y0, x1) => run.show(share(x0), share(x1)),
+        marking: (x0, y0, x1) => {
+          if (!this.marked) return;
+          const [a, b] = [x0, x1].map((x) => this.x(share(x)));
           this.marked.setAttribute('x', Math.min(a, b));
           this.marked.setAttribute('width', Math.abs(a - b));
-        } else {
-          const by = (event.clientX - start.x) / inner * (start.to - start.from);
-          if (Math.abs(event.clientX - start.x) > 2) run.show(start.from - by, start.to - by);
-        }
-      });
-      const up = (event) => {
-        if (start && start.marks && down.size === 1 && event.type === 'pointerup') {
-          const t = this.time(event);
-          if (Math.abs(this.x(t) - this.x(start.time)) > 4) run.show(Math.min(t, start.time), Math.max(t, start.time));
-        }
-        down.delete(event.pointerId);
-        if (this.marked) this.marked.setAttribute('width', 0);
-        if (!down.size) start = null;
+        },
       };
-      svg.addEventListener('pointerup', up);
-      svg.addEventListener('pointercancel', up);
+      window.zoomable(svg, shown, figure.querySelector('figcaption'));
+      svg.addEventListener('pointermove', (event) => this.tell(event));
       svg.addEventListener('pointerleave', () => {
         this.readout.textContent = '';
         if (this.cursor) this.cursor.setAttribute('d', '');
-      });
-      svg.addEventListener('keydown', (event) => {
-        const act = {
-          '+': () => run.zoom(0.5), '=': () => run.zoom(0.5), '-': () => run.zoom(2),
-          ArrowLeft: () => run.move(-0.2), ArrowRight: () => run.move(0.2),
-          0: () => run.reset(), Escape: () => run.reset(), Home: () => run.reset(),
-        }[event.key];
-        if (!act || event.ctrlKey || event.metaKey) return;
-        event.preventDefault();
-        act();
       });
     }
 
@@ -309,8 +247,6 @@
     }
   }
 
-  let scrolled = -1e9;
-  window.addEventListener('scroll', () => { scrolled = performance.now(); }, { passive: true });
   let runs = [];
   const again = () => runs.forEach((run) => run.draw());
   if (window.ResizeObserver) {
@@ -318,21 +254,14 @@
     observer.observe(document.querySelector('main'));
   } else window.addEventListener('resize', again);
 
-  // Paper shows everything that is folded, the equations apart.
-  window.addEventListener('beforeprint', () => {
-    for (const one of document.querySelectorAll('details:not(.embedded)')) {
-      if (!one.open && !one.closest('.embedded')) { one.open = true; one.dataset.folded = ''; }
-    }
-    for (const run of runs) for (const plot of run.plots) plot.draw();
-  });
-  window.addEventListener('afterprint', () => {
-    for (const one of document.querySelectorAll('details[data-folded]')) { one.open = false; delete one.dataset.folded; }
-  });
+  // What was folded has its width as soon as it is opened for paper.
+  window.addEventListener('beforeprint', again);
 
   // What stands in an element; what stood in one that is gone is forgotten.
   window.enliven = (part) => {
     runs = runs.filter((run) => run.root.isConnected);
     runs.push(...[...part.querySelectorAll('[data-curves]')].map((root) => new Run(root)));
+    window.enlivenPictures(part);
     for (const table of part.querySelectorAll('table.sortable')) {
       const heads = [...table.querySelectorAll('th')];
       heads.forEach((head, k) => {

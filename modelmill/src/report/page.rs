@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use modelmill_codegen::review::{Format, STYLE};
+use modelmill_codegen::review::Format;
+use modelmill_draw::page as pages;
 use modelmill_identify::diagnose::Verdict;
 
 use super::{Findings, curves, keys, ladder, maps, regions, spectrum, tables, words};
@@ -20,7 +21,7 @@ pub fn page(findings: &Findings, spelling: &dyn Spelling) -> Outcome<String> {
     let equations = last.model.equations(Format::Html)?.text;
     let name = &findings.before.model.name;
     let title = format!("{name}: what the model lacks");
-    let mut page = begin(&title, STYLE);
+    let mut page = pages::begin(&title);
     let sections = [
         ("ladder", "How the error falls", the_ladder(findings)),
         (
@@ -60,38 +61,25 @@ pub fn page(findings: &Findings, spelling: &dyn Spelling) -> Outcome<String> {
             "<section id=\"report-{id}\">\n<h2>{title}</h2>\n{html}</section>\n"
         );
     }
-    page.push_str(END);
+    page.push_str(&end());
     Ok(page)
 }
 
-/// The page up to its heading, in the style of the page of equations.
-pub(super) fn begin(title: &str, style: &str) -> String {
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <meta name=\"color-scheme\" content=\"light dark\">\n\
-         <title>{0}</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{style}{1}</style>\n</head>\n\
-         <body>\n<main>\n<h1>{0}</h1>\n",
-        escape(title),
-        include_str!("page.css"),
-    )
+/// The end of a page with curves.
+pub(super) fn end() -> String {
+    pages::end(&[CURVES])
 }
 
-/// The style of pages: that of equations, and what pictures and tables need besides.
-pub fn style() -> String {
-    format!("{STYLE}{}", include_str!("page.css"))
+/// What makes curves that are drawn anew as they are zoomed, and tables that can be sorted.
+const CURVES: &str = include_str!("page.js");
+
+/// The style of all pages.
+pub use pages::STYLE;
+
+/// Scripts of pages, once they stand. Who puts parts of a page into another one later calls `enliven(element)` on them.
+pub fn scripts() -> impl Iterator<Item = &'static str> {
+    pages::SCRIPTS.into_iter().chain([CURVES])
 }
-
-/// What makes curves that can be zoomed and tables that can be sorted of a page, once it stands. Who puts parts of a page into
-/// another one later calls `enliven(element)` on them.
-pub const SCRIPT: &str = include_str!("page.js");
-
-/// The page from its last section on.
-pub(super) const END: &str = concat!(
-    "</main>\n<script>\n",
-    include_str!("page.js"),
-    "</script>\n</body>\n</html>\n"
-);
 
 /// What stands between two marks; empty if they are missing.
 pub(super) fn between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
@@ -233,7 +221,8 @@ fn effects(findings: &Findings, spelling: &dyn Spelling) -> String {
 fn the_curves(findings: &Findings) -> String {
     format!(
         "<p class=\"script-only\">Turn the wheel over a picture to zoom, drag to move, drag with Shift to mark a stretch, double \
-         click for the whole. With the keyboard: + and −, arrows, 0. A click on a name hides its curve.</p>\n{}",
+         click for the whole. With the keyboard: + and −, arrows, 0. A click on a name hides its curve, one on a number of a \
+         table copies its digits.</p>\n{}",
         curves::section(
             &findings.before,
             findings.after.as_ref().ok(),

@@ -2,14 +2,12 @@
 
 use std::fmt::Write as _;
 
-use modelmill_codegen::review::Format;
+use modelmill_draw::page as pages;
 
 use super::draw::{Axis, LEFT, Picture, RIGHT, WIDTH, range, with_room};
-use super::page::{END, begin, between};
+use super::page::end;
 use super::tables::{Cell, table};
 use super::units::pretty;
-use crate::error::Outcome;
-use crate::model::Model;
 use crate::runs::{Changed, Compared, Fitted, SharedFit};
 use crate::text::svg::escape;
 use crate::text::table::{count, significant};
@@ -20,12 +18,9 @@ const HEIGHT: f64 = 170.0;
 const BARS: f64 = 2.0;
 
 /// The page's text.
-///
-/// Fails only when whoever watches stops it.
-pub fn runs_page(model: &Model, compared: &Compared) -> Outcome<String> {
-    let equations = model.equations(Format::Html)?.text;
+pub fn runs_page(compared: &Compared) -> String {
     let title = format!("{}: what changed between runs", compared.model);
-    let mut page = begin(&title, between(&equations, "<style>", "</style>"));
+    let mut page = pages::begin(&title);
     page.push_str(&summary(compared));
     let mut sections = vec![
         (
@@ -50,8 +45,8 @@ pub fn runs_page(model: &Model, compared: &Compared) -> Outcome<String> {
             "<section id=\"runs-{id}\">\n<h2>{title}</h2>\n{html}</section>\n"
         );
     }
-    page.push_str(END);
-    Ok(page)
+    page.push_str(&end());
+    page
 }
 
 fn summary(compared: &Compared) -> String {

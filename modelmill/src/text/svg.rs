@@ -10,7 +10,25 @@ const RIGHT: f64 = 16.0;
 const TOP: f64 = 44.0;
 /// Points of a curve; more would not be seen.
 const POINTS: usize = 820;
-const COLOURS: [&str; 3] = ["#1f5fa8", "#c2452d", "#2f7d4f"];
+/// Colours of curves in the style.
+const COLOURS: usize = 3;
+/// Light and dark, with the colours of all pages; a figure is a file of its own too.
+const STYLE: &str = "\
+.figure{--paper:#fff;--ink:#1a1d21;--faint:#59636c;--line:#d9dee3;--c0:#1f5fa8;--c1:#b53d26;--c2:#2a7147;font-family:system-ui,sans-serif}
+@media screen and (prefers-color-scheme:dark){.figure{--paper:#14171a;--ink:#e4e7ea;--faint:#a2acb5;--line:#343b42;--c0:#74b2f5;--c1:#f0826a;--c2:#6cc492}}
+.figure .paper{fill:var(--paper)}
+.figure .box{fill:none;stroke:var(--faint)}
+.figure .zero{stroke:var(--line)}
+.figure .mark{stroke:var(--faint);stroke-dasharray:3 3}
+.figure .part{fill:#c9a227;fill-opacity:.2}
+.figure circle.c0{fill:var(--c0)}.figure circle.c1{fill:var(--c1)}.figure circle.c2{fill:var(--c2)}
+.figure polyline{fill:none;stroke-width:1.2}
+.figure polyline.c0{stroke:var(--c0)}.figure polyline.c1{stroke:var(--c1)}.figure polyline.c2{stroke:var(--c2)}
+.figure text{font-size:13px;fill:var(--ink)}
+.figure text.c0{fill:var(--c0)}.figure text.c1{fill:var(--c1)}.figure text.c2{fill:var(--c2)}
+.figure text.title{font-size:17px}
+.figure text.scale{font-size:11px;fill:var(--faint)}
+";
 
 /// How a panel looks, beyond what its curves say.
 #[derive(Default)]
@@ -58,9 +76,9 @@ impl<'a> Figure<'a> {
         let body = &mut self.body;
         let _ = writeln!(
             body,
-            r##"<rect x="{LEFT}" y="{top}" width="{plot_width}" height="{PANEL}" fill="none" stroke="#bbb"/>
-<line x1="{LEFT}" x2="{:.1}" y1="{1:.1}" y2="{1:.1}" stroke="#ddd"/>
-<text x="{LEFT}" y="{2:.1}">{3}</text>"##,
+            r#"<rect class="box" x="{LEFT}" y="{top}" width="{plot_width}" height="{PANEL}"/>
+<line class="zero" x1="{LEFT}" x2="{:.1}" y1="{1:.1}" y2="{1:.1}"/>
+<text x="{LEFT}" y="{2:.1}">{3}</text>"#,
             WIDTH - RIGHT,
             y(0.0),
             top - 8.0,
@@ -74,7 +92,7 @@ impl<'a> Figure<'a> {
             let share = (mark - first) / (last - first).max(f64::MIN_POSITIVE);
             let _ = writeln!(
                 body,
-                r##"<line x1="{0:.1}" x2="{0:.1}" y1="{top:.1}" y2="{1:.1}" stroke="#888" stroke-dasharray="3 3"/>"##,
+                r#"<line class="mark" x1="{0:.1}" x2="{0:.1}" y1="{top:.1}" y2="{1:.1}"/>"#,
                 LEFT + plot_width * share,
                 top + PANEL
             );
@@ -105,7 +123,7 @@ impl<'a> Figure<'a> {
         let width = |name: &str| (6.5 * name.chars().count() as f64 + 15.0).max(80.0);
         for (k, (name, values)) in curves.iter().enumerate() {
             let behind: f64 = curves[k + 1..].iter().map(|(name, _)| width(name)).sum();
-            let colour = COLOURS[k % COLOURS.len()];
+            let colour = k % COLOURS;
             let n = values.len().max(2) - 1;
             let mut points = String::new();
             for (i, value) in thinned(values, POINTS) {
@@ -114,8 +132,8 @@ impl<'a> Figure<'a> {
             }
             let _ = writeln!(
                 body,
-                r#"<polyline points="{}" fill="none" stroke="{colour}" stroke-width="1.2"/>
-<text x="{:.1}" y="{:.1}" text-anchor="end" fill="{colour}">{}</text>"#,
+                r#"<polyline class="c{colour}" points="{}"/>
+<text class="c{colour}" x="{:.1}" y="{:.1}" text-anchor="end">{}</text>"#,
                 points.trim_end(),
                 WIDTH - RIGHT - behind,
                 top - 8.0,
@@ -133,22 +151,30 @@ impl<'a> Figure<'a> {
             self.time.first().copied().unwrap_or(0.0),
             self.time.last().copied().unwrap_or(0.0),
         );
-        format!(
-            r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" font-family="sans-serif" font-size="13">
-<style>.scale {{ font-size: 11px; fill: #555 }}</style>
-<rect width="{WIDTH}" height="{height}" fill="#fff"/>
-<text x="{LEFT}" y="26" font-size="17">{}</text>
-{}<text x="{LEFT}" y="{:.1}" class="scale">{first} s</text>
-<text x="{:.1}" y="{:.1}" text-anchor="end" class="scale">{last} s</text>
-</svg>
-"##,
-            self.title,
+        let body = format!(
+            r#"{0}<text x="{LEFT}" y="{1:.1}" class="scale">{first} s</text>
+<text x="{2:.1}" y="{1:.1}" text-anchor="end" class="scale">{last} s</text>
+"#,
             self.body,
             bottom - GAP + 16.0,
             WIDTH - RIGHT,
-            bottom - GAP + 16.0,
-        )
+        );
+        sheet(&self.title, LEFT, height, &body)
     }
+}
+
+/// A sheet of 900 units with a title, in the colours of all figures: classes `c0`, `c1` and `c2` of curves, discs and their names,
+/// `zero` of lines, `scale` of small text, `part` of what is marked. `title` and `body` are SVG.
+pub fn sheet(title: &str, left: f64, height: f64, body: &str) -> String {
+    format!(
+        r#"<svg xmlns="http://www.w3.org/2000/svg" class="figure" role="img" aria-label="{title}" viewBox="0 0 {WIDTH} {height:.0}">
+<style>
+{STYLE}</style>
+<rect class="paper" width="{WIDTH}" height="{height:.0}"/>
+<text class="title" x="{left}" y="26">{title}</text>
+{body}</svg>
+"#
+    )
 }
 
 /// Least and largest value of each of half as many stretches as points are wanted, with their places; all values where

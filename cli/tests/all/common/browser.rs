@@ -50,6 +50,14 @@ pub(crate) struct Browser {
 #[derive(Clone, Debug)]
 pub(crate) struct Window(String);
 
+/// What a page is shown on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Medium {
+    Light,
+    Dark,
+    Paper,
+}
+
 impl Browser {
     /// Starts a browser that keeps its files in a fresh folder; `None` where there is none.
     pub(crate) fn start(folder: &str) -> Option<Self> {
@@ -135,19 +143,60 @@ impl Browser {
         for domain in ["Runtime.enable", "Log.enable", "Page.enable"] {
             self.ask(Some(&window), domain, &json!({}));
         }
-        let helpers = include_str!("../../browser/wait.js");
-        let script = json!({ "source": helpers });
-        self.ask(
-            Some(&window),
-            "Page.addScriptToEvaluateOnNewDocument",
-            &script,
-        );
+        for helpers in [
+            include_str!("../../browser/wait.js"),
+            include_str!("../../browser/measure.js"),
+        ] {
+            let script = json!({ "source": helpers });
+            let method = "Page.addScriptToEvaluateOnNewDocument";
+            self.ask(Some(&window), method, &script);
+        }
         self.ask(Some(&window), "Page.navigate", &json!({ "url": link }));
         self.run(
             &window,
             "await until('the page', () => document.readyState === 'complete');",
         );
         window
+    }
+
+    /// Shows a window at a width, on a screen that is light or dark or on paper.
+    pub(crate) fn show(&mut self, window: &Window, width: u32, medium: Medium) {
+        let size =
+            json!({ "width": width, "height": 900, "deviceScaleFactor": 1, "mobile": false });
+        self.ask(Some(window), "Emulation.setDeviceMetricsOverride", &size);
+        let (media, scheme) = match medium {
+            Medium::Light => ("screen", "light"),
+            Medium::Dark => ("screen", "dark"),
+            Medium::Paper => ("print", "light"),
+        };
+        let scheme = json!([{ "name": "prefers-color-scheme", "value": scheme }]);
+        let media = json!({ "media": media, "features": scheme });
+        self.ask(Some(window), "Emulation.setEmulatedMedia", &media);
+        // Pictures are drawn anew in the frame after next, where they are at all.
+        self.run(
+            window,
+            "await new Promise((done) => setTimeout(done, 250));",
+        );
+    }
+
+    /// Presses a key of a name, such as `Enter`, with letters that it types.
+    pub(crate) fn press(&mut self, window: &Window, key: &str, ctrl: bool) {
+        let code = match key {
+            "Enter" => 13,
+            "Escape" => 27,
+            "ArrowUp" => 38,
+            "ArrowDown" => 40,
+            " " => 32,
+            "Tab" => 9,
+            _ => 0,
+        };
+        for kind in ["rawKeyDown", "keyUp"] {
+            let event = json!({
+                "type": kind, "key": key, "code": if key == " " { "Space" } else { key },
+                "windowsVirtualKeyCode": code, "modifiers": if ctrl { 2 } else { 0 },
+            });
+            self.ask(Some(window), "Input.dispatchKeyEvent", &event);
+        }
     }
 
     /// Brings a window to the front.

@@ -2,6 +2,7 @@
 
 pub(crate) mod browser;
 pub(crate) mod html;
+pub(crate) mod workbench;
 
 use std::panic::Location;
 use std::path::{Path, PathBuf};

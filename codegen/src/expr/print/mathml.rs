@@ -10,10 +10,69 @@ use super::symbol::{Glyphs, Symbol, typeset};
 impl Formula {
     /// As the content of a `math` element.
     pub fn mathml(&self) -> String {
-        let mut out = String::from("<mrow>");
+        let mut out = Out::default();
         write(&mut out, self, false);
-        out.push_str("</mrow>");
-        out
+        format!("<mrow>{}</mrow>", out.text)
+    }
+
+    /// As the contents of `math` elements, one after the other, between which a line may end: before each sign of a sum, those
+    /// in parentheses too. What cannot be parted otherwise, a long fraction or root, is written on the line.
+    pub fn mathml_stretches(&self) -> Vec<String> {
+        let mut out = Out {
+            may_part: true,
+            ..Out::default()
+        };
+        write(&mut out, self, false);
+        out.part();
+        let stretches = out.done.into_iter();
+        stretches
+            .map(|stretch| format!("<mrow>{stretch}</mrow>"))
+            .collect()
+    }
+}
+
+/// Letters of text beyond which a fraction or a root is written on the line where lines may end.
+const LONG: usize = 32;
+
+/// MathML as it grows.
+#[derive(Default)]
+struct Out {
+    /// Stretches that ended.
+    done: Vec<String>,
+    text: String,
+    /// Whether a line may end here.
+    may_part: bool,
+}
+
+impl Out {
+    fn push_str(&mut self, text: &str) {
+        self.text.push_str(text);
+    }
+
+    /// A line may end here.
+    fn part(&mut self) {
+        if self.may_part && !self.text.is_empty() {
+            self.done.push(std::mem::take(&mut self.text));
+        }
+    }
+
+    /// Writes what must stay together.
+    fn whole(&mut self, write: impl FnOnce(&mut Self)) {
+        let may_part = std::mem::replace(&mut self.may_part, false);
+        write(self);
+        self.may_part = may_part;
+    }
+
+    /// Whether something is to be written on the line, since it would be too wide in one piece.
+    fn is_too_wide(&self, formula: &Formula) -> bool {
+        self.may_part && formula.text().chars().count() > LONG
+    }
+}
+
+impl Write for Out {
+    fn write_str(&mut self, text: &str) -> std::fmt::Result {
+        self.text.push_str(text);
+        Ok(())
     }
 }
 
@@ -69,13 +128,40 @@ fn glyphs(one: &Glyphs) -> String {
     }
 }
 
-fn fenced(out: &mut String, open: &str, close: &str, body: impl FnOnce(&mut String)) {
+fn fenced(out: &mut Out, open: &str, close: &str, body: impl FnOnce(&mut Out)) {
+    fenced_and_raised(out, open, close, None, body);
+}
+
+fn fenced_and_raised(
+    out: &mut Out,
+    open: &str,
+    close: &str,
+    exponent: Option<u32>,
+    body: impl FnOnce(&mut Out),
+) {
+    if out.may_part {
+        // Both parentheses may come into stretches of their own.
+        _ = write!(out, "<mo form=\"prefix\" stretchy=\"false\">{open}</mo>");
+        body(out);
+        let close = format!("<mo form=\"postfix\" stretchy=\"false\">{close}</mo>");
+        match exponent {
+            Some(n) => _ = write!(out, "<msup>{close}<mn>{n}</mn></msup>"),
+            None => out.push_str(&close),
+        }
+        return;
+    }
+    if exponent.is_some() {
+        out.push_str("<msup>");
+    }
     _ = write!(out, "<mrow><mo>{open}</mo>");
     body(out);
     _ = write!(out, "<mo>{close}</mo></mrow>");
+    if let Some(n) = exponent {
+        _ = write!(out, "<mn>{n}</mn></msup>");
+    }
 }
 
-fn write(out: &mut String, formula: &Formula, tight: bool) {
+fn write(out: &mut Out, formula: &Formula, tight: bool) {
     let enclosed = tight
         && match formula {
             Formula::Sum(_) => true,
@@ -94,11 +180,19 @@ fn write(out: &mut String, formula: &Formula, tight: bool) {
         }
         Formula::Sum(terms) => {
             for (i, term) in terms.iter().enumerate() {
+                if i > 0 {
+                    out.part();
+                }
+                // What begins a line keeps its distance from its sign.
+                let sides = match i {
+                    0 => " form=\"prefix\"",
+                    _ if out.may_part => " form=\"infix\" lspace=\"0\" rspace=\"0.22em\"",
+                    _ => "",
+                };
                 match (i, term.is_negative()) {
-                    (0, true) => out.push_str("<mo form=\"prefix\">&#x2212;</mo>"),
+                    (_, true) => _ = write!(out, "<mo{sides}>&#x2212;</mo>"),
                     (0, false) => {}
-                    (_, true) => out.push_str("<mo>&#x2212;</mo>"),
-                    (_, false) => out.push_str("<mo>+</mo>"),
+                    (_, false) => _ = write!(out, "<mo{sides}>+</mo>"),
                 }
                 magnitude(out, term);
             }
@@ -114,41 +208,46 @@ fn write(out: &mut String, formula: &Formula, tight: bool) {
     }
 }
 
-fn power(out: &mut String, base: &Formula, n: u32) {
+fn power(out: &mut Out, base: &Formula, n: u32) {
     match base {
         Formula::Apply(f @ (Function::Sin | Function::Cos | Function::Tanh), operands) => {
             apply(out, *f, Some(n), operands);
         }
         Formula::Symbol(symbol) => out.push_str(&symbol.mathml_raised(Some(n))),
-        Formula::Indexed(..) | Formula::Apply(Function::Abs, _) => {
-            out.push_str("<msup>");
-            out.push_str("<mrow>");
+        Formula::Indexed(..) | Formula::Apply(Function::Abs, _) => out.whole(|out| {
+            out.push_str("<msup><mrow>");
             write(out, base, true);
             _ = write!(out, "</mrow><mn>{n}</mn></msup>");
-        }
-        other => {
-            out.push_str("<msup>");
-            fenced(out, "(", ")", |out| write(out, other, false));
-            _ = write!(out, "<mn>{n}</mn></msup>");
-        }
+        }),
+        other => fenced_and_raised(out, "(", ")", Some(n), |out| write(out, other, false)),
     }
 }
 
-fn apply(out: &mut String, function: Function, exponent: Option<u32>, operands: &[Formula]) {
-    let mut arguments = String::new();
-    for (i, operand) in operands.iter().enumerate() {
-        if i > 0 {
-            arguments.push_str("<mo>,</mo>");
+fn apply(out: &mut Out, function: Function, exponent: Option<u32>, operands: &[Formula]) {
+    let arguments = |out: &mut Out| {
+        for (i, operand) in operands.iter().enumerate() {
+            if i > 0 {
+                out.push_str("<mo>,</mo>");
+            }
+            write(out, operand, false);
         }
-        write(&mut arguments, operand, false);
-    }
+    };
     match function {
+        Function::Sqrt if operands.iter().any(|one| out.is_too_wide(one)) => {
+            out.push_str("<mo form=\"prefix\" stretchy=\"false\">&#x221A;</mo>");
+            fenced(out, "(", ")", arguments);
+            return;
+        }
         Function::Sqrt => {
-            _ = write!(out, "<msqrt><mrow>{arguments}</mrow></msqrt>");
+            out.whole(|out| {
+                out.push_str("<msqrt><mrow>");
+                arguments(out);
+                out.push_str("</mrow></msqrt>");
+            });
             return;
         }
         Function::Abs => {
-            fenced(out, "|", "|", |out| out.push_str(&arguments));
+            fenced(out, "|", "|", arguments);
             return;
         }
         _ => {}
@@ -160,19 +259,17 @@ fn apply(out: &mut String, function: Function, exponent: Option<u32>, operands: 
     }
     match operands {
         [Formula::Symbol(_)] if matches!(function, Function::Sin | Function::Cos) => {
-            _ = write!(
-                out,
-                "<mo lspace=\"0\" rspace=\"0.17em\">&#x2061;</mo>{arguments}"
-            );
+            out.push_str("<mo lspace=\"0\" rspace=\"0.17em\">&#x2061;</mo>");
+            arguments(out);
         }
         _ => {
             out.push_str("<mo>&#x2061;</mo>");
-            fenced(out, "(", ")", |out| out.push_str(&arguments));
+            fenced(out, "(", ")", arguments);
         }
     }
 }
 
-fn magnitude(out: &mut String, formula: &Formula) {
+fn magnitude(out: &mut Out, formula: &Formula) {
     match formula {
         Formula::Number(n) => match digits(n) {
             (n, Some(d)) => _ = write!(out, "<mfrac><mn>{n}</mn><mn>{d}</mn></mfrac>"),
@@ -186,12 +283,25 @@ fn magnitude(out: &mut String, formula: &Formula) {
             let (n, d) = digits(factor);
             if d.is_none() && below.is_empty() {
                 line(out, &n, above, true);
+            } else if out.is_too_wide(formula) {
+                line(out, &n, above, true);
+                out.part();
+                out.push_str("<mo form=\"infix\" stretchy=\"false\">/</mo>");
+                let d = d.as_deref().unwrap_or("1");
+                let is_one = below.len() + usize::from(d != "1") == 1;
+                if is_one {
+                    line(out, d, below, true);
+                } else {
+                    fenced(out, "(", ")", |out| line(out, d, below, true));
+                }
             } else {
-                out.push_str("<mfrac><mrow>");
-                line(out, &n, above, false);
-                out.push_str("</mrow><mrow>");
-                line(out, d.as_deref().unwrap_or("1"), below, false);
-                out.push_str("</mrow></mfrac>");
+                out.whole(|out| {
+                    out.push_str("<mfrac><mrow>");
+                    line(out, &n, above, false);
+                    out.push_str("</mrow><mrow>");
+                    line(out, d.as_deref().unwrap_or("1"), below, false);
+                    out.push_str("</mrow></mfrac>");
+                });
             }
         }
         other => write(out, other, false),
@@ -199,7 +309,7 @@ fn magnitude(out: &mut String, formula: &Formula) {
 }
 
 /// A product on one line; a fraction's line encloses what stands alone on it, other products are `tight`.
-fn line(out: &mut String, number: &str, factors: &[Formula], tight: bool) {
+fn line(out: &mut Out, number: &str, factors: &[Formula], tight: bool) {
     let with_number = number != "1" || factors.is_empty();
     if with_number {
         _ = write!(out, "<mn>{number}</mn>");

@@ -174,6 +174,47 @@ proptest! {
         prop_assert!(latex_is_balanced(&latex), "{}", latex);
         let mathml = printed.mathml();
         prop_assert!(markup_is_balanced(&mathml), "{}", mathml);
+        // Parted, it says the same; only what was too wide is written with other signs.
+        let stretches = printed.mathml_stretches();
+        for stretch in &stretches {
+            prop_assert!(markup_is_balanced(stretch), "{}", stretch);
+        }
+        prop_assert_eq!(words(&stretches.concat()), words(&mathml), "{}", text);
+    }
+}
+
+/// What markup shows, without the signs that tell a fraction or a root on the line.
+fn words(markup: &str) -> String {
+    let mut shown: String = markup
+        .split('<')
+        .filter_map(|piece| piece.split_once('>'))
+        .map(|(_, text)| text)
+        .collect();
+    for sign in ["(", ")", "/", "&#x221A;"] {
+        shown = shown.replace(sign, "");
+    }
+    shown
+}
+
+#[test]
+fn long_formulas_can_be_parted_within_parentheses_fractions_and_roots() {
+    let sum = |letter: &str| {
+        let terms = (1..9).map(|k| {
+            Formula::product(
+                Rational::integer(1),
+                [name(&format!("{letter}{k}")), name("d1")],
+            )
+        });
+        Formula::sum(terms)
+    };
+    let quotient = Formula::quotient(sum("m"), sum("k"));
+    let root = Formula::apply(Function::Sqrt, sum("x"));
+    let all = Formula::product(Rational::integer(3), [sum("a"), root, quotient]);
+    let stretches = all.mathml_stretches();
+    assert!(stretches.len() >= 4 * 8, "{}", stretches.len());
+    for stretch in &stretches {
+        assert!(markup_is_balanced(stretch), "{stretch}");
+        assert!(words(stretch).chars().count() < 40, "{stretch}");
     }
 }
 

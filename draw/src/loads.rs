@@ -1,0 +1,129 @@
+//! Forces of drives as arrows: along what slides or pushes, around what turns, as long as they are large, in the colour of how
+//! far a model is off there.
+
+use crate::scene::{Joint, Mark, Shape};
+use crate::symbols::polygon;
+
+/// The force or torque of a drive at one moment.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Load {
+    /// The drive.
+    pub drive: String,
+    /// The force as a share of the largest that is shown, from -1 to 1.
+    pub force: f64,
+    /// How far a model is off, as a share of the largest error that is shown, from 0 to 1.
+    pub error: f64,
+}
+
+/// Length of the longest straight arrow, in units of the picture.
+const LONGEST: f64 = 60.0;
+/// Radius of an arrow around a joint, and the longest turn of one, rad.
+const RADIUS: f64 = 19.0;
+const TURN: f64 = 5.0;
+/// Shades from no error to the largest one; the style has a colour for each.
+const SHADES: f64 = 6.0;
+/// What is smaller than this is no arrow, in units of the picture.
+const LEAST: f64 = 3.0;
+
+/// The arrow of a load at the mark of its drive; nothing where the mark is another one. `at` and `direction` tell where places
+/// and directions lie in the picture, `towards` which part of a direction points at the viewer.
+pub(crate) fn arrow(
+    mark: &Mark,
+    load: &Load,
+    at: impl Fn(&nalgebra::Vector3<f64>) -> [f64; 2],
+    direction: impl Fn(&nalgebra::Vector3<f64>) -> [f64; 2],
+    towards: impl Fn(&nalgebra::Vector3<f64>) -> f64,
+) -> String {
+    let force = if load.force.is_finite() {
+        load.force.clamp(-1.0, 1.0)
+    } else {
+        0.0
+    };
+    let drawn = match &mark.shape {
+        Shape::Drive(ends) if mark.name == load.drive => {
+            let [a, b] = ends.each_ref().map(&at);
+            let length = (b[0] - a[0]).hypot(b[1] - a[1]).max(1e-9);
+            let along = [0, 1].map(|k| (b[k] - a[k]) / length);
+            // A positive force pushes the ends apart.
+            straight(b, along, force) + &straight(a, along.map(|x| -x), force)
+        }
+        Shape::Joint(joint) if joint.drive.as_deref() == Some(load.drive.as_str()) => of_joint(
+            joint,
+            at(&joint.at),
+            direction(&joint.axis),
+            towards(&joint.axis),
+            force,
+        ),
+        _ => return String::new(),
+    };
+    let error = if load.error.is_finite() {
+        load.error.clamp(0.0, 1.0)
+    } else {
+        1.0
+    };
+    let shade = (error * SHADES).floor().min(SHADES - 1.0);
+    format!("<g class=\"load e{shade:.0}\">{drawn}</g>\n")
+}
+
+fn of_joint(joint: &Joint, at: [f64; 2], axis: [f64; 2], towards: f64, force: f64) -> String {
+    if joint.slides && !joint.turns {
+        let length = axis[0].hypot(axis[1]);
+        return straight(at, axis, force * length.max(0.2));
+    }
+    // Seen from the tip of its axis, a positive torque turns to the left.
+    around(at, if towards < 0.0 { -force } else { force })
+}
+
+/// An arrow from `from` on; a negative force points back at it.
+fn straight(from: [f64; 2], along: [f64; 2], force: f64) -> String {
+    let by = LONGEST * force;
+    if by.abs() < LEAST {
+        return String::new();
+    }
+    let length = along[0].hypot(along[1]).max(1e-9);
+    let along = along.map(|x| x / length);
+    let end = [0, 1].map(|k| from[k] + by.abs() * along[k]);
+    let (tail, tip, along) = if by > 0.0 {
+        (from, end, along)
+    } else {
+        (end, from, along.map(|x| -x))
+    };
+    format!(
+        "<path d=\"M{:.1} {:.1}L{:.1} {:.1}\"/>{}",
+        tail[0],
+        tail[1],
+        tip[0],
+        tip[1],
+        head(tip, along)
+    )
+}
+
+/// An arrow around a joint, to the left where it is positive; it begins at the right.
+fn around(at: [f64; 2], force: f64) -> String {
+    let turn = TURN * force;
+    if turn.abs() * RADIUS < LEAST {
+        return String::new();
+    }
+    let place = |angle: f64| [at[0] + RADIUS * angle.cos(), at[1] - RADIUS * angle.sin()];
+    let (start, end) = (place(0.0), place(turn));
+    let along = [-turn.signum() * turn.sin(), -turn.signum() * turn.cos()];
+    format!(
+        "<path d=\"M{:.1} {:.1}A{RADIUS} {RADIUS} 0 {} {} {:.1} {:.1}\"/>{}",
+        start[0],
+        start[1],
+        u8::from(turn.abs() > std::f64::consts::PI),
+        u8::from(turn < 0.0),
+        end[0],
+        end[1],
+        head(end, along)
+    )
+}
+
+fn head(tip: [f64; 2], along: [f64; 2]) -> String {
+    let across = [-along[1], along[0]];
+    let corner = |back: f64, side: f64| [0, 1].map(|k| tip[k] + back * along[k] + side * across[k]);
+    polygon(
+        "head",
+        &[corner(5.0, 0.0), corner(-5.0, 4.5), corner(-5.0, -4.5)],
+    )
+}

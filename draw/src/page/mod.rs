@@ -1,0 +1,39 @@
+//! What all pages of HTML share: their head, their one style, and their one way of zooming pictures, copying numbers and printing
+//! what is folded. A page stands without its scripts too.
+
+use std::fmt::Write as _;
+
+use modelmill_boundary::text::html as escape;
+
+/// The style of all pages, light and dark, for wide and narrow screens and for paper.
+pub const STYLE: &str = include_str!("page.css");
+
+/// Scripts of all pages, to run once a page stands. Whoever puts parts of a page into another one later calls
+/// `enlivenPictures(element)` and `enlivenTables(element)` on them.
+pub const SCRIPTS: [&str; 3] = [
+    include_str!("zoom.js"),
+    include_str!("tables.js"),
+    include_str!("paper.js"),
+];
+
+/// A page up to its heading.
+pub fn begin(title: &str) -> String {
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <title>{0}</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{STYLE}</style>\n</head>\n\
+         <body>\n<main>\n<h1>{0}</h1>\n",
+        escape(title),
+    )
+}
+
+/// The end of a page, with the scripts of all pages and `more` of its own.
+pub fn end(more: &[&str]) -> String {
+    let mut text = String::from("</main>\n");
+    for script in SCRIPTS.iter().chain(more) {
+        _ = write!(text, "<script>\n{script}</script>\n");
+    }
+    text.push_str("</body>\n</html>\n");
+    text
+}
