@@ -681,7 +681,10 @@ fn numbers_are_copied_with_all_their_digits() {
     };
     let all = number(&compared, "/nrms");
     assert!((value(0) - all).abs() < 1e-12 * all, "{copied} {all}");
-    assert!(value(1) > 0.0 && copied["texts"][1] != copied["texts"][0], "{copied}");
+    assert!(
+        value(1) > 0.0 && copied["texts"][1] != copied["texts"][0],
+        "{copied}"
+    );
     assert_eq!(copied["stops"], 1, "Tab stops once at a table");
     let says = copied["says"].as_str().expect("a word");
     assert!(

@@ -220,7 +220,11 @@ fn pages_are_whole_and_the_same_every_time() {
         let html = page(&one, Format::Html, None);
         let without_scripts: String = html
             .split("<script>")
-            .map(|piece| piece.split_once("</script>").map_or(piece, |(_, rest)| rest))
+            .map(|piece| {
+                piece
+                    .split_once("</script>")
+                    .map_or(piece, |(_, rest)| rest)
+            })
             .collect();
         assert!(markup_is_balanced(&without_scripts), "{name}");
         // Nothing is fetched.
