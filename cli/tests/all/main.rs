@@ -22,6 +22,7 @@ mod estimators;
 mod excite;
 mod excited_rig;
 mod experiment;
+mod export;
 mod faulty_recordings;
 mod figures;
 mod formats;

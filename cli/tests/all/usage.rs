@@ -62,6 +62,7 @@ fn every_command_helps_with_an_example() {
         "simulate",
         "reduce",
         "import",
+        "export",
         "completions",
         "tour",
     ] {
