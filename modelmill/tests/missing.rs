@@ -8,7 +8,8 @@ mod made;
 use std::path::Path;
 
 use modelmill::Model;
-use modelmill::diagnose::{Findings, Held, Missing, Question};
+use modelmill::diagnose::{Findings, Held, Missing, Question, Verdict};
+use modelmill::identify::Estimation;
 use modelmill::recording::Reading;
 
 use made::{Made, bundled, run, run_of};
@@ -97,4 +98,39 @@ fn a_gear_that_yields_is_found_with_its_compliance() {
         4e-4,
         0.2,
     );
+}
+
+/// A fit of one run is known to its own deviations only: a further run in which nothing changed misses it by as much, and a load
+/// stands out against that.
+#[test]
+fn what_a_fit_does_not_know_is_no_error_of_the_model() {
+    let model = Model::open(bundled(ARM)).expect("the model");
+    let read = |file: &Path| {
+        let recording = model.recording(file, &Reading::default());
+        recording.expect("the recording")
+    };
+    let before = read(&run(ARM, 740, Made::Nothing));
+    let found = model.identify(&[&before], &[], &Estimation::default());
+    let found = found.expect("a fit");
+    let values = model.values_of(&found.fit, "fit.json");
+    let values = values.expect("its values");
+    assert!(values.covariance.is_some());
+    let fitted = model.with_fit(&values);
+    let question = Question {
+        held: Held::All,
+        again_with_nominal: false,
+    };
+    let asked = |file: &Path| {
+        let recording = read(file);
+        fitted
+            .diagnose(&[&recording], &[], &question)
+            .expect("an answer")
+    };
+    let same = asked(&run(ARM, 741, Made::Nothing));
+    assert!(same.missing.is_empty(), "{:#?}", same.missing);
+    assert_eq!(same.diagnosis.verdict, Verdict::Adequate);
+    let part = "\n[[part]]\nname = \"tool\"\non = \"link6\"\nmass = 1.4\ncentre = [0.03, -0.02, 0.08]\n\
+                inertia = { xx = 0.004, yy = 0.005, zz = 0.006 }\n";
+    let loaded = asked(&run(ARM, 742, Made::Body(part)));
+    near(only(&loaded, "payload", "link6"), "mass", 1.4, 0.05);
 }
