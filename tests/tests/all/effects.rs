@@ -180,6 +180,21 @@ fn laws_at_drives() {
     );
     let coupled = [("Ia", 2.0), ("Fv", 20.0), ("Fs", 15.0)];
     same("coupled_drive", both, &coupled, &[]);
+    // A cable that is a spring, and a speed that is never reached.
+    check(
+        "cable_torque",
+        left,
+        ("spring", left, &[("k", 300.0), ("rest", 0.9)]),
+        &[("c0", -270.0), ("c1", 300.0)],
+        &[],
+    );
+    check(
+        "stribeck_load_friction",
+        both,
+        ("load_friction", both, &[("mu", 0.08)]),
+        &[("mus", 0.08)],
+        &[("vs", 1e9)],
+    );
 }
 
 #[test]
