@@ -520,7 +520,7 @@ impl<'a> Numbers<'a> {
             {
                 let ends = self.ends([*a, *b], [&poses, &displaced]);
                 let values = [0, 1, 2].map(|i| self.parameters[effect.terms[i].parameter.0]);
-                add_strut(&mut balance, ends, values);
+                add_strut(&mut balance, &ends, values);
             }
             let motions: Vec<Option<Jet>> = (effect.places.iter())
                 .map(|place| match place {
@@ -716,10 +716,10 @@ fn add_rod(
 /// The virtual work of what pulls two points together by a constant, by their distance and by its rate.
 fn add_strut(
     balance: &mut Balance,
-    motions: [[[Jet; 3]; 2]; 2],
+    motions: &[[[Jet; 3]; 2]; 2],
     [constant, stiffness, damping]: [f64; 3],
 ) {
-    let [moves, change] = motions.map(|[a, b]| {
+    let [moves, change] = motions.each_ref().map(|[a, b]| {
         let d: [Jet; 3] = std::array::from_fn(|i| b[i] - a[i]);
         (0..3)
             .fold(Jet::constant(0.0), |sum, i| sum + d[i] * d[i])

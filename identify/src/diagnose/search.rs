@@ -467,7 +467,7 @@ impl Bench<'_> {
                     picks.push((*pick).clone());
                     self.try_in(&table, picks)
                 })
-                .filter(|trial| trial.is_possible());
+                .filter(Trial::is_possible);
             let next = trials.min_by(|a, b| a.squares.total_cmp(&b.squares))?;
             set.clone_from(&next.picks);
             first.get_or_insert_with(|| next.clone());

@@ -125,7 +125,7 @@ fn said(mechanism: &Mechanism, effect: &Effect, format: Format, found: &mut Fric
             Place::Drive(d) => match mechanism.drives[d.0].kind {
                 DriveKind::Joint(i) => change(&mut found.joints[i.0]),
                 DriveKind::Linear { .. } if format == Format::Mjcf => {
-                    change(&mut found.drives[d.0])
+                    change(&mut found.drives[d.0]);
                 }
                 DriveKind::Linear { .. } => return false,
             },

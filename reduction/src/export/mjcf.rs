@@ -1,5 +1,7 @@
 //! MJCF: bodies within bodies, loops as `connect`, drives between two points as tendons.
 
+use std::fmt::Write as _;
+
 use modelmill_spec::{CoordinateIdx, Drive, DriveKind, Mechanism, PointIdx};
 use nalgebra::UnitQuaternion;
 
@@ -144,13 +146,13 @@ impl Writer<'_> {
         );
         let reference = joint.ratio * self.at[joint.coordinate];
         if reference != 0.0 {
-            text += &format!(" ref=\"{}\"", number(reference));
+            let _ = write!(text, " ref=\"{}\"", number(reference));
         }
         if joint.name == coordinate.name {
             let limits = self.mechanism.limits.coordinates.iter();
             let of = limits.clone().find(|(i, _)| i.0 == joint.coordinate);
             if let Some([low, high]) = of.and_then(|(_, one)| one.position) {
-                text += &format!(" range=\"{} {}\"", number(low), number(high));
+                let _ = write!(text, " range=\"{} {}\"", number(low), number(high));
             }
             text += &passive(&self.friction.joints[joint.coordinate], "springref");
         }
@@ -302,11 +304,11 @@ fn passive(one: &Passive, rest: &str) -> String {
         ("stiffness", one.stiffness),
     ] {
         if value != 0.0 {
-            text += &format!(" {name}=\"{}\"", number(value));
+            let _ = write!(text, " {name}=\"{}\"", number(value));
         }
     }
     if one.stiffness != 0.0 {
-        text += &format!(" {rest}=\"{}\"", number(one.rest));
+        let _ = write!(text, " {rest}=\"{}\"", number(one.rest));
     }
     text
 }

@@ -160,7 +160,7 @@ fn owners(
     for (f, pose) in poses.frames().iter().enumerate() {
         for (k, moved) in pose.moved.iter().enumerate() {
             moves[moved.coordinate] = true;
-            if moved.factor.abs() == 1.0 {
+            if (moved.factor.abs() - 1.0).abs() < f64::EPSILON {
                 owners[moved.coordinate].get_or_insert((f, k));
             }
         }

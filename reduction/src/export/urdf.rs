@@ -1,5 +1,7 @@
 //! URDF: a tree of links; a coordinate that moves several joints moves one, which the others mimic.
 
+use std::fmt::Write as _;
+
 use modelmill_spec::{DriveKind, Mechanism};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
@@ -80,9 +82,10 @@ fn branch(
     );
     if one.joints.is_empty() {
         let origin = origin(&parent.1.sees(&one.placed));
-        text += &format!(
+        let _ = writeln!(
+            text,
             "  <joint name=\"{0}_floating\" type=\"floating\">\n    {origin}\n    <parent link=\"{1}\"/>\n    <child link=\"{0}\"/>\n  \
-             </joint>\n",
+             </joint>",
             one.name, parent.0
         );
     }
@@ -153,21 +156,24 @@ fn joint(
             format!("lower=\"{}\" upper=\"{}\" ", number(low), number(high))
         };
         let most = |range: Option<[f64; 2]>| range.map_or(FAR, |r| r[0].abs().max(r[1].abs()));
-        text += &format!(
-            "    <limit {bounds}effort=\"{}\" velocity=\"{}\"/>\n",
+        let _ = writeln!(
+            text,
+            "    <limit {bounds}effort=\"{}\" velocity=\"{}\"/>",
             number(effort.unwrap_or(FAR)),
             number(most(rate.map(scaled)))
         );
     }
     let own = friction.joints[moving.coordinate];
     if moving.name != *coordinate {
-        text += &format!(
-            "    <mimic joint=\"{coordinate}\" multiplier=\"{}\" offset=\"0\"/>\n",
+        let _ = writeln!(
+            text,
+            "    <mimic joint=\"{coordinate}\" multiplier=\"{}\" offset=\"0\"/>",
             number(moving.ratio)
         );
     } else if own != Passive::default() {
-        text += &format!(
-            "    <dynamics damping=\"{}\" friction=\"{}\"/>\n",
+        let _ = writeln!(
+            text,
+            "    <dynamics damping=\"{}\" friction=\"{}\"/>",
             number(own.damping),
             number(own.friction)
         );
