@@ -29,18 +29,20 @@ impl Model {
                     "{file} has base parameters only, and simulators need ten numbers of every body; identify with option `physical`"
                 )));
             }
-            Some((fit, file)) => Some(self.adopt(fit, file)?.loaded),
+            Some((fit, file)) => Some(self.adopt(fit, file)?),
             None => None,
         };
         let mechanism = match &adopted {
-            Some(loaded) => &loaded.mechanism,
+            Some(adopted) => &adopted.loaded.mechanism,
             None => &self.loaded.mechanism,
         };
         let exported = modelmill_reduction::export(mechanism, format)
             .map_err(|error| Error::input(format!("{}: {error}", self.path)))?;
+        let mut notes = adopted.map_or_else(Vec::new, |adopted| adopted.notes);
+        notes.extend(exported.remarks.into_iter().map(Note::warning));
         Ok(Exported {
             text: exported.text,
-            notes: exported.remarks.into_iter().map(Note::warning).collect(),
+            notes,
         })
     }
 }

@@ -300,6 +300,7 @@
   const refresh = () => {
     draw();
     compare();
+    errors_of_now();
     document.dispatchEvent(new CustomEvent('stands', { detail: { view, pane, seen: { at: Object.entries(at), from } } }));
     for (const old of ['curves', 'where', 'written', 'found']) mark_stale(old);
   };
@@ -374,12 +375,14 @@
     return low;
   };
   const largest = (all) => Math.max(...all.map((one) => one.reduce((most, v) => Math.max(most, Math.abs(v)), 0)), 1e-300);
-  // Forces and errors at a time, as shares of the largest of the run.
+  // An error of this share of the largest force is shown as far off.
+  const FAR_OFF = 0.2;
+  // Forces at a time as shares of the largest of the run, and errors as shares of what is far off.
   const shares = (run, time) => {
     if (!run.forces || !by('forces').checked) return [];
-    run.largest = run.largest || [largest(run.forces.measured), largest(run.forces.error)];
+    run.largest = run.largest || largest(run.forces.measured);
     const k = place(run.forces.time, time);
-    return motion.drives.map((drive, d) => [drive, (run.forces.measured[d][k] || 0) / run.largest[0], Math.abs(run.forces.error[d][k] || 0) / run.largest[1]]);
+    return motion.drives.map((drive, d) => [drive, (run.forces.measured[d][k] || 0) / run.largest, Math.min(1, Math.abs(run.forces.error[d][k] || 0) / (FAR_OFF * run.largest))]);
   };
   const pose = (k) => {
     const run = chosen();
@@ -405,10 +408,24 @@
     by('run').replaceChildren(...runs.map((run) => make('option', run.file)));
     if (motion) choose();
   };
+  let shown_of = null, waiting = null;
   const load = () => tried(async () => {
+    shown_of = view.derived;
     recorded = await ask('motion', {});
     offer();
   });
+  // Errors are those of the text as it stands, once typing rests.
+  const errors_of_now = () => {
+    if (!recorded || shown_of === view.derived || pane !== 'mechanism' || !by('forces').checked) return;
+    clearTimeout(waiting);
+    waiting = setTimeout(() => tried(async () => {
+      const of = view.derived;
+      const told = await ask('motion', {});
+      shown_of = of;
+      told.runs.forEach((run, i) => { if (recorded.runs[i]) recorded.runs[i].forces = run.forces; });
+      if (motion && !playing) pose(Number(by('time').value));
+    }), 400);
+  };
   by('forces').addEventListener('change', () => pose(Number(by('time').value)));
   by('run').addEventListener('change', () => { choose(); pose(0); });
   by('time').addEventListener('input', () => pose(Number(by('time').value)));

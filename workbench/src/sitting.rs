@@ -58,8 +58,12 @@ struct State {
     others: Vec<Option<Vec<u8>>>,
     /// Why the file cannot be read any more.
     unreadable: Option<String>,
-    /// What was done since the last rung of the ladder.
-    done: Vec<String>,
+    /// What was done since the last rung of the ladder, and to which revision that led.
+    done: Vec<(u64, String)>,
+    /// The errors that were found last, and of which revision.
+    compared: Option<(u64, Value)>,
+    /// The revision of the last rung.
+    on_ladder: u64,
     ladder: Vec<Rung>,
     diagnosis: Diagnosis,
 }
@@ -141,7 +145,9 @@ impl Sitting {
             now,
             saved,
             unreadable: None,
-            done: vec!["as opened".to_owned()],
+            done: vec![(options.first + 1, "as opened".to_owned())],
+            compared: None,
+            on_ladder: options.first,
             ladder: Vec::new(),
             diagnosis: Diagnosis {
                 number: options.first,
@@ -215,6 +221,9 @@ impl Sitting {
         {
             let mut state = self.state();
             let before = state.draft.revision();
+            if did.is_some() {
+                state.ends_typing();
+            }
             if !state.draft.edit(base, text) {
                 return None;
             }
@@ -413,12 +422,13 @@ impl Sitting {
         told = told::spelled(told, &*self.commands);
         told["revision"] = json!(revision);
         let mut state = self.state();
-        if state.draft.revision() == revision && !state.done.is_empty() {
+        if state.draft.revision() == revision {
             let errors = json!({ "nominal": brief(&told["nominal"]), "identified": brief(&told["identified"]) });
-            let what = std::mem::take(&mut state.done).join(", ");
-            state.ladder.push(Rung { what, errors });
-            drop(state);
-            self.tell();
+            state.compared = Some((revision, errors));
+            if state.stands() {
+                drop(state);
+                self.tell();
+            }
         }
         Ok(told)
     }
@@ -660,6 +670,7 @@ impl Sitting {
         let edited = edited.map_err(|error| self.said(&error))?;
         {
             let mut state = self.state();
+            state.ends_typing();
             if !state.draft.edit(revision, &edited.text) {
                 return Err("the text was changed meanwhile; add it again".to_owned());
             }
@@ -687,9 +698,45 @@ impl Sitting {
 impl State {
     /// Something was done whose effect on the errors is to stand on the ladder.
     fn did(&mut self, what: &str) {
-        if self.done.iter().all(|one| one != what) {
-            self.done.push(what.to_owned());
+        let revision = self.draft.revision();
+        if (self.done.iter()).all(|(at, one)| *at != revision || one != what) {
+            self.done.push((revision, what.to_owned()));
         }
+        self.stands();
+    }
+
+    /// What was typed until now is a step of its own, before something else is done to the text.
+    fn ends_typing(&mut self) {
+        let revision = self.draft.revision();
+        let Some((_, errors)) = self.compared.as_ref().filter(|(at, _)| *at == revision) else {
+            return;
+        };
+        let is_news = self.ladder.last().is_none_or(|rung| rung.errors != *errors);
+        if is_news && self.on_ladder != revision {
+            self.did("edited");
+        }
+    }
+
+    /// Puts what led to the text as it stands on the ladder, if its errors are known. What led to a text whose errors nobody
+    /// waited for has no rung: those of another text are not its own.
+    fn stands(&mut self) -> bool {
+        let revision = self.draft.revision();
+        let Some((_, errors)) = self.compared.as_ref().filter(|(at, _)| *at == revision) else {
+            return false;
+        };
+        let errors = errors.clone();
+        let done = std::mem::take(&mut self.done).into_iter();
+        let here = done.filter(|(at, _)| *at == revision);
+        let what: Vec<String> = here.map(|(_, what)| what).collect();
+        if what.is_empty() {
+            return false;
+        }
+        self.on_ladder = revision;
+        self.ladder.push(Rung {
+            what: what.join(", "),
+            errors,
+        });
+        true
     }
 }
 

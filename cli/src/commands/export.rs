@@ -13,7 +13,9 @@ use crate::{commands, terminal};
 /// Writes the description and says what it does not hold.
 pub(crate) fn run(host: &Host, args: &ExportArgs) -> Outcome {
     let ending = args.out.extension().and_then(|ending| ending.to_str());
-    let format = args.format.or_else(|| Format::of_ending(ending?));
+    let format = args
+        .format
+        .or_else(|| Format::of_ending(&ending?.to_lowercase()));
     let Some(format) = format else {
         return Err(Failure::Input(format!(
             "{}: its ending says no format; end it in .urdf or .xml (MJCF), or give --format",

@@ -100,16 +100,6 @@ impl Bench<'_> {
             .map(|(_, one)| one)
     }
 
-    /// A member that depends on what the drives carry, with the value of its constant that explains most beside the others.
-    pub(crate) fn carried_anew(&mut self, picks: &[Pick], member: usize) -> Option<Pick> {
-        let load = self.load(picks);
-        let mut others = picks.to_vec();
-        let candidate = others.remove(member).candidate;
-        let beside = self.beside(&others);
-        self.rubbing_on(&load, Carried::Of(candidate), &beside)
-            .remove(&candidate)
-    }
-
     /// Columns of a candidate that changes the model as fitted. What it was found to be so far, if it is among the picks,
     /// says where: the columns times the parameters are the change there.
     pub(crate) fn changed(

@@ -4,6 +4,9 @@ use super::bench::{Bench, Pick};
 use super::column::Column;
 use super::problem::{Carried, Source};
 
+/// Where values of a constant are costly, neighbours on the grid that is looked at differ by about this factor.
+const FEW: f64 = 3.0;
+
 impl Bench<'_> {
     /// Chooses the constants of each effect of a set anew, beside those of the others.
     pub(crate) fn retune(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
@@ -14,13 +17,6 @@ impl Bench<'_> {
                 let candidate = picks[i].candidate;
                 match &problem.candidates[candidate].source {
                     Source::Columns(choices) if choices.len() > 1 => {}
-                    Source::Carried if !picks[i].constants.is_empty() => {
-                        let rank = picks[i].rank;
-                        if let Some(anew) = self.carried_anew(&picks, i) {
-                            picks[i] = Pick { rank, ..anew };
-                        }
-                        continue;
-                    }
                     _ => continue,
                 }
                 let mut others = picks.clone();
@@ -52,14 +48,8 @@ impl Bench<'_> {
             let (name, value) = (name.clone(), *value);
             let mut grid: Vec<f64> = match &problem.candidates[candidate].source {
                 Source::Columns(choices) => choices.iter().map(|c| c.constants[0].1).collect(),
-                // Values with what the drives carry by this set.
-                Source::Carried => (self
-                    .supply
-                    .carried(&self.load(&picks), Carried::Of(candidate)))
-                .into_iter()
-                .flat_map(|(_, choices)| choices)
-                .filter_map(|choice| Some(choice.constants.first()?.1))
-                .collect(),
+                // Few values were looked at, so that this one's neighbours are as far away as that.
+                Source::Carried => vec![value / FEW, value, value * FEW],
                 _ => continue,
             };
             grid.sort_by(f64::total_cmp);
@@ -73,8 +63,14 @@ impl Bench<'_> {
             // What is positive throughout is searched by its logarithm.
             let is_positive = grid.first().is_some_and(|first| *first > 0.0);
             if is_positive {
-                low = low.max(0.7 * value).max(grid[0]);
-                high = high.min(1.4 * value).min(grid[grid.len() - 1]);
+                let is_costly = problem.candidates[candidate].source == Source::Carried;
+                let [under, over] = if is_costly {
+                    [1.0 / FEW, FEW]
+                } else {
+                    [0.7, 1.4]
+                };
+                low = low.max(under * value).max(grid[0]);
+                high = high.min(over * value).min(grid[grid.len() - 1]);
             }
             low = if low.is_finite() { low } else { value };
             high = if high.is_finite() { high } else { value };
