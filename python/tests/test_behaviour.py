@@ -152,8 +152,11 @@ def test_warnings_are_warnings_of_the_package() -> None:
         arm.inverse_dynamics([0, 0], [0, 0], [0, 0], parameters=arm.p_min.values)
 
 
-def test_a_typed_program_passes_the_checker() -> None:
+def test_a_typed_program_passes_the_checker(monkeypatch: pytest.MonkeyPatch) -> None:
     mypy = pytest.importorskip("mypy.api")
-    package = Path(modelmill.__file__).parent
-    text, faults, status = mypy.run(["--strict", str(Path(__file__).with_name("typed_use.py")), str(package)])
-    assert status == 0, text + faults
+    here = Path(__file__).parent
+    # From where the name of the package is that of no folder.
+    monkeypatch.chdir(here)
+    for what in (["typed_use.py"], ["-p", "modelmill"]):
+        text, faults, status = mypy.run(["--strict", *what])
+        assert status == 0, text + faults
