@@ -164,7 +164,7 @@ pub enum Nature {
 /// Which candidates that depend on what the drives carry are asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Carried {
-    /// All, with few values of their constants.
+    /// All, with one value of each constant.
     All,
     /// One, with many values of its constant.
     Of(usize),

@@ -4,8 +4,8 @@ use super::bench::{Bench, Pick};
 use super::column::Column;
 use super::problem::{Carried, Source};
 
-/// Where values of a constant are costly, neighbours on the grid that is looked at differ by about this factor.
-const FEW: f64 = 3.0;
+/// Where values of a constant are costly one is looked at, and others up to this factor away.
+const AROUND: f64 = 4.0;
 
 impl Bench<'_> {
     /// Chooses the constants of each effect of a set anew, beside those of the others.
@@ -48,8 +48,7 @@ impl Bench<'_> {
             let (name, value) = (name.clone(), *value);
             let mut grid: Vec<f64> = match &problem.candidates[candidate].source {
                 Source::Columns(choices) => choices.iter().map(|c| c.constants[0].1).collect(),
-                // Few values were looked at, so that this one's neighbours are as far away as that.
-                Source::Carried => vec![value / FEW, value, value * FEW],
+                Source::Carried => vec![value / AROUND, value, value * AROUND],
                 _ => continue,
             };
             grid.sort_by(f64::total_cmp);
@@ -65,7 +64,7 @@ impl Bench<'_> {
             if is_positive {
                 let is_costly = problem.candidates[candidate].source == Source::Carried;
                 let [under, over] = if is_costly {
-                    [1.0 / FEW, FEW]
+                    [1.0 / AROUND, AROUND]
                 } else {
                     [0.7, 1.4]
                 };

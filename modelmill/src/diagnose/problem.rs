@@ -189,7 +189,7 @@ impl Supply for Made<'_> {
             }
         };
         let tried = |single: usize| match which {
-            Carried::All => few(&self.grids[single]),
+            Carried::All => middle(&self.grids[single]),
             Carried::Of(_) => self.grids[single].clone(),
             Carried::At(_, value) => vec![value],
         };
@@ -206,12 +206,9 @@ impl Supply for Made<'_> {
     }
 }
 
-/// Every fourth value of a grid, from its second on: near enough to see whether anything is there.
-fn few(grid: &[f64]) -> Vec<f64> {
-    match grid {
-        [only] => vec![*only],
-        _ => grid.iter().copied().skip(1).step_by(4).collect(),
-    }
+/// The middle of a grid: near enough to see whether anything is there, and no more columns to make than without a constant.
+fn middle(grid: &[f64]) -> Vec<f64> {
+    grid.get(grid.len() / 2).copied().into_iter().collect()
 }
 
 /// The problem in numbers, with all columns of the base.
