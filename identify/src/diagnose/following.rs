@@ -6,10 +6,9 @@ use std::collections::HashMap;
 use nalgebra::DVector;
 
 use super::bench::{Bench, Pick};
-use super::beside::Beside;
 use super::column::Column;
 use super::pool::{On, solve};
-use super::problem::{Candidate, Carried, Choice, Source};
+use super::problem::{Candidate, Carried, Source};
 
 impl Bench<'_> {
     /// Candidates that depend on what the drives carry, with the columns that a fit gives them.
@@ -19,8 +18,7 @@ impl Bench<'_> {
             return HashMap::new();
         }
         let load = self.load(picks);
-        let beside = self.beside(picks);
-        self.rubbing_on(&load, Carried::All, &beside)
+        self.rubbing_on(&load, Carried::All)
     }
 
     /// What the drives carry by a set's fit: masses and weight, and no friction.
@@ -65,16 +63,10 @@ impl Bench<'_> {
         sum
     }
 
-    /// Candidates that depend on what the drives carry, with the values of their constants that explain most beside a set.
-    fn rubbing_on(
-        &mut self,
-        load: &Column,
-        which: Carried,
-        beside: &Beside,
-    ) -> HashMap<usize, Pick> {
+    /// Candidates that depend on what the drives carry.
+    fn rubbing_on(&mut self, load: &Column, which: Carried) -> HashMap<usize, Pick> {
         let made = self.supply.carried(load, which);
-        let picks = made.into_iter().filter_map(|(candidate, choices)| {
-            let choice = self.best_of(choices, beside)?;
+        let picks = made.into_iter().map(|(candidate, choice)| {
             let pick = Pick {
                 candidate,
                 constants: choice.constants,
@@ -83,21 +75,9 @@ impl Bench<'_> {
                     .map(|c| self.pool.add(c))
                     .collect(),
             };
-            Some((candidate, pick))
+            (candidate, pick)
         });
         picks.collect()
-    }
-
-    /// The choice that explains most beside a set; an only one is not asked.
-    fn best_of(&self, mut choices: Vec<Choice>, beside: &Beside) -> Option<Choice> {
-        if choices.len() < 2 {
-            return choices.pop();
-        }
-        let scored =
-            (choices.into_iter()).map(|one| (self.explained_by(&one.columns, beside), one));
-        scored
-            .max_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(_, one)| one)
     }
 
     /// Columns of a candidate that changes the model as fitted. What it was found to be so far, if it is among the picks,
@@ -170,13 +150,10 @@ impl Bench<'_> {
     /// A member that depends on what the drives carry, with or without friction as explains more; its constant stays.
     fn best_carried(&mut self, picks: &[Pick], member: usize) -> Option<Pick> {
         let candidate = picks[member].candidate;
-        let which = match picks[member].constants.as_slice() {
-            [(_, value)] => Carried::At(candidate, *value),
-            _ => Carried::Of(candidate),
-        };
-        let beside = Beside::default();
+        let value = picks[member].constants.first().map(|(_, value)| *value);
+        let which = Carried::One(candidate, value);
         let loads = [self.load(picks), self.load_with_friction(picks)];
-        let ways = loads.map(|load| (self.rubbing_on(&load, which, &beside)).remove(&candidate));
+        let ways = loads.map(|load| self.rubbing_on(&load, which).remove(&candidate));
         let squares = |way: &Pick| {
             let mut set = picks.to_vec();
             set[member] = way.clone();

@@ -166,10 +166,8 @@ pub enum Nature {
 pub enum Carried {
     /// All, with one value of each constant.
     All,
-    /// One, with many values of its constant.
-    Of(usize),
-    /// One, with a value of its constant.
-    At(usize, f64),
+    /// One, with a value of its constant if it has one.
+    One(usize, Option<f64>),
 }
 
 /// Columns that are made while the search goes on.
@@ -177,8 +175,8 @@ pub trait Supply {
     /// Columns of a candidate for another value of the constant that is searched for, if they can be had.
     fn finer(&self, candidate: usize, constant: f64) -> Option<Vec<Column>>;
 
-    /// Columns of candidates that depend on what the drives carry, for each value of a constant that is tried.
-    fn carried(&self, load: &Column, which: Carried) -> Vec<(usize, Vec<Choice>)>;
+    /// Columns of candidates that depend on what the drives carry.
+    fn carried(&self, load: &Column, which: Carried) -> Vec<(usize, Choice)>;
 
     /// Places on which laws that no library holds may act; asked where something stays unexplained.
     fn sites(&self) -> Vec<Site> {
@@ -194,7 +192,7 @@ impl Supply for NoSupply {
         None
     }
 
-    fn carried(&self, _: &Column, _: Carried) -> Vec<(usize, Vec<Choice>)> {
+    fn carried(&self, _: &Column, _: Carried) -> Vec<(usize, Choice)> {
         Vec::new()
     }
 }

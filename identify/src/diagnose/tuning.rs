@@ -86,8 +86,8 @@ impl Bench<'_> {
             let at = |x: f64| -> Option<(f64, Vec<Column>)> {
                 let columns = match &load {
                     Some(load) => {
-                        let made = supply.carried(load, Carried::At(candidate, unscale(x)));
-                        made.into_iter().next()?.1.pop()?.columns
+                        let which = Carried::One(candidate, Some(unscale(x)));
+                        supply.carried(load, which).pop()?.1.columns
                     }
                     None => supply.finer(candidate, unscale(x))?,
                 };

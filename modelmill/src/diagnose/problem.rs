@@ -178,10 +178,10 @@ impl Supply for Made<'_> {
         sites(self.candidates, self.model, self.all).unwrap_or_default()
     }
 
-    fn carried(&self, load: &Column, which: Carried) -> Vec<(usize, Vec<Choice>)> {
+    fn carried(&self, load: &Column, which: Carried) -> Vec<(usize, Choice)> {
         let only = match which {
             Carried::All => None,
-            Carried::Of(candidate) | Carried::At(candidate, _) => {
+            Carried::One(candidate, _) => {
                 let Some((entry, _)) = &self.origins[candidate] else {
                     return Vec::new();
                 };
@@ -189,9 +189,8 @@ impl Supply for Made<'_> {
             }
         };
         let tried = |single: usize| match which {
-            Carried::All => middle(&self.grids[single]),
-            Carried::Of(_) => self.grids[single].clone(),
-            Carried::At(_, value) => vec![value],
+            Carried::One(_, Some(value)) => vec![value],
+            Carried::All | Carried::One(_, None) => middle(&self.grids[single]),
         };
         // Poses without answer were reported when the recordings were evaluated for the first time.
         let made = carried(self.candidates, self.model, self.all, load, only, &tried);
@@ -201,7 +200,7 @@ impl Supply for Made<'_> {
             self.origins.iter().position(is_its)
         };
         made.into_iter()
-            .filter_map(|(entry, choices)| Some((place(entry)?, choices)))
+            .filter_map(|(entry, mut choices)| Some((place(entry)?, choices.pop()?)))
             .collect()
     }
 }
