@@ -4,30 +4,7 @@ use std::path::Path;
 
 use modelmill::files::{Files, Memory};
 use modelmill::{Error, Host, Model, Outcome};
-
-/// Model files by name.
-const MODELS: [(&str, &str); 2] = [
-    (
-        "spidermill.toml",
-        include_str!("../../../model-spec/models/spidermill.toml"),
-    ),
-    (
-        "spidermill-paper.toml",
-        include_str!("../../../model-spec/models/spidermill-paper.toml"),
-    ),
-];
-
-/// Rig files by name.
-const RIGS: [(&str, &str); 2] = [
-    (
-        "spidermill-full.toml",
-        include_str!("../../../model-spec/rigs/spidermill-full.toml"),
-    ),
-    (
-        "spidermill-with-rods.toml",
-        include_str!("../../../model-spec/rigs/spidermill-with-rods.toml"),
-    ),
-];
+use modelmill_spec::bundled::{MODELS, RIGS};
 
 /// Files that are part of the program.
 fn files(bundled: &[(&str, &str)]) -> Memory {

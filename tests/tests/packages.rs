@@ -1,0 +1,132 @@
+//! What is published can stand alone: metadata, licences, and no file from outside a crate's own folder.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The workspace.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn text(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+/// Folder and manifest of every member of the workspace.
+fn members() -> Vec<(PathBuf, String)> {
+    let manifest = text(&root().join("Cargo.toml"));
+    let line = manifest.lines().find(|line| line.starts_with("members = "));
+    let names = line.expect("a list of members").split('"');
+    let folders = names.skip(1).step_by(2).map(|name| root().join(name));
+    folders
+        .map(|folder| (folder.clone(), text(&folder.join("Cargo.toml"))))
+        .collect()
+}
+
+/// Those that are published.
+fn published() -> Vec<(PathBuf, String)> {
+    let mut all = members();
+    all.retain(|(_, manifest)| !manifest.contains("\npublish = false\n"));
+    assert!(all.len() > 10, "{} crates are published", all.len());
+    all
+}
+
+/// Files below a folder that end so.
+fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut open = vec![folder.to_path_buf()];
+    while let Some(next) = open.pop() {
+        for entry in fs::read_dir(&next).unwrap_or_else(|e| panic!("{}: {e}", next.display())) {
+            let path = entry.expect("an entry of a folder").path();
+            if path.is_dir() {
+                open.push(path);
+            } else if path.extension().is_some_and(|e| e == ending) {
+                found.push(path);
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn every_published_crate_says_what_it_is() {
+    for (folder, manifest) in published() {
+        for key in [
+            "description",
+            "documentation",
+            "readme",
+            "keywords",
+            "categories",
+            "license.workspace",
+            "repository.workspace",
+            "rust-version.workspace",
+        ] {
+            let is_there = manifest.contains(&format!("\n{key} = "));
+            assert!(is_there, "{} has no {key}", folder.display());
+        }
+        assert!(manifest.contains("\ninclude"), "{}", folder.display());
+        assert!(folder.join("README.md").is_file(), "{}", folder.display());
+    }
+}
+
+/// They are copies, since not every system that checks a repository out knows links.
+#[test]
+fn licences_are_those_of_the_project() {
+    let folders = published().into_iter().map(|(folder, _)| folder);
+    for folder in folders.chain([root().join("python")]) {
+        for name in ["LICENSE-MIT", "LICENSE-APACHE"] {
+            let is_same = text(&folder.join(name)) == text(&root().join(name));
+            assert!(is_same, "{}: {name} is another text", folder.display());
+        }
+    }
+}
+
+#[test]
+fn no_published_crate_takes_a_file_from_outside_its_folder() {
+    let mut seen = 0;
+    for (folder, _) in published() {
+        for file in files(&folder, "rs") {
+            let below = file.strip_prefix(&folder).expect("below the folder");
+            if !below.starts_with("src") && below != Path::new("lib.rs") {
+                continue;
+            }
+            let depth = below.components().count() - 1;
+            let text = text(&file);
+            let macros = ["include_str!(", "include_bytes!(", "include!("];
+            for rest in macros.iter().flat_map(|one| text.split(one).skip(1)) {
+                // What is put together from pieces lies where the build puts it.
+                let Some(rest) = rest.trim_start().strip_prefix('"') else {
+                    continue;
+                };
+                let path = rest.split('"').next().unwrap_or_default();
+                let up = path.split('/').take_while(|part| *part == "..").count();
+                assert!(up <= depth, "{} takes {path}", file.display());
+                seen += 1;
+            }
+        }
+    }
+    assert!(seen > 20, "{seen} files are part of crates");
+}
+
+/// A dependency with a version would be looked for where crates are published.
+#[test]
+fn crates_that_are_not_published_have_no_version_to_depend_on() {
+    let manifest = text(&root().join("Cargo.toml"));
+    for (folder, own) in members() {
+        let name = own
+            .split("name = \"")
+            .nth(1)
+            .and_then(|rest| rest.split('"').next());
+        let name = name.expect("a name");
+        let line = format!("\n{name} = {{ path");
+        let Some(rest) = manifest.split(&line).nth(1) else {
+            continue;
+        };
+        let has_version = rest
+            .lines()
+            .next()
+            .is_some_and(|line| line.contains("version"));
+        let is_published = !own.contains("\npublish = false\n");
+        assert_eq!(has_version, is_published, "{}", folder.display());
+    }
+}
