@@ -197,7 +197,7 @@ impl fmt::Display for DeriveError {
                 "the rank differs between random constants",
             ),
             Self::NotConfirmed => {
-                f.write_str("what was found in symbols does not hold at other poses")
+                f.write_str("what was found does not hold at other poses")
             }
         }
     }

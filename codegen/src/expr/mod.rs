@@ -12,6 +12,7 @@ mod differentiate;
 mod evaluate;
 pub(crate) mod independent;
 pub(crate) mod linear;
+mod many_digits;
 mod nominal;
 pub mod print;
 mod substitute;
@@ -26,6 +27,7 @@ use rustc_hash::FxHashMap;
 pub use angle::AngleSum;
 pub(crate) use coordinates::coordinates_of;
 pub use evaluate::{Domain, F64, FieldPoint, RationalPoint, Tape};
+pub(crate) use many_digits::DigitsPoint;
 pub use modelmill_algebra::Rational;
 pub(crate) use nominal::{nominal_of, nominal_value};
 

@@ -3,6 +3,7 @@
 use modelmill_spec::Mechanism;
 
 use super::closure::{Closure, closures};
+use super::coupling;
 use super::independent::{independent, sufficient};
 use super::parallelogram;
 use crate::DeriveError;
@@ -17,6 +18,8 @@ pub(crate) struct Loops {
     pub(crate) closures: Vec<Closure>,
     /// Residuals that are independent, as many as there are passive coordinates.
     pub(crate) residual: Vec<ExprId>,
+    /// Angles whose turns others make fractions of, and into how many parts the field divides them.
+    pub(crate) divided: Vec<(usize, i64)>,
 }
 
 impl Loops {
@@ -28,6 +31,8 @@ impl Loops {
         let (passive, active): (Vec<usize>, Vec<usize>) =
             (0..mechanism.coordinates.len()).partition(|i| mechanism.coordinates[*i].passive);
         let mut closures = closures(graph, mechanism, tree)?;
+        let couplings = coupling::couplings(graph, mechanism)?;
+        closures.extend(couplings.closures);
         parallelogram::find(graph, mechanism, &mut closures);
         let residual: Vec<ExprId> = closures
             .iter()
@@ -56,11 +61,13 @@ impl Loops {
             passive,
             closures,
             residual,
+            divided: couplings.divided,
         })
     }
 
-    /// How many gaps close the loops: eqs. (L1) to (Ln) of the page.
-    pub(crate) fn n_gaps(&self) -> usize {
-        self.closures.iter().map(|c| c.residual.len()).sum()
+    /// How many gaps close the loops, couplings aside: eqs. (L1) to (Ln) of the page.
+    pub(crate) fn n_gaps(&self, mechanism: &Mechanism) -> usize {
+        let of_loops = self.closures.iter().take(mechanism.loops.len());
+        of_loops.map(|c| c.residual.len()).sum()
     }
 }

@@ -6,7 +6,7 @@ use modelmill_spec::Mechanism;
 
 use super::solve_step::{Plan, SolveStep};
 use crate::DeriveError;
-use crate::expr::{Atom, ExprId, FieldPoint, Graph, Node, Tape, Unary};
+use crate::expr::{Atom, Domain, ExprId, FieldPoint, Graph, Node, Rational, Tape, Unary};
 
 /// How often a draw is repeated until all square roots exist.
 pub(crate) const MOST_DRAWS: usize = 4000;
@@ -18,6 +18,8 @@ pub(crate) struct FieldPoses {
     /// Functions of constants that exist only for some of them.
     of_constants: Tape,
     pub(crate) steps: Vec<SolveStep>,
+    /// Angles whose turns are drawn in so many parts.
+    divided: Vec<(usize, i64)>,
 }
 
 impl FieldPoses {
@@ -40,6 +42,7 @@ impl FieldPoses {
             n_constants: mechanism.constants.len(),
             of_constants: functions_of_constants(graph, &all),
             steps,
+            divided: plan.divided,
         }
     }
 
@@ -81,6 +84,11 @@ impl FieldPoses {
             }
             point.values.insert(Atom::Coordinate(*i), N::draw(stream));
         }
+        for (i, n) in &self.divided {
+            if let Some(turn) = in_parts(&point, *i, *n) {
+                point.angles.insert(Atom::Coordinate(*i), turn);
+            }
+        }
         point
     }
 
@@ -91,6 +99,26 @@ impl FieldPoses {
         }
         Some(point)
     }
+}
+
+/// Cosine and sine of a coordinate as `n` times the opaque angle that is its `n`-th part.
+fn in_parts<N: Number>(point: &FieldPoint<N>, coordinate: usize, n: i64) -> Option<(N, N)> {
+    let value = point.atom(Atom::Coordinate(coordinate))?;
+    let part = value * point.rational(&Rational::new(1, n))?;
+    let mut power = (
+        point.unary(Unary::Cos, &part)?,
+        point.unary(Unary::Sin, &part)?,
+    );
+    let turned = |(a, b): (N, N), (c, s): (N, N)| (a * c - b * s, a * s + b * c);
+    let (mut total, mut left) = ((N::ONE, N::ZERO), n);
+    while left > 0 {
+        if left % 2 == 1 {
+            total = turned(total, power);
+        }
+        power = turned(power, power);
+        left /= 2;
+    }
+    Some(total)
 }
 
 /// Functions under `roots` that depend on constants alone and do not exist for all of them.

@@ -43,15 +43,15 @@ impl Size {
             .iter()
             .map(|r| magnitude(graph, mechanism, &mut known, *r))
             .collect();
-        let total = graph.add_all(&terms);
         let still = lengths(graph, mechanism, |_, _| Graph::ZERO);
-        let total = graph.substitute(&[total], &still)[0];
+        let mut terms = graph.substitute(&terms, &still);
+        // What couples coordinates has no size of its own.
+        terms.retain(|term| graph.atoms(&[*term]).into_iter().all(Atom::is_fixed));
+        let total = graph.add_all(&terms);
         let nominal = nominal_value(graph, mechanism, total).filter(|size| size.is_normal());
         match nominal {
-            Some(nominal) if graph.atoms(&[total]).into_iter().all(Atom::is_fixed) => {
-                Self { total, nominal }
-            }
-            _ => Self {
+            Some(nominal) => Self { total, nominal },
+            None => Self {
                 total: Graph::ZERO,
                 nominal: 0.0,
             },

@@ -113,6 +113,10 @@ impl<'a> NumericLoops<'a> {
             _ => 0.0,
         };
         let values = self.tape.evaluate(&F64(value))?;
+        // A singular value decomposition of what are no numbers comes to no end.
+        if !values.iter().all(|x| x.is_finite()) {
+            return None;
+        }
         let (residual, jacobian) = values.split_at(self.n_residuals);
         Some((
             DVector::from_column_slice(residual),

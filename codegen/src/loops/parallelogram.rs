@@ -10,9 +10,12 @@ use modelmill_algebra::field::{Element, Stream};
 use modelmill_spec::Mechanism;
 use nalgebra::{DMatrix, DVector};
 
-use crate::expr::{AngleSum, Atom, ExprId, FieldPoint, Graph, Node, Tape, coordinates_of};
+use crate::expr::{
+    AngleSum, Atom, ExprId, F64, FieldPoint, Graph, Node, Tape, coordinates_of, nominal_of,
+};
 use crate::loops::closure::Closure;
-use crate::loops::numeric_poses::NumericLoops;
+use crate::loops::magnitude;
+use crate::loops::numeric_poses::{NumericLoops, symmetric};
 use crate::loops::relation::AngleRelation;
 
 /// How far known coordinates are moved from the nominal pose, in rad or relative to the size of the loop, and how exact
@@ -29,6 +32,7 @@ pub(crate) fn find(graph: &mut Graph, mechanism: &Mechanism, closures: &mut [Clo
         .filter(|c| !mechanism.coordinates[*c].passive)
         .collect();
     let mut related: Vec<AngleRelation> = Vec::new();
+    let mut solved: Vec<ExprId> = Vec::new();
     let mut todo: Vec<usize> = (0..closures.len()).collect();
     let unknown_of = |closure: &Closure, known: &BTreeSet<usize>| -> Vec<usize> {
         let coordinates = closure.coordinates.iter().copied();
@@ -41,16 +45,68 @@ pub(crate) fn find(graph: &mut Graph, mechanism: &Mechanism, closures: &mut [Clo
         let closure = &mut closures[todo.remove(position)];
         let unknown = unknown_of(closure, &known);
         known.extend(&unknown);
+        if !closure.given().is_empty() {
+            related.extend(closure.relations.iter().cloned());
+            continue;
+        }
         // What is known of other loops' angles may be what makes this one a parallelogram.
         let residual = put_in(graph, &related, &closure.residual);
-        if let Some(relations) = relations_of(graph, mechanism, &residual, &unknown) {
+        let mut relations = relations_of(graph, mechanism, &residual, &unknown);
+        if relations.is_none() && mechanism.is_at_values {
+            let of_relations = |c: &usize| related.iter().any(|r| r.coordinate == *c);
+            let motion = Motion {
+                residual: solved.iter().chain(&residual).copied().collect(),
+                unknown: (known.iter().copied())
+                    .filter(|c| mechanism.coordinates[*c].passive)
+                    .collect(),
+                turning: (known.iter().copied())
+                    .filter(|c| !unknown.contains(c) && !of_relations(c))
+                    .collect(),
+            };
+            relations = relations_along(graph, mechanism, &motion, &residual, &unknown);
+        }
+        if let Some(relations) = relations {
             closure.residual = relations.iter().map(|r| r.residual(graph)).collect();
             closure.coordinates = coordinates_of(graph, &closure.residual);
             closure.chain = None;
             related.extend(relations.iter().cloned());
             closure.relations = relations;
         }
+        solved.extend(&closure.residual);
     }
+}
+
+/// Loops that are closed together, with the coordinates that they settle, and those by which others may turn.
+struct Motion {
+    residual: Vec<ExprId>,
+    unknown: Vec<usize>,
+    turning: Vec<usize>,
+}
+
+/// Relations that hold along the motion of other loops and not without it, as those of a parallelogram of which one side is
+/// the side of a five-bar; seen in numbers, to the last digits of the file, and so only of its values.
+fn relations_along(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    motion: &Motion,
+    residual: &[ExprId],
+    unknown: &[usize],
+) -> Option<Vec<AngleRelation>> {
+    let given: Vec<usize> = (0..mechanism.coordinates.len())
+        .filter(|c| !motion.unknown.contains(c))
+        .collect();
+    let poses = poses(graph, mechanism, &motion.residual, &motion.unknown, &given)?;
+    let fixed = fixed_angles(graph, residual);
+    let candidates: Vec<Vec<AngleRelation>> = unknown
+        .iter()
+        .map(|p| relations(mechanism, &poses, &motion.turning, &fixed, *p))
+        .collect();
+    let size = magnitude::at_nominal(graph, mechanism, residual);
+    combinations(&candidates).find(|relations| {
+        let closed = put_in(graph, relations, residual);
+        let tape = Tape::new(graph, &closed);
+        poses.iter().all(|q| closes_at(mechanism, &tape, q, size))
+    })
 }
 
 /// The relations that solve a loop for `unknown`, if there are such; shown exactly.
@@ -70,7 +126,7 @@ fn relations_of(
         .iter()
         .map(|p| relations(mechanism, &poses, &given, &fixed, *p))
         .collect();
-    combinations(&candidates).find(|relations| closes(graph, residual, relations))
+    combinations(&candidates).find(|relations| closes(graph, mechanism, residual, relations))
 }
 
 /// Coordinates at the nominal pose and at some poses around it; `None` if the loop cannot be followed there.
@@ -231,13 +287,19 @@ fn turning(
     Some((AngleSum::new(terms), offset))
 }
 
-/// Whether the relations close the loop at every pose: shown at random points of the field.
-fn closes(graph: &mut Graph, residual: &[ExprId], relations: &[AngleRelation]) -> bool {
+/// Whether the relations close the loop at every pose: shown at random points of the field; or, of a mechanism for its file's
+/// values alone, in numbers, since there lengths are what is left of those that were meant.
+fn closes(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    residual: &[ExprId],
+    relations: &[AngleRelation],
+) -> bool {
     let closed = put_in(graph, relations, residual);
     let tape = Tape::new(graph, &closed);
     let atoms = graph.atoms(&closed);
     let mut stream = Stream::new(2);
-    (0..8).all(|_| {
+    let closes_exactly = (0..8).all(|_| {
         let mut point = FieldPoint::<Element>::default();
         for atom in &atoms {
             point.values.insert(*atom, stream.element());
@@ -245,7 +307,40 @@ fn closes(graph: &mut Graph, residual: &[ExprId], relations: &[AngleRelation]) -
         }
         tape.evaluate(&point)
             .is_some_and(|values| values.iter().all(|v| *v == Element::ZERO))
+    });
+    closes_exactly || mechanism.is_at_values && closes_in_numbers(graph, mechanism, residual, &tape)
+}
+
+/// Whether nothing but the last digits of the file's lengths is left of a loop, at any angles.
+fn closes_in_numbers(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    residual: &[ExprId],
+    closed: &Tape,
+) -> bool {
+    let size = magnitude::at_nominal(graph, mechanism, residual);
+    let mut stream = Stream::new(3);
+    (0..8).all(|_| {
+        let moved: Vec<f64> = (mechanism.coordinates.iter())
+            .map(|c| {
+                let far = if c.motion.is_angle() { 3.0 } else { size };
+                c.nominal + far * symmetric(&mut stream)
+            })
+            .collect();
+        closes_at(mechanism, closed, &moved, size)
     })
+}
+
+/// Whether nothing but the last digits of the file's lengths is left of a loop at a pose.
+fn closes_at(mechanism: &Mechanism, closed: &Tape, pose: &[f64], size: f64) -> bool {
+    /// Relative to the size of the loop: what the arithmetic of other programs leaves in lengths that they write.
+    const LAST_DIGITS: f64 = 1e-11;
+    let value = |atom: Atom| match atom {
+        Atom::Coordinate(i) => pose[i],
+        fixed => nominal_of(mechanism, fixed),
+    };
+    let left = closed.evaluate(&F64(value));
+    left.is_some_and(|left| left.iter().all(|x| x.abs() <= LAST_DIGITS * size))
 }
 
 /// Replaces the related angles in sines and cosines.

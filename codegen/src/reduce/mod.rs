@@ -15,10 +15,12 @@ mod oracle;
 mod preference;
 mod print;
 mod rational_function;
+mod recognise;
 mod reconstruct;
 mod reduction;
 mod relations;
 mod sample;
+mod states;
 mod support;
 
 use modelmill_algebra::field::Stream;

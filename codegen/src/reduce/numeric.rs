@@ -1,31 +1,36 @@
-//! The numeric reduction, for loops that cannot be sampled exactly: the rank test of eq. (9) on the model file's values.
+//! The numeric reduction, for loops that cannot be sampled exactly: the rank test of eq. (9) on the model file's values, with
+//! so many digits that what is dependent shows beside what is only small.
 //!
-//! Its factors are floating-point numbers and hold for these values alone; results say so.
+//! Columns of a mechanism with one freedom are functions of one coordinate, and smooth: on a short path they differ by less than
+//! machine numbers resolve. So states come from a walk along the whole motion, have some 130 digits, and are on all loops.
+//! The factors hold for the file's values alone; results say so, with what they leave at further states.
 
+use modelmill_algebra::digits::Digits;
 use modelmill_algebra::field::Stream;
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
-use num_traits::ToPrimitive;
 
-use super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
+use super::recognise::Constants;
 use super::reduction::{Dependency, Method, Reduction};
+use super::states::States;
 use crate::DeriveError;
 use crate::expr::independent::SEED;
-use crate::expr::{Atom, ExprId, F64, Graph, Rational, Tape};
+use crate::expr::{Atom, ExprId, F64, Graph, Tape};
 use crate::loops::numeric_poses::{NumericLoops, symmetric};
 use crate::regressor::projection::Projection;
 use crate::tree::expressions::Monomial;
 
-/// What is left of a column, relative to its size, below which it counts as dependent.
-const DEPENDENT: f64 = 1e-9;
+/// What others leave of a column, relative to its size, below which it counts as dependent, and the size relative to the
+/// largest below which it counts as none; and the same as a multiple of what the digits of the file leave open in its loops.
+const DEPENDENT: f64 = 1e-13;
+const PER_OFF: f64 = 100.0;
 /// A column this much smaller than the largest is rounding.
 const NOTHING: f64 = 1e-13;
+/// What written factors may leave of a column at further states, relative to its terms; and as a multiple of the same.
+const SHOWN: f64 = 1e-10;
 /// How far poses lie from the nominal one, in rad or relative to the size of the loops, and how often that is halved
 /// where most of such poses cannot be reached.
 pub(super) const REACH: f64 = 0.4;
-/// The same where a base is looked for: columns of a mechanism with one freedom hardly differ along a short path, and a long
-/// one may lead through a singular pose into another branch, where the mechanism is another one.
-const FAR: f64 = 0.5;
 const HALVINGS: u32 = 7;
 
 /// Reduces `columns[k][d]`, trying them in the given order.
@@ -38,52 +43,16 @@ pub(super) fn reduce(
     order: &[usize],
     because: DeriveError,
 ) -> Result<Reduction, DeriveError> {
-    let w = sample(
-        graph,
-        mechanism,
-        projection,
-        columns,
-        4 * columns.len(),
-        FAR,
-    )?;
-    let norms: Vec<f64> = (0..columns.len()).map(|k| w.column(k).norm()).collect();
-    let largest = norms.iter().fold(0.0, |a: f64, b| a.max(*b));
-    let mut effective: Vec<usize> = (order.iter().copied())
-        .filter(|k| norms[*k] > NOTHING * largest)
-        .collect();
-    let units = DMatrix::from_fn(w.nrows(), effective.len(), |i, j| {
-        w[(i, effective[j])] / norms[effective[j]]
-    });
-    let rank = rank(&units);
-    let Chosen {
-        kept: chosen,
-        least_kept,
-        most_dropped,
-    } = Chosen::new(&units, rank);
-    let kept: Vec<usize> = chosen.iter().map(|j| effective[*j]).collect();
-    let basis = units.select_columns(&chosen);
-    let qr = basis.qr();
-    let triangle = qr.r();
-    let mut lines: Vec<(usize, Vec<f64>)> = Vec::new();
-    for (j, k) in effective.iter().enumerate() {
-        if chosen.contains(&j) {
-            continue;
-        }
-        let mut rotated = units.columns(j, 1).into_owned();
-        qr.q_tr_mul(&mut rotated);
-        let factors = triangle
-            .solve_upper_triangular(&rotated.rows(0, chosen.len()))
-            .ok_or(DeriveError::RankChanged)?;
-        // What contributes less than is dropped is rounding.
-        let above_rounding = |f: f64| if f.abs() > DEPENDENT { f } else { 0.0 };
-        let factors = factors.iter().zip(&kept);
-        lines.push((
-            *k,
-            factors
-                .map(|(f, j)| above_rounding(*f) * norms[*k] / norms[*j])
-                .collect(),
-        ));
-    }
+    let mut states = States::new(graph, mechanism, projection, columns)?;
+    let n_rows = columns.len() + columns.len() / 4 + 20;
+    let w = Columns::new(&states.rows(n_rows)?, columns.len());
+    let limit = DEPENDENT.max(PER_OFF * states.off());
+    let largest = w.norms.iter().fold(0.0, |a: f64, b| a.max(*b));
+    let is_effective = |k: usize| w.norms[k] > limit * largest;
+    let tried: Vec<usize> = order.iter().copied().filter(|k| is_effective(*k)).collect();
+    let base = Base::new(&w, &tried, limit);
+
+    let mut effective = tried.clone();
     effective.sort_unstable();
     let at = |k: usize| {
         effective
@@ -91,32 +60,39 @@ pub(super) fn reduce(
             .position(|x| *x == k)
             .expect("an effective column has a position")
     };
-    let mut sorted = kept.clone();
+    let mut sorted = base.kept.clone();
     sorted.sort_unstable();
-    let mut dependencies: Vec<Dependency> = lines
-        .iter()
-        .map(|(k, factors)| Dependency {
-            product: at(*k),
-            equals: kept
-                .iter()
-                .zip(factors)
-                .filter(|(_, f)| **f != 0.0)
-                .map(|(j, f)| {
-                    (
-                        sorted
-                            .iter()
-                            .position(|x| x == j)
-                            .expect("a kept column is kept"),
-                        recognised(*f, mechanism),
-                    )
-                })
-                .collect(),
+    let retained_at = |k: usize| {
+        sorted
+            .iter()
+            .position(|x| *x == k)
+            .expect("a kept column is kept")
+    };
+    // What contributes less than is dropped is rounding.
+    let rounding = (1e3 * base.most_dropped).clamp(1e-60, 1e-9);
+    let constants = Constants::new(mechanism, rounding.min(1e-10));
+    let mut dependencies: Vec<Dependency> = Vec::new();
+    for j in tried.iter().copied().filter(|j| !base.kept.contains(j)) {
+        let factors = base.kept.iter().zip(base.factors(j));
+        let mut equals: Vec<_> = factors
+            .filter(|(k, f)| f.abs().to_f64() * w.norms[**k] > rounding * w.norms[j])
+            .map(|(k, f)| {
+                (
+                    retained_at(*k),
+                    constants.factor(&f, &candidates[j], &candidates[*k]),
+                )
+            })
+            .collect();
+        equals.sort_by_key(|(k, _)| *k);
+        dependencies.push(Dependency {
+            product: at(j),
+            equals,
             via: Vec::new(),
-        })
-        .collect();
+        });
+    }
     dependencies.sort_by_key(|line| line.product);
     let products: Vec<Monomial> = effective.iter().map(|k| candidates[*k].clone()).collect();
-    Ok(Reduction {
+    let mut found = Reduction {
         without_effect: candidates
             .iter()
             .filter(|c| !products.contains(c))
@@ -125,143 +101,137 @@ pub(super) fn reduce(
         retained: sorted.iter().map(|k| at(*k)).collect(),
         products,
         dependencies,
-        method: Method::Numeric {
-            least_kept,
-            most_dropped,
-            because: Box::new(because),
-        },
-    })
-}
-
-/// The rank of columns of unit length: up to the widest gap between singular values where they are small.
-fn rank(units: &DMatrix<f64>) -> usize {
-    /// Singular values above this share of the largest count.
-    const LARGE: f64 = 1e-6;
-    /// Below, all is rounding.
-    const ROUNDING: f64 = 1e-15;
-    if units.ncols() == 0 {
-        return 0;
+        method: Method::Unreduced,
+    };
+    let values: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
+    let fresh = Columns::new(&states.rows(n_rows)?, columns.len());
+    let residual = fresh.left(&found, &effective, &values);
+    // Terms that count as rounding are left out, each by itself.
+    let left_out = rounding * base.kept.len() as f64;
+    if residual > SHOWN.max(10.0 * PER_OFF * states.off()).max(left_out) {
+        return Err(DeriveError::NotConfirmed);
     }
-    let mut values: Vec<f64> = units.singular_values().iter().copied().collect();
-    values.sort_by(|a, b| b.total_cmp(a));
-    let floor = ROUNDING * values[0];
-    values.push(0.0);
-    let gap = |k: usize| values[k - 1].max(floor) / values[k].max(floor);
-    let candidates = (1..values.len()).filter(|k| values[*k] <= LARGE * values[0]);
-    // Of equal gaps the first.
-    let widest = candidates.fold(None, |best: Option<usize>, k| match best {
-        Some(best) if gap(best) >= gap(k) => Some(best),
-        _ => Some(k),
-    });
-    widest.unwrap_or(units.ncols())
+    found.method = Method::Numeric {
+        least_kept: base.least_kept,
+        most_dropped: base.most_dropped,
+        residual,
+        because: Box::new(because),
+    };
+    Ok(found)
 }
 
-/// Columns that are kept, as many as the rank says.
-struct Chosen {
+/// Columns of W.
+struct Columns {
+    values: Vec<Vec<Digits>>,
+    norms: Vec<f64>,
+}
+
+impl Columns {
+    fn new(rows: &[Vec<Digits>], n: usize) -> Self {
+        let values: Vec<Vec<Digits>> = (0..n)
+            .map(|k| rows.iter().map(|row| row[k].clone()).collect())
+            .collect();
+        Self {
+            norms: values.iter().map(|column| norm(column)).collect(),
+            values,
+        }
+    }
+
+    /// The most that dependences leave of a column, relative to their terms.
+    fn left(&self, found: &Reduction, effective: &[usize], constants: &[f64]) -> f64 {
+        let lines = found.dependencies.iter().zip(found.factors(constants));
+        let shares = lines.map(|(line, factors)| {
+            let product = effective[line.product];
+            let mut left = self.values[product].clone();
+            let mut size = self.norms[product];
+            for (k, factor) in factors {
+                let kept = effective[found.retained[k]];
+                size += factor.abs() * self.norms[kept];
+                let factor = Digits::from_f64(-factor).expect("a factor is a number");
+                add(&mut left, &factor, &self.values[kept]);
+            }
+            norm(&left) / size
+        });
+        shares.fold(0.0, f64::max)
+    }
+}
+
+fn norm(column: &[Digits]) -> f64 {
+    column
+        .iter()
+        .map(|x| x.to_f64().powi(2))
+        .sum::<f64>()
+        .sqrt()
+}
+
+fn dot(a: &[Digits], b: &[Digits]) -> Digits {
+    let products = a.iter().zip(b).map(|(a, b)| a * b);
+    products.fold(Digits::zero(), |sum, term| &sum + &term)
+}
+
+/// `column + factor * other`
+fn add(column: &mut [Digits], factor: &Digits, other: &[Digits]) {
+    for (x, y) in column.iter_mut().zip(other) {
+        *x = &*x + &(factor * y);
+    }
+}
+
+/// Columns that are kept, and what all others are beside them.
+struct Base {
+    /// In the order in which they were taken.
     kept: Vec<usize>,
     /// What the others leave of the kept column that is nearest to being dependent, and of the dropped one that is furthest.
     least_kept: f64,
     most_dropped: f64,
+    /// Of each column the shares along what was left of each kept one when that was taken.
+    shares: Vec<Vec<Digits>>,
 }
 
-impl Chosen {
-    /// The first columns of which much is left beside those before, then those of which most is left.
-    fn new(units: &DMatrix<f64>, rank: usize) -> Self {
+impl Base {
+    /// The first columns of which much is left beside those before, then those of which most is left, down to `limit`.
+    fn new(w: &Columns, tried: &[usize], limit: f64) -> Self {
         const MUCH: f64 = 1e-3;
-        let mut left = units.clone();
-        let mut kept: Vec<usize> = Vec::with_capacity(rank);
-        let mut least_kept = 1.0_f64;
-        while kept.len() < rank {
-            let open = (0..units.ncols()).filter(|j| !kept.contains(j));
-            let sizes: Vec<(usize, f64)> = open.map(|j| (j, left.column(j).norm())).collect();
-            let first = sizes.iter().find(|(_, size)| *size > MUCH);
-            let most = sizes.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-            let Some(&(pivot, size)) = first.or(most).filter(|(_, size)| *size > 0.0) else {
-                break;
-            };
-            least_kept = least_kept.min(size);
-            kept.push(pivot);
-            // Twice, so that rounding leaves nothing of it.
-            for _ in 0..2 {
-                let direction = left.column(pivot).normalize();
-                for j in (0..units.ncols()).filter(|j| *j != pivot && !kept.contains(j)) {
-                    let share = direction.dot(&left.column(j));
-                    left.column_mut(j).axpy(-share, &direction, 1.0);
-                }
-            }
-        }
-        let dropped = (0..units.ncols()).filter(|j| !kept.contains(j));
-        let most_dropped = dropped.map(|j| left.column(j).norm()).fold(0.0, f64::max);
-        kept.sort_unstable();
-        Self {
-            kept,
-            least_kept,
-            most_dropped,
-        }
-    }
-}
-
-/// A factor as a small rational, or as one times constants of the file, where it is that up to rounding; else as a number.
-fn recognised(value: f64, mechanism: &Mechanism) -> RationalFunction {
-    /// Factors come from poses that are closed to about this accuracy.
-    const ROUNDING: f64 = 1e-10;
-    const LARGEST_DENOMINATOR: i64 = 24;
-    let is_near = |a: f64| (a - value).abs() <= ROUNDING * value.abs();
-    for below in 1..=LARGEST_DENOMINATOR {
-        let above = (value * below as f64).round();
-        if let Some(n) = above.to_i64().filter(|n| n.abs() < 1000)
-            && is_near(above / below as f64)
-        {
-            return RationalFunction::constant(Rational::new(n, below));
-        }
-    }
-    let lengths: Vec<(usize, f64)> = (mechanism.constants.iter().enumerate())
-        .filter(|(_, c)| !c.is_angle && c.value != 0.0)
-        .map(|(i, c)| (i, c.value))
-        .collect();
-    let function = |number: Rational, above: &[usize], below: &[usize]| {
-        let powers = |of: &[usize]| {
-            let mut powers = Powers::new();
-            for i in of {
-                match powers
-                    .iter_mut()
-                    .find(|(v, _)| *v == Variable::Constant(*i))
-                {
-                    Some((_, n)) => *n += 1,
-                    None => powers.push((Variable::Constant(*i), 1)),
-                }
-            }
-            powers.sort_unstable();
-            powers
+        let mut left = w.values.clone();
+        let mut base = Self {
+            kept: Vec::new(),
+            least_kept: 1.0,
+            most_dropped: 0.0,
+            shares: vec![Vec::new(); w.values.len()],
         };
-        RationalFunction::new(
-            Polynomial::from([(powers(above), number)]),
-            Polynomial::from([(powers(below), Rational::ONE)]),
-        )
-    };
-    for number in [(1, 1), (-1, 1), (2, 1), (-2, 1), (1, 2), (-1, 2)] {
-        let k = f64::from(number.0) / f64::from(number.1);
-        let number = || Rational::new(i64::from(number.0), i64::from(number.1));
-        for (i, a) in &lengths {
-            if is_near(k * a) {
-                return function(number(), &[*i], &[]);
-            }
-            if is_near(k / a) {
-                return function(number(), &[], &[*i]);
-            }
-        }
-        for (i, a) in &lengths {
-            for (j, b) in &lengths {
-                if is_near(k * a * b) {
-                    return function(number(), &[*i, *j], &[]);
-                }
-                if i != j && is_near(k * a / b) {
-                    return function(number(), &[*i], &[*j]);
-                }
+        loop {
+            let open: Vec<(usize, f64)> = (tried.iter().copied())
+                .filter(|j| !base.kept.contains(j))
+                .map(|j| (j, norm(&left[j]) / w.norms[j]))
+                .collect();
+            let most = open.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+            base.most_dropped = most.map_or(0.0, |(_, size)| *size);
+            let first = open.iter().find(|(_, size)| *size > MUCH);
+            let Some(&(pivot, size)) = first.or(most).filter(|(_, size)| *size > limit) else {
+                return base;
+            };
+            base.least_kept = base.least_kept.min(size);
+            base.kept.push(pivot);
+            let direction = left[pivot].clone();
+            let square = dot(&direction, &direction);
+            for (j, _) in open.into_iter().filter(|(j, _)| *j != pivot) {
+                let share = dot(&direction, &left[j]) / square.clone();
+                add(&mut left[j], &-&share, &direction);
+                base.shares[j].push(share);
             }
         }
     }
-    decimal(value)
+
+    /// A dropped column by the kept ones.
+    fn factors(&self, j: usize) -> Vec<Digits> {
+        let mut factors = self.shares[j].clone();
+        for m in (0..factors.len()).rev() {
+            for i in 0..m {
+                let change = &factors[m] * &self.shares[self.kept[m]][i];
+                factors[i] = &factors[i] - &change;
+            }
+        }
+        factors
+    }
 }
 
 /// Whether dependences that were found elsewhere fail on the model file's values around the nominal pose. Where no pose
@@ -303,19 +273,6 @@ pub(super) fn contradicts(
             }
             left.norm() > WRONG * size && left.norm() > NOTHING * largest
         })
-}
-
-/// A number with thirteen significant digits, as an exact rational, so that everything behind treats it like any other
-/// factor.
-fn decimal(value: f64) -> RationalFunction {
-    const DIGITS: i32 = 12;
-    let written = format!("{value:.12e}");
-    let rational = written.split_once('e').and_then(|(mantissa, exponent)| {
-        let mantissa: i64 = mantissa.replace('.', "").parse().ok()?;
-        let exponent: i32 = exponent.parse().ok()?;
-        Some(&Rational::integer(mantissa) * &Rational::integer(10).pow(exponent - DIGITS))
-    });
-    RationalFunction::constant(rational.expect("a finite number has a mantissa and an exponent"))
 }
 
 /// W of eq. (9) at random states around the nominal pose, with some more rows than are wanted.
@@ -401,4 +358,126 @@ pub(super) fn sample(
         columns.len(),
         &rows,
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regressor::equations;
+    use crate::review::tests::model;
+
+    /// Where an exact base is known the numeric one has as many columns, with factors that are constants of the file.
+    #[test]
+    fn as_many_columns_as_in_the_field() {
+        for name in [
+            "two_link",
+            "scara",
+            "drone",
+            "four_bar",
+            "slider_crank",
+            "parallelogram",
+            "five_bar",
+            "three_rrr",
+            "delta",
+        ] {
+            let mechanism = model(name);
+            let mut graph = Graph::new();
+            let found = equations(&mut graph, &mechanism).expect("equations");
+            let exact = crate::reduce::reduce(&mut graph, &mechanism, &found).expect("a base");
+            assert!(matches!(exact.method, Method::Exact { .. }), "{name}");
+            let order: Vec<usize> = (0..found.columns.len())
+                .filter(|k| found.columns[*k].iter().any(|x| *x != Graph::ZERO))
+                .collect();
+            let numeric = reduce(
+                &mut graph,
+                &mechanism,
+                &found.projection,
+                &found.products,
+                &found.columns,
+                &order,
+                DeriveError::NotConfirmed,
+            )
+            .expect("a base");
+            assert_eq!(numeric.retained.len(), exact.retained.len(), "{name}");
+            let Method::Numeric {
+                least_kept,
+                most_dropped,
+                residual,
+                ..
+            } = numeric.method
+            else {
+                panic!("{name}: {:?}", numeric.method);
+            };
+            assert!(least_kept > 1e-8 && most_dropped < 1e-100, "{name}");
+            assert!(residual < SHOWN, "{name}: {residual:.1e}");
+        }
+    }
+
+    /// A mechanism of which an independent program counted the base parameters, with changes in its text.
+    fn judged(name: &str, changes: &[(&str, &str)]) -> Mechanism {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/fixtures/judged");
+        let mut text = std::fs::read_to_string(format!("{folder}/{name}.toml")).expect("a fixture");
+        for (old, new) in changes {
+            assert!(text.contains(old), "{name} has no {old}");
+            text = text.replace(old, new);
+        }
+        let memory = modelmill_boundary::files::Memory::default();
+        match modelmill_spec::load(name, &text, &memory) {
+            Ok(loaded) => loaded.mechanism,
+            Err(failure) => panic!("{}", failure.render(false)),
+        }
+    }
+
+    /// Loops that move against the count of their freedoms, and loops that fold: the number is beyond doubt, and factors are
+    /// constants of the file, without a decimal point.
+    #[test]
+    fn overconstrained_and_symmetric_loops() {
+        for (name, rank) in [
+            ("bricard_trihedral", 22),
+            ("bricard_regular", 19),
+            ("peaucellier", 14),
+            ("peaucellier_tied", 8),
+            ("sarrus", 5),
+        ] {
+            let found = crate::derive(&judged(name, &[])).expect("a derivation");
+            assert_eq!(found.reduction.retained.len(), rank, "{name}");
+            let Method::Numeric {
+                least_kept,
+                most_dropped,
+                residual,
+                ..
+            } = found.reduction.method
+            else {
+                panic!("{name}: {:?}", found.reduction.method);
+            };
+            assert!(least_kept > 1e-6 && most_dropped < 1e-100, "{name}");
+            assert!(residual < 1e-12, "{name}: {residual:.1e}");
+            if name == "bricard_trihedral" {
+                continue;
+            }
+            for base in found.base_parameters() {
+                assert!(
+                    !base.expression.contains('.'),
+                    "{name}: {}",
+                    base.expression
+                );
+            }
+        }
+    }
+
+    /// Lengths that a person has rounded close a loop with more equations than it needs only nearly: the base is that of the
+    /// loop that was meant, and what is left says how nearly.
+    #[test]
+    fn rounded_lengths_keep_the_base() {
+        let rounded = [(
+            r#"xyz = ["-(a)", 0, 0]"#,
+            r#"xyz = ["-0.4000000003", 0, 0]"#,
+        )];
+        let found = crate::derive(&judged("bricard_regular", &rounded)).expect("a derivation");
+        assert_eq!(found.reduction.retained.len(), 19);
+        let Method::Numeric { residual, .. } = found.reduction.method else {
+            panic!("{:?}", found.reduction.method);
+        };
+        assert!(residual > 1e-12 && residual < 1e-6, "{residual:.1e}");
+    }
 }

@@ -35,12 +35,14 @@ pub enum Method {
     },
     /// Not at all: every product that was asked for is retained.
     Unreduced,
-    /// On the model file's values, in floating point: the factors are rounded numbers.
+    /// On the model file's values, with many digits: factors that are recognised are written so, others are rounded numbers.
     Numeric {
         /// What the others leave of the retained column that is nearest to being dependent, relative to its size.
         least_kept: f64,
         /// The same for the dependent column that is furthest from it.
         most_dropped: f64,
+        /// What the factors leave of a dependent column at further states, relative to its terms: the most of all.
+        residual: f64,
         /// Why there is no exact reduction.
         because: Box<DeriveError>,
     },
@@ -57,9 +59,9 @@ impl Method {
             Self::Exact { .. } => Some(
                 "the constants stand as the numbers of this file: base and equations hold for these values alone".to_owned(),
             ),
-            Self::Numeric { because, .. } => Some(format!(
-                "the base parameters were found numerically, on the values of this file: {because}; factors are rounded, and \
-                 base and factors hold for these values alone"
+            Self::Numeric { because, residual, .. } => Some(format!(
+                "the base parameters were found numerically, on the values of this file: {because}; factors are rounded (they \
+                 leave {residual:.1e} of a column), and base and factors hold for these values alone"
             )),
         }
     }

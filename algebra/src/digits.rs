@@ -1,0 +1,420 @@
+//! Floating-point numbers of some 130 digits: what two functions have in common shows beside what rounding leaves of them,
+//! however small either is in machine numbers.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::sync::OnceLock;
+
+use num_bigint::BigInt;
+use num_traits::{Signed, ToPrimitive, Zero};
+
+use crate::Rational;
+
+/// Bits that a number keeps.
+const BITS: u64 = 448;
+/// Bits more for what is summed up inside a function.
+const SPARE: u64 = 64;
+
+/// `mantissa * 2^exponent`, of `BITS` bits at most; zero has the exponent zero.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Digits {
+    mantissa: BigInt,
+    exponent: i64,
+}
+
+impl Digits {
+    /// A relative error far above that of a chain of many operations.
+    pub const ROUNDING: f64 = 1e-120;
+
+    /// 0
+    pub fn zero() -> Self {
+        Self {
+            mantissa: BigInt::zero(),
+            exponent: 0,
+        }
+    }
+
+    /// An integer.
+    pub fn integer(value: i64) -> Self {
+        Self::new(BigInt::from(value), 0)
+    }
+
+    /// Rounded to [`BITS`] bits, towards zero.
+    fn new(mantissa: BigInt, exponent: i64) -> Self {
+        Self::rounded(mantissa, exponent, BITS)
+    }
+
+    fn rounded(mantissa: BigInt, exponent: i64, bits: u64) -> Self {
+        if mantissa.is_zero() {
+            return Self::zero();
+        }
+        let excess = mantissa.bits().saturating_sub(bits);
+        let places = i64::try_from(excess).expect("a mantissa fits the memory");
+        Self {
+            // Shifted by its magnitude, since shifts of negative numbers round down.
+            mantissa: if excess == 0 {
+                mantissa
+            } else {
+                BigInt::from_biguint(mantissa.sign(), mantissa.magnitude() >> excess)
+            },
+            exponent: exponent + places,
+        }
+    }
+
+    /// The value of a machine number; `None` where that is no number.
+    pub fn from_f64(value: f64) -> Option<Self> {
+        if !value.is_finite() {
+            return None;
+        }
+        let bits = value.to_bits();
+        let biased = i64::try_from((bits >> 52) & 0x7ff).expect("eleven bits");
+        let fraction = bits & ((1 << 52) - 1);
+        let (magnitude, exponent) = if biased == 0 {
+            (fraction, -1074)
+        } else {
+            (fraction | (1 << 52), biased - 1075)
+        };
+        let magnitude = BigInt::from(magnitude);
+        let signed = if value < 0.0 { -magnitude } else { magnitude };
+        Some(Self::new(signed, exponent))
+    }
+
+    /// The shortest decimal number that is read as `value`: what a person wrote; `None` where that is no number.
+    pub fn as_written(value: f64) -> Option<Self> {
+        let text = value.is_finite().then(|| format!("{value:e}"))?;
+        let (mantissa, exponent) = text.split_once('e')?;
+        let n_places = mantissa
+            .split_once('.')
+            .map_or(0, |(_, places)| places.len());
+        let whole: BigInt = mantissa.replace('.', "").parse().ok()?;
+        let exponent: i64 = exponent.parse::<i64>().ok()? - i64::try_from(n_places).ok()?;
+        let power = BigInt::from(10).pow(u32::try_from(exponent.unsigned_abs()).ok()?);
+        Some(if exponent < 0 {
+            Self::new(whole, 0) / Self::new(power, 0)
+        } else {
+            Self::new(whole * power, 0)
+        })
+    }
+
+    /// A fraction.
+    pub fn from_rational(value: &Rational) -> Self {
+        if let Some((n, d)) = value.as_small() {
+            return if d == 1 {
+                Self::integer(n)
+            } else {
+                Self::integer(n) / Self::integer(d)
+            };
+        }
+        let big = value.to_big();
+        Self::new(big.numer().clone(), 0) / Self::new(big.denom().clone(), 0)
+    }
+
+    /// The nearest machine number, but for its last bit.
+    pub fn to_f64(&self) -> f64 {
+        let short = Self::rounded(self.mantissa.clone(), self.exponent, 60);
+        let mantissa = short.mantissa.to_f64().unwrap_or(0.0);
+        // In two steps, so that neither power leaves the range before the product does.
+        let half = short.exponent.clamp(-2200, 2200) / 2;
+        let rest = short.exponent.clamp(-2200, 2200) - half;
+        let power = |n: i64| 2.0_f64.powi(i32::try_from(n).expect("clamped"));
+        mantissa * power(half) * power(rest)
+    }
+
+    /// Whether it is 0.
+    pub fn is_zero(&self) -> bool {
+        self.mantissa.is_zero()
+    }
+
+    /// Whether it is below 0.
+    pub fn is_negative(&self) -> bool {
+        self.mantissa.is_negative()
+    }
+
+    /// Its magnitude.
+    #[must_use]
+    pub fn abs(&self) -> Self {
+        if self.is_negative() {
+            -self
+        } else {
+            self.clone()
+        }
+    }
+
+    /// `self * 2^n`
+    #[must_use]
+    pub fn scaled(&self, n: i64) -> Self {
+        let mut scaled = self.clone();
+        if !scaled.is_zero() {
+            scaled.exponent += n;
+        }
+        scaled
+    }
+
+    /// `self^n`; `None` for a negative power of 0.
+    #[must_use]
+    pub fn power(&self, n: i32) -> Option<Self> {
+        if n < 0 {
+            let below = self.power(-n).filter(|x| !x.is_zero())?;
+            return Some(Self::integer(1) / below);
+        }
+        let (mut rest, mut square, mut product) = (n, self.clone(), Self::integer(1));
+        while rest > 0 {
+            if rest & 1 == 1 {
+                product = &product * &square;
+            }
+            rest >>= 1;
+            if rest > 0 {
+                square = &square * &square;
+            }
+        }
+        Some(product)
+    }
+
+    /// The square root; `None` of what is negative.
+    #[must_use]
+    pub fn sqrt(&self) -> Option<Self> {
+        if self.is_negative() {
+            return None;
+        }
+        if self.is_zero() {
+            return Some(Self::zero());
+        }
+        let wanted = 2 * BITS;
+        let mut shift = wanted.saturating_sub(self.mantissa.bits());
+        if (self.exponent - i64::try_from(shift).expect("some bits")) % 2 != 0 {
+            shift += 1;
+        }
+        let exponent = self.exponent - i64::try_from(shift).expect("some bits");
+        Some(Self::new((&self.mantissa << shift).sqrt(), exponent / 2))
+    }
+
+    /// The power of two below which its magnitude lies.
+    fn magnitude(&self) -> i64 {
+        i64::try_from(self.mantissa.bits()).expect("some bits") + self.exponent
+    }
+
+    /// As an integer in units of `2^-places`.
+    fn fixed(&self, places: u64) -> BigInt {
+        let shift = self.exponent + i64::try_from(places).expect("some bits");
+        if shift >= 0 {
+            &self.mantissa << shift.unsigned_abs()
+        } else {
+            let magnitude = self.mantissa.magnitude() >> shift.unsigned_abs();
+            BigInt::from_biguint(self.mantissa.sign(), magnitude)
+        }
+    }
+
+    /// How often an argument is halved for its series, and the places that doubling costs besides.
+    fn halvings(&self) -> Option<(u64, u64)> {
+        /// Arguments beyond 2^40 have no place in a mechanism.
+        const LARGEST: i64 = 40;
+        const SMALL: i64 = 20;
+        let n = (self.magnitude() + SMALL).max(0);
+        let n = (self.magnitude() <= LARGEST).then(|| n.unsigned_abs())?;
+        Some((n, BITS + SPARE + 2 * n))
+    }
+
+    /// Cosine and sine of an angle in rad; `None` of one that is beyond all measure.
+    pub fn cos_sin(&self) -> Option<(Self, Self)> {
+        let (n, places) = self.halvings()?;
+        let one = BigInt::from(1) << places;
+        let x = self.scaled(-i64::try_from(n).ok()?).fixed(places);
+        let square: BigInt = (&x * &x) >> places;
+        // 1 - cos by its series, since doubling it loses nothing.
+        let (mut term, mut versed) = (square.clone() >> 1_u32, BigInt::zero());
+        let mut k = 2_u64;
+        while !term.is_zero() {
+            versed += &term;
+            term = -((term * &square) >> places) / ((k + 1) * (k + 2));
+            k += 2;
+        }
+        let (mut term, mut sine) = (x, BigInt::zero());
+        let mut k = 1_u64;
+        while !term.is_zero() {
+            sine += &term;
+            term = -((term * &square) >> places) / ((k + 1) * (k + 2));
+            k += 2;
+        }
+        for _ in 0..n {
+            let cosine = &one - &versed;
+            versed = (&sine * &sine) >> (places - 1);
+            sine = (sine * cosine) >> (places - 1);
+        }
+        let exponent = -i64::try_from(places).ok()?;
+        Some((Self::new(one - versed, exponent), Self::new(sine, exponent)))
+    }
+
+    /// The exponential; `None` where it is beyond all measure.
+    pub fn exp(&self) -> Option<Self> {
+        /// The exponential of this is still of use.
+        const LARGEST: f64 = 1e4;
+        if self.to_f64().abs() > LARGEST {
+            return None;
+        }
+        let (n, places) = self.halvings()?;
+        let x = self.scaled(-i64::try_from(n).ok()?).fixed(places);
+        let mut total = BigInt::zero();
+        let (mut term, mut k) = (BigInt::from(1) << places, 1_u64);
+        while !term.is_zero() {
+            total += &term;
+            term = ((term * &x) >> places) / k;
+            if term == BigInt::from(-1) {
+                break;
+            }
+            k += 1;
+        }
+        let mut value = Self::rounded(total, -i64::try_from(places).ok()?, places);
+        for _ in 0..n {
+            let mantissa = &value.mantissa * &value.mantissa;
+            value = Self::rounded(mantissa, 2 * value.exponent, places);
+        }
+        Some(Self::new(value.mantissa, value.exponent))
+    }
+
+    /// The hyperbolic tangent.
+    pub fn tanh(&self) -> Option<Self> {
+        const FLAT: f64 = 400.0;
+        let size = self.to_f64();
+        if size.abs() > FLAT {
+            return Some(Self::integer(if size > 0.0 { 1 } else { -1 }));
+        }
+        let (above, below) = (self.exp()?, (-self).exp()?);
+        Some((&above - &below) / (&above + &below))
+    }
+
+    /// pi, by Machin's formula (1706).
+    pub fn pi() -> Self {
+        static PI: OnceLock<Digits> = OnceLock::new();
+        PI.get_or_init(|| {
+            let places = BITS + SPARE;
+            let arctangent = |inverse: u64| {
+                let mut power = (BigInt::from(1) << places) / inverse;
+                let (mut total, mut k) = (BigInt::zero(), 1_u64);
+                while !power.is_zero() {
+                    let term = &power / k;
+                    total += if k % 4 == 1 { term } else { -term };
+                    power /= inverse * inverse;
+                    k += 2;
+                }
+                total
+            };
+            let total = arctangent(5) * 16 - arctangent(239) * 4;
+            Self::new(total, -i64::try_from(places).expect("some bits"))
+        })
+        .clone()
+    }
+}
+
+impl Add for &Digits {
+    type Output = Digits;
+    fn add(self, other: &Digits) -> Digits {
+        if self.is_zero() {
+            return other.clone();
+        }
+        if other.is_zero() {
+            return self.clone();
+        }
+        let (high, low) = if self.exponent >= other.exponent {
+            (self, other)
+        } else {
+            (other, self)
+        };
+        // What lies below the last bit of the larger one is left out.
+        if high.magnitude() - low.magnitude() > i64::try_from(BITS + SPARE).expect("some bits") {
+            return high.clone();
+        }
+        let shift = (high.exponent - low.exponent).unsigned_abs();
+        Digits::new((&high.mantissa << shift) + &low.mantissa, low.exponent)
+    }
+}
+
+impl Neg for &Digits {
+    type Output = Digits;
+    fn neg(self) -> Digits {
+        Digits {
+            mantissa: -&self.mantissa,
+            exponent: self.exponent,
+        }
+    }
+}
+
+impl Sub for &Digits {
+    type Output = Digits;
+    fn sub(self, other: &Digits) -> Digits {
+        self + &-other
+    }
+}
+
+impl Mul for &Digits {
+    type Output = Digits;
+    fn mul(self, other: &Digits) -> Digits {
+        Digits::new(
+            &self.mantissa * &other.mantissa,
+            self.exponent + other.exponent,
+        )
+    }
+}
+
+impl Div for Digits {
+    type Output = Digits;
+    /// The divisor must not be zero.
+    fn div(self, other: Digits) -> Digits {
+        assert!(!other.is_zero(), "a divisor is not zero");
+        let shift = (BITS + other.mantissa.bits() + 1).saturating_sub(self.mantissa.bits());
+        let exponent = self.exponent - other.exponent - i64::try_from(shift).expect("some bits");
+        Digits::new((self.mantissa << shift) / other.mantissa, exponent)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn same(a: &Digits, b: &Digits) {
+        let off = (a - b).abs().to_f64();
+        assert!(off <= Digits::ROUNDING * a.abs().to_f64(), "{off:.1e}");
+    }
+
+    #[test]
+    fn decimals_are_what_was_written() {
+        let tenth = Digits::as_written(0.1).unwrap();
+        same(&(&tenth * &Digits::integer(10)), &Digits::integer(1));
+        same(
+            &Digits::as_written(-2.5e-7).unwrap(),
+            &(Digits::integer(-25) / Digits::integer(100_000_000)),
+        );
+        // The machine's own tenth is another number.
+        let rounded = Digits::from_f64(0.1).unwrap();
+        assert!((&rounded - &tenth).abs().to_f64() > 1e-19);
+        assert_eq!(rounded.to_f64().to_bits(), 0.1_f64.to_bits());
+    }
+
+    #[test]
+    fn functions_keep_their_laws() {
+        for x in [1e-9, 0.3, 1.7, -12.0, 150.0] {
+            let x = Digits::as_written(x).unwrap();
+            let (c, s) = x.cos_sin().unwrap();
+            same(&(&(&c * &c) + &(&s * &s)), &Digits::integer(1));
+            assert!((s.to_f64() - x.to_f64().sin()).abs() < 1e-14);
+            assert!((c.to_f64() - x.to_f64().cos()).abs() < 1e-14);
+            same(
+                &(&x.exp().unwrap() * &(-&x).exp().unwrap()),
+                &Digits::integer(1),
+            );
+            assert!((x.tanh().unwrap().to_f64() - x.to_f64().tanh()).abs() < 1e-15);
+            let root = x.abs().sqrt().unwrap();
+            same(&(&root * &root), &x.abs());
+        }
+        let (c, s) = Digits::pi().cos_sin().unwrap();
+        assert!(s.abs().to_f64() < Digits::ROUNDING);
+        same(&c, &Digits::integer(-1));
+        let e = Digits::integer(1).exp().unwrap();
+        assert!((e.to_f64() - std::f64::consts::E).abs() < 1e-15);
+        same(
+            &Digits::integer(2).power(-3).unwrap(),
+            &Digits::as_written(0.125).unwrap(),
+        );
+        assert!(Digits::zero().power(-1).is_none());
+        assert!(Digits::integer(-1).sqrt().is_none());
+    }
+}

@@ -1,0 +1,75 @@
+//! Evaluation with many digits: numbers in which small shares of columns are told from rounding.
+
+use std::collections::BTreeMap;
+
+use modelmill_algebra::digits::Digits;
+
+use super::{AngleSum, Atom, Domain, Rational, Unary};
+
+/// Values of atoms, with cosines and sines of those that were asked for as angles.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct DigitsPoint {
+    values: BTreeMap<Atom, Digits>,
+    circles: BTreeMap<Atom, (Digits, Digits)>,
+}
+
+impl DigitsPoint {
+    /// Gives an atom a value; `None` where it is too large to be an angle, if it is one.
+    pub(crate) fn set(&mut self, atom: Atom, value: Digits, is_angle: bool) -> Option<()> {
+        if is_angle {
+            self.circles.insert(atom, value.cos_sin()?);
+        }
+        self.values.insert(atom, value);
+        Some(())
+    }
+
+    /// The value of an atom that has one.
+    pub(crate) fn value(&self, atom: Atom) -> Option<&Digits> {
+        self.values.get(&atom)
+    }
+}
+
+impl Domain for DigitsPoint {
+    type Value = Digits;
+    fn rational(&self, value: &Rational) -> Option<Digits> {
+        Some(Digits::from_rational(value))
+    }
+    fn add(&self, a: &Digits, b: &Digits) -> Digits {
+        a + b
+    }
+    fn mul(&self, a: &Digits, b: &Digits) -> Digits {
+        a * b
+    }
+    fn power(&self, a: &Digits, n: i32) -> Option<Digits> {
+        a.power(n)
+    }
+    fn unary(&self, function: Unary, a: &Digits) -> Option<Digits> {
+        match function {
+            Unary::Sqrt => a.sqrt(),
+            Unary::Sign if a.is_zero() => Some(Digits::zero()),
+            Unary::Sign => Some(Digits::integer(if a.is_negative() { -1 } else { 1 })),
+            Unary::Abs => Some(a.abs()),
+            Unary::Tanh => a.tanh(),
+            Unary::Exp => a.exp(),
+            Unary::Sin => Some(a.cos_sin()?.1),
+            Unary::Cos => Some(a.cos_sin()?.0),
+        }
+    }
+    fn atom(&self, atom: Atom) -> Option<Digits> {
+        self.values.get(&atom).cloned()
+    }
+    fn cos_sin(&self, angle: &AngleSum) -> Option<(Digits, Digits)> {
+        let mut total = (Digits::integer(1), Digits::zero());
+        for (atom, n) in angle.terms() {
+            let (c, s) = self.circles.get(atom)?;
+            let s = if *n < 0 { -s } else { s.clone() };
+            for _ in 0..n.unsigned_abs() {
+                total = (
+                    &(&total.0 * c) - &(&total.1 * &s),
+                    &(&total.0 * &s) + &(&total.1 * c),
+                );
+            }
+        }
+        Some(total)
+    }
+}

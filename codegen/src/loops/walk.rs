@@ -1,0 +1,243 @@
+//! A walk along the motion of a mechanism, from the nominal pose through all that hangs together with it: poses at which
+//! every loop is closed, in all its equations and on the branch on which the machine lives.
+//!
+//! Each step goes along the tangent of the motion and is closed again at once. It is the shorter the nearer a pose is at which
+//! branches meet, so that none is passed over. Drives' dead points are passed: motion is smooth there.
+
+use modelmill_algebra::field::Stream;
+use modelmill_spec::Mechanism;
+use nalgebra::{DMatrix, DVector};
+
+use super::all::Loops;
+use super::closure::Closure;
+use super::magnitude;
+use super::numeric_poses::{NumericLoops, symmetric};
+use crate::expr::{ExprId, Graph};
+
+/// Longest step, in rad or relative to the size of the loops, and as a share of the least singular value of the loops'
+/// derivatives, which says how near branches meet.
+const LONGEST: f64 = 0.15;
+const SHARE: f64 = 0.5;
+/// Nearer than this to a pose where branches meet the walk turns round.
+const NEAR: f64 = 2e-3;
+/// How far the coordinates that move the mechanism may go from the nominal pose.
+const FARTHEST: f64 = 2.0;
+/// Steps between two poses that are shown.
+const STEPS: usize = 6;
+/// Residuals relative to the size of the loops that count as closed at once, and those that a file with rounded lengths may
+/// leave where a loop has equations that follow from others.
+const CLOSED: f64 = 1e-12;
+pub(crate) const NEARLY_CLOSED: f64 = 1e-7;
+/// The least singular value by the passive coordinates relative to the largest: below, rates say little but rounding.
+const DEAD: f64 = 1e-3;
+
+/// Where a walk is.
+pub(crate) struct Walk<'a> {
+    loops: NumericLoops<'a>,
+    units: Vec<f64>,
+    active: Vec<usize>,
+    passive: Vec<usize>,
+    /// The size of the loop of each equation, m: small loops count as much as large ones.
+    sizes: Vec<f64>,
+    nominal: Vec<f64>,
+    q: Vec<f64>,
+    /// The direction of the last step, in units of the coordinates.
+    heading: Option<DVector<f64>>,
+}
+
+/// The loops' equations at a pose.
+struct Tangent {
+    /// Relative to the sizes of the loops.
+    residual: DVector<f64>,
+    /// As many right singular vectors as there are passive coordinates, one row each.
+    across: DMatrix<f64>,
+    /// What takes a residual to the step along these that closes it.
+    closing: DMatrix<f64>,
+    /// The least of those singular values relative to the largest.
+    least: f64,
+}
+
+impl<'a> Walk<'a> {
+    /// Begins at the nominal pose; `None` if that closes no loop.
+    pub(crate) fn new(graph: &mut Graph, mechanism: &'a Mechanism, loops: &Loops) -> Option<Self> {
+        let residual = all_residuals(loops);
+        let all: Vec<usize> = (0..mechanism.coordinates.len()).collect();
+        let numeric = NumericLoops::solved_for(graph, mechanism, &residual, all.clone(), &[]);
+        let nominal = numeric.as_written();
+        let mut walk = Self {
+            units: all.iter().map(|i| numeric.unit(*i)).collect(),
+            active: loops.active.clone(),
+            passive: loops.passive.clone(),
+            sizes: sizes(graph, mechanism, loops),
+            q: nominal.clone(),
+            nominal,
+            heading: None,
+            loops: numeric,
+        };
+        // The file's pose is as good as its last digit.
+        walk.q = walk.closed(walk.q.clone())?;
+        walk.nominal.clone_from(&walk.q);
+        Some(walk)
+    }
+
+    /// The next pose at which the passive coordinates are determined; `None` where the walk comes to no end.
+    pub(crate) fn next(&mut self, stream: &mut Stream) -> Option<Vec<f64>> {
+        const TRIES: usize = 400;
+        let mut steps = 0;
+        for _ in 0..TRIES {
+            match self.step(stream) {
+                Some(()) => steps += 1,
+                // Back, and a little aside.
+                None => self.heading = self.heading.take().map(|h| -h),
+            }
+            if steps >= STEPS && self.is_determined() {
+                return Some(self.q.clone());
+            }
+        }
+        None
+    }
+
+    /// What counts as one for a coordinate.
+    pub(crate) fn unit(&self, coordinate: usize) -> f64 {
+        self.units[coordinate]
+    }
+
+    /// What each residual is held against, in m.
+    pub(crate) fn sizes(&self) -> &[f64] {
+        &self.sizes
+    }
+
+    fn step(&mut self, stream: &mut Stream) -> Option<()> {
+        let n = self.q.len();
+        let here = self.tangent(&self.q)?;
+        let mut towards = DVector::from_fn(n, |_, _| symmetric(stream));
+        if let Some(heading) = &self.heading {
+            towards += heading;
+        }
+        towards -= here.across.transpose() * (&here.across * &towards);
+        let size = towards.amax();
+        if size < 1e-9 {
+            return None;
+        }
+        if self.heading.as_ref().is_some_and(|h| h.dot(&towards) < 0.0) {
+            towards = -towards;
+        }
+        let length = LONGEST.min(SHARE * here.least) * (0.65 + 0.35 * symmetric(stream));
+        let step = towards / size;
+        let there: Vec<f64> = (0..n)
+            .map(|i| self.q[i] + length * step[i] * self.units[i])
+            .collect();
+        let closed = self.closed(there.clone())?;
+        let by = |a: &[f64], b: &[f64], i: usize| ((a[i] - b[i]) / self.units[i]).abs();
+        let is_far = (0..n).any(|i| by(&closed, &there, i) > 0.5 * length)
+            || (self.active.iter()).any(|i| by(&closed, &self.nominal, *i) > FARTHEST);
+        if is_far || self.tangent(&closed)?.least < NEAR {
+            return None;
+        }
+        self.q = closed;
+        self.heading = Some(step);
+        Some(())
+    }
+
+    /// The nearest pose at which all loops are closed.
+    fn closed(&self, mut q: Vec<f64>) -> Option<Vec<f64>> {
+        const ROUNDS: usize = 12;
+        const STILL: f64 = 1e-12;
+        for _ in 0..ROUNDS {
+            let here = self.tangent(&q)?;
+            if here.residual.is_empty() || here.residual.amax() <= CLOSED {
+                return Some(q);
+            }
+            let is_nearly_closed = here.residual.amax() <= NEARLY_CLOSED;
+            let step = here.closing * here.residual;
+            if is_nearly_closed && step.amax() <= STILL {
+                return Some(q);
+            }
+            for (i, dx) in step.iter().enumerate() {
+                q[i] -= dx * self.units[i];
+            }
+        }
+        None
+    }
+
+    /// Residuals of all loops, each relative to the size of its own, and their derivatives in units of the coordinates.
+    fn linearise(&self, q: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let (mut residual, mut jacobian) = self.loops.linearise(q)?;
+        for (mut column, unit) in jacobian.column_iter_mut().zip(&self.units) {
+            column *= *unit;
+        }
+        for (i, size) in self.sizes.iter().enumerate() {
+            residual[i] /= size;
+            jacobian.row_mut(i).scale_mut(size.recip());
+        }
+        Some((residual, jacobian))
+    }
+
+    fn tangent(&self, q: &[f64]) -> Option<Tangent> {
+        let (residual, jacobian) = self.linearise(q)?;
+        let (rank, n) = (self.passive.len(), q.len());
+        if rank == 0 {
+            return Some(Tangent {
+                closing: DMatrix::zeros(n, residual.len()),
+                across: DMatrix::zeros(0, n),
+                residual,
+                least: 1.0,
+            });
+        }
+        let svd = jacobian.svd(true, true);
+        let (u, v) = (svd.u?, svd.v_t?);
+        let mut order: Vec<usize> = (0..svd.singular_values.len()).collect();
+        order.sort_by(|a, b| svd.singular_values[*b].total_cmp(&svd.singular_values[*a]));
+        order.truncate(rank);
+        let largest = svd.singular_values[*order.first()?];
+        let least = svd.singular_values[*order.last()?];
+        if order.len() < rank || least <= f64::EPSILON * largest {
+            return None;
+        }
+        let across = v.select_rows(&order);
+        let mut closing = across.transpose();
+        for (mut column, k) in closing.column_iter_mut().zip(&order) {
+            column /= svd.singular_values[*k];
+        }
+        Some(Tangent {
+            closing: closing * u.select_columns(&order).transpose(),
+            across,
+            residual,
+            least: least / largest,
+        })
+    }
+
+    /// Whether the passive coordinates follow from the others, and not only just.
+    fn is_determined(&self) -> bool {
+        if self.passive.is_empty() {
+            return true;
+        }
+        let Some((_, jacobian)) = self.linearise(&self.q) else {
+            return false;
+        };
+        let jacobian = jacobian.select_columns(&self.passive);
+        let mut values: Vec<f64> = jacobian.singular_values().iter().copied().collect();
+        values.sort_by(|a, b| b.total_cmp(a));
+        values
+            .get(self.passive.len() - 1)
+            .is_some_and(|x| *x > DEAD * values[0])
+    }
+}
+
+/// The size of the loop that each of [`all_residuals`] belongs to.
+fn sizes(graph: &mut Graph, mechanism: &Mechanism, loops: &Loops) -> Vec<f64> {
+    let of_one = |closure: &Closure| {
+        let size = match closure.follower {
+            Some(_) => 1.0,
+            None => magnitude::at_nominal(graph, mechanism, &closure.residual),
+        };
+        vec![size; closure.residual.len()]
+    };
+    loops.closures.iter().flat_map(of_one).collect()
+}
+
+/// What all loops leave open, equations that follow from others included.
+pub(crate) fn all_residuals(loops: &Loops) -> Vec<ExprId> {
+    let closures = loops.closures.iter();
+    closures.flat_map(|c| c.residual.iter().copied()).collect()
+}

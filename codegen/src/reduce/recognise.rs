@@ -1,0 +1,192 @@
+//! Numbers as what a person would write: a small rational, or one times constants of the model file.
+//!
+//! Of all that equal a number in all its digits and have its unit the shortest is taken; what has none is rounded.
+
+use modelmill_algebra::digits::Digits;
+use modelmill_spec::Mechanism;
+use num_traits::ToPrimitive;
+
+use super::base;
+use super::rational_function::{Polynomial, Powers, RationalFunction, Variable};
+use crate::expr::Rational;
+use crate::tree::expressions::Monomial;
+
+const LARGEST_DENOMINATOR: i64 = 24;
+const LARGEST_NUMERATOR: f64 = 1000.0;
+
+/// Three constants are put together only where no more than this many stand in a file.
+const MOST_IN_THREES: usize = 12;
+/// The same for two.
+const MOST_IN_PAIRS: usize = 60;
+
+/// Constants of a model file, alone and a few together.
+pub(super) struct Constants<'a> {
+    mechanism: &'a Mechanism,
+    powers: Vec<Power>,
+    /// How far a number may be from what it is taken for, relative to it.
+    rounding: f64,
+}
+
+/// A product of powers of constants.
+struct Power {
+    above: Vec<Variable>,
+    below: Vec<Variable>,
+    value: Digits,
+    rough: f64,
+    /// Its unit as a power of metres.
+    metres: i32,
+}
+
+impl<'a> Constants<'a> {
+    pub(super) fn new(mechanism: &'a Mechanism, rounding: f64) -> Self {
+        let one = Power {
+            above: Vec::new(),
+            below: Vec::new(),
+            value: Digits::integer(1),
+            rough: 1.0,
+            metres: 0,
+        };
+        let mut powers = vec![one];
+        let lengths: Vec<(Variable, Digits, i32)> = (mechanism.constants.iter().enumerate())
+            .filter(|(_, c)| !c.is_angle && c.value != 0.0)
+            .filter_map(|(i, c)| {
+                let metres = match c.unit.as_str() {
+                    "m" => 1,
+                    "1" => 0,
+                    _ => return None,
+                };
+                Some((Variable::Constant(i), Digits::as_written(c.value)?, metres))
+            })
+            .collect();
+        let mut push = |above: &[usize], below: &[usize]| {
+            let of = |chosen: &[usize]| -> Vec<Variable> {
+                chosen.iter().map(|i| lengths[*i].0).collect()
+            };
+            let product = |chosen: &[usize]| {
+                chosen
+                    .iter()
+                    .fold(Digits::integer(1), |product, i| &product * &lengths[*i].1)
+            };
+            let metres = |chosen: &[usize]| chosen.iter().map(|i| lengths[*i].2).sum::<i32>();
+            let value = product(above) / product(below);
+            powers.push(Power {
+                above: of(above),
+                below: of(below),
+                rough: value.to_f64(),
+                value,
+                metres: metres(above) - metres(below),
+            });
+        };
+        for i in 0..lengths.len() {
+            push(&[i], &[]);
+            push(&[], &[i]);
+        }
+        for i in 0..lengths.len() {
+            for j in (0..lengths.len()).filter(|_| lengths.len() <= MOST_IN_PAIRS) {
+                if i <= j {
+                    push(&[i, j], &[]);
+                    push(&[], &[i, j]);
+                }
+                if i != j {
+                    push(&[i], &[j]);
+                }
+                for k in 0..lengths.len() {
+                    if i <= j && k != i && k != j && lengths.len() <= MOST_IN_THREES {
+                        push(&[i, j], &[k]);
+                    }
+                }
+            }
+        }
+        Self {
+            mechanism,
+            powers,
+            rounding,
+        }
+    }
+
+    /// The factor of the column of `kept` in that of `product`.
+    pub(super) fn factor(
+        &self,
+        value: &Digits,
+        product: &Monomial,
+        kept: &Monomial,
+    ) -> RationalFunction {
+        let unit = |of: &Monomial| metres(&base::unit(self.mechanism, of));
+        // The column of a product has its inverse unit.
+        let wanted = unit(product).zip(unit(kept)).map(|(a, b)| b - a);
+        let fitting = self
+            .powers
+            .iter()
+            .filter(|p| wanted.is_none_or(|n| p.metres == n));
+        let found = fitting.filter_map(|power| {
+            let number = self.small_rational(value, power)?;
+            let (n, d) = number.as_small()?;
+            let length = n.abs() + d + 2 * (power.above.len() + power.below.len()).to_i64()?;
+            Some((length, number, power))
+        });
+        match found.min_by_key(|(length, _, _)| *length) {
+            Some((_, number, power)) => written(number, power),
+            None => decimal(value.to_f64()),
+        }
+    }
+
+    /// `value` over `power`, if that is a small rational.
+    fn small_rational(&self, value: &Digits, power: &Power) -> Option<Rational> {
+        const ROUGH: f64 = 1e-9;
+        let ratio = value.to_f64() / power.rough;
+        (1..=LARGEST_DENOMINATOR).find_map(|below| {
+            let wanted = ratio * below as f64;
+            let above = wanted.round();
+            if above == 0.0
+                || above.abs() > LARGEST_NUMERATOR
+                || (above - wanted).abs() > ROUGH * wanted.abs()
+            {
+                return None;
+            }
+            let number = Rational::new(above.to_i64()?, below);
+            let off = &(&Digits::from_rational(&number) * &power.value) - value;
+            (off.to_f64().abs() <= self.rounding * value.to_f64().abs()).then_some(number)
+        })
+    }
+}
+
+fn written(number: Rational, power: &Power) -> RationalFunction {
+    let powers = |of: &[Variable]| {
+        let mut powers = Powers::new();
+        for variable in of {
+            match powers.iter_mut().find(|(v, _)| v == variable) {
+                Some((_, n)) => *n += 1,
+                None => powers.push((*variable, 1)),
+            }
+        }
+        powers.sort_unstable();
+        powers
+    };
+    RationalFunction::new(
+        Polynomial::from([(powers(&power.above), number)]),
+        Polynomial::from([(powers(&power.below), Rational::ONE)]),
+    )
+}
+
+/// The power of metres in the unit of a mass or one of its moments.
+fn metres(unit: &str) -> Option<i32> {
+    match unit {
+        "kg" => Some(0),
+        "kg m" => Some(1),
+        "kg m^2" => Some(2),
+        _ => None,
+    }
+}
+
+/// A number with thirteen significant digits, as an exact rational, so that everything behind treats it like any other
+/// factor.
+fn decimal(value: f64) -> RationalFunction {
+    const DIGITS: i32 = 12;
+    let written = format!("{value:.12e}");
+    let rational = written.split_once('e').and_then(|(mantissa, exponent)| {
+        let mantissa: i64 = mantissa.replace('.', "").parse().ok()?;
+        let exponent: i32 = exponent.parse().ok()?;
+        Some(&Rational::integer(mantissa) * &Rational::integer(10).pow(exponent - DIGITS))
+    });
+    RationalFunction::constant(rational.expect("a finite number has a mantissa and an exponent"))
+}
