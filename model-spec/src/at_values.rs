@@ -48,6 +48,12 @@ impl Mechanism {
         for point in &mut at.points {
             point.at = point.at.each_ref().map(|x| stands.exact(x));
         }
+        for coupling in &mut at.couplings {
+            for (_, factor) in &mut coupling.terms {
+                *factor = stands.exact(factor);
+            }
+            coupling.offset = stands.exact(&coupling.offset);
+        }
         stands.bodies(&mut at.parts, &mut at.lumped_masses);
         for effect in &mut at.effects {
             for term in &mut effect.terms {

@@ -164,7 +164,7 @@ impl Log {
         if diagnostic.severity == Severity::Error {
             self.n_errors += 1;
         }
-        if self.diagnostics.contains(&diagnostic) {
+        if self.diagnostics.contains(&diagnostic) || self.is_consequence(&diagnostic) {
             return;
         }
         if self.diagnostics.len() < MOST_DIAGNOSTICS {
@@ -172,6 +172,13 @@ impl Log {
         } else {
             self.n_left_off += 1;
         }
+    }
+
+    /// Whether the text is broken at the very place that a finding means.
+    fn is_consequence(&self, diagnostic: &Diagnostic) -> bool {
+        let start = |one: &Diagnostic| one.span.map(|span| (span.file, span.start));
+        let is_there = |one: &Diagnostic| start(one) == start(diagnostic);
+        self.syntax_broken && diagnostic.span.is_some() && self.diagnostics.iter().any(is_there)
     }
 
     /// True once there are so many findings that it is not worth working out good advice for more.

@@ -7,6 +7,7 @@ mod additions;
 mod angle;
 mod at_values;
 mod build;
+pub mod bundled;
 mod column;
 mod diagnostic;
 mod document;
@@ -63,6 +64,9 @@ pub use mechanism::*;
 pub use motion::{Kinematics, Moved, Pose, Poses};
 pub use reading::{read_named, read_text};
 pub use unit::unit_product;
+
+/// The JSON Schema of model files, by which editors complete and explain them; a test keeps it true.
+pub const SCHEMA: &str = include_str!("../schema/modelmill.schema.json");
 
 #[cfg(any(test, feature = "schema"))]
 pub use editor::json_schema;

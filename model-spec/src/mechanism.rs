@@ -4,7 +4,7 @@
 
 use num_rational::BigRational;
 
-use crate::exact::{Angle, CoordinateIdx, Exact, Length, ParameterIdx};
+use crate::exact::{Angle, CoordinateIdx, Exact, Length, ParameterIdx, Symbol};
 use crate::joint_motion::Motion;
 use crate::mechanics::Mechanics;
 
@@ -46,6 +46,8 @@ pub struct Mechanism {
     pub lumped_masses: Vec<LumpedMass>,
     /// Loops closed by coincident points.
     pub loops: Vec<Loop>,
+    /// Coordinates that follow others; they are passive.
+    pub couplings: Vec<Coupling>,
     /// Drives, one per degree of freedom; what nothing drives has its row here too.
     pub drives: Vec<Drive>,
     /// Drives of a mechanism that has more of them than degrees of freedom, such as cables; then none of [`Self::drives`] is
@@ -104,7 +106,7 @@ pub struct Coordinate {
     pub name: String,
     /// Angle or length.
     pub motion: Motion,
-    /// Passive coordinates follow from the loops; the others are independent.
+    /// Passive coordinates follow from the loops or by a coupling; the others are independent.
     pub passive: bool,
     /// Value at the nominal pose, which chooses the assembly mode.
     /// For passive coordinates refined until the loops close.
@@ -250,6 +252,26 @@ pub struct Loop {
     pub name: String,
     /// The points.
     pub joins: [PointIdx; 2],
+}
+
+/// A coordinate that follows others, as by gears, a belt or a screw: `coordinate = sum of factor * other + offset`.
+#[derive(Clone, Debug)]
+pub struct Coupling {
+    /// What follows.
+    pub coordinate: CoordinateIdx,
+    /// What it follows, sorted, each with its factor: expressions over constants, in units of one over the other.
+    pub terms: Vec<(CoordinateIdx, Exact)>,
+    /// An expression over constants, rad or m.
+    pub offset: Exact,
+}
+
+impl Coupling {
+    /// The value of what follows, rad or m.
+    pub fn value(&self, value: &dyn Fn(Symbol) -> f64) -> f64 {
+        let terms = self.terms.iter();
+        let moved = terms.map(|(i, factor)| factor.evaluate(value) * value(Symbol::Coordinate(*i)));
+        self.offset.evaluate(value) + moved.sum::<f64>()
+    }
 }
 
 /// A drive.

@@ -12,6 +12,15 @@ pub struct Kinematics {
     frames: Vec<(usize, Vec<Motion>)>,
     points: Vec<(usize, Vec3)>,
     loops: Vec<[usize; 2]>,
+    couplings: Vec<Follower>,
+}
+
+/// A coordinate that follows others: `offset + sum of factor * other`.
+#[derive(Clone, Debug)]
+struct Follower {
+    coordinate: usize,
+    terms: Vec<(usize, f64)>,
+    offset: f64,
 }
 
 /// One step on the way to a frame.
@@ -126,6 +135,19 @@ impl Kinematics {
                 .iter()
                 .map(|l| [l.joins[0].0, l.joins[1].0])
                 .collect(),
+            couplings: mechanism
+                .couplings
+                .iter()
+                .map(|coupling| Follower {
+                    coordinate: coupling.coordinate.0,
+                    terms: coupling
+                        .terms
+                        .iter()
+                        .map(|(i, factor)| (i.0, factor.evaluate(&value)))
+                        .collect(),
+                    offset: coupling.offset.evaluate(&value),
+                })
+                .collect(),
         }
     }
 
@@ -195,20 +217,24 @@ impl Kinematics {
         })
     }
 
-    /// How far apart the two points of each loop are, m: three numbers for each loop.
-    pub fn gaps(&self, poses: &Poses) -> Vec<f64> {
+    /// How far apart the two points of each loop are, m: three numbers for each loop; then by how much each coordinate that
+    /// follows others is off, rad or m, at the coordinates that the poses were made of.
+    pub fn gaps(&self, poses: &Poses, coordinates: &[f64]) -> Vec<f64> {
         let ends = |l: &[usize; 2]| l.map(|point| self.position(poses, point));
-        self.loops
-            .iter()
-            .flat_map(|l| {
-                let [a, b] = ends(l);
-                [0, 1, 2].map(|k| a[k] - b[k])
-            })
-            .collect()
+        let of_loops = self.loops.iter().flat_map(|l| {
+            let [a, b] = ends(l);
+            [0, 1, 2].map(|k| a[k] - b[k])
+        });
+        let of_couplings = self.couplings.iter().map(|follower| {
+            let terms = follower.terms.iter();
+            let followed: f64 = terms.map(|(i, factor)| factor * coordinates[*i]).sum();
+            coordinates[follower.coordinate] - followed - follower.offset
+        });
+        of_loops.chain(of_couplings).collect()
     }
 
     /// Derivative of [`Self::gaps`] by all coordinates, one row for each gap.
-    pub fn loop_jacobian(&self, poses: &Poses) -> Vec<Vec<f64>> {
+    pub fn gap_jacobian(&self, poses: &Poses) -> Vec<Vec<f64>> {
         let mut rows = vec![vec![0.0; self.n]; 3 * self.loops.len()];
         for (l, ends) in self.loops.iter().enumerate() {
             for (point, sign) in ends.iter().zip([1.0, -1.0]) {
@@ -218,6 +244,14 @@ impl Kinematics {
                     }
                 });
             }
+        }
+        for follower in &self.couplings {
+            let mut row = vec![0.0; self.n];
+            row[follower.coordinate] = 1.0;
+            for (i, factor) in &follower.terms {
+                row[*i] -= factor;
+            }
+            rows.push(row);
         }
         rows
     }
@@ -296,20 +330,20 @@ mod tests {
             };
             let poses = kinematics.poses(&q);
             assert!(
-                close(&kinematics.gaps(&poses), &expected.values, 1e-12),
+                close(&kinematics.gaps(&poses, &q), &expected.values, 1e-12),
                 "{name}"
             );
             // Away from the nominal pose, against differences.
             for (i, value) in q.iter_mut().enumerate() {
                 *value += 0.1 + 0.03 * f64::from(u8::try_from(i).unwrap());
             }
-            let rows = kinematics.loop_jacobian(&kinematics.poses(&q));
+            let rows = kinematics.gap_jacobian(&kinematics.poses(&q));
             for i in 0..q.len() {
                 let step = 1e-6;
                 let mut moved = |by: f64| {
                     let old = q[i];
                     q[i] += by;
-                    let gaps = kinematics.gaps(&kinematics.poses(&q));
+                    let gaps = kinematics.gaps(&kinematics.poses(&q), &q);
                     q[i] = old;
                     gaps
                 };

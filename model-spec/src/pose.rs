@@ -8,7 +8,7 @@ use crate::build::Places;
 use crate::diagnostic::{Diagnostic, Log, Span};
 use crate::exact::Symbol;
 use crate::kinematics::{Vec3, frame_poses, jacobian, position};
-use crate::mechanism::{DriveKind, Mechanism, Step};
+use crate::mechanism::{Coupling, DriveKind, Mechanism, Step};
 use crate::numeric::{Rows, least_squares, rank};
 
 /// Passive angles may move this far, in rad, before it counts as another assembly.
@@ -34,7 +34,7 @@ pub(crate) fn check(mechanism: &mut Mechanism, places: &Places, log: &mut Log) {
     }
 }
 
-/// Gaps of all loops, the derivative of the gaps, and the size of the mechanism.
+/// Gaps of all loops, three for each, then of the couplings, the derivative of the gaps, and the size of the mechanism.
 pub(crate) struct Gaps {
     pub(crate) values: Vec<f64>,
     pub(crate) rows: Rows,
@@ -66,7 +66,27 @@ pub(crate) fn gaps(mechanism: &Mechanism) -> Gaps {
             .iter()
             .fold(found.size, |size, x| size.max(x.abs()));
     }
+    let value = |symbol: Symbol| mechanism.symbol_nominal(symbol);
+    for (coupling, row) in mechanism.couplings.iter().zip(coupling_rows(mechanism)) {
+        let own = mechanism.coordinates[coupling.coordinate.0].nominal;
+        found.values.push(own - coupling.value(&value));
+        found.rows.push(row);
+    }
     found
+}
+
+/// The derivative of what follows, less what it follows, by all coordinates: one row for each coupling.
+fn coupling_rows(mechanism: &Mechanism) -> Rows {
+    let value = |symbol: Symbol| mechanism.symbol_nominal(symbol);
+    let row = |coupling: &Coupling| {
+        let mut row = vec![0.0; mechanism.coordinates.len()];
+        row[coupling.coordinate.0] = 1.0;
+        for (i, factor) in &coupling.terms {
+            row[i.0] -= factor.evaluate(&value);
+        }
+        row
+    };
+    mechanism.couplings.iter().map(row).collect()
 }
 
 fn norm(values: &[f64]) -> f64 {
@@ -166,6 +186,28 @@ fn close_loops(mechanism: &mut Mechanism, places: &Places, log: &mut Log) -> boo
             .help("the values of passive coordinates are only a start: they are moved until the loops close, those of active ones stay"),
         );
     }
+    let followers = now.values[3 * mechanism.loops.len()..].iter();
+    for (coupling, gap) in mechanism.couplings.iter().zip(followers) {
+        if gap.abs() <= CLOSED * size.max(1.0) {
+            continue;
+        }
+        closes = false;
+        let coordinate = &mechanism.coordinates[coupling.coordinate.0];
+        log.push(
+            Diagnostic::error(
+                places.coordinates[coupling.coordinate.0],
+                format!(
+                    "the loops do not let `{}` follow at the nominal pose",
+                    coordinate.name
+                ),
+            )
+            .label(format!(
+                "it stays {gap:.3} {} off",
+                coordinate.motion.unit()
+            ))
+            .help("check what it follows, and the nominal values of the coordinates of the loops"),
+        );
+    }
     closes && check_same_assembly(mechanism, &passive, &given, size, places, log)
 }
 
@@ -234,6 +276,10 @@ fn check_same_assembly(
     let mut fine = true;
     for (&i, given) in passive.iter().zip(given) {
         let coordinate = &mechanism.coordinates[i];
+        let mut followers = mechanism.couplings.iter();
+        if followers.any(|coupling| coupling.coordinate.0 == i) {
+            continue; // Its value was no choice.
+        }
         let unit = coordinate.motion.unit();
         let farthest = if coordinate.motion.is_angle() {
             FARTHEST_TURN
@@ -278,6 +324,7 @@ fn tied_rows(mechanism: &Mechanism) -> Rows {
             rows.push(left.iter().zip(right).map(|(a, b)| a - b).collect());
         }
     }
+    rows.extend(coupling_rows(mechanism));
     rows
 }
 
@@ -300,10 +347,24 @@ fn check_tied(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
     if n_equations <= n_passive && n_passive < n_coordinates {
         return true;
     }
+    let first_loop = places.loops.first().or(places.coordinates.first());
+    let Some(span) = first_loop.copied() else {
+        return false;
+    };
+    if n_equations < n_passive {
+        log.push(
+            Diagnostic::error(span, "all coordinates are passive")
+                .label("expected one at least that is not, for the others to follow")
+                .help(
+                    "drop `passive` where a drive acts, or say `driven = false` where nothing does",
+                ),
+        );
+        return false;
+    }
     if n_equations >= n_coordinates {
         log.push(
             Diagnostic::error(
-                places.loops[0],
+                span,
                 format!(
                     "this mechanism cannot move: its loops tie {} {}",
                     if n_coordinates == 1 { "its" } else { "all" },
@@ -327,7 +388,7 @@ fn check_tied(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
     }
     log.push(
         Diagnostic::error(
-            places.loops[0],
+            span,
             format!(
                 "the loops tie {}, but {} passive",
                 plural(n_equations, "coordinate"),

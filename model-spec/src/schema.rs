@@ -98,6 +98,9 @@ record! {
         /// False if nothing drives the coordinate: its row of the equation of motion, with a force of zero, takes part in
         /// identification.
         "driven" driven: optional Flag,
+        /// What the coordinate follows, by gears, a belt or a screw: a sum of other coordinates, each times constants, and of
+        /// constants, such as `"n*q1 + q0"`.
+        "follows" follows: optional Formula,
         /// Remark.
         "note" note: optional Text,
     }

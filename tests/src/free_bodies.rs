@@ -159,6 +159,18 @@ fn joints_give_way(
     }
 }
 
+/// A coupling supplies what follows with a force, and takes it, times the factor, from what is followed.
+fn couplings_carry(mechanism: &Mechanism, first: usize, matrix: &mut DMatrix<f64>) {
+    let value = |symbol| mechanism.symbol_nominal(symbol);
+    let joints = 6 * (mechanism.frames.len() - 1);
+    for (column, coupling) in (first..).zip(&mechanism.couplings) {
+        matrix[(joints + coupling.coordinate.0, column)] -= 1.0;
+        for (i, factor) in &coupling.terms {
+            matrix[(joints + i.0, column)] += factor.evaluate(&value);
+        }
+    }
+}
+
 impl Balances {
     fn new(mechanism: &Mechanism, numbers: &Numbers<'_>, motion: &[Jet]) -> Self {
         let n = motion.len();
@@ -174,7 +186,8 @@ impl Balances {
         let loops = 6 * (n_frames - 1);
         let moments = loops + 3 * mechanism.loops.len();
         let drives = moments + n_pins;
-        let n_unknowns = drives + mechanism.drives.len();
+        let couplings = drives + mechanism.drives.len();
+        let n_unknowns = couplings + mechanism.couplings.len();
         let n_rows = 6 * (n_frames - 1) + n;
         let mut matrix = DMatrix::zeros(n_rows, n_unknowns);
         let mut needed = DVector::zeros(n_rows);
@@ -242,6 +255,7 @@ impl Balances {
                 column += 1;
             }
         }
+        couplings_carry(mechanism, couplings, &mut matrix);
         let effects = numbers.effects_on_joints(motion);
         joints_give_way(
             mechanism,

@@ -437,17 +437,22 @@ impl<'a> Numbers<'a> {
         Vector3::from(self.vector(&self.mechanism.gravity))
     }
 
-    /// Distances of the points that loops join, with derivatives: three components per loop.
+    /// Distances of the points that loops join, with derivatives: three components per loop; then by how much each
+    /// coordinate that follows others is off.
     pub fn gaps(&self, coordinates: &[Jet]) -> Vec<Jet> {
         let poses = self.poses(coordinates);
-        self.mechanism
-            .loops
-            .iter()
-            .flat_map(|l| {
-                let [a, b] = l.joins.map(|p| self.point(&poses, p));
-                std::array::from_fn::<Jet, 3, _>(|i| a[i] - b[i])
+        let of_loops = self.mechanism.loops.iter().flat_map(|l| {
+            let [a, b] = l.joins.map(|p| self.point(&poses, p));
+            std::array::from_fn::<Jet, 3, _>(|i| a[i] - b[i])
+        });
+        let value = |exact: &Exact| exact.evaluate(&|symbol| self.mechanism.symbol_nominal(symbol));
+        let of_couplings = self.mechanism.couplings.iter().map(|coupling| {
+            let own = coordinates[coupling.coordinate.0] - Jet::constant(value(&coupling.offset));
+            coupling.terms.iter().fold(own, |off, (i, factor)| {
+                off - Jet::constant(value(factor)) * coordinates[i.0]
             })
-            .collect()
+        });
+        of_loops.chain(of_couplings).collect()
     }
 
     /// Derivatives of the gaps by the coordinates, one column each.

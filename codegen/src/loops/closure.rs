@@ -4,6 +4,7 @@ use modelmill_spec::{FrameIdx, Mechanism};
 
 use crate::DeriveError;
 use crate::expr::{AngleSum, ExprId, Graph, coordinates_of};
+use crate::loops::coupling::Follower;
 use crate::loops::relation::AngleRelation;
 use crate::loops::spatial;
 use crate::loops::stretch::{Between, Stretch, fixed_turns, inverse, point_at, sum_of};
@@ -25,8 +26,20 @@ pub(crate) struct Closure {
     pub(crate) equations: Vec<ExprId>,
     /// Relations that solve it outright; empty if there are none.
     pub(crate) relations: Vec<AngleRelation>,
+    /// What follows others, if this is a coupling and no loop.
+    pub(crate) follower: Option<Follower>,
     /// Coordinates on which it depends, sorted.
     pub(crate) coordinates: Vec<usize>,
+}
+
+impl Closure {
+    /// The coordinates that it gives outright; none where it has to be solved.
+    pub(super) fn given(&self) -> Vec<usize> {
+        match &self.follower {
+            Some(follower) => vec![follower.coordinate],
+            None => self.relations.iter().map(|r| r.coordinate).collect(),
+        }
+    }
 }
 
 /// A vector of a planar chain, turned by `angle + pi12 * pi/12`.
@@ -125,6 +138,7 @@ fn close(graph: &mut Graph, name: String, path: &[Stretch]) -> Closure {
         chain,
         equations: Vec::new(),
         relations: Vec::new(),
+        follower: None,
         coordinates,
     }
 }

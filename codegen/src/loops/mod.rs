@@ -5,6 +5,7 @@ mod all;
 pub(crate) mod branches;
 mod choose;
 pub(crate) mod closure;
+pub(crate) mod coupling;
 pub(crate) mod field_poses;
 pub(crate) mod independent;
 pub(crate) mod magnitude;
@@ -17,6 +18,7 @@ pub(crate) mod solve_step;
 pub(crate) mod solved;
 mod spatial;
 pub(crate) mod stretch;
+pub(crate) mod walk;
 mod whole_root;
 
 pub(crate) use all::Loops;

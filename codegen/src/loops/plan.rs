@@ -1,4 +1,4 @@
-//! The order in which loops are solved, each as a dyad or by relations, and the same made evaluable in the field.
+//! The order in which loops are solved, each as a dyad, by relations or as a coupling, and the same made evaluable in the field.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use modelmill_spec::Mechanism;
 use super::all::Loops;
 use super::solve_step::{Plan, PlanStep};
 use super::solved::Solved;
-use crate::expr::{ExprId, Graph, nominal_value};
+use crate::expr::{AngleSum, Atom, ExprId, Graph, nominal_value};
 use crate::loops::choose;
 use crate::loops::closure::Closure;
 use crate::loops::planar;
@@ -55,7 +55,7 @@ pub(crate) fn plan(
                 .collect();
             choices(graph, mechanism, closure, &free, loops, unknowns)
                 .into_iter()
-                .find_map(|unknown| solve(graph, mechanism, closure, unknown))
+                .find_map(|unknown| solve(graph, mechanism, closure, unknown, unknowns))
                 .map(|found| (position, found))
         });
         let Some((position, mut found)) = next else {
@@ -76,7 +76,11 @@ pub(crate) fn plan(
     if unknowns == Unknowns::Any {
         steps.reverse();
     }
-    Some(Plan { steps })
+    let divided = match unknowns {
+        Unknowns::Passive => Vec::new(),
+        Unknowns::Any => loops.divided.clone(),
+    };
+    Some(Plan { steps, divided })
 }
 
 /// Of more sets than this of a loop's coordinates not all are tried: each attempt derives expressions.
@@ -92,8 +96,8 @@ fn choices(
     loops: &Loops,
     unknowns: Unknowns,
 ) -> Vec<Vec<usize>> {
-    if !closure.relations.is_empty() {
-        let related: Vec<usize> = closure.relations.iter().map(|r| r.coordinate).collect();
+    let related = closure.given();
+    if !related.is_empty() {
         let all = match unknowns {
             Unknowns::Passive => free.iter().all(|c| related.contains(c)),
             Unknowns::Any => related.iter().all(|c| free.contains(c)),
@@ -139,7 +143,7 @@ fn together(
     let closures: Vec<&Closure> = todo.iter().map(|i| &loops.closures[*i]).collect();
     if closures
         .iter()
-        .any(|c| c.equations.is_empty() || !c.relations.is_empty())
+        .any(|c| c.equations.is_empty() || !c.given().is_empty())
     {
         return None;
     }
@@ -209,7 +213,24 @@ fn solve(
     mechanism: &Mechanism,
     closure: &Closure,
     unknown: Vec<usize>,
+    unknowns: Unknowns,
 ) -> Option<Vec<PlanStep>> {
+    if let Some(follower) = &closure.follower
+        && closure.relations.is_empty()
+    {
+        let angle = AngleSum::new([(Atom::Coordinate(follower.coordinate), 1)]);
+        let in_parts = follower.in_parts.filter(|_| unknowns == Unknowns::Any);
+        let solved = Solved {
+            angles: in_parts
+                .map(|cos_sin| (angle, cos_sin))
+                .into_iter()
+                .collect(),
+            relations: Vec::new(),
+            values: vec![(follower.coordinate, follower.value)],
+            root: None,
+        };
+        return Some(vec![PlanStep { unknown, solved }]);
+    }
     if closure.chain.is_none() && closure.relations.is_empty() {
         let steps = spatial::solve(
             graph,

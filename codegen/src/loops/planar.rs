@@ -31,7 +31,7 @@ pub(crate) fn solve(
         return Some(Solved {
             angles: Vec::new(),
             relations,
-            lengths: Vec::new(),
+            values: Vec::new(),
             root: None,
         });
     }
@@ -95,7 +95,7 @@ pub(crate) fn solve(
 /// Whether the solved angles determine every unknown coordinate (their integer matrix is unimodular and triangular).
 fn determines(solved: &Solved, unknown: &[usize]) -> bool {
     let mut left: BTreeSet<usize> = unknown.iter().copied().collect();
-    for (slide, _) in &solved.lengths {
+    for (slide, _) in &solved.values {
         left.remove(slide);
     }
     loop {
@@ -213,7 +213,7 @@ fn two_circles(
             ),
         ],
         relations: Vec::new(),
-        lengths: Vec::new(),
+        values: Vec::new(),
         root: Some(Root {
             radicand,
             witness,
@@ -288,7 +288,7 @@ fn circle_and_line(
     Some(Solved {
         angles,
         relations: Vec::new(),
-        lengths: vec![(slide, value)],
+        values: vec![(slide, value)],
         root,
     })
 }
@@ -306,7 +306,7 @@ fn two_lines(graph: &mut Graph, known: [ExprId; 2], first: usize, second: usize)
     Some(Solved {
         angles: Vec::new(),
         relations: Vec::new(),
-        lengths: vec![(first, s), (second, t)],
+        values: vec![(first, s), (second, t)],
         root: None,
     })
 }

@@ -9,6 +9,8 @@ use crate::expr::{AngleSum, Atom, Domain, ExprId, FieldPoint, Graph, Node, Tape,
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
     pub(crate) steps: Vec<PlanStep>,
+    /// Angles whose turns are drawn in so many parts, for others to follow them by fractions.
+    pub(crate) divided: Vec<(usize, i64)>,
 }
 
 /// One loop of a plan, or one of its coordinates.
@@ -22,7 +24,7 @@ pub(crate) struct PlanStep {
 pub(crate) struct SolveStep {
     unknown: Vec<usize>,
     angles: Vec<AngleSum>,
-    /// Coordinates whose values follow: lengths, and angles that are combinations of known ones.
+    /// Coordinates whose values follow: lengths, angles that are combinations of known ones, and what follows others.
     numbers: Vec<usize>,
     /// Cosines and sines of the angles in pairs, then the numbers.
     tape: Tape,
@@ -35,7 +37,7 @@ impl SolveStep {
     pub(crate) fn new(graph: &mut Graph, step: PlanStep, roots: &mut Vec<ExprId>) -> Self {
         let solved = step.solved;
         let mut angles: Vec<(AngleSum, [ExprId; 2])> = solved.angles;
-        let mut numbers: Vec<(usize, ExprId)> = solved.lengths;
+        let mut numbers: Vec<(usize, ExprId)> = solved.values;
         for relation in &solved.relations {
             let (c, s) = graph.cos_sin(&relation.sum, relation.pi12);
             let angle = AngleSum::new([(Atom::Coordinate(relation.coordinate), 1)]);

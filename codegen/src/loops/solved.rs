@@ -10,8 +10,8 @@ pub(crate) struct Solved {
     pub(crate) angles: Vec<(AngleSum, [ExprId; 2])>,
     /// Angles that are integer combinations of known ones.
     pub(crate) relations: Vec<AngleRelation>,
-    /// Values of prismatic coordinates.
-    pub(crate) lengths: Vec<(usize, ExprId)>,
+    /// Values of coordinates: of prismatic ones, and of angles that follow others.
+    pub(crate) values: Vec<(usize, ExprId)>,
     /// The square root that chooses between the two assembly modes: its sign is `branch`'s.
     pub(crate) root: Option<Root>,
 }

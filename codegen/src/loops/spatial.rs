@@ -205,7 +205,7 @@ fn ways_for(
     };
     let size = |graph: &Graph, solved: &Solved| {
         let mut roots: Vec<ExprId> = solved.angles.iter().flat_map(|(_, cs)| *cs).collect();
-        roots.extend(solved.lengths.iter().map(|(_, value)| *value));
+        roots.extend(solved.values.iter().map(|(_, value)| *value));
         graph.nodes_of(&roots).count()
     };
     solved
@@ -290,7 +290,7 @@ fn of_angle(coordinate: usize, cos_sin: [ExprId; 2]) -> Solved {
     Solved {
         angles: vec![(AngleSum::new([(Atom::Coordinate(coordinate), 1)]), cos_sin)],
         relations: Vec::new(),
-        lengths: Vec::new(),
+        values: Vec::new(),
         root: None,
     }
 }
@@ -299,7 +299,7 @@ fn of_length(coordinate: usize, value: ExprId) -> Solved {
     Solved {
         angles: Vec::new(),
         relations: Vec::new(),
-        lengths: vec![(coordinate, value)],
+        values: vec![(coordinate, value)],
         root: None,
     }
 }
@@ -456,7 +456,7 @@ fn closes(graph: &Graph, residual: &[ExprId], steps: &[(usize, Solved)]) -> bool
         .iter()
         .map(|(_, solved)| {
             let mut roots: Vec<ExprId> = solved.angles.iter().flat_map(|(_, cs)| *cs).collect();
-            roots.extend(solved.lengths.iter().map(|(_, value)| *value));
+            roots.extend(solved.values.iter().map(|(_, value)| *value));
             Tape::new(graph, &roots)
         })
         .collect();
@@ -464,7 +464,7 @@ fn closes(graph: &Graph, residual: &[ExprId], steps: &[(usize, Solved)]) -> bool
     let mut all = residual.to_vec();
     for (_, solved) in steps {
         all.extend(solved.angles.iter().flat_map(|(_, cs)| *cs));
-        all.extend(solved.lengths.iter().map(|(_, value)| *value));
+        all.extend(solved.values.iter().map(|(_, value)| *value));
     }
     let atoms = graph.atoms(&all);
     let mut stream = Stream::new(4);
@@ -477,7 +477,7 @@ fn closes(graph: &Graph, residual: &[ExprId], steps: &[(usize, Solved)]) -> bool
         for ((coordinate, solved), tape) in steps.iter().zip(&tapes) {
             let values = tape.evaluate(&point)?;
             let atom = Atom::Coordinate(*coordinate);
-            if solved.lengths.is_empty() {
+            if solved.values.is_empty() {
                 point.angles.insert(atom, (values[0], values[1]));
             } else {
                 point.values.insert(atom, values[0]);

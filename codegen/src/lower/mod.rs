@@ -13,7 +13,7 @@ mod tests;
 
 pub(crate) use program::SINGULAR;
 pub use program::{Guard, Op, OperationCount, Program, Stage, ValueId};
-pub(crate) use schedule::Definition;
+pub(crate) use schedule::{By, Definition};
 
 use crate::expr::{ExprId, Graph};
 
@@ -74,7 +74,7 @@ pub(crate) fn lower_by(graph: &Graph, passes: &[Pass], request: &Request<'_>) ->
     roots.extend(request.reachable);
     roots.extend(request.regular.iter().flat_map(|(id, size)| [*id, *size]));
     for definition in request.definitions {
-        roots.extend(definition.operands());
+        roots.extend(definition.by.operands());
     }
     // Costs are the finished programs', so that no round is kept that does not pay. The passes go through the whole arena
     // again and again, so that only what is needed should be in it.

@@ -9,20 +9,47 @@ use super::Request;
 use super::program::{Guard, Op, Program, Stage, ValueId};
 use crate::expr::{AngleSum, Atom, ExprId, Graph, Node, Rational};
 
-/// An atom that is computed: a passive angle from the sine and cosine of what it exceeds `quarters` quarter turns by.
-///
-/// The quarter turns are those of the nominal pose: the angle goes on through half a turn, and jumps only far from there.
+/// An atom that is computed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Definition {
     pub(crate) atom: Atom,
-    pub(crate) quarters: i32,
-    pub(crate) sine: ExprId,
-    pub(crate) cosine: ExprId,
+    pub(crate) by: By,
 }
 
-impl Definition {
-    pub(crate) fn operands(&self) -> [ExprId; 2] {
-        [self.sine, self.cosine]
+/// How an atom is computed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum By {
+    /// By its value: an angle that follows others.
+    Value(ExprId),
+    /// A passive angle from the sine and cosine of what it exceeds `quarters` quarter turns by.
+    ///
+    /// The quarter turns are those of the nominal pose: the angle goes on through half a turn, and jumps only far from there.
+    Turn {
+        quarters: i32,
+        sine: ExprId,
+        cosine: ExprId,
+    },
+}
+
+impl By {
+    pub(crate) fn operands(self) -> Vec<ExprId> {
+        match self {
+            Self::Value(value) => vec![value],
+            Self::Turn { sine, cosine, .. } => vec![sine, cosine],
+        }
+    }
+
+    /// The same by other operands, which are taken from `from`.
+    fn with(self, from: &mut impl Iterator<Item = ExprId>) -> Self {
+        let mut next = || from.next().expect("as many roots as operands");
+        match self {
+            Self::Value(_) => Self::Value(next()),
+            Self::Turn { quarters, .. } => Self::Turn {
+                quarters,
+                sine: next(),
+                cosine: next(),
+            },
+        }
     }
 }
 
@@ -32,6 +59,7 @@ pub(crate) fn schedule(graph: &Graph, roots: &[ExprId], request: &Request<'_>) -
     let (outputs, rest) = roots.split_at(request.outputs.len());
     let (reachable, rest) = rest.split_at(request.reachable.len());
     let (regular, defined) = rest.split_at(2 * request.regular.len());
+    let mut defined = defined.iter().copied();
     let mut scheduler = Scheduler {
         graph,
         fixed: fixed_nodes(graph, roots),
@@ -42,8 +70,7 @@ pub(crate) fn schedule(graph: &Graph, roots: &[ExprId], request: &Request<'_>) -
         defined: request
             .definitions
             .iter()
-            .zip(defined.chunks(2))
-            .map(|(d, pair)| (d.atom, (d.quarters, pair[0], pair[1])))
+            .map(|d| (d.atom, d.by.with(&mut defined)))
             .collect(),
     };
     for id in reachable {
@@ -110,8 +137,7 @@ struct Scheduler<'a> {
     program: Program,
     known: FxHashMap<Op, ValueId>,
     values: FxHashMap<ExprId, ValueId>,
-    /// Quarter turns, sine and cosine.
-    defined: FxHashMap<Atom, (i32, ExprId, ExprId)>,
+    defined: FxHashMap<Atom, By>,
 }
 
 impl Scheduler<'_> {
@@ -211,7 +237,12 @@ impl Scheduler<'_> {
 
     fn atom(&mut self, atom: Atom) -> ValueId {
         match self.defined.get(&atom).copied() {
-            Some((quarters, sine, cosine)) => {
+            Some(By::Value(value)) => self.value(value),
+            Some(By::Turn {
+                quarters,
+                sine,
+                cosine,
+            }) => {
                 let (y, x) = (self.value(sine), self.value(cosine));
                 let angle = self.push(Op::Atan2(y, x));
                 if quarters == 0 {

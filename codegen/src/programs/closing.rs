@@ -13,7 +13,7 @@ use crate::loops::solve_step::Plan;
 use crate::loops::solved::turn;
 use crate::lower::SINGULAR;
 use crate::lower::cost::cost;
-use crate::lower::{Definition, PASSES, Pass, Program, Request, lower_by};
+use crate::lower::{By, Definition, PASSES, Pass, Program, Request, lower_by};
 use crate::regressor::Equations;
 use crate::tree::checks;
 
@@ -22,7 +22,7 @@ use crate::tree::checks;
 pub(crate) struct Closing {
     /// The order in which the loops are solved, if they have closed forms.
     plan: Option<Plan>,
-    /// Cosine and sine of passive coordinates alone, for their values.
+    /// How passive angles are computed, where their values are asked for or follow others.
     definitions: Vec<Definition>,
     reachable: Vec<ExprId>,
     /// Nodes replaced by the position's closed form.
@@ -89,7 +89,7 @@ impl Closing {
             // Earlier steps' unknowns are known by now; their closed form goes into this step's expressions.
             let mut roots: Vec<ExprId> =
                 step.solved.angles.iter().flat_map(|(_, cs)| *cs).collect();
-            roots.extend(step.solved.lengths.iter().map(|(_, value)| *value));
+            roots.extend(step.solved.values.iter().map(|(_, value)| *value));
             roots.extend(step.solved.root.iter().map(|root| root.radicand));
             let closed = closing.close_position(graph, &roots);
             let n_angles = step.solved.angles.len();
@@ -97,10 +97,14 @@ impl Closing {
             closing
                 .solved
                 .extend(closed[..2 * n_angles].chunks(2).map(|cs| [cs[0], cs[1]]));
-            for ((coordinate, _), value) in step.solved.lengths.iter().zip(&closed[2 * n_angles..])
-            {
-                let atom = graph.atom(Atom::Coordinate(*coordinate));
-                closing.position.insert(atom, *value);
+            for ((coordinate, _), value) in step.solved.values.iter().zip(&closed[2 * n_angles..]) {
+                let atom = Atom::Coordinate(*coordinate);
+                if mechanism.coordinates[*coordinate].motion.is_angle() {
+                    let by = By::Value(*value);
+                    closing.definitions.push(Definition { atom, by });
+                } else {
+                    closing.position.insert(graph.atom(atom), *value);
+                }
             }
             closing
                 .reachable
@@ -133,9 +137,11 @@ impl Closing {
                 let [cosine, sine] = turn(graph, [back.0, back.1], [cosine, sine]);
                 closing.definitions.push(Definition {
                     atom: Atom::Coordinate(*p),
-                    quarters,
-                    sine,
-                    cosine,
+                    by: By::Turn {
+                        quarters,
+                        sine,
+                        cosine,
+                    },
                 });
             }
         }
@@ -269,6 +275,25 @@ impl Closing {
         graph.substitute(roots, &replacements)
     }
 
+    /// The definitions of atoms that some expressions need, directly or by way of other definitions.
+    fn definitions(&self, graph: &Graph, roots: &[ExprId]) -> Vec<Definition> {
+        let mut used = graph.atoms(roots);
+        used.extend(graph.atoms(&self.reachable));
+        let (mut found, mut left): (Vec<Definition>, _) = (Vec::new(), self.definitions.clone());
+        loop {
+            let (next, rest): (Vec<Definition>, Vec<Definition>) =
+                left.into_iter().partition(|d| used.contains(&d.atom));
+            if next.is_empty() {
+                return found;
+            }
+            for definition in &next {
+                used.extend(graph.atoms(&definition.by.operands()));
+            }
+            found.extend(next);
+            left = rest;
+        }
+    }
+
     /// Closes some expressions over the active coordinates and lowers them.
     pub(crate) fn program(
         &self,
@@ -323,13 +348,7 @@ impl Closing {
         roots.extend(self.regular.iter().map(|(id, _)| *id));
         roots = self.close_position(graph, &roots);
         let (outputs, regular) = roots.split_at(n);
-        let used = graph.atoms(outputs);
-        let definitions: Vec<Definition> = self
-            .definitions
-            .iter()
-            .filter(|d| used.contains(&d.atom))
-            .copied()
-            .collect();
+        let definitions = self.definitions(graph, &roots);
         let regular: Vec<(ExprId, ExprId)> = regular
             .iter()
             .copied()

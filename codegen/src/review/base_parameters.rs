@@ -175,10 +175,11 @@ pub(super) fn dependencies(page: &mut Document, derivation: &Derivation) {
              They were found in exact arithmetic and confirmed at {confirmed_at} further states with other values of the constants."
         ),
         Method::Unreduced => "Columns are not reduced.".to_owned(),
-        Method::Numeric { least_kept, most_dropped, because } => format!(
+        Method::Numeric { least_kept, most_dropped, residual, because } => format!(
             "Columns that are constant combinations of retained ones, eq. (6), found numerically on the values of this file: \
              {because}. The factors are rounded, and base and factors hold for these values alone. \
-             Of every retained column the others leave at least {least_kept:.1e}, of every dependent one at most {most_dropped:.1e}."
+             Of every retained column the others leave at least {least_kept:.1e}, of every dependent one at most {most_dropped:.1e}; \
+             at further states the factors leave at most {residual:.1e} of a column."
         ),
     })]);
     let lines = reduction

@@ -90,6 +90,8 @@ pub struct NumericMethod {
     pub least_kept: f64,
     /// The same for the dependent column that is furthest from it.
     pub most_dropped: f64,
+    /// What the factors leave of a dependent column at further states, relative to its terms: the most of all.
+    pub residual: f64,
 }
 
 impl NumericMethod {
@@ -98,6 +100,7 @@ impl NumericMethod {
         let Method::Numeric {
             least_kept,
             most_dropped,
+            residual,
             because,
         } = &reduction.method
         else {
@@ -109,6 +112,7 @@ impl NumericMethod {
             because: because.to_string(),
             least_kept: *least_kept,
             most_dropped: *most_dropped,
+            residual: *residual,
         })
     }
 }

@@ -41,6 +41,7 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
         ..
     } = derivation;
     let projection = &equations.projection;
+    couplings(page, derivation);
     if mechanism.loops.is_empty() {
         return;
     }
@@ -114,6 +115,37 @@ pub(super) fn loops(page: &mut Document, derivation: &Derivation) {
     page.equations("determinants", determinants);
 }
 
+/// What follows other coordinates.
+fn couplings(page: &mut Document, derivation: &Derivation) {
+    let Derivation {
+        mechanism,
+        graph,
+        equations,
+        ..
+    } = derivation;
+    let closures = equations.projection.loops.closures.iter();
+    let mut lines = Vec::new();
+    for follower in closures.filter_map(|closure| closure.follower.as_ref()) {
+        let Some(right) = shown(graph, mechanism, follower.value) else {
+            continue;
+        };
+        lines.push(Equation {
+            left: Formula::name(&*mechanism.coordinates[follower.coordinate].name),
+            right,
+            tag: format!("C{}", lines.len() + 1),
+            unit: None,
+        });
+    }
+    if lines.is_empty() {
+        return;
+    }
+    page.heading("Couplings");
+    page.paragraph([text(
+        "These coordinates follow others, and their rates and accelerations do alike. Forces on them act on what they          follow, times the factor.",
+    )]);
+    page.equations("couplings", lines);
+}
+
 fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
     let Derivation {
         mechanism,
@@ -125,7 +157,14 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
         return;
     };
     let mut related = Vec::new();
+    let is_follower = |i: &usize| {
+        let mut couplings = mechanism.couplings.iter();
+        couplings.any(|coupling| coupling.coordinate.0 == *i)
+    };
     for step in &plan.steps {
+        if step.unknown.iter().all(is_follower) {
+            continue;
+        }
         for relation in &step.solved.relations {
             let offset = Rational::new(i64::from(relation.pi12), 12);
             related.push(Equation {
@@ -142,7 +181,7 @@ fn solved_in_closed_form(page: &mut Document, derivation: &Derivation) {
             continue;
         }
         let mut line = names(mechanism, &step.unknown);
-        line.push(text(match step.solved.lengths.len() {
+        line.push(text(match step.solved.values.len() {
             0 => " follow in closed form as the intersection of two circles",
             1 => " follow in closed form as the intersection of a circle and a line",
             _ => " follow from two linear equations",

@@ -5,6 +5,7 @@
 
 mod actuation;
 mod bodies;
+mod couplings;
 pub(crate) mod effect_places;
 mod effects;
 mod frames;
@@ -56,6 +57,7 @@ pub(crate) fn build(
     let points = frames::points(model, &symbols.scope, &tree, &mut places, log);
     let parts = bodies::parts(model, &symbols, &tree, log);
     let lumped_masses = bodies::lumped_masses(model, &symbols, &tree, &points, log);
+    let couplings = couplings::couplings(model, &mut symbols, &places, log);
     let loops = actuation::loops(model, &points, &mut places, log);
     free::check_loops(&tree, &loops, &points, &places, log);
     let drives = actuation::drives(model, &symbols, &tree, &points, &mut places, log);
@@ -104,6 +106,7 @@ pub(crate) fn build(
         parts,
         lumped_masses,
         loops,
+        couplings,
         drives: drives.rows,
         shared_drives: drives.shared,
         effects,

@@ -424,7 +424,7 @@ fn declare_coordinates(
             symbols.coordinates.push(Coordinate {
                 name: key.name.clone(),
                 motion,
-                passive: entry.passive.is_some_and(|flag| flag.0),
+                passive: entry.passive.is_some_and(|flag| flag.0) || entry.follows.is_some(),
                 nominal: entry.nominal.map_or(at_rest, |number| number.value),
             });
         } else {

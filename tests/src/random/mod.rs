@@ -77,6 +77,7 @@ impl Draft {
                 parts: Vec::new(),
                 lumped_masses: Vec::new(),
                 loops: Vec::new(),
+                couplings: Vec::new(),
                 drives: Vec::new(),
                 shared_drives: Vec::new(),
                 effects: Vec::new(),

@@ -47,7 +47,7 @@ ranks! {
         "palletizer" => 25;
     planar_bodies_wherever_gravity_points:
         "four_bar_tilted" => 8, "four_bar_in_a_horizontal_plane" => 4, "four_bar_isosceles" => 8,
-        "antiparallelogram" => 8, "deltoid" => 8;
+        "antiparallelogram" => 8, "deltoid" => 8, "kites_in_a_row" => 8, "kite_sprung" => 7;
     planar_platforms:
         "three_prr" => 13, "three_prr_tied_by_drives" => 7, "three_rpr_tied" => 9,
         "three_rpr_by_drives" => 19, "three_rrr_by_drives" => 19, "five_bar_prismatic" => 7;
@@ -75,10 +75,29 @@ ranks! {
 /// What has no symbolic form yet has the right number all the same, and says that its factors are numbers.
 #[test]
 fn numeric_reductions_have_the_rank_of_the_judge() {
-    for (name, rank) in [("rssp", 4), ("two_prs_psr", 23), ("sarrus", 5)] {
+    for (name, rank) in [
+        ("rssp", 4),
+        ("two_prs_psr", 23),
+        ("sarrus", 5),
+        ("bricard_trihedral", 22),
+        ("bricard_regular", 19),
+        ("peaucellier", 14),
+        ("peaucellier_tied", 8),
+    ] {
         let reduction = derive(&judged(name)).reduction;
         assert_eq!(reduction.retained.len(), rank, "{name}");
-        assert!(matches!(reduction.method, Method::Numeric { .. }), "{name}");
+        let Method::Numeric {
+            least_kept,
+            most_dropped,
+            residual,
+            ..
+        } = reduction.method
+        else {
+            panic!("{name}: {:?}", reduction.method);
+        };
+        // No doubt is left about the number.
+        assert!(least_kept > 1e-6 && most_dropped < 1e-100, "{name}");
+        assert!(residual < 1e-12, "{name}: {residual:.1e}");
     }
 }
 
@@ -92,6 +111,12 @@ fn forces_are_those_of_the_bodies() {
         "three_rrs_by_pose",
         "rscr",
         "sarrus",
+        "bricard_trihedral",
+        "bricard_regular",
+        "peaucellier",
+        "peaucellier_tied",
+        "kites_in_a_row",
+        "kite_sprung",
     ] {
         let mut mechanism = judged(name);
         for (i, parameter) in mechanism.parameters.iter_mut().enumerate() {

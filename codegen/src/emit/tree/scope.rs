@@ -193,7 +193,7 @@ fn notes(derivation: &Derivation) -> BTreeMap<String, String> {
     let mechanism = &derivation.mechanism;
     let projection = &derivation.equations.projection;
     let mut notes = BTreeMap::new();
-    let n_gaps = projection.loops.n_gaps();
+    let n_gaps = projection.loops.n_gaps(mechanism);
     for k in 0..projection.determinants.len() {
         let tag = format!("eq. (L{})", n_gaps + k + 1);
         notes.insert(format!("Delta_{}", k + 1), tag);

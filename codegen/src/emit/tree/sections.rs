@@ -188,8 +188,8 @@ impl Sections {
 /// What is said of the loops.
 fn closing(derivation: &Derivation) -> String {
     let loops = &derivation.equations.projection.loops;
-    let n_gaps = loops.n_gaps();
     let mechanism = &derivation.mechanism;
+    let n_gaps = loops.n_gaps(mechanism);
     let names: Vec<String> = mechanism
         .loops
         .iter()

@@ -266,7 +266,9 @@ fn closing_gaps(
     cuts: &[Cut],
 ) -> Vec<ExprId> {
     let projection = &equations.projection;
-    let mut all: Vec<ExprId> = Vec::new();
+    // Couplings are no cuts, and carry what no other gap does.
+    let couplings = &projection.loops.closures[mechanism.loops.len()..];
+    let mut all: Vec<ExprId> = couplings.iter().flat_map(|c| c.residual.clone()).collect();
     for gap in cuts.iter().flat_map(|cut| cut.gap) {
         if gap != Graph::ZERO && !all.contains(&gap) {
             all.push(gap);

@@ -90,6 +90,7 @@ pub(super) fn items(derivation: &Derivation, scope: &Scope) -> TokenStream {
         #pose
         #model
         #inverse_dynamics
+        ::modelmill_runtime::watch!();
     }
 }
 

@@ -1,0 +1,221 @@
+//! Coordinates that follow others, by gears, belts or screws: each is a closure of its own, solved as it stands.
+//!
+//! In the field an angle that turns with a fraction of another one is made of the parts that both are made of: with
+//! `q2 = 7/10 q1` both are powers of the turn by `q1/10`. A ratio that is a constant of the file makes an angle of its own,
+//! since sine and cosine of `n q` are no algebraic functions of those of `q`. So the base holds for every value of the
+//! constant; for a special one the numeric rank may be lower, which is said.
+
+use std::collections::BTreeMap;
+
+use modelmill_spec::Mechanism;
+
+use super::closure::Closure;
+use super::relation::AngleRelation;
+use super::solved::turn;
+use crate::DeriveError;
+use crate::expr::{AngleSum, Atom, ExprId, Graph, Node, Rational, Unary, coordinates_of};
+use crate::tree::expressions::expression;
+
+/// Angles are divided into at most so many parts, and turn by at most so many of them.
+const MOST_PARTS: i64 = 1000;
+
+/// A coordinate that follows others.
+#[derive(Clone, Debug)]
+pub(crate) struct Follower {
+    pub(crate) coordinate: usize,
+    /// rad or m, in terms of what it follows.
+    pub(crate) value: ExprId,
+    /// Cosine and sine of an angle by the parts of what it follows, as the field has them.
+    pub(crate) in_parts: Option<[ExprId; 2]>,
+}
+
+/// All couplings of a mechanism.
+pub(crate) struct Couplings {
+    pub(crate) closures: Vec<Closure>,
+    /// Angles whose turns others make fractions of, and into how many parts the field divides them.
+    pub(crate) divided: Vec<(usize, i64)>,
+}
+
+/// The couplings of a mechanism as closures.
+pub(crate) fn couplings(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+) -> Result<Couplings, DeriveError> {
+    let is_angle = |i: usize| mechanism.coordinates[i].motion.is_angle();
+    let mut values = Vec::new();
+    for coupling in &mechanism.couplings {
+        let mut terms = vec![expression(graph, &coupling.offset)?];
+        for (i, factor) in &coupling.terms {
+            let factor = expression(graph, factor)?;
+            let followed = graph.atom(Atom::Coordinate(i.0));
+            terms.push(graph.mul(factor, followed));
+        }
+        values.push((coupling.coordinate.0, graph.add_all(&terms)));
+    }
+    // What follows a follower turns in parts of what that one follows.
+    let known: BTreeMap<ExprId, ExprId> = values
+        .iter()
+        .map(|(i, value)| (graph.atom(Atom::Coordinate(*i)), *value))
+        .collect();
+    let mut resolved: Vec<ExprId> = values.iter().map(|(_, value)| *value).collect();
+    for _ in 1..values.len() {
+        resolved = graph.substitute(&resolved, &known);
+    }
+    let mut parts: BTreeMap<ExprId, i64> = BTreeMap::new();
+    let turning = values
+        .iter()
+        .zip(&resolved)
+        .filter(|((i, _), _)| is_angle(*i));
+    for (_, value) in turning {
+        for (base, factor) in pieces(graph, *value) {
+            let denominator = factor.as_small().map_or(0, |(_, d)| d);
+            let common = parts.entry(base).or_insert(1);
+            let both = lcm(*common, denominator);
+            if (1..=MOST_PARTS).contains(&both) {
+                *common = both;
+            }
+        }
+    }
+    let mut closures = Vec::new();
+    for ((coordinate, value), resolved) in values.into_iter().zip(resolved) {
+        let own = graph.atom(Atom::Coordinate(coordinate));
+        let residual = vec![graph.sub(own, value)];
+        let relation = is_angle(coordinate)
+            .then(|| relation(graph, mechanism, coordinate, value))
+            .flatten();
+        let in_parts = is_angle(coordinate).then(|| {
+            let all = pieces(graph, resolved);
+            all.into_iter()
+                .fold([Graph::ONE, Graph::ZERO], |so_far, (base, factor)| {
+                    let piece = circle(graph, mechanism, base, &factor, &parts);
+                    turn(graph, piece, so_far)
+                })
+        });
+        closures.push(Closure {
+            name: mechanism.coordinates[coordinate].name.clone(),
+            coordinates: coordinates_of(graph, &residual),
+            residual,
+            n_independent: 1,
+            chain: None,
+            equations: Vec::new(),
+            follower: Some(Follower {
+                coordinate,
+                value,
+                in_parts,
+            }),
+            relations: relation.into_iter().collect(),
+        });
+    }
+    let divided = parts.into_iter().filter(|(_, n)| *n > 1);
+    let divided = divided.filter_map(|(base, n)| match graph.node(base) {
+        Node::Atom(Atom::Coordinate(i)) if is_angle(*i) => Some((*i, n)),
+        _ => None,
+    });
+    Ok(Couplings {
+        closures,
+        divided: divided.collect(),
+    })
+}
+
+/// A sum as what it is made of, each with its rational factor.
+fn pieces(graph: &Graph, value: ExprId) -> Vec<(ExprId, Rational)> {
+    match graph.node(value) {
+        Node::Sum(terms) => terms.clone(),
+        Node::Rational(number) if number.is_zero() => Vec::new(),
+        Node::Rational(number) => vec![(Graph::ONE, number.clone())],
+        _ => vec![(value, Rational::ONE)],
+    }
+}
+
+/// A piece that is a whole multiple of an angle with a name, or of pi/12.
+fn whole(
+    graph: &Graph,
+    mechanism: &Mechanism,
+    base: ExprId,
+    factor: &Rational,
+) -> Option<(AngleSum, i32)> {
+    let count = |factor: &Rational| {
+        let (n, _) = factor.as_small().filter(|(_, d)| *d == 1)?;
+        i32::try_from(n)
+            .ok()
+            .filter(|n| i64::from(n.abs()) <= MOST_PARTS)
+    };
+    match graph.node(base) {
+        Node::Atom(Atom::Pi) => {
+            let twelfths = count(&(factor * &Rational::integer(12)))?;
+            Some((AngleSum::NONE, twelfths.rem_euclid(24)))
+        }
+        Node::Atom(atom @ Atom::Coordinate(i)) if mechanism.coordinates[*i].motion.is_angle() => {
+            Some((AngleSum::new([(*atom, count(factor)?)]), 0))
+        }
+        Node::Atom(atom @ Atom::Constant(i)) if mechanism.constants[*i].is_angle => {
+            Some((AngleSum::new([(*atom, count(factor)?)]), 0))
+        }
+        _ => None,
+    }
+}
+
+/// The coupling of an angle that is a sum of whole multiples of others.
+fn relation(
+    graph: &Graph,
+    mechanism: &Mechanism,
+    coordinate: usize,
+    value: ExprId,
+) -> Option<AngleRelation> {
+    let mut relation = AngleRelation {
+        coordinate,
+        sum: AngleSum::NONE,
+        pi12: 0,
+    };
+    for (base, factor) in pieces(graph, value) {
+        let (sum, pi12) = whole(graph, mechanism, base, &factor)?;
+        relation.sum = relation.sum.plus(&sum, 1);
+        relation.pi12 = (relation.pi12 + pi12).rem_euclid(24);
+    }
+    Some(relation)
+}
+
+/// Cosine and sine of a piece of an angle.
+fn circle(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    base: ExprId,
+    factor: &Rational,
+    parts: &BTreeMap<ExprId, i64>,
+) -> [ExprId; 2] {
+    if let Some((sum, pi12)) = whole(graph, mechanism, base, factor) {
+        let (c, s) = graph.cos_sin(&sum, pi12);
+        return [c, s];
+    }
+    let n_parts = Rational::integer(parts[&base]);
+    let times = (factor * &n_parts).as_small();
+    let times = times.filter(|(n, d)| *d == 1 && n.abs() <= MOST_PARTS);
+    // What has no parts in common with others is an angle of its own.
+    let (part, times) = match times {
+        Some((n, _)) => (n_parts.recip(), n),
+        None => (factor.clone(), 1),
+    };
+    let part = graph.scale(base, &part);
+    let mut power = [Unary::Cos, Unary::Sin].map(|function| graph.unary(function, part));
+    if times < 0 {
+        power[1] = graph.neg(power[1]);
+    }
+    let mut total = [Graph::ONE, Graph::ZERO];
+    let mut left = times.abs();
+    while left > 0 {
+        if left % 2 == 1 {
+            total = turn(graph, power, total);
+        }
+        power = turn(graph, power, power);
+        left /= 2;
+    }
+    total
+}
+
+fn lcm(a: i64, b: i64) -> i64 {
+    let (mut x, mut y) = (a, b);
+    while y != 0 {
+        (x, y) = (y, x % y);
+    }
+    if x == 0 { 0 } else { (a / x).saturating_mul(b) }
+}
