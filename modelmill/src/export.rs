@@ -1,6 +1,7 @@
 //! `export`: a model as a robot description of other programs.
 
 use modelmill_identify::{FitFile, Note};
+use modelmill_spec::Loaded;
 
 pub use modelmill_reduction::ExportFormat as Format;
 
@@ -16,33 +17,35 @@ pub struct Exported {
     pub notes: Vec<Note>,
 }
 
+/// Writes a model file that was read from `path` with its nominal values as a URDF or MJCF. Nothing is derived for it.
+///
+/// Fails when the format does not know how a joint or a lumped mass of the model is.
+pub fn description(path: &str, loaded: &Loaded, format: Format) -> Outcome<Exported> {
+    let exported = modelmill_reduction::export(&loaded.mechanism, format)
+        .map_err(|error| Error::input(format!("{path}: {error}")))?;
+    Ok(Exported {
+        text: exported.text,
+        notes: exported.remarks.into_iter().map(Note::warning).collect(),
+    })
+}
+
 impl Model {
-    /// Writes the model with its nominal values, or with the physical parameters of a fit, as a URDF or MJCF. `file` is what
-    /// messages call the fit.
+    /// Writes the model with its nominal values, or with the physical parameters of a fit, as a URDF or MJCF. `fit` comes with
+    /// what messages call it.
     ///
-    /// Fails when a fit has base parameters only, since these say nothing of single bodies, and when the format does not know
-    /// how a joint or a lumped mass of the model is.
+    /// Fails when a fit has base parameters only, since these say nothing of single bodies, and as [`description`] does.
     pub fn export(&self, format: Format, fit: Option<(&FitFile, &str)>) -> Outcome<Exported> {
-        let adopted = match fit {
-            Some((fit, file)) if fit.physical().is_empty() => {
-                return Err(Error::input(format!(
-                    "{file} has base parameters only, and simulators need ten numbers of every body; identify with option `physical`"
-                )));
-            }
-            Some((fit, file)) => Some(self.adopt(fit, file)?),
-            None => None,
+        let Some((fit, file)) = fit else {
+            return description(&self.path, &self.loaded, format);
         };
-        let mechanism = match &adopted {
-            Some(adopted) => &adopted.loaded.mechanism,
-            None => &self.loaded.mechanism,
-        };
-        let exported = modelmill_reduction::export(mechanism, format)
-            .map_err(|error| Error::input(format!("{}: {error}", self.path)))?;
-        let mut notes = adopted.map_or_else(Vec::new, |adopted| adopted.notes);
-        notes.extend(exported.remarks.into_iter().map(Note::warning));
-        Ok(Exported {
-            text: exported.text,
-            notes,
-        })
+        if fit.physical().is_empty() {
+            return Err(Error::input(format!(
+                "{file} has base parameters only, and simulators need ten numbers of every body; identify with option `physical`"
+            )));
+        }
+        let adopted = self.adopt(fit, file)?;
+        let mut exported = description(&self.path, &adopted.loaded, format)?;
+        exported.notes.splice(0..0, adopted.notes);
+        Ok(exported)
     }
 }

@@ -1,9 +1,9 @@
 //! `export`: a model as a robot description of other programs.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use modelmill::Host;
-use modelmill::export::Format;
+use modelmill::export::{Format, description};
 
 use crate::args::ExportArgs;
 use crate::failure::{Failure, Outcome};
@@ -22,16 +22,19 @@ pub(crate) fn run(host: &Host, args: &ExportArgs) -> Outcome {
             args.out.display()
         )));
     };
-    let model = commands::model(host, &args.model)?;
-    let fits = args.parameters.iter().map(std::path::PathBuf::as_path);
-    let target = Target::new(&args.out, model.files().chain(fits).collect::<Vec<&Path>>())?;
-    let fit = args
-        .parameters
-        .as_ref()
-        .map(|path| host.fit(path))
-        .transpose()?;
-    let file = (args.parameters.as_ref()).map_or(String::new(), |path| path.display().to_string());
-    let exported = model.export(format, fit.as_ref().map(|fit| (fit, file.as_str())))?;
+    let loaded = commands::load(host, &args.model)?;
+    let fits = args.parameters.iter().map(PathBuf::as_path);
+    let inputs = loaded.sources.paths().chain(fits);
+    let target = Target::new(&args.out, inputs.collect::<Vec<&Path>>())?;
+    let path = args.model.display().to_string();
+    let exported = match &args.parameters {
+        None => description(&path, &loaded, format)?,
+        Some(file) => {
+            let fit = host.fit(file)?;
+            let model = commands::derived(host, &path, loaded)?;
+            model.export(format, Some((&fit, &file.display().to_string())))?
+        }
+    };
     target.write(&exported.text)?;
     for note in &exported.notes {
         terminal::remark(note);

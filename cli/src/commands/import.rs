@@ -1,9 +1,9 @@
 //! `import`: a robot description of other programs as the start of a model file.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use modelmill::Host;
-use modelmill::import::Options;
+use modelmill::import::{Imported, Options};
 use modelmill::text::table::count;
 
 use crate::args::ImportArgs;
@@ -17,34 +17,21 @@ const LARGEST_DESCRIPTION: u64 = 16 << 20;
 /// Writes the model file and says what was left out or rounded.
 pub(crate) fn run(host: &Host, args: &ImportArgs) -> Outcome {
     let file = args.description.as_path();
-    let beside = file.with_file_name("robot.yaml");
-    let is_urdf = file.extension().is_some_and(|ending| ending == "urdf");
-    let closures = match &args.closures {
-        Some(given) => Some(given.as_path()),
-        None => (is_urdf && beside.is_file()).then_some(beside.as_path()),
+    let closures = closures_of(file, args.closures.as_deref());
+    let target = Target::new(&args.out, [file].into_iter().chain(closures.as_deref()))?;
+    let options = Options {
+        floating: args.floating,
+        round_angles: args.round_angles,
+        closures: None,
+        pose: &args.at,
     };
-    let target = Target::new(&args.out, [file].into_iter().chain(closures))?;
-    let text = read(
-        host,
-        file,
-        "a robot description (URDF, MJCF or SDF, all XML)",
-    )?;
-    let closing = closures
-        .map(|path| read(host, path, "a file of closures (YAML)"))
-        .transpose()?;
+    let imported = imported(host, file, closures.as_deref(), options)?;
     if let (None, Some(path)) = (&args.closures, closures) {
         terminal::note(&format!(
             "closures and drives are those of {}, which lies beside the description",
             path.display()
         ));
     }
-    let options = Options {
-        floating: args.floating,
-        round_angles: args.round_angles,
-        closures: closing.as_deref(),
-        pose: &args.at,
-    };
-    let imported = host.import(&file.display().to_string(), &text, &options)?;
     target.write(&imported.model)?;
     terminal::note(&format!(
         "{}: {}, with the ten linear parameters of every body; read and mend it",
@@ -52,6 +39,45 @@ pub(crate) fn run(host: &Host, args: &ImportArgs) -> Outcome {
         count(imported.joints.len(), "joint", "joints"),
     ));
     Ok(())
+}
+
+/// Whether a file is called as robot descriptions are.
+pub(crate) fn is_description(file: &Path) -> bool {
+    let endings = ["urdf", "xml", "mjcf", "sdf"];
+    file.extension()
+        .is_some_and(|ending| endings.iter().any(|known| ending == *known))
+}
+
+/// The file of closures that is given, or the one that lies beside a URDF.
+pub(crate) fn closures_of(file: &Path, given: Option<&Path>) -> Option<PathBuf> {
+    let beside = file.with_file_name("robot.yaml");
+    let is_urdf = file.extension().is_some_and(|ending| ending == "urdf");
+    match given {
+        Some(given) => Some(given.to_owned()),
+        None => (is_urdf && beside.is_file()).then_some(beside),
+    }
+}
+
+/// The model file of a robot description.
+pub(crate) fn imported(
+    host: &Host,
+    file: &Path,
+    closures: Option<&Path>,
+    options: Options<'_>,
+) -> Outcome<Imported> {
+    let text = read(
+        host,
+        file,
+        "a robot description (URDF, MJCF or SDF, all XML)",
+    )?;
+    let closures = closures
+        .map(|path| read(host, path, "a file of closures (YAML)"))
+        .transpose()?;
+    let options = Options {
+        closures: closures.as_deref(),
+        ..options
+    };
+    Ok(host.import(&file.display().to_string(), &text, &options)?)
 }
 
 fn read(host: &Host, path: &Path, expected: &str) -> Result<String, Failure> {

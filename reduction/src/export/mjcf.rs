@@ -210,6 +210,17 @@ impl Writer<'_> {
                 ));
             }
         }
+        for one in &self.tree.followed {
+            // Seen from where the bodies are drawn.
+            let [own, other] = [one.coordinate, one.of].map(|i| self.at[i]);
+            lines.push(format!(
+                "<joint joint1=\"{}\" joint2=\"{}\" polycoef=\"{} {} 0 0 0\"/>",
+                m.coordinates[one.coordinate].name,
+                m.coordinates[one.of].name,
+                number(one.offset + one.factor * other - own),
+                number(one.factor)
+            ));
+        }
         if lines.is_empty() {
             return;
         }

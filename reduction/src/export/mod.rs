@@ -12,7 +12,7 @@ mod urdf;
 
 use std::fmt;
 
-use modelmill_spec::Mechanism;
+use modelmill_spec::{Exact, Mechanism};
 
 /// A format of robot descriptions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,7 +79,8 @@ pub fn export(mechanism: &Mechanism, format: Format) -> Result<Exported, ExportE
         }
         _ => vec![0.0; mechanism.coordinates.len()],
     };
-    let tree = tree::tree(mechanism, &at)?;
+    let mut tree = tree::tree(mechanism, &at)?;
+    tree.followed = followed(mechanism, &mut remarks);
     let mut bodies = inertia::bodies(mechanism, &tree)?;
     inertia::complete(&tree, &mut bodies, &mut remarks);
     inertia::judge(&tree, &bodies, &mut remarks);
@@ -96,6 +97,37 @@ pub fn export(mechanism: &Mechanism, format: Format) -> Result<Exported, ExportE
         Format::Mjcf => mjcf::write(mechanism, &tree, &bodies, &friction, &at, &mut remarks),
     };
     Ok(Exported { text, remarks })
+}
+
+/// A coordinate that follows a single other one.
+#[derive(Clone, Debug)]
+struct Followed {
+    coordinate: usize,
+    of: usize,
+    factor: f64,
+    offset: f64,
+}
+
+/// Couplings that formats have; those to several coordinates they have not, which is said.
+fn followed(mechanism: &Mechanism, remarks: &mut Vec<String>) -> Vec<Followed> {
+    let value = |exact: &Exact| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
+    let mut found = Vec::new();
+    for coupling in &mechanism.couplings {
+        if let [(of, factor)] = &coupling.terms[..] {
+            found.push(Followed {
+                coordinate: coupling.coordinate.0,
+                of: of.0,
+                factor: value(factor),
+                offset: value(&coupling.offset),
+            });
+        } else {
+            remarks.push(format!(
+                "`{}` follows several joints, which the format has no word for: it moves by itself",
+                mechanism.coordinates[coupling.coordinate.0].name
+            ));
+        }
+    }
+    found
 }
 
 /// Numbers with spaces between them, each with as many digits as it needs.

@@ -3,7 +3,7 @@
 use modelmill_spec::{Kinematics, Mechanism, PointIdx, Step};
 use nalgebra::{Matrix3, Vector3};
 
-use super::ExportError;
+use super::{ExportError, Followed};
 
 /// A position with axes, in those of the base.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +63,8 @@ pub(super) struct Tree {
     pub(super) link_of: Vec<usize>,
     /// Of each frame.
     pub(super) frames: Vec<Placed>,
+    /// Couplings that formats have.
+    pub(super) followed: Vec<Followed>,
 }
 
 impl Tree {
@@ -146,6 +148,7 @@ pub(super) fn tree(mechanism: &Mechanism, at: &[f64]) -> Result<Tree, ExportErro
         links,
         link_of,
         frames,
+        followed: Vec::new(),
     })
 }
 

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use super::friction::{Friction, Passive};
 use super::inertia::Body;
 use super::tree::{Joint, Link, Placed, Tree};
-use super::{list, number};
+use super::{Followed, list, number};
 
 /// How far a joint may go that has no limits, m.
 const FAR: f64 = 1000.0;
@@ -107,7 +107,7 @@ fn branch(
             moving,
             &parent,
             &(name.clone(), placed),
-            friction,
+            (friction, &tree.followed),
         );
         parent = (name, placed);
     }
@@ -119,7 +119,7 @@ fn joint(
     moving: &Joint,
     (parent, from): &(String, Placed),
     (child, to): &(String, Placed),
-    friction: &Friction,
+    (friction, followed): (&Friction, &[Followed]),
 ) -> String {
     let coordinate = &mechanism.coordinates[moving.coordinate].name;
     let limits = mechanism.limits.coordinates.iter();
@@ -169,6 +169,14 @@ fn joint(
             text,
             "    <mimic joint=\"{coordinate}\" multiplier=\"{}\" offset=\"0\"/>",
             number(moving.ratio)
+        );
+    } else if let Some(one) = followed.iter().find(|f| f.coordinate == moving.coordinate) {
+        let _ = writeln!(
+            text,
+            "    <mimic joint=\"{}\" multiplier=\"{}\" offset=\"{}\"/>",
+            mechanism.coordinates[one.of].name,
+            number(one.factor),
+            number(one.offset)
         );
     } else if own != Passive::default() {
         let _ = writeln!(

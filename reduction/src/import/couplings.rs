@@ -1,9 +1,9 @@
 //! Joints that follow others: each joint as `ratio*variable + offset`, where a variable becomes a coordinate of the model.
 //!
-//! Angles of a model are integer multiples of coordinates. A ratio such as 6/7 is therefore exact with a coordinate that is
-//! a seventh of the leading joint.
+//! A joint whose angle is a whole multiple of another's shares its coordinate; any other one has a coordinate that follows.
 
 use super::description::{Description, Joint, Kind};
+use crate::write::float;
 
 /// Integer multiples of a coordinate beyond this make expressions that nobody wants.
 const LARGEST_MULTIPLE: i64 = 60;
@@ -13,10 +13,8 @@ const SAME_RATIO: f64 = 1e-9;
 /// What becomes a coordinate.
 #[derive(Clone)]
 pub(crate) struct Variable {
-    /// The joint that it is, or a whole part of.
+    /// The joint that it is.
     pub(crate) joint: String,
-    /// The joint is this many times the variable.
-    pub(crate) parts: i64,
     pub(crate) is_driven: bool,
 }
 
@@ -27,6 +25,10 @@ pub(crate) struct Follows {
     pub(crate) variable: Option<usize>,
     pub(crate) ratio: f64,
     pub(crate) offset: f64,
+    /// Whether it has a coordinate of its own, which follows that of the variable.
+    pub(crate) has_own: bool,
+    /// Whether one of both turns and the other slides.
+    pub(crate) changes_kind: bool,
 }
 
 /// Joints that turn or slide, and what they follow, in the order of the description.
@@ -52,10 +54,6 @@ struct Rule {
 }
 
 /// Resolves all couplings of a description.
-#[allow(
-    clippy::too_many_lines,
-    reason = "one pass over leaders, one over followers"
-)]
 pub(crate) fn resolve(description: &mut Description) -> Result<Couplings, String> {
     let joints: Vec<Joint> = description
         .links
@@ -64,107 +62,61 @@ pub(crate) fn resolve(description: &mut Description) -> Result<Couplings, String
         .filter(|joint| matches!(joint.kind, Kind::Turn | Kind::Slide))
         .cloned()
         .collect();
-    let n = joints.len();
     let mut rules = rules(description, &joints)?;
     lead_by_driven(&joints, &mut rules);
-    let mut out = Couplings {
-        variables: Vec::new(),
-        follows: Vec::new(),
-    };
-    let mut variable_of: Vec<Option<usize>> = vec![None; n];
-    for leader in 0..n {
+    let mut variables = Vec::new();
+    let mut variable_of: Vec<Option<usize>> = vec![None; joints.len()];
+    for (leader, joint) in joints.iter().enumerate() {
         if rules[leader].is_some() {
             continue;
         }
-        let members: Vec<(usize, Rule)> = (0..n)
-            .filter_map(|k| {
-                rules[k]
-                    .filter(|rule| rule.of == Some(leader))
-                    .map(|rule| (k, rule))
-            })
-            .collect();
-        let mut parts = 1;
-        for (k, rule) in &members {
-            if rule.ratio == 0.0 {
-                continue;
-            }
-            let (one, other) = (&joints[*k], &joints[leader]);
-            if one.kind != other.kind {
-                return Err(format!(
-                    "line {}: `{}` follows `{}`, one turns and one slides; models have no screws yet: leave the coupling \
-                     away and give both a drive",
-                    rule.line, one.name, other.name
-                ));
-            }
-            if one.kind == Kind::Turn {
-                let (_, denominator) =
-                    fraction(rule.ratio).ok_or_else(|| no_fraction(*rule, one))?;
-                parts = least_common(parts, denominator);
-            }
-        }
-        variable_of[leader] = Some(out.variables.len());
-        out.variables.push(Variable {
-            joint: joints[leader].name.clone(),
-            parts,
-            is_driven: joints[leader].is_driven
-                || members.iter().any(|(k, _)| joints[*k].is_driven),
+        let mut followers = joints.iter().zip(&rules);
+        let leads_driven = followers.any(|(other, rule)| {
+            other.is_driven && rule.is_some_and(|rule| rule.of == Some(leader))
         });
-        for (k, rule) in members {
-            let joint = &joints[k];
-            if parts > 1 || joint.kind == Kind::Turn {
-                let exact = fraction(rule.ratio).map(|(p, q)| p * (parts / q));
-                let exact = exact.filter(|n| n.abs() <= LARGEST_MULTIPLE);
-                let multiple = exact.ok_or_else(|| no_fraction(rule, joint))?;
-                #[allow(clippy::cast_precision_loss, reason = "at most 60")]
-                let ratio = multiple as f64 / parts as f64;
-                if (ratio - rule.ratio).abs() > 1e-14 {
-                    description.remarks.push(format!(
-                        "line {}: the ratio {} is taken for {}; angles of models have rational ratios",
-                        rule.line,
-                        rule.ratio,
-                        shown(rule.ratio)
-                    ));
-                }
-                if let Some(Some(rule)) = rules.get_mut(k) {
-                    rule.ratio = ratio;
-                }
-            }
-        }
+        variable_of[leader] = Some(variables.len());
+        variables.push(Variable {
+            joint: joint.name.clone(),
+            is_driven: joint.is_driven || leads_driven,
+        });
     }
+    let mut follows = Vec::new();
     for (k, joint) in joints.iter().enumerate() {
-        let follows = match rules[k] {
+        let found = match rules[k] {
             None => Follows {
                 variable: variable_of[k],
-                ratio: variable_of[k].map_or(1.0, |v| parts_of(&out, v)),
+                ratio: 1.0,
                 offset: 0.0,
+                has_own: false,
+                changes_kind: false,
             },
             Some(rule) => {
-                let variable = rule
-                    .of
-                    .and_then(|of| variable_of[of])
-                    .filter(|_| rule.ratio != 0.0);
+                let leader = rule.of.filter(|_| rule.ratio != 0.0);
+                let ratio = fraction(rule.ratio).map_or(rule.ratio, |(p, q)| p as f64 / q as f64);
+                if leader.is_some() && (ratio - rule.ratio).abs() > 1e-14 {
+                    description.remarks.push(format!(
+                        "line {}: the ratio {} is taken for {}",
+                        rule.line,
+                        rule.ratio,
+                        shown(ratio)
+                    ));
+                }
+                let shares = |of: usize| match (joint.kind, joints[of].kind) {
+                    (Kind::Turn, Kind::Turn) => fraction(ratio).is_some_and(|(_, q)| q == 1),
+                    (one, other) => one == other,
+                };
                 Follows {
-                    variable,
-                    // Whole numbers again, free of the rounding of the quotient.
-                    ratio: variable.map_or(0.0, |v| {
-                        let ratio = rule.ratio * parts_of(&out, v);
-                        if joint.kind == Kind::Turn {
-                            ratio.round()
-                        } else {
-                            ratio
-                        }
-                    }),
+                    variable: leader.and_then(|of| variable_of[of]),
+                    ratio: leader.map_or(0.0, |_| ratio),
                     offset: rule.offset,
+                    has_own: leader.is_some_and(|of| !shares(of)),
+                    changes_kind: leader.is_some_and(|of| joint.kind != joints[of].kind),
                 }
             }
         };
-        out.follows.push((joint.name.clone(), follows));
+        follows.push((joint.name.clone(), found));
     }
-    Ok(out)
-}
-
-fn parts_of(couplings: &Couplings, variable: usize) -> f64 {
-    couplings.variables[variable].parts as f64
+    Ok(Couplings { variables, follows })
 }
 
 /// Every joint by the joint that leads in the end.
@@ -266,14 +218,6 @@ fn lead_by_driven(joints: &[Joint], rules: &mut [Option<Rule>]) {
     }
 }
 
-fn no_fraction(rule: Rule, joint: &Joint) -> String {
-    format!(
-        "line {}: the ratio {} of `{}` is no fraction of small whole numbers; angles of models are whole multiples of \
-         coordinates: leave the coupling away and give both joints a drive",
-        rule.line, rule.ratio, joint.name
-    )
-}
-
 /// Numerator and denominator of a ratio of small whole numbers.
 fn fraction(ratio: f64) -> Option<(i64, i64)> {
     (1..=LARGEST_MULTIPLE).find_map(|q| {
@@ -284,18 +228,11 @@ fn fraction(ratio: f64) -> Option<(i64, i64)> {
     })
 }
 
-fn shown(ratio: f64) -> String {
+/// A ratio as a model file has it.
+pub(crate) fn shown(ratio: f64) -> String {
     match fraction(ratio) {
         Some((p, 1)) => p.to_string(),
         Some((p, q)) => format!("{p}/{q}"),
-        None => ratio.to_string(),
+        None => float(ratio),
     }
-}
-
-fn least_common(a: i64, b: i64) -> i64 {
-    let (mut x, mut y) = (a, b);
-    while y != 0 {
-        (x, y) = (y, x % y);
-    }
-    a / x * b
 }

@@ -16,6 +16,7 @@ pub(crate) struct Description {
     pub(crate) links: Vec<Link>,
     pub(crate) closures: Vec<Closure>,
     pub(crate) couplings: Vec<Coupling>,
+    pub(crate) lines: Vec<StraightDrive>,
     /// Values of joints from which loops are closed, by name of the joint.
     pub(crate) pose: Vec<(String, f64)>,
     /// What was left out or made up.
@@ -139,4 +140,18 @@ pub(crate) struct Coupling {
     pub(crate) of: Option<String>,
     pub(crate) ratio: f64,
     pub(crate) offset: f64,
+}
+
+/// A drive along the straight line between two points of links.
+pub(crate) struct StraightDrive {
+    pub(crate) name: String,
+    /// What the format calls the line itself.
+    pub(crate) tendon: String,
+    pub(crate) line: u32,
+    /// Link (none is the world) and a point in its frame; a force that pushes moves the second from the first.
+    pub(crate) ends: [(Option<usize>, Vector3<f64>); 2],
+    pub(crate) force: Option<[f64; 2]>,
+    pub(crate) damping: f64,
+    pub(crate) friction: f64,
+    pub(crate) armature: f64,
 }

@@ -1,8 +1,10 @@
-//! What acts on the joints of MJCF: actuators, fixed tendons that they pull, and the pose that its author kept.
+//! What acts on the bodies of MJCF: actuators, the joints of fixed tendons and the straight spatial ones that they pull, and the
+//! pose that its author kept.
 
+use nalgebra::Vector3;
 use roxmltree::Node;
 
-use super::description::Kind;
+use super::description::{Kind, StraightDrive};
 use super::mjcf::Reader;
 use super::xml::{at, children, numbers, word};
 
@@ -32,10 +34,7 @@ impl<'a, 'i> Reader<'a, 'i> {
                     .find(|tendon| tendon.attribute("name") == Some(name))
                     .ok_or_else(|| at(&node, &format!("no tendon is called `{name}`")))?;
                 if tendon.tag_name().name() != "fixed" {
-                    self.out.remarks.push(at(
-                        &node,
-                        "it pulls a spatial tendon, which models do not have: joints that it moves need drives by hand",
-                    ));
+                    self.pull(&node, &tendon, gear)?;
                     continue;
                 }
                 self.out.remarks.push(at(
@@ -50,7 +49,7 @@ impl<'a, 'i> Reader<'a, 'i> {
             } else {
                 self.out.remarks.push(at(
                     &node,
-                    "it acts on no joint and no fixed tendon and is left out",
+                    "it acts on no joint and no tendon and is left out",
                 ));
             }
         }
@@ -61,7 +60,13 @@ impl<'a, 'i> Reader<'a, 'i> {
                 .collect::<Vec<_>>()
         }) {
             let mut bends = Vec::new();
-            for key in ["stiffness", "damping", "frictionloss", "armature"] {
+            let is_drive = (self.out.lines.iter())
+                .any(|line| tendon.attribute("name") == Some(line.tendon.as_str()));
+            let kept = if is_drive { 1 } else { 4 };
+            for key in ["stiffness", "damping", "frictionloss", "armature"]
+                .into_iter()
+                .take(kept)
+            {
                 if self
                     .text(&tendon, None, key)?
                     .is_some_and(|text| text.trim() != "0")
@@ -94,20 +99,87 @@ impl<'a, 'i> Reader<'a, 'i> {
         Ok(())
     }
 
-    /// Gives a joint its drive.
-    fn drive(&mut self, node: &Node<'a, 'i>, name: &str, gear: f64) -> Result<(), String> {
-        let mut range = None;
+    /// Makes a drive of an actuator that pulls a spatial tendon, if that is a straight line between two sites.
+    fn pull(
+        &mut self,
+        node: &Node<'a, 'i>,
+        tendon: &Node<'a, 'i>,
+        gear: f64,
+    ) -> Result<(), String> {
+        let parts: Vec<Node> = tendon.children().filter(Node::is_element).collect();
+        let (&[one, other], true) = (
+            parts.as_slice(),
+            parts.iter().all(|part| part.tag_name().name() == "site"),
+        ) else {
+            self.out.remarks.push(at(
+                node,
+                "it pulls a tendon that is no straight line between two sites, which models do not have: joints that it moves \
+                 need drives by hand",
+            ));
+            return Ok(());
+        };
+        let mut ends = [(None, Vector3::zeros()); 2];
+        for (end, part) in ends.iter_mut().zip([one, other]) {
+            let (link, place) = self.site(&part, &word(&part, "site")?)?;
+            *end = (link, place.p);
+        }
+        let line = tendon.attribute("name").unwrap_or_default().to_owned();
+        if self.out.lines.iter().any(|known| known.tendon == line) {
+            self.out.remarks.push(at(
+                node,
+                &format!("another actuator pulls the tendon `{line}` too: both are one drive here"),
+            ));
+            return Ok(());
+        }
+        let own = |key: &str| {
+            Ok::<f64, String>(self.numbers::<1>(tendon, None, key)?.map_or(0.0, |[x]| x))
+        };
+        let (damping, friction) = (own("damping")?, own("frictionloss")?);
+        let on_tendon = own("armature")?;
+        let on_drive = self
+            .numbers::<1>(node, None, "armature")?
+            .map_or(0.0, |[x]| x);
+        self.out.lines.push(StraightDrive {
+            name: node.attribute("name").unwrap_or(&line).to_owned(),
+            line: super::xml::line(node),
+            ends,
+            force: self.force_range(node)?.map(|range| scaled(range, gear)),
+            damping,
+            friction,
+            armature: on_tendon + on_drive * gear * gear,
+            tendon: line,
+        });
+        if (gear - 1.0).abs() > 0.0 {
+            self.out.remarks.push(at(
+                node,
+                &format!(
+                    "its gear is {gear}: the force of the drive here is that along the tendon"
+                ),
+            ));
+        }
+        Ok(())
+    }
+
+    /// Between which forces an actuator stays, before its gear.
+    fn force_range(&self, node: &Node<'a, 'i>) -> Result<Option<[f64; 2]>, String> {
         if let Some([low, high]) = self.numbers(node, None, "forcerange")?
             && low < high
             && self.text(node, None, "forcelimited")? != Some("false")
         {
-            range = Some([low, high]);
-        } else if node.tag_name().name() == "motor"
+            return Ok(Some([low, high]));
+        }
+        if node.tag_name().name() == "motor"
             && let Some([low, high]) = self.numbers(node, None, "ctrlrange")?
             && self.text(node, None, "ctrllimited")? != Some("false")
         {
-            range = Some([low, high]);
+            return Ok(Some([low, high]));
         }
+        Ok(None)
+    }
+
+    /// Gives a joint its drive.
+    fn drive(&mut self, node: &Node<'a, 'i>, name: &str, gear: f64) -> Result<(), String> {
+        let range = self.force_range(node)?;
         let armature = self
             .numbers::<1>(node, None, "armature")?
             .map_or(0.0, |[x]| x);
@@ -121,10 +193,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         joint.is_driven = joint.kind != Kind::Free;
         joint.armature += armature * gear * gear;
         if joint.force.is_none() {
-            joint.force = range.map(|[low, high]| {
-                let ends = [low * gear, high * gear];
-                [ends[0].min(ends[1]), ends[0].max(ends[1])]
-            });
+            joint.force = range.map(|range| scaled(range, gear));
         }
         if (gear - 1.0).abs() > 0.0 && node.tag_name().name() != "joint" {
             self.out.remarks.push(at(
@@ -159,4 +228,10 @@ impl<'a, 'i> Reader<'a, 'i> {
         }
         Ok(())
     }
+}
+
+/// A range times a factor of either sign.
+fn scaled([low, high]: [f64; 2], factor: f64) -> [f64; 2] {
+    let ends = [low * factor, high * factor];
+    [ends[0].min(ends[1]), ends[0].max(ends[1])]
 }

@@ -19,7 +19,7 @@ impl<'a, 'i> Reader<'a, 'i> {
             .ok_or_else(|| at(node, &format!("no body is called `{name}`")))
     }
 
-    fn site(&self, node: &Node, name: &str) -> Result<(Option<usize>, Placed), String> {
+    pub(super) fn site(&self, node: &Node, name: &str) -> Result<(Option<usize>, Placed), String> {
         let found = self.sites.iter().find(|(site, _, _)| site == name);
         found
             .map(|(_, link, placed)| (*link, *placed))

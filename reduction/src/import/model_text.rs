@@ -3,17 +3,20 @@
 //! Every movable joint becomes a frame; links behind fixed joints become part of the link that carries them; each body gets
 //! the ten linear parameters about its frame.
 
+mod lines;
+
 use std::fmt::Write as _;
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::chain::{Chain, Move, Node, Pair};
 use super::closing::{self, Closed, INSIDE};
-use super::couplings::{self, Couplings};
+use super::couplings::{self, Couplings, Follows};
 use super::description::{Closure, Description, Holds, Joint, Kind, Link};
 use super::placed::{Placed, axis, roll_pitch_yaw, twelfths};
 use super::{Imported, ImportedJoint, Options};
 use crate::write::{digits, float, quoted};
+use lines::{Pulled, between};
 
 /// Angles this near to a multiple of a twelfth of pi are taken for it where the option asks for it, rad.
 const SAME_ANGLE: f64 = 1e-4;
@@ -40,6 +43,8 @@ struct Coordinate {
     is_driven: bool,
     /// Whether the format wants to know that nothing drives it.
     is_free: bool,
+    /// Whether a line moves it, as far as the count of drives goes.
+    is_pulled: bool,
 }
 
 /// What acts at a variable, added up over the joints that it moves.
@@ -65,6 +70,8 @@ struct Build<'a> {
     constants: String,
     /// Constants that are angles, with their values.
     angles: Vec<(String, f64)>,
+    /// Coordinates that follow others.
+    followers: String,
     frames: String,
     frame_names: Vec<String>,
     chain: Chain,
@@ -79,6 +86,8 @@ struct Build<'a> {
     start: Vec<f64>,
     bodies: Vec<Body>,
     joints: Vec<ImportedJoint>,
+    /// Whether there are more drives than freedoms: such have no effects of their own.
+    has_surplus: bool,
 }
 
 /// Makes the model file of a description.
@@ -91,6 +100,7 @@ pub(crate) fn model(mut description: Description, options: &Options) -> Result<I
         remarks: std::mem::take(&mut description.remarks),
         constants: String::new(),
         angles: Vec::new(),
+        followers: String::new(),
         frames: String::new(),
         frame_names: Vec::new(),
         chain: Chain {
@@ -105,6 +115,7 @@ pub(crate) fn model(mut description: Description, options: &Options) -> Result<I
         start: vec![0.0; n],
         bodies: Vec::new(),
         joints: Vec::new(),
+        has_surplus: false,
         couplings,
     };
     for (k, variable) in build.couplings.variables.iter().enumerate() {
@@ -116,8 +127,15 @@ pub(crate) fn model(mut description: Description, options: &Options) -> Result<I
     if build.coordinates.is_empty() {
         return Err("this robot has no joint that moves".to_owned());
     }
+    // What a line pulls had better be independent.
+    for line in &description.lines {
+        for variable in between(&build.chain, build.frames_of(line)) {
+            build.reluctance[variable] = build.reluctance[variable].min(1);
+        }
+    }
     let closed = build.close(&description)?;
-    Ok(build.finish(&description, closed.as_ref()))
+    let lines = build.pull(&description.lines, closed.as_ref());
+    Ok(build.finish(&description, closed.as_ref(), &lines))
 }
 
 impl Build<'_> {
@@ -186,29 +204,26 @@ impl Build<'_> {
         });
         let constant = follows.offset - joint.zero;
         let shown = self.place(&joint.name, &at);
+        let follower = moved
+            .as_ref()
+            .filter(|_| follows.has_own)
+            .map(|(_, leader)| self.follower(joint, leader, &follows));
         let own = self.name(name);
-        let mut text = match &moved {
-            None => String::new(),
-            Some((1.0, name)) => name.clone(),
-            Some((-1.0, name)) => format!("-{name}"),
-            Some((ratio, name)) => format!("{}*{name}", plain(*ratio)),
+        let text = match (&follower, &moved) {
+            (Some(follower), _) => follower.clone(),
+            (None, None) => String::new(),
+            (None, Some((1.0, name))) => name.clone(),
+            (None, Some((-1.0, name))) => format!("-{name}"),
+            (None, Some((ratio, name))) => format!("{}*{name}", plain(*ratio)),
         };
-        let offset = if is_turn {
-            self.angle(&format!("{}_zero", joint.name), constant, &joint.name)
+        // What follows has its offset in its own coordinate.
+        let left = if follower.is_some() {
+            -joint.zero
         } else {
-            self.length(&format!("{}_zero", joint.name), constant)
+            constant
         };
-        let offset = offset.trim_matches('"').to_owned();
-        match (text.is_empty(), offset.as_str()) {
-            (true, _) => text = offset,
-            (false, "0") => {}
-            (false, offset) if offset.starts_with('-') => {
-                let _ = write!(text, " {offset}");
-            }
-            (false, offset) => {
-                let _ = write!(text, " + {offset}");
-            }
-        }
+        let offset = self.offset(&format!("{}_zero", joint.name), left, joint);
+        let text = with_offset(text, &offset);
         let kind = if is_turn { "revolute" } else { "prismatic" };
         let axis_text = if axis == "z" {
             String::new()
@@ -256,16 +271,52 @@ impl Build<'_> {
             return Ok((Some(frame), back));
         }
         if let Some((_, coordinate)) = &moved {
+            let (coordinate, ratio, offset) = match &follower {
+                Some(own) => (own, 1.0, 0.0),
+                None => (coordinate, follows.ratio, follows.offset),
+            };
             self.joints.push(ImportedJoint {
                 name: joint.name.clone(),
                 coordinates: vec![coordinate.clone()],
-                ratio: follows.ratio,
-                offset: follows.offset,
+                ratio,
+                offset,
                 axes: String::new(),
             });
         }
         let frame = self.frame(own, on, at, &shown, &joint_text, vec![motion]);
         Ok((Some(frame), back))
+    }
+
+    /// A fixed part of a joint's angle or length.
+    fn offset(&mut self, name: &str, value: f64, joint: &Joint) -> String {
+        let text = if joint.kind == Kind::Turn {
+            self.angle(name, value, &joint.name)
+        } else {
+            self.length(name, value)
+        };
+        text.trim_matches('"').to_owned()
+    }
+
+    /// The coordinate of a joint that follows another coordinate.
+    fn follower(&mut self, joint: &Joint, leader: &str, follows: &Follows) -> String {
+        let own = self.name(&joint.name);
+        let offset = self.offset(&format!("{}_offset", joint.name), follows.offset, joint);
+        let ratio = if follows.changes_kind {
+            let unit = if joint.kind == Kind::Turn { "1/m" } else { "m" };
+            let per = self.name(&format!("{}_per_{leader}", joint.name));
+            let _ = writeln!(
+                self.constants,
+                "{per} = {{ value = {}, unit = \"{unit}\" }}",
+                float(follows.ratio)
+            );
+            per
+        } else {
+            couplings::shown(follows.ratio)
+        };
+        let followed = format!("{ratio}*{leader}");
+        let followed = with_offset(followed, &offset);
+        let _ = writeln!(self.followers, "{own} = {{ follows = \"{followed}\" }}");
+        own
     }
 
     /// The coordinate of a variable, made when it is first met.
@@ -274,17 +325,7 @@ impl Build<'_> {
             return self.coordinates[k].name.clone();
         }
         let meant = self.couplings.variables[variable].clone();
-        let name = if meant.parts == 1 {
-            self.name(&meant.joint)
-        } else {
-            let name = self.name(&format!("{}_by_{}", meant.joint, meant.parts));
-            self.remarks.push(format!(
-                "`{}` is {} times the coordinate `{name}`, so that what follows it turns by whole multiples too; the force \
-                 of its drive is that of the joint times {}",
-                meant.joint, meant.parts, meant.parts
-            ));
-            name
-        };
+        let name = self.name(&meant.joint);
         self.of_variable[variable] = Some(self.coordinates.len());
         self.coordinates.push(Coordinate {
             name: name.clone(),
@@ -292,6 +333,7 @@ impl Build<'_> {
             nominal: 0.0,
             is_driven: meant.is_driven,
             is_free: false,
+            is_pulled: false,
         });
         name
     }
@@ -372,6 +414,7 @@ impl Build<'_> {
                 nominal: 0.0,
                 is_driven: joint.is_driven,
                 is_free: false,
+                is_pulled: false,
             });
             names.push(coordinate);
             let mut axis = Vector3::zeros();
@@ -431,6 +474,7 @@ impl Build<'_> {
                 nominal: rounded(nominal),
                 is_driven: false,
                 is_free: true,
+                is_pulled: false,
             });
             names.push(name);
         }
@@ -755,7 +799,12 @@ impl Build<'_> {
         format!("\"{name}\"")
     }
 
-    fn finish(mut self, description: &Description, closed: Option<&Closed>) -> Imported {
+    fn finish(
+        mut self,
+        description: &Description,
+        closed: Option<&Closed>,
+        lines: &[Pulled<'_>],
+    ) -> Imported {
         let robot = &description.name;
         let gravity = description.gravity.unwrap_or(Vector3::new(0.0, 0.0, -9.81));
         let mut text = format!(
@@ -799,7 +848,7 @@ impl Build<'_> {
         for coordinate in &self.coordinates {
             let more = if is_passive(coordinate) {
                 ", passive = true"
-            } else if coordinate.is_driven || coordinate.is_free {
+            } else if coordinate.is_driven || coordinate.is_free || coordinate.is_pulled {
                 ""
             } else {
                 ", driven = false"
@@ -811,10 +860,12 @@ impl Build<'_> {
                 float(rounded(coordinate.nominal))
             );
         }
+        text.push_str(&self.followers);
         text.push_str(&self.frames);
         self.loops(description, closed, &mut text);
         self.parts(&mut text);
-        self.forces(&is_passive, &mut text);
+        self.line_points(lines, &mut text);
+        self.forces(&is_passive, lines, &mut text);
         Imported {
             model: text,
             remarks: self.remarks,
@@ -895,7 +946,12 @@ impl Build<'_> {
     }
 
     /// Drives, what acts at coordinates, and limits.
-    fn forces(&mut self, is_passive: &dyn Fn(&Coordinate) -> bool, text: &mut String) {
+    fn forces(
+        &mut self,
+        is_passive: &dyn Fn(&Coordinate) -> bool,
+        lines: &[Pulled<'_>],
+        text: &mut String,
+    ) {
         let coordinates = std::mem::take(&mut self.coordinates);
         let (mut drives, mut effects) = (String::new(), String::new());
         let (mut ranges, mut forces) = (String::new(), String::new());
@@ -919,6 +975,11 @@ impl Build<'_> {
                     coordinate.name
                 ));
             }
+            let effects_at = if self.has_surplus {
+                coordinate.name.clone()
+            } else {
+                place.clone()
+            };
             for (kind, symbol, value) in [
                 ("viscous_friction", "Fv", acts.damping),
                 ("coulomb_friction", "Fc", acts.friction),
@@ -930,7 +991,7 @@ impl Build<'_> {
                 }
                 let _ = write!(
                     effects,
-                    "\n[[effect]]\nkind = \"{kind}\"\nat = [\"{place}\"]\nparameters = {{ {symbol} = {{ nominal = {} }} }}\n",
+                    "\n[[effect]]\nkind = \"{kind}\"\nat = [\"{effects_at}\"]\nparameters = {{ {symbol} = {{ nominal = {} }} }}\n",
                     float(value)
                 );
                 if kind == "spring" {
@@ -964,6 +1025,7 @@ impl Build<'_> {
                 );
             }
         }
+        self.line_forces(lines, [&mut drives, &mut effects, &mut forces]);
         text.push_str(&drives);
         text.push_str(&effects);
         for (table, entries) in [("coordinates", ranges), ("drives", forces)] {
@@ -977,6 +1039,16 @@ impl Build<'_> {
 /// Fifteen significant digits: what follows is rounding of sums.
 fn rounded(value: f64) -> f64 {
     format!("{value:.14e}").parse().unwrap_or(value)
+}
+
+/// A coordinate's expression with its fixed part behind it.
+fn with_offset(text: String, offset: &str) -> String {
+    match (text.is_empty(), offset) {
+        (true, _) => offset.to_owned(),
+        (false, "0") => text,
+        (false, offset) if offset.starts_with('-') => format!("{text} {offset}"),
+        (false, offset) => format!("{text} + {offset}"),
+    }
 }
 
 /// A ratio without a point where it is whole.

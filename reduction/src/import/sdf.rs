@@ -272,11 +272,12 @@ fn joint(
         "prismatic" => &[("axis", Kind::Slide)],
         "ball" => &[("", Kind::Ball)],
         "universal" | "revolute2" => &[("axis", Kind::Turn), ("axis2", Kind::Turn)],
+        "screw" => &[("axis", Kind::Turn), ("axis", Kind::Slide)],
         other => {
             return Err(at(
                 node,
                 &format!(
-                    "models have no joint of the type {other}; write it as several of revolute, prismatic, ball and fixed"
+                    "models have no joint of the type {other}; write it as several of revolute, prismatic, screw, ball and fixed"
                 ),
             ));
         }
@@ -294,6 +295,11 @@ fn joint(
         }
         joints.push(joint);
     }
+    if let [turn, slide] = joints.as_mut_slice()
+        && kind == "screw"
+    {
+        out.couplings.push(screw(node, turn, slide)?);
+    }
     if let Some(physics) = child(node, "sensor").or(child(node, "physics")) {
         out.remarks.push(at(&physics, "not read"));
     }
@@ -305,6 +311,27 @@ fn joint(
         name,
         line: line(node),
         kind,
+    })
+}
+
+/// A screw: limits and losses are those of its turn, and what slides follows.
+fn screw(node: &Node, turn: &Joint, slide: &mut Joint) -> Result<Coupling, String> {
+    let pitch = number_of(node, "screw_thread_pitch")?.ok_or_else(|| {
+        at(
+            node,
+            "it needs <screw_thread_pitch>, in metres for each turn; the older <thread_pitch> had several meanings",
+        )
+    })?;
+    let mut bare = Joint::new(slide.name.clone(), Kind::Slide, slide.line);
+    (bare.axis, bare.anchor) = (slide.axis, slide.anchor);
+    bare.is_driven = false;
+    *slide = bare;
+    Ok(Coupling {
+        line: line(node),
+        joint: slide.name.clone(),
+        of: Some(turn.name.clone()),
+        ratio: pitch / std::f64::consts::TAU,
+        offset: 0.0,
     })
 }
 

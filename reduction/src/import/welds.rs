@@ -255,6 +255,11 @@ fn sort(description: &mut Description) {
             *link = link.map(place);
         }
     }
+    for line in &mut description.lines {
+        for (link, _) in &mut line.ends {
+            *link = link.map(place);
+        }
+    }
     let mut links: Vec<(usize, Link)> = description.links.drain(..).enumerate().collect();
     for (_, link) in &mut links {
         link.parent = link.parent.map(place);

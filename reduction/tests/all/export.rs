@@ -38,7 +38,7 @@ fn motion(mechanism: &Mechanism, samples: usize) -> Vec<(String, [Vec<f64>; 3])>
         .collect()
 }
 
-/// Forces of the drives of joints along a motion, by the coordinates of these.
+/// Forces of the drives along a motion, by the coordinates of joints or by their own names.
 fn forces(mechanism: &Mechanism, motion: &[(String, [Vec<f64>; 3])]) -> Vec<(String, Vec<f64>)> {
     let derivation = derive(mechanism).expect("a derivation");
     let evaluator = Evaluator::new(&derivation);
@@ -62,9 +62,9 @@ fn forces(mechanism: &Mechanism, motion: &[(String, [Vec<f64>; 3])]) -> Vec<(Str
         .expect("forces");
     let drives = mechanism.drives.iter().zip(found);
     drives
-        .filter_map(|(drive, force)| match drive.kind {
-            DriveKind::Joint(i) => Some((mechanism.coordinates[i.0].name.clone(), force)),
-            DriveKind::Linear { .. } => None,
+        .map(|(drive, force)| match drive.kind {
+            DriveKind::Joint(i) => (mechanism.coordinates[i.0].name.clone(), force),
+            DriveKind::Linear { .. } => (drive.name.clone(), force),
         })
         .collect()
 }
@@ -110,6 +110,18 @@ fn there_and_back(mechanism: &Mechanism, format: ExportFormat) -> Vec<String> {
             assert!((x / ratio - y).abs() < 1e-9 * size, "{joint}: {x} {y}");
         }
     }
+    for drive in &mechanism.drives {
+        if !matches!(drive.kind, DriveKind::Linear { .. }) {
+            continue;
+        }
+        let [expected, found] = [&expected, &found].map(|forces| {
+            let found = forces.iter().find(|(name, _)| *name == drive.name);
+            &found.unwrap_or_else(|| panic!("no drive {}", drive.name)).1
+        });
+        for (x, y) in found.iter().zip(expected) {
+            assert!((x - y).abs() < 1e-9 * size, "{}: {x} {y}", drive.name);
+        }
+    }
     assert_eq!(signs.len(), moved.len());
     exported.remarks
 }
@@ -134,6 +146,12 @@ fn loops_keep_their_forces() {
         let remarks = there_and_back(&bundled(name), ExportFormat::Mjcf).join("\n");
         assert!(remarks.contains("soft constraints"), "{remarks}");
     }
+}
+
+/// Drives between two points are tendons there, and drives again here.
+#[test]
+fn drives_between_points_keep_their_forces() {
+    there_and_back(&bundled("spidermill"), ExportFormat::Mjcf);
 }
 
 /// Friction, inertia of drives and springs stand where the format has them; what it has not is said.
@@ -200,4 +218,17 @@ fn bodies_can_be() {
 fn what_no_body_is_is_refused() {
     let says = export(&bundled("spidermill-paper"), ExportFormat::Mjcf).unwrap_err();
     assert!(says.to_string().contains("different places"), "{says}");
+}
+
+/// Joints that follow others by any ratio are written as such in both formats.
+#[test]
+fn couplings_are_kept() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/fixtures/coupled");
+    for name in ["geared_arm_any_ratio", "ball_screw", "helical_joint"] {
+        let loaded = modelmill_spec::load_file(&folder.join(format!("{name}.toml")));
+        let mechanism = loaded
+            .unwrap_or_else(|failure| panic!("{failure}"))
+            .mechanism;
+        there_and_back(&mechanism, ExportFormat::Mjcf);
+    }
 }

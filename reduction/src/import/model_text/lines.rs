@@ -1,0 +1,223 @@
+//! Drives along straight lines between two points: which coordinates they move, and what the model file says of them.
+
+use std::fmt::Write as _;
+
+use super::super::chain::Chain;
+use super::super::closing::Closed;
+use super::super::description::StraightDrive;
+use super::{Build, Coordinate, rounded};
+use crate::write::float;
+
+/// A line that is a drive of the model, with the names that it and its points have there.
+pub(super) struct Pulled<'a> {
+    pub(super) line: &'a StraightDrive,
+    pub(super) name: String,
+    pub(super) points: [String; 2],
+}
+
+/// Variables that move one of two frames on the other.
+pub(super) fn between(chain: &Chain, frames: [Option<usize>; 2]) -> Vec<usize> {
+    let paths = frames.map(|frame| -> Vec<usize> {
+        std::iter::successors(frame, |k| chain.nodes[*k].on).collect()
+    });
+    let own = |a: &[usize], b: &[usize]| -> Vec<usize> {
+        a.iter().copied().filter(|k| !b.contains(k)).collect()
+    };
+    let [one, other] = [own(&paths[0], &paths[1]), own(&paths[1], &paths[0])];
+    let moves = one
+        .iter()
+        .chain(&other)
+        .flat_map(|k| &chain.nodes[*k].moves);
+    moves.filter_map(|motion| motion.variable).collect()
+}
+
+/// For each line one of those that it wants, no two the same, for as many lines as can be: by augmenting paths (H. W. Kuhn 1955).
+fn matched(wanted: &[Vec<usize>]) -> Vec<Option<usize>> {
+    fn finds(
+        line: usize,
+        wanted: &[Vec<usize>],
+        tried: &mut Vec<usize>,
+        of: &mut [Option<usize>],
+    ) -> bool {
+        for k in &wanted[line] {
+            if tried.contains(k) {
+                continue;
+            }
+            tried.push(*k);
+            let holder = of.iter().position(|one| *one == Some(*k));
+            if holder.is_none_or(|holder| finds(holder, wanted, tried, of)) {
+                of[line] = Some(*k);
+                return true;
+            }
+        }
+        false
+    }
+    let mut of = vec![None; wanted.len()];
+    for line in 0..wanted.len() {
+        finds(line, wanted, &mut Vec::new(), &mut of);
+    }
+    of
+}
+
+impl Build<'_> {
+    /// The frames that carry the ends of a line.
+    pub(super) fn frames_of(&self, line: &StraightDrive) -> [Option<usize>; 2] {
+        line.ends
+            .map(|(link, _)| link.and_then(|link| self.links[link].0))
+    }
+
+    /// Finds for each line an independent coordinate that nothing else drives. Lines that are left over are more drives than
+    /// there are freedoms, which a tree may have if all else is driven.
+    pub(super) fn pull<'l>(
+        &mut self,
+        lines: &'l [StraightDrive],
+        closed: Option<&Closed>,
+    ) -> Vec<Pulled<'l>> {
+        let is_open = |one: &Coordinate| {
+            let is_passive = |v: usize| closed.is_some_and(|closed| closed.passive[v]);
+            !one.is_driven && !one.is_pulled && one.variable.is_some_and(|v| !is_passive(v))
+        };
+        // What each line can drive: what moves its ends on each other first; around a loop any coordinate moves all others.
+        let drives = |line: &StraightDrive| -> Vec<usize> {
+            let near = between(&self.chain, self.frames_of(line));
+            let open = self.coordinates.iter().enumerate();
+            let open = open.filter(|(_, one)| is_open(one));
+            let (mut on_line, others): (Vec<_>, Vec<_>) =
+                open.partition(|(_, one)| one.variable.is_some_and(|v| near.contains(&v)));
+            if closed.is_some() {
+                on_line.extend(others);
+            }
+            on_line.into_iter().map(|(k, _)| k).collect()
+        };
+        let wanted: Vec<Vec<usize>> = lines.iter().map(drives).collect();
+        let driven = matched(&wanted);
+        let (mut kept, mut over): (Vec<&StraightDrive>, Vec<&StraightDrive>) =
+            (Vec::new(), Vec::new());
+        for (line, driven) in lines.iter().zip(driven) {
+            match driven {
+                Some(k) => {
+                    self.coordinates[k].is_pulled = true;
+                    kept.push(line);
+                }
+                None => over.push(line),
+            }
+        }
+        let all_driven =
+            closed.is_none() && (self.coordinates.iter()).all(|one| one.is_driven || one.is_pulled);
+        for line in over {
+            if all_driven {
+                self.has_surplus = true;
+                kept.push(line);
+            } else {
+                self.remarks.push(format!(
+                    "line {}: `{}` pulls what other drives move already, and is left out",
+                    line.line, line.name
+                ));
+            }
+        }
+        kept.into_iter()
+            .map(|line| {
+                let name = self.name(&line.name);
+                let points = ["from", "to"].map(|end| self.name(&format!("{name}_{end}")));
+                Pulled { line, name, points }
+            })
+            .collect()
+    }
+
+    /// The points between which lines act.
+    pub(super) fn line_points(&self, lines: &[Pulled<'_>], text: &mut String) {
+        for Pulled { line, points, .. } in lines {
+            for ((link, at), point) in line.ends.iter().zip(points) {
+                let (frame, place) = match link {
+                    Some(link) => {
+                        let (frame, placed) = self.links[*link];
+                        (frame, placed.p + placed.r * at)
+                    }
+                    None => (None, *at),
+                };
+                let on = frame.map_or("base", |frame| self.frame_names[frame].as_str());
+                let at: Vec<String> = place
+                    .iter()
+                    .map(|x| {
+                        if x.abs() < 1e-12 {
+                            "0".to_owned()
+                        } else {
+                            float(rounded(*x))
+                        }
+                    })
+                    .collect();
+                let _ = write!(
+                    text,
+                    "\n[[point]]\nname = \"{point}\"\non = \"{on}\"\nat = [{}]\n",
+                    at.join(", ")
+                );
+            }
+        }
+    }
+
+    /// Drives, effects and limits of forces of lines, added to those of joints.
+    pub(super) fn line_forces(
+        &mut self,
+        lines: &[Pulled<'_>],
+        [drives, effects, forces]: [&mut String; 3],
+    ) {
+        for Pulled {
+            line,
+            name: place,
+            points: [from, to],
+        } in lines
+        {
+            let _ = write!(
+                drives,
+                "\n[[drive]]\nname = \"{place}\"\nlinear = {{ from = \"{from}\", to = \"{to}\" }}\n"
+            );
+            for (kind, symbol, value) in [
+                ("viscous_friction", "Fv", line.damping),
+                ("coulomb_friction", "Fc", line.friction),
+                ("drive_inertia", "Ia", line.armature),
+            ] {
+                if value != 0.0 && self.has_surplus {
+                    self.remarks.push(format!(
+                        "{kind} of `{place}` is left out: there are more drives than freedoms"
+                    ));
+                } else if value != 0.0 {
+                    let _ = write!(
+                        effects,
+                        "\n[[effect]]\nkind = \"{kind}\"\nat = [\"{place}\"]\nparameters = {{ {symbol} = {{ nominal = {} }} }}\n",
+                        float(value)
+                    );
+                }
+            }
+            if let Some([low, high]) = line.force.filter(|[low, high]| low < high) {
+                let _ = writeln!(
+                    forces,
+                    "{place} = {{ force = [{}, {}] }}",
+                    float(low),
+                    float(high)
+                );
+            }
+        }
+        if self.has_surplus && !forces.is_empty() {
+            forces.clear();
+            self.remarks.push(
+                "limits of forces are left out: there are more drives than freedoms".to_owned(),
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::matched;
+
+    /// A tendon over two joints gives way to one that has the first alone, in whatever order they stand.
+    #[test]
+    fn no_line_takes_what_another_alone_can_have() {
+        assert_eq!(matched(&[vec![0, 1], vec![0]]), [Some(1), Some(0)]);
+        assert_eq!(matched(&[vec![0], vec![0, 1]]), [Some(0), Some(1)]);
+        assert_eq!(
+            matched(&[vec![0, 1], vec![1, 2], vec![0], vec![0]]),
+            [Some(1), Some(2), Some(0), None]
+        );
+    }
+}
