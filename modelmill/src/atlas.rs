@@ -41,6 +41,8 @@ pub struct Entry {
     pub operations: [OperationCount; 2],
     /// Seconds that it took to derive the model, if they were measured.
     pub seconds: Option<f64>,
+    /// Whether the model was made of a robot description: it has a line and a picture, but no page of expressions.
+    pub is_imported: bool,
 }
 
 impl Model {
@@ -87,6 +89,7 @@ impl Model {
                 programs.inverse_dynamics.count(Stage::State),
             ],
             seconds,
+            is_imported: false,
         })
     }
 
@@ -160,8 +163,14 @@ impl Entry {
             [0, _] => "-".to_owned(),
             [n, base] => format!("{base} with {n}"),
         };
+        let name = &self.name;
+        let named = if self.is_imported {
+            format!("`{name}` (imported)")
+        } else {
+            format!("[`{name}`]({name}.md)")
+        };
         format!(
-            "| ![]({name}.svg) | [`{name}`]({name}.md) | {} | {} | {} | {} | {with}{} | {without} | {} | {effects} | {} | {} | {} |",
+            "| ![]({name}.svg) | {named} | {} | {} | {} | {} | {with}{} | {without} | {} | {effects} | {} | {} | {} |",
             self.joints_in_letters(),
             self.passive,
             self.loops,
@@ -172,7 +181,6 @@ impl Entry {
             operations(dynamics),
             self.seconds
                 .map_or_else(|| "-".to_owned(), |s| significant(s, 2)),
-            name = self.name,
         )
         .replace("](", "](atlas/")
     }
@@ -187,7 +195,7 @@ pub(crate) const ABOUT: [&str; 2] = [
      *With effects* is the number with the effects of the file, such as friction. Operations are additions and \
      multiplications of one call at one state, effects included. Joints: R turns, P slides, free hangs on nothing; \
      *passive* are coordinates that loops settle. Seconds are those of one derivation on the machine that wrote this \
-     page.",
+     page. What is *imported* was made of a robot description of other people, and has no page of expressions.",
 ];
 
 /// The atlas as a page in Markdown; pictures and pages of the mechanisms stand in the folder `atlas` beside it.

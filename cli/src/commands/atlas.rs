@@ -1,18 +1,21 @@
 //! `atlas`: pictures, base parameters and counts of many mechanisms, as one table with a page for each, and as one page of HTML.
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use modelmill::Host;
-use modelmill::atlas;
+use modelmill::atlas::{self, Entry};
+use modelmill::import::Options;
+use modelmill::model::Loaded;
 use modelmill::picture::Drawing;
 use modelmill::report::{self, Pictured};
 
 use crate::args::AtlasArgs;
+use crate::commands::{self, import};
 use crate::failure::{Failure, Outcome};
 use crate::output::{self, Target};
-use crate::{commands, terminal};
+use crate::terminal;
 
 /// Name of the table in its folder, of all in one page, and of the folder of what the table links to.
 const TABLE: &str = "atlas.md";
@@ -27,8 +30,14 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> Outcome {
     let mut entries = Vec::new();
     let mut mechanisms = Vec::new();
     for path in &args.models {
+        let is_imported = import::is_description(path);
+        let loaded = if is_imported {
+            described(host, path)?
+        } else {
+            commands::load(host, path)?
+        };
         let start = Instant::now();
-        let model = commands::model(host, path)?;
+        let model = commands::derived(host, &path.display().to_string(), loaded)?;
         let seconds = start.elapsed().as_secs_f64();
         if !names.insert(model.name.clone()) {
             return Err(Failure::Input(format!(
@@ -37,14 +46,19 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> Outcome {
                 model.name
             )));
         }
-        let entry = model.atlas(Some(seconds))?;
+        let entry = Entry {
+            is_imported,
+            ..model.atlas(Some(seconds))?
+        };
         let file = |ending: &str| {
             let file = folder.join(format!("{}.{ending}", model.name));
             Target::new(&file, args.models.iter().map(PathBuf::as_path))
         };
         let picture = model.picture(&Drawing::default(), None)?;
         file("svg")?.write(&picture)?;
-        file("md")?.write(&model.atlas_page(&entry))?;
+        if !is_imported {
+            file("md")?.write(&model.atlas_page(&entry))?;
+        }
         entries.push(entry.clone());
         mechanisms.push(Pictured {
             entry,
@@ -68,4 +82,11 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> Outcome {
         modelmill::text::table::count(entries.len(), "mechanism", "mechanisms"),
         args.out.join(PAGE).display()
     ))
+}
+
+/// The model of a robot description, as `import` makes it of the file alone.
+fn described(host: &Host, path: &Path) -> Outcome<Loaded> {
+    let closures = import::closures_of(path, None);
+    let imported = import::imported(host, path, closures.as_deref(), Options::default())?;
+    Ok(host.load_text(path, &imported.model)?)
 }

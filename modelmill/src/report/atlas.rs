@@ -102,11 +102,22 @@ fn counts(mechanisms: &[Pictured]) -> String {
 }
 
 fn mechanism(one: &Pictured) -> String {
-    let Pictured {
-        entry,
-        model,
-        picture,
-    } = one;
+    let Pictured { entry, picture, .. } = one;
+    let expressions = if entry.is_imported {
+        String::new()
+    } else {
+        expressions(&one.model)
+    };
+    format!(
+        "<section id=\"{name}\">\n<h2>{name}</h2>\n<p>{}. {}.</p>\n<figure class=\"picture\">{picture}</figure>\n\
+         {expressions}</section>\n",
+        escape(&entry.title),
+        escape(&entry.in_words()),
+        name = escape(&entry.name),
+    )
+}
+
+fn expressions(model: &Model) -> String {
     let rows: Vec<Vec<Cell>> = (model.base.iter().zip(&model.nominal).enumerate())
         .map(|(k, (base, value))| {
             let value = if model.has_nominal(k) {
@@ -123,12 +134,8 @@ fn mechanism(one: &Pictured) -> String {
         })
         .collect();
     format!(
-        "<section id=\"{name}\">\n<h2>{name}</h2>\n<p>{}. {}.</p>\n<figure class=\"picture\">{picture}</figure>\n\
-         <details><summary>Base parameters, eq. (16)</summary>\n{}</details>\n</section>\n",
-        escape(&entry.title),
-        escape(&entry.in_words()),
+        "<details><summary>Base parameters, eq. (16)</summary>\n{}</details>\n",
         table("", &["p_min", "expression", "#value", "unit"], &rows),
-        name = escape(&entry.name),
     )
 }
 
