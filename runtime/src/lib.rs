@@ -7,6 +7,7 @@ mod arithmetic;
 pub mod blocks;
 mod geometry;
 mod lanes;
+pub mod live;
 mod loops;
 mod model;
 mod numbers;

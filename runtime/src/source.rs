@@ -1,13 +1,21 @@
 //! This crate's own source, for crates that are handed on in a folder of their own.
 
 /// Place in the crate's folder and text of every file.
-pub const FILES: [(&str, &str); 16] = [
+pub const FILES: [(&str, &str); 24] = [
     ("Cargo.toml", MANIFEST),
     ("src/arithmetic.rs", include_str!("arithmetic.rs")),
     ("src/blocks.rs", include_str!("blocks.rs")),
     ("src/geometry.rs", include_str!("geometry.rs")),
     ("src/lanes.rs", include_str!("lanes.rs")),
     ("src/lib.rs", include_str!("lib.rs")),
+    ("src/live/averages.rs", include_str!("live/averages.rs")),
+    ("src/live/comparison.rs", include_str!("live/comparison.rs")),
+    ("src/live/emitted.rs", include_str!("live/emitted.rs")),
+    ("src/live/estimator.rs", include_str!("live/estimator.rs")),
+    ("src/live/mod.rs", include_str!("live/mod.rs")),
+    ("src/live/options.rs", include_str!("live/options.rs")),
+    ("src/live/scatter.rs", include_str!("live/scatter.rs")),
+    ("src/live/watch.rs", include_str!("live/watch.rs")),
     ("src/loops.rs", include_str!("loops.rs")),
     ("src/model.rs", include_str!("model.rs")),
     ("src/numbers.rs", include_str!("numbers.rs")),
@@ -51,11 +59,16 @@ mod tests {
     #[test]
     fn no_file_is_missing() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let files = std::fs::read_dir(folder.join("src")).unwrap();
-        let mut names: std::vec::Vec<_> = files
-            .map(|f| std::format!("src/{}", f.unwrap().file_name().to_str().unwrap()))
-            .collect();
-        names.push("Cargo.toml".into());
+        let mut names = std::vec::Vec::from([std::string::String::from("Cargo.toml")]);
+        for below in ["src", "src/live"] {
+            for entry in std::fs::read_dir(folder.join(below)).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_file() {
+                    let name = path.file_name().unwrap().to_str().unwrap();
+                    names.push(std::format!("{below}/{name}"));
+                }
+            }
+        }
         names.sort();
         let mut listed = FILES.map(|f| f.0).to_vec();
         listed.sort_unstable();

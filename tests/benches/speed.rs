@@ -157,6 +157,27 @@ macro_rules! emitted {
                     });
                 }
 
+                /// A step of the watch that has learned its noise, regressor included: beside `regressor`.
+                #[divan::bench(sample_count = 50)]
+                fn watch(bencher: Bencher) {
+                    let states = each_state();
+                    let geometry = module::Geometry::default();
+                    let base = [0.0; module::N_BASE];
+                    let options = modelmill_runtime::live::Options::at_rate(1000.0);
+                    let mut watch = module::Watch::new(&geometry, &base, &options);
+                    let mut stream = super::super::Stream::new(3);
+                    let mut round = || {
+                        for state in &states {
+                            let forces = std::array::from_fn(|_| stream.between(-1.0, 1.0));
+                            _ = black_box(watch.step(black_box(state), &forces));
+                        }
+                    };
+                    for _ in 0..200 {
+                        round();
+                    }
+                    bencher.counter(ItemsCount::new(STATES)).bench_local(round);
+                }
+
                 #[divan::bench(sample_count = 50)]
                 fn inverse_dynamics(bencher: Bencher) {
                     let states = each_state();

@@ -1,0 +1,100 @@
+//! How a watch looks: times in seconds, and what they are in samples and blocks.
+
+use crate::Real;
+
+/// How a watch looks; all times in seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Samples per second.
+    pub rate: f64,
+    /// Time over which samples are averaged.
+    pub block: f64,
+    /// Memory of the window: what is older counts e times less. A change is found some of these after it came.
+    pub window: f64,
+    /// Memory of the reference and of how windows differ.
+    pub memory: f64,
+    /// How long the watch learns before it judges: a third of it the noise, the rest how windows differ. The motion should
+    /// be that of every day.
+    pub learning: f64,
+    /// Mean time between false alarms that thresholds are made for, with noise that is all chance.
+    pub calm: f64,
+}
+
+impl Options {
+    /// Blocks of 20 ms, a window of 2 s, a memory of 10 minutes, one minute to learn, a false alarm in 100 hours.
+    #[must_use]
+    pub const fn at_rate(samples_per_second: f64) -> Self {
+        Self {
+            rate: samples_per_second,
+            block: 0.02,
+            window: 2.0,
+            memory: 600.0,
+            learning: 60.0,
+            calm: 360_000.0,
+        }
+    }
+}
+
+/// What options are in samples, blocks and shares.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plan<T> {
+    /// Samples of a block.
+    pub(super) block: u32,
+    /// Blocks between two comparisons.
+    pub(super) interval: u32,
+    /// Blocks of each drive from which its noise is learned.
+    pub(super) noise: u32,
+    /// Blocks from which scatter is learned.
+    pub(super) scatter: u32,
+    /// Comparisons in which a parameter must come out to be steady.
+    pub(super) steady: u32,
+    pub(super) window_root: T,
+    pub(super) memory_root: T,
+    pub(super) scatter_share: T,
+    /// Windows that do not overlap, per comparison: a memory of tau averages over 2 tau.
+    pub(super) per_comparison: T,
+    /// A block's share of its samples.
+    pub(super) per_sample: T,
+    /// Windows per memory of the reference.
+    pub(super) windows: T,
+    pub(super) limit: T,
+}
+
+impl<T: Real> Plan<T> {
+    pub(super) fn new(options: &Options, n_base: usize) -> Self {
+        let rate = options.rate.max(1e-6);
+        let block = count(options.block * rate);
+        let block_time = f64::from(block) / rate;
+        let window = options.window.max(block_time);
+        let memory = options.memory.max(10.0 * window);
+        let learning = options.learning.max(10.0 * window) / block_time;
+        // A comparison takes a step for each parameter.
+        let samples = (window / 6.0 * rate).max(n_base as f64 + 2.0);
+        let interval = count(samples / f64::from(block));
+        let interval_time = f64::from(interval) * block_time;
+        let root = |memory: f64, dt: f64| T::from_f64(libm::exp(-0.5 * dt / memory));
+        // Tests that have little to do with each other: two in each window, for each parameter.
+        let tests = 2.0 * n_base.max(1) as f64 * (options.calm / window).max(1.0);
+        Self {
+            block,
+            interval,
+            noise: count(learning / 3.0),
+            scatter: count(learning * 2.0 / 3.0),
+            steady: count(window / interval_time),
+            window_root: root(window, block_time),
+            memory_root: root(memory, block_time),
+            scatter_share: root(0.5 * memory, interval_time),
+            per_comparison: T::from_f64(interval_time / (2.0 * window)),
+            per_sample: T::from_f64(1.0 / f64::from(block)),
+            windows: T::from_f64(memory / window),
+            limit: T::from_f64(2.0 * libm::log(tests)),
+        }
+    }
+}
+
+/// A whole number of samples or blocks, at least one.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+fn count(x: f64) -> u32 {
+    // What is no number becomes one.
+    libm::round(x.clamp(1.0, 1e9)).max(1.0) as u32
+}
