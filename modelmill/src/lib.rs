@@ -50,7 +50,7 @@
 //! | [`Host::simulate`] | a full-body rig along a trajectory |
 //! | [`Host::reduce`] | a rig to a planar model |
 //! | [`Host::import`] | a model file from a URDF, MJCF or SDF |
-//! | [`Model::export`] | a URDF or MJCF from a model |
+//! | [`export::description`], [`Model::export`] | a URDF or MJCF from a model file, or from a fit |
 //! | [`Model::interpret`] | physical parameters from base parameters |
 //! | [`Model::excite`] | the motion that tells base parameters, or effects, apart best |
 //!
@@ -192,11 +192,8 @@ pub mod text;
 pub mod variants;
 
 pub use modelmill_boundary::files;
-pub use modelmill_identify::{Note, Severity};
-pub use modelmill_spec::{EffectKind, edit};
-
-/// The JSON Schema of model files, by which editors complete and explain them; a test of `model-spec` keeps it true.
-pub const SCHEMA: &str = include_str!("../../model-spec/schema/modelmill.schema.json");
+pub use modelmill_identify::{FitFile, Note, Severity};
+pub use modelmill_spec::{EffectKind, SCHEMA, bundled, edit};
 
 pub use error::{Error, Outcome};
 pub use host::Host;

@@ -74,11 +74,19 @@ fn moving(
 ) -> Outcome<Vec<Option<Vec<f64>>>> {
     let mut columns: Vec<Option<Vec<f64>>> = Vec::new();
     let mut before = 0;
+    let n_drives = model.drives().len().max(1);
+    // Of many columns few may be wanted.
+    let mut is_wanted: Vec<bool> = Vec::new();
     one.for_each_block(model, |states| {
         Ok::<_, Error>(
             evaluator.regressor_blocks_of(states, wanted, |samples, block| {
-                columns.resize(block.len(), None);
-                for (column, values) in columns.iter_mut().zip(block) {
+                if columns.is_empty() {
+                    let n = block.len() / n_drives;
+                    columns.resize(block.len(), None);
+                    is_wanted = (0..block.len()).map(|k| wanted(k % n)).collect();
+                }
+                let columns = columns.iter_mut().zip(block).zip(&is_wanted);
+                for ((column, values), _) in columns.filter(|(_, is_wanted)| **is_wanted) {
                     if column.is_none() && values.iter().all(|x| *x == 0.0) {
                         continue;
                     }

@@ -1,4 +1,5 @@
-//! `diagnose` where an arm carries more than its model, where a length of the model is wrong, and where a gear yields. Forces are
+//! `diagnose` where an arm carries more than its model, where a length of the model or the direction of gravity is wrong, and where
+//! a gear yields. Forces are
 //! those of a model file that has the body or the length; the encoder's error is put into the recorded positions.
 
 mod draws;
@@ -133,4 +134,35 @@ fn what_a_fit_does_not_know_is_no_error_of_the_model() {
                 inertia = { xx = 0.004, yy = 0.005, zz = 0.006 }\n";
     let loaded = asked(&run(ARM, 742, Made::Body(part)));
     near(only(&loaded, "payload", "link6"), "mass", 1.4, 0.05);
+}
+
+/// Bodies that would have to push upwards: gravity is turned, and so are drives that count the other way.
+#[test]
+fn what_turns_the_sign_of_bodies_is_suspected() {
+    let text = std::fs::read_to_string(bundled("spidermill")).expect("a model");
+    let suspicions = |text: &str| -> Vec<String> {
+        let model = Model::from_text("spidermill.toml", text).expect("a model");
+        let runs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/spidermill-mbs");
+        let recording = |name: &str| {
+            (model.recording(runs.join(name), &Reading::default())).expect("a recording")
+        };
+        let question = Question {
+            held: Held::Known,
+            again_with_nominal: false,
+        };
+        let [fit, check] = ["plain-fit.csv", "plain-check.csv"].map(recording);
+        let found = model.diagnose(&[&fit], &[&check], &question);
+        let notes = found.expect("an answer").notes.into_iter();
+        let says = notes.map(|note| note.says);
+        says.filter(|says| says.contains("no bodies near"))
+            .collect()
+    };
+    assert!(suspicions(&text).is_empty());
+    let turned = text.replace("[0, \"-g\", 0]", "[0, \"g\", 0]");
+    assert_ne!(turned, text);
+    let says = suspicions(&turned);
+    assert!(
+        says.len() == 1 && says[0].starts_with("p1_min comes out"),
+        "{says:?}"
+    );
 }

@@ -63,7 +63,8 @@ impl Recording {
             self.rates(coordinates, time)
         };
         let step = median(time.windows(2).map(|w| w[1] - w[0]).collect());
-        if step <= FASTEST {
+        // One sample has no steps.
+        if time.len() > 1 && step <= FASTEST {
             notes.push(Note::warning(format!(
                 "The steps of `t` in {} are {} s, which is fast for a recording of forces; time must be in s.",
                 self.file(),

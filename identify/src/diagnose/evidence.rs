@@ -67,6 +67,12 @@ impl Evidence {
             && self.above_noise > BELOW_NOISE
     }
 
+    /// Whether a change that was found before is worth keeping.
+    pub(crate) fn would_be_missed(&self) -> bool {
+        let is_large = self.gain >= LARGE_GAIN && self.bic > 0.0 && self.above_noise > BELOW_NOISE;
+        self.holds() || is_large
+    }
+
     /// Whether the gain is the same all along: in the mean over the blocks, or, if it is large, block by block.
     fn is_steady(&self) -> bool {
         let least_t = if self.least_gain < LEAST_GAIN {

@@ -64,6 +64,9 @@ use reproducible::reproducible;
 /// Kinds of friction of which a drift is a change.
 const FRICTION: [&str; 2] = ["viscous_friction", "coulomb_friction"];
 
+/// A law for so much of what is left says what effects that it makes needless were part of.
+const MOST_OF_THE_REST: f64 = 0.5;
+
 /// Why an effect is refused that does nothing but take back another.
 const CANCELS: &str = "it would only cancel another effect at its place";
 
@@ -176,25 +179,31 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
         ladder.push(bench.rung(&before, &step.picks, step.evidence));
         before.clone_from(&step.picks);
     }
-    let (picks, left) = bench.above_the_unexplained(picks);
+    let (mut picks, mut left) = bench.above_the_unexplained(picks);
     if picks.len() < before.len() {
         ladder.push(bench.rung(&before, &picks, None));
+    }
+    let (mut sites, mut laws) = bench.laws(&picks, &left);
+    let needed = bench.beside_laws(&picks, &laws);
+    if needed.len() < picks.len() {
+        let left_then = bench.left(&needed);
+        let (sites_then, laws_then) = bench.laws(&needed, &left_then);
+        let stands = |law: &Proposal| {
+            let is_its = |then: &Proposal| {
+                then.channels == law.channels && then.law.gain >= MOST_OF_THE_REST
+            };
+            law.law.gain < MOST_OF_THE_REST || laws_then.iter().any(is_its)
+        };
+        if laws.iter().all(stands) {
+            ladder.push(bench.rung(&picks, &needed, None));
+            (picks, left, sites, laws) = (needed, left_then, sites_then, laws_then);
+        }
     }
     let Left {
         rest,
         mut again,
         mut unexplained,
     } = left;
-    let (sites, laws) = laws::propose(
-        &bench,
-        &picks,
-        &laws::Left {
-            rest: &rest,
-            again: &again,
-            unexplained: &unexplained,
-        },
-        supply,
-    );
     // What a law foretells comes again.
     for proposal in &laws {
         for d in &proposal.channels {
@@ -312,6 +321,30 @@ impl Bench<'_> {
             again,
             unexplained,
         }
+    }
+
+    /// Laws for what a set leaves, and where they may act.
+    fn laws(&self, picks: &[Pick], left: &Left) -> (Vec<Site>, Vec<Proposal>) {
+        let left = laws::Left {
+            rest: &left.rest,
+            again: &left.again,
+            unexplained: &left.unexplained,
+        };
+        laws::propose(self, picks, &left, self.supply)
+    }
+
+    /// The members of a set that laws do not make needless: an effect that goes where a law for most of the rest comes is part of
+    /// that law, if it acts on drives that feel the law.
+    fn beside_laws(&self, picks: &[Pick], laws: &[Proposal]) -> Vec<Pick> {
+        let is_part = |pick: &Pick, proposal: &Proposal| {
+            let channels = self.acted_on(std::slice::from_ref(pick));
+            let effect = &self.candidate(pick).effect;
+            proposal.law.gain >= MOST_OF_THE_REST
+                && proposal.law.instead_of.contains(effect)
+                && channels.iter().all(|d| proposal.channels.contains(d))
+        };
+        let is_needed = |pick: &&Pick| !laws.iter().any(|proposal| is_part(pick, proposal));
+        picks.iter().filter(is_needed).cloned().collect()
     }
 
     /// A set without members that explain less than what stays unexplained where they act, and what it leaves: part of a law that

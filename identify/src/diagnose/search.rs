@@ -16,6 +16,8 @@ const TESTED: usize = 10;
 const CLOSE: f64 = 1.5;
 /// The same for one whose constant has been looked for on a grid only.
 const CLOSE_ON_A_GRID: f64 = 20.0;
+/// A rival is tried with finer constants if so many times what it explains with those of a grid would be enough.
+const FINER_EXPLAINS: f64 = 2.0;
 /// A simpler kind that brings this share of what one that holds it brings comes first.
 const NEARLY_ALL_OF: f64 = 0.97;
 /// Another simple kind that brings this share of what a refinement of a member brings comes first.
@@ -102,6 +104,11 @@ impl Bench<'_> {
         } else {
             pruned
         };
+        let pruned = if self.is_worse(&pruned, &accepted) {
+            accepted.clone()
+        } else {
+            pruned
+        };
         let pruned = self.trial(pruned).picks;
         if pruned != accepted {
             steps.push(Step {
@@ -175,11 +182,12 @@ impl Bench<'_> {
         self.evidence(before, after, &self.acted_on(&differ))
     }
 
-    /// Whether evidence speaks for one set beside another that is to take its place.
+    /// Whether evidence speaks for one set beside another that is to take its place. What was found step by step need not prove
+    /// itself again as a whole: a large loss that its parameters are worth is enough.
     pub(crate) fn is_worse(&mut self, settled: &[Pick], before: &[Pick]) -> bool {
         self.weigh(before);
         let channels: Vec<usize> = (0..self.weights.len()).collect();
-        self.evidence(settled, before, &channels).holds()
+        self.evidence(settled, before, &channels).would_be_missed()
     }
 
     /// Whether a set is another one and a further effect, which may take the place of what it holds.
@@ -399,6 +407,7 @@ impl Bench<'_> {
                 .filter(|rival| self.freedoms(rival) <= self.freedoms(&own))
                 .cloned()
                 .collect();
+            let without = self.trial(others.clone()).squares;
             let mut best = now;
             for rival in rivals {
                 let mut set = others.clone();
@@ -412,15 +421,17 @@ impl Bench<'_> {
                     set
                 };
                 let kind = |pick: &Pick| self.candidate(pick).effect.kind.clone();
-                let close = if kind(&tuned[i]) == kind(&own) {
-                    CLOSE_ON_A_GRID
+                let squares = self.trial(tuned.clone()).squares;
+                let is_close = if kind(&tuned[i]) == kind(&own) {
+                    squares <= CLOSE_ON_A_GRID * best.squares
                 } else {
-                    CLOSE
+                    squares <= CLOSE * best.squares
+                        && FINER_EXPLAINS * (without - squares) >= without - best.squares
                 };
-                if self.trial(tuned.clone()).squares > close * best.squares {
+                if !is_close {
                     continue;
                 }
-                let tuned = self.refine(tuned);
+                let tuned = self.refine_around(tuned, i);
                 let trial = self.trial(tuned);
                 if trial.is_possible() && trial.squares < best.squares {
                     best = trial;

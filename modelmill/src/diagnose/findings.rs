@@ -19,15 +19,13 @@ use super::chosen::Named;
 use super::faults;
 use super::laws::{self, Hypothesis};
 use super::long;
+use super::off_nominal::{OffNominal, off_nominal, turned};
 use super::problem::{self, Answer, Asked, Held};
 use super::versions::Version;
 use super::words::Judged;
 
 /// Recordings that differ leave so many times as much where that is not said.
 const NO_WORSE: f64 = 1.5;
-/// A base parameter is off its nominal value from this many of its deviations on, and from this share of it on.
-const SIGMAS: f64 = 5.0;
-const OFF: f64 = 0.01;
 
 /// What is asked of a diagnosis; [`Question::default`] identifies what the model file leaves open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,17 +138,6 @@ pub struct Estimate {
     pub unit: String,
 }
 
-/// A base parameter that is not what the file says.
-#[derive(Clone, Debug, PartialEq)]
-pub struct OffNominal {
-    /// The parameter as it was identified.
-    pub parameter: FitParameter,
-    /// Its nominal value.
-    pub nominal: f64,
-    /// How many of its standard deviations lie between.
-    pub sigmas: f64,
-}
-
 /// A diagnosis with all parameters held at their nominal values.
 pub struct WithNominal {
     /// Verdict, ladder and candidates.
@@ -242,6 +229,10 @@ impl Model {
         findings.laws = laws::hypotheses(&findings.before.model, &findings.diagnosis);
         findings.untold = untold(&findings);
         findings.off_nominal = off_nominal(findings.last());
+        if let Some(note) = turned(findings.last(), &findings.off_nominal) {
+            self.host().note(&note);
+            findings.notes.push(note);
+        }
         findings.regions = regions(&findings);
         if question.again_with_nominal && held != Held::All && !findings.off_nominal.is_empty() {
             findings.with_nominal = Some(with_nominal(&findings, &between)?);
@@ -490,30 +481,6 @@ fn separation(findings: &Findings, found: &FoundEffect) -> Option<Separation> {
             .collect(),
         noise: (noise > 0.0 && noise.is_finite()).then_some(noise),
     })
-}
-
-/// Base parameters of the bodies that are not what the file says, with the nominal value and the distance in deviations.
-fn off_nominal(version: &Version) -> Vec<OffNominal> {
-    let Some(identified) = &version.identified else {
-        return Vec::new();
-    };
-    let parameters = identified.fit.parameters.iter().enumerate();
-    let mut off: Vec<OffNominal> = parameters
-        .filter(|(k, p)| p.status == Status::Identified && !version.model.is_effect(*k))
-        .filter_map(|(_, p)| {
-            let (nominal, std) = (p.nominal?, p.std?);
-            let sigmas = (p.value - nominal).abs() / std;
-            let is_off =
-                std > 0.0 && sigmas > SIGMAS && (p.value - nominal).abs() > OFF * nominal.abs();
-            is_off.then(|| OffNominal {
-                parameter: p.clone(),
-                nominal,
-                sigmas,
-            })
-        })
-        .collect();
-    off.sort_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
-    off
 }
 
 /// Where the error sits that matters: what is left unexplained, or that of the model as it is.

@@ -4,7 +4,8 @@
 //! `places` -> `candidates` (what `add` would add) -> `columns` (numbers along the recordings) -> `problem` (posed and solved)
 //! with `long` (recordings in fewer samples), `faults` (of recordings, taken off), and candidates that no entry of a model
 //! file says: `encoders`, `gears`, `memory`, `payloads`, `constants`
-//! -> `added` (the model file with what was found) -> `versions` (both models identified, along all recordings) -> `findings`.
+//! -> `added` (the model file with what was found) -> `versions` (both models identified, along all recordings) -> `off_nominal`
+//! (what base parameters say against the file) -> `findings`.
 //! `chosen` does the same for effects that the user names; `words` puts verdicts into sentences.
 
 pub(crate) mod added;
@@ -20,6 +21,7 @@ mod laws;
 mod long;
 mod memory;
 pub(crate) mod numbers;
+mod off_nominal;
 mod payloads;
 mod places;
 mod problem;
@@ -30,12 +32,11 @@ pub mod words;
 pub(crate) use candidates::sign;
 pub use chosen::Named;
 pub(crate) use chosen::{Chosen, Constants, base, choose};
-pub use findings::{
-    Estimate, Findings, Missing, OffNominal, Question, Separation, Untold, WithNominal,
-};
+pub use findings::{Estimate, Findings, Missing, Question, Separation, Untold, WithNominal};
 pub use laws::{Hypothesis, Law, LawEntry};
 pub use modelmill_identify::diagnose::{
     Budget, Diagnosis, Disturbance, Effect, Quantity, Rung, Verdict,
 };
+pub use off_nominal::OffNominal;
 pub use problem::Held;
 pub use versions::{Along, Version};

@@ -134,7 +134,7 @@ impl<'a> ModelPlant<'a> {
         if !self.passive.is_empty() {
             for (sample, least) in of_loops.iter_mut().enumerate() {
                 let at: Vec<f64> = all.iter().map(|column| column[sample]).collect();
-                let rows = self.kinematics.loop_jacobian(&self.kinematics.poses(&at));
+                let rows = self.kinematics.gap_jacobian(&self.kinematics.poses(&at));
                 let rows = rows
                     .iter()
                     .map(|row| self.passive.iter().map(|i| row[*i]).collect())

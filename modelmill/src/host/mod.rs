@@ -156,6 +156,13 @@ impl Host {
         Ok(FitFile::read_from(self.files(), path)?)
     }
 
+    /// Reads a fit from its text; `file` is what messages call it.
+    ///
+    /// Fails with the place of what is wrong with it.
+    pub fn fit_of_text(&self, text: &str, file: &str) -> Outcome<FitFile> {
+        Ok(FitFile::parse(text, file)?)
+    }
+
     /// Passes a remark on to whoever watches.
     pub(crate) fn note(&self, note: &Note) {
         self.progress.notes(note);

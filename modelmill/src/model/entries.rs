@@ -116,6 +116,15 @@ fn actuation(m: &Mechanism, entries: &mut Entries) {
         let [a, b] = l.joins.map(|p| m.points[p.0].name.clone());
         entries.add("loop", &l.name, format!("joins {a} and {b}"));
     }
+    for c in &m.couplings {
+        let terms = c.terms.iter();
+        let terms =
+            terms.map(|(i, factor)| format!("({})*{}", text(m, factor), m.coordinates[i.0].name));
+        let offset = (!c.offset.is_zero()).then(|| text(m, &c.offset));
+        let all: Vec<String> = terms.chain(offset).collect();
+        let name = &m.coordinates[c.coordinate.0].name;
+        entries.add("coupling of", name, format!("follows {}", all.join(" + ")));
+    }
     for d in &m.drives {
         let how = match d.kind {
             DriveKind::Joint(i) => format!("on the joint {}", m.coordinates[i.0].name),

@@ -342,7 +342,7 @@ impl Findings {
             &rows,
         ));
         lines.push(
-            "  They make up for what the nominal values lack, such as a payload or a misplaced mass."
+            "  They make up for what the nominal values lack, such as a payload, a misplaced mass or a wrong length."
                 .to_owned(),
         );
         let Some(held) = &self.with_nominal else {

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::Tried;
 use super::features::Product;
 use super::ground::Samples;
 use crate::diagnose::bench::{Bench, Pick};
@@ -191,15 +192,11 @@ impl HeldOut {
         }
     }
 
-    /// Squares of what a law leaves for each independent sample, on the channels that feel it.
-    pub(crate) fn scatter(
-        &self,
-        samples: &Samples<'_>,
-        site: usize,
-        terms: &[Product],
-        judged: &Judged,
-    ) -> f64 {
-        let own: Vec<Vec<f64>> = (terms.iter())
+    /// Squares of what a law leaves on the channels that feel it, fitted to all blocks, and how many independent samples that is
+    /// worth.
+    pub(super) fn left_there(&self, samples: &Samples<'_>, one: &Tried) -> (f64, f64) {
+        let site = one.site;
+        let own: Vec<Vec<f64>> = (one.terms.iter())
             .flat_map(|term| samples.columns(site, term))
             .collect();
         let k = samples.picked.len();
@@ -210,7 +207,7 @@ impl HeldOut {
             let mut left = known[n].clone();
             let of_law = own.iter().map(|column| &column[part * k..(part + 1) * k]);
             let all = known[..n].iter().map(Vec::as_slice).chain(of_law);
-            for (column, factor) in all.zip(judged.factors.iter()) {
+            for (column, factor) in all.zip(one.judged.factors.iter()) {
                 for (left, x) in left.iter_mut().zip(column) {
                     *left -= factor * x;
                 }
@@ -218,7 +215,7 @@ impl HeldOut {
             squares += dot(&left, &left);
             worth += effective_samples(&left);
         }
-        squares / worth.max(1.0)
+        (squares, worth)
     }
 }
 

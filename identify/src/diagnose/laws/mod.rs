@@ -155,6 +155,14 @@ impl Left<'_> {
         dot(rest, rest) / rest.len().max(1) as f64
     }
 
+    /// Part of the squares per sample of some channels, in units of the noise.
+    fn squares(&self, channels: &[usize], deviations: &[f64], part: &dyn Fn(usize) -> f64) -> f64 {
+        let scaled = channels
+            .iter()
+            .map(|d| part(*d) * self.size(*d) / deviations[*d].powi(2));
+        scaled.sum()
+    }
+
     /// Of each channel what does not come again, at least its noise.
     fn deviations(&self, noise: &[f64]) -> Vec<f64> {
         let deviation = |d: usize| {
@@ -226,19 +234,19 @@ pub(crate) fn propose(
                 });
             }
         }
-        // Part of what is left of some channels, in units of the noise.
-        let squares = |site: usize, of: &dyn Fn(usize) -> f64| -> f64 {
-            let scaled = (many.channels(site).into_iter())
-                .map(|d| of(d) * left.size(d) / deviations[d].powi(2));
-            many.picked.len() as f64 * scaled.sum::<f64>()
+        let squares = |site: usize, of: &dyn Fn(usize) -> f64| {
+            many.picked.len() as f64 * left.squares(&many.channels(site), &deviations, of)
         };
+        let left_there = |one: &Tried| bases[one.base].held_out.left_there(&many, one);
+        // Where the base, freed by a law, fits other drives better as well, that is not gained on its own drives.
         let gain = |one: &Tried| {
+            let all = squares(one.site, &|_| 1.0).max(f64::MIN_POSITIVE);
             let off = without.total() - one.judged.total();
-            off / squares(one.site, &|_| 1.0).max(f64::MIN_POSITIVE)
+            (off / all).min(1.0 - left_there(one).0 / all)
         };
         let scatter = |one: &Tried| {
-            let held_out = &bases[one.base].held_out;
-            held_out.scatter(&many, one.site, &one.terms, &one.judged)
+            let (squares, worth) = left_there(one);
+            squares / worth.max(1.0)
         };
         let is_one = |one: &Tried| {
             let channels = many.channels(one.site);
