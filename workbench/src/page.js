@@ -48,13 +48,18 @@
 
   const plain = (words) => words.replace(/\r\n/g, '\n');
 
+  const differs_at = (one, other) => {
+    let at = 0;
+    while (at < one.length && one[at] === other[at]) at++;
+    return at;
+  };
+
   // Puts a text in the place of the old one by an edit that the browser can undo, of what differs only.
   const replace = (words) => {
     const old = text.value, top = text.scrollTop;
     words = plain(words);
     if (old === words) return;
-    let from = 0;
-    while (from < old.length && old[from] === words[from]) from++;
+    const from = differs_at(old, words);
     let end = 0;
     while (end < old.length - from && end < words.length - from && old[old.length - 1 - end] === words[words.length - 1 - end]) end++;
     const held = document.activeElement;
@@ -75,6 +80,12 @@
     while (gutter.childElementCount > count) gutter.lastElementChild.remove();
     while (gutter.childElementCount < count) gutter.appendChild(make('div', String(gutter.childElementCount + 1)));
     gutter.scrollTop = text.scrollTop;
+  };
+
+  // The first line with words of what was put in at an offset.
+  const line_of = (start) => {
+    const ahead = text.value.slice(start).search(/\S/);
+    return text.value.slice(0, start + Math.max(ahead, 0)).split('\n').length;
   };
 
   const go = (line, column) => {
@@ -197,7 +208,7 @@
     loads = [];
     by('diagnose').disabled = !view.data;
     for (const id of ['places', 'draw']) by(id).disabled = !view.data;
-    for (const id of ['curves', 'where', 'written', 'found']) by(id).replaceChildren();
+    for (const id of ['curves', 'where', 'written', 'found']) { by(id).replaceChildren(); mark_stale(id); }
     by('motion').hidden = true;
     if (view.data) load(); else by('errors').textContent = window.mill.hint;
   };
@@ -291,10 +302,15 @@
     say('', 'errors');
   };
 
-  // What was asked for by a button stays until it is asked for again, with a mark once the text is another one.
+  // What was asked for by a button stays until it is asked for again, and says so once the text is another one.
   const mark_stale = (id) => {
     const one = by(id);
-    one.classList.toggle('stale', one.childElementCount > 0 && one.dataset.revision !== String(view.revision));
+    const isOld = one.childElementCount > 0 && one.dataset.revision !== String(view.revision);
+    one.classList.toggle('stale', isOld);
+    const told = one.previousElementSibling;
+    const isTold = told.classList.contains('of-before');
+    if (isOld && !isTold) one.before(make('p', 'The text was changed since: this is of the text before. Ask again for the text as it stands.', 'alias of-before'));
+    if (!isOld && isTold) told.remove();
   };
   const made_of = (id, revision) => { by(id).dataset.revision = revision; mark_stale(id); };
   const refresh = () => {
@@ -479,6 +495,10 @@
   const findings = (told) => {
     const box = by('found');
     box.replaceChildren();
+    listed(box, told);
+    made_of('found', told.of_this_text ? String(view.revision) : '');
+  };
+  const listed = (box, told) => {
     if (told.cancelled) box.append(make('p', 'The diagnosis was cancelled.'));
     if (told.failed) box.append(make('p', told.failed, 'alias'));
     const { found } = told;
@@ -494,7 +514,13 @@
       button.type = 'button';
       button.addEventListener('click', () => tried(async () => {
         button.disabled = true;
-        try { follow(await ask('add', { entry: k })); say(''); } catch (error) { button.disabled = false; throw error; }
+        try {
+          const before = text.value;
+          // The text may arrive as that of another window, too, before the answer does.
+          follow(await ask('add', { entry: k }));
+          say('');
+          go(line_of(differs_at(before, text.value)));
+        } catch (error) { button.disabled = false; throw error; }
       }));
       one.append(button, make('br'), make('code', entry.command));
       box.append(one);
@@ -515,8 +541,6 @@
     for (const one of found.where) list.append(make('li', `${one.says}.`));
     box.append(list);
     for (const note of found.data) if (note.severity === 'warning') box.append(make('p', note.says, 'alias'));
-    box.dataset.revision = told.of_this_text ? String(view.revision) : '';
-    box.classList.toggle('stale', !told.of_this_text);
   };
   const follow_diagnosis = async () => {
     for (;;) {
@@ -538,6 +562,7 @@
   by('diagnose').addEventListener('click', () => tried(async () => {
     await send();
     by('found').replaceChildren();
+    mark_stale('found');
     await ask('diagnose', {});
     say('');
     await follow_diagnosis();
@@ -555,6 +580,8 @@
   by('mine').addEventListener('click', () => tried(async () => show(await ask('choose', { theirs: false }))));
   by('copy').addEventListener('click', () => window.copied(by('command').textContent, 'the command'));
   const open = (name) => {
+    // What a pane says of its own is not for another one.
+    if (pane !== name) say('');
     pane = name;
     for (const one of document.querySelectorAll('.pane')) one.hidden = one.id !== pane;
     for (const tab of by('tabs').children) tab.setAttribute('aria-selected', String(tab.dataset.pane === pane));

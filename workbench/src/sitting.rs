@@ -18,9 +18,11 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 mod excitation;
+mod ladder;
 
 pub(crate) use excitation::Keeping;
 use excitation::Planning;
+use ladder::Ladder;
 
 use crate::draft::Draft;
 use crate::options::{Commands, Excitation, Options, Step};
@@ -58,13 +60,7 @@ struct State {
     others: Vec<Option<Vec<u8>>>,
     /// Why the file cannot be read any more.
     unreadable: Option<String>,
-    /// What was done since the last rung of the ladder, and to which revision that led.
-    done: Vec<(u64, String)>,
-    /// The errors that were found last, and of which revision.
-    compared: Option<(u64, Value)>,
-    /// The revision of the last rung.
-    on_ladder: u64,
-    ladder: Vec<Rung>,
+    ladder: Ladder,
     diagnosis: Diagnosis,
 }
 
@@ -74,13 +70,6 @@ struct Now {
     revision: u64,
     found: Arc<Result<Model, Error>>,
     seconds: f64,
-}
-
-/// A step of the sitting, with the errors after it.
-#[derive(Clone)]
-struct Rung {
-    what: String,
-    errors: Value,
 }
 
 #[derive(Default)]
@@ -145,10 +134,7 @@ impl Sitting {
             now,
             saved,
             unreadable: None,
-            done: vec![(options.first + 1, "as opened".to_owned())],
-            compared: None,
-            on_ladder: options.first,
-            ladder: Vec::new(),
+            ladder: Ladder::new(options.first + 1),
             diagnosis: Diagnosis {
                 number: options.first,
                 ..Diagnosis::default()
@@ -201,9 +187,7 @@ impl Sitting {
         told["unreadable"] = json!(state.unreadable);
         told["data"] = json!(!self.options.data.is_empty());
         told["opened"] = json!(self.options.first);
-        told["ladder"] = (state.ladder.iter())
-            .map(|rung| json!({ "what": rung.what, "errors": rung.errors }))
-            .collect();
+        told["ladder"] = state.ladder.told();
         told["commands"] = json!({
             "picture": self.commands.same(Step::Picture),
             "equations": self.commands.same(Step::Equations),
@@ -222,7 +206,7 @@ impl Sitting {
             let mut state = self.state();
             let before = state.draft.revision();
             if did.is_some() {
-                state.ends_typing();
+                state.ladder.ends_typing(before);
             }
             if !state.draft.edit(base, text) {
                 return None;
@@ -424,8 +408,7 @@ impl Sitting {
         let mut state = self.state();
         if state.draft.revision() == revision {
             let errors = json!({ "nominal": brief(&told["nominal"]), "identified": brief(&told["identified"]) });
-            state.compared = Some((revision, errors));
-            if state.stands() {
+            if state.ladder.compared(revision, errors) {
                 drop(state);
                 self.tell();
             }
@@ -670,7 +653,8 @@ impl Sitting {
         let edited = edited.map_err(|error| self.said(&error))?;
         {
             let mut state = self.state();
-            state.ends_typing();
+            let now = state.draft.revision();
+            state.ladder.ends_typing(now);
             if !state.draft.edit(revision, &edited.text) {
                 return Err("the text was changed meanwhile; add it again".to_owned());
             }
@@ -696,47 +680,9 @@ impl Sitting {
 }
 
 impl State {
-    /// Something was done whose effect on the errors is to stand on the ladder.
+    /// Something was done to the text as it stands.
     fn did(&mut self, what: &str) {
-        let revision = self.draft.revision();
-        if (self.done.iter()).all(|(at, one)| *at != revision || one != what) {
-            self.done.push((revision, what.to_owned()));
-        }
-        self.stands();
-    }
-
-    /// What was typed until now is a step of its own, before something else is done to the text.
-    fn ends_typing(&mut self) {
-        let revision = self.draft.revision();
-        let Some((_, errors)) = self.compared.as_ref().filter(|(at, _)| *at == revision) else {
-            return;
-        };
-        let is_news = self.ladder.last().is_none_or(|rung| rung.errors != *errors);
-        if is_news && self.on_ladder != revision {
-            self.did("edited");
-        }
-    }
-
-    /// Puts what led to the text as it stands on the ladder, if its errors are known. What led to a text whose errors nobody
-    /// waited for has no rung: those of another text are not its own.
-    fn stands(&mut self) -> bool {
-        let revision = self.draft.revision();
-        let Some((_, errors)) = self.compared.as_ref().filter(|(at, _)| *at == revision) else {
-            return false;
-        };
-        let errors = errors.clone();
-        let done = std::mem::take(&mut self.done).into_iter();
-        let here = done.filter(|(at, _)| *at == revision);
-        let what: Vec<String> = here.map(|(_, what)| what).collect();
-        if what.is_empty() {
-            return false;
-        }
-        self.on_ladder = revision;
-        self.ladder.push(Rung {
-            what: what.join(", "),
-            errors,
-        });
-        true
+        self.ladder.did(self.draft.revision(), what);
     }
 }
 

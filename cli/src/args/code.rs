@@ -78,7 +78,7 @@ fn in_folders() -> Vec<(&'static str, &'static str)> {
 /// `atlas`.
 #[derive(Debug, Args)]
 pub(crate) struct AtlasArgs {
-    /// Model files
+    /// Model files, and robot descriptions (URDF, MJCF, SDF), which get a line and a picture
     #[arg(required = true)]
     pub(crate) models: Vec<PathBuf>,
     /// Write `atlas.md`, `atlas.html` and the folder `atlas` into this folder

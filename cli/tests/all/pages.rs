@@ -109,7 +109,10 @@ fn the_workbench_fits_every_screen_and_paper() {
     let panes = texts(&panes);
     assert!(panes.len() >= 5, "{panes:?}");
     for pane in panes {
-        browser.run(&window, &format!("tab('{pane}');"));
+        // What is being made anew is pale until it is there.
+        let ready =
+            "await until('all of it', () => !document.querySelector('#both.stale, #costs.stale'));";
+        browser.run(&window, &format!("tab('{pane}'); {ready}"));
         check(&mut browser, &window, &format!("the workbench, {pane}"));
     }
     assert_eq!(browser.heard, Vec::<String>::new());

@@ -294,7 +294,19 @@ fn adds_as_the_command_does(
          tab('ladder');
          await until('a rung', () => at('rungs').tBodies[0].rows.length >= 2 &&
            at('rungs').tBodies[0].rows[1].cells[0].textContent.includes('rod inertia'));
-         return at('text').value;",
+         const { value, selectionStart, selectionEnd } = at('text');
+         const old = at('found').previousElementSibling;
+         return [value, value.slice(selectionStart, selectionEnd), old.classList.contains('of-before') && old.textContent];",
+    );
+    assert!(
+        added[1].as_str().is_some_and(|line| line.starts_with("[[")),
+        "what was added is selected: {}",
+        added[1]
+    );
+    assert!(
+        (added[2].as_str()).is_some_and(|says| says.contains("of the text before")),
+        "the diagnosis is of another text: {}",
+        added[2]
     );
     assert_eq!(bench.text(), original, "nothing is saved yet");
     let copy = scratch("by-command.toml");
@@ -303,7 +315,7 @@ fn adds_as_the_command_does(
     let words: Vec<&str> = command.split(' ').skip(1).collect();
     printed(&words);
     let by_command = std::fs::read_to_string(&copy).expect("the copy");
-    assert_eq!(added, json!(by_command));
+    assert_eq!(added[0], json!(by_command));
     let rungs: Vec<Vec<String>> = [0, 1].map(|k| row(browser, window, "rungs", k)).into();
     let value = |text: &str| -> f64 { text.trim_end_matches(" %").parse().expect("a percentage") };
     let [before, after] = [0, 1].map(|k| value(&rungs[k][4]));

@@ -2,7 +2,6 @@
 //! the error fall; then the same for the paper's own treatment. Everything it uses and makes goes into one folder, so that
 //! each command can be repeated by hand.
 
-mod bundled;
 mod story;
 
 use std::path::{Path, PathBuf};
@@ -12,7 +11,8 @@ use modelmill::diagnose::{Findings, Held, Question, words};
 use modelmill::print::{Spelling, edit};
 use modelmill::recording::{Reading, Recording};
 use modelmill::report::page;
-use modelmill::{Host, Model, along};
+use modelmill::{Host, Model, along, bundled};
+use modelmill_recordings::{PLAIN, Runs, WITH_RODS};
 
 use crate::args::TourArgs;
 use crate::failure::{Failure, Outcome};
@@ -20,7 +20,6 @@ use crate::flags::{Flags, quoted};
 use crate::output;
 use crate::terminal;
 
-use bundled::{PLAIN, Runs, WITH_RODS};
 use story::Story;
 
 /// The page of the robot with rods.
