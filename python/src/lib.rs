@@ -1,11 +1,12 @@
 //! The compiled part of the Python package `modelmill`: models, recordings and verbs of the library, with JSON and text of
-//! what they find. The Python part (`modelmill/`) makes objects with attributes of them.
+//! what they find. The Python part (`package/`) makes objects with attributes of them.
 
 mod arrays;
 mod errors;
 mod model;
 mod options;
 mod results;
+mod rigs;
 mod spelling;
 mod work;
 
@@ -18,4 +19,6 @@ mod _core {
     use crate::model::{CoreModel, contents, import_text, kinds, load, load_text};
     #[pymodule_export]
     use crate::results::{Excited, Found, Recorded};
+    #[pymodule_export]
+    use crate::rigs::{Simulated, reduce, simulate};
 }

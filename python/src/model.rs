@@ -7,14 +7,15 @@ use modelmill::add::{Said, Setting, new_effect};
 use modelmill::diagnose::{Held, Question};
 use modelmill::generate::{Code, Language};
 use modelmill::identify::Instruments;
-use modelmill::model::Format;
+use modelmill::model::{Changes, Format};
 use modelmill::picture::Drawing;
 use modelmill::recording::Recording;
 use modelmill::report::{page, runs_page};
 use modelmill::runs::Unread;
 use modelmill::states::{Function, Functions, Given};
 use modelmill::text::style::Style;
-use modelmill::{Error, Host, Model, Outcome, import, print};
+use modelmill::variants::Variants;
+use modelmill::{Error, FitFile, Host, Model, Outcome, export, import, print};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
@@ -30,10 +31,10 @@ const FEW: usize = 256;
 /// No robot description is longer, bytes.
 const LARGEST_DESCRIPTION: u64 = 16 << 20;
 
-type Callback<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
+pub(crate) type Callback<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
 
 /// A host whose jobs the listener hears.
-fn host(libraries: Vec<PathBuf>, at_values: bool) -> (Host, Arc<Listener>) {
+pub(crate) fn host(libraries: Vec<PathBuf>, at_values: bool) -> (Host, Arc<Listener>) {
     let listener = Arc::new(Listener::default());
     let host = Host::new()
         .with_libraries(libraries)
@@ -136,6 +137,15 @@ impl CoreModel {
             functions: Arc::new(model.functions()),
             model,
             listener,
+        }
+    }
+
+    /// A fit: its text with what messages call it, or a file.
+    fn fit(&self, text: Option<&str>, name: &str) -> Outcome<FitFile> {
+        let host = self.model.host();
+        match text {
+            Some(text) => host.fit_of_text(text, name),
+            None => host.fit(Path::new(name)),
         }
     }
 
@@ -537,6 +547,83 @@ impl CoreModel {
             self.model.values_of(&fit, &path.display().to_string())
         })?;
         Ok((found.values, remarks(&found.notes)))
+    }
+
+    /// Physical parameters from a fit, which is a text with a name or the path of a file.
+    fn interpret(
+        &self,
+        py: Python<'_>,
+        fit: Option<&str>,
+        name: &str,
+        unknown: Vec<String>,
+    ) -> PyResult<Found> {
+        self.work(py, None, || {
+            let found = self
+                .model
+                .interpret(&self.fit(fit, name)?, name, &unknown)?;
+            let text = found.text(Style::PLAIN);
+            Ok(Found::new(&found.json(), &text, remarks(&found.notes)))
+        })
+    }
+
+    /// The model with a fit in its file, and remarks.
+    fn adopt(&self, py: Python<'_>, fit: Option<&str>, name: &str) -> PyResult<(Self, Remarks)> {
+        let (model, notes) = self.work(py, None, || {
+            let adoption = self.model.adopt(&self.fit(fit, name)?, name)?;
+            let host = self.model.host();
+            let model = host.derive(&self.model.path, adoption.loaded)?;
+            Ok((model, remarks(&adoption.notes)))
+        })?;
+        Ok((self.like(model), notes))
+    }
+
+    /// A robot description of the model, with the physical parameters of a fit if there is one; and remarks.
+    fn export(
+        &self,
+        py: Python<'_>,
+        format: &str,
+        fit: Option<&str>,
+        name: Option<&str>,
+    ) -> PyResult<(String, Remarks)> {
+        let mut formats = export::Format::ALL.into_iter();
+        let Some(format) = formats.find(|one| one.name() == format) else {
+            let known = export::Format::ALL.map(export::Format::name).join(", ");
+            let says = format!("format={format:?}: expected one of {known}");
+            return Err(refused(py, &says));
+        };
+        self.work(py, None, || {
+            let fit = name.map(|name| self.fit(fit, name)).transpose()?;
+            let exported = self.model.export(format, fit.as_ref().zip(name))?;
+            Ok((exported.text, remarks(&exported.notes)))
+        })
+    }
+
+    /// What another model changes; along recordings, as both read them, what that costs.
+    fn diff(
+        &self,
+        py: Python<'_>,
+        other: PyRef<'_, Self>,
+        data: Vec<PyRef<'_, Recorded>>,
+        other_data: Vec<PyRef<'_, Recorded>>,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Found> {
+        let models = [&self.model, &other.model.clone()];
+        let runs = [recordings(&data), recordings(&other_data)];
+        self.work(py, progress.as_ref(), || {
+            let [before, after] = models;
+            let changes = Changes::between(before, after);
+            let mut object = changes.json(before, after);
+            let mut text = changes.text(before, after, Style::PLAIN);
+            let mut notes = Remarks::new();
+            if !runs[0].is_empty() {
+                let [first, second] = [&runs[0], &runs[1]].map(|runs| borrowed(runs));
+                let variants = Variants::along(models, [&first, &second])?;
+                object["along"] = variants.json();
+                text = format!("{text}\n\n{}", variants.text(Style::PLAIN));
+                notes = remarks(&variants.notes);
+            }
+            Ok(Found::new(&object, &text, notes))
+        })
     }
 
     /// Emitted code: paths and texts.

@@ -88,7 +88,6 @@ pub(crate) fn spelled(text: &str) -> Cow<'_, str> {
         Advised::Option(name, Some(value)) => format!("`{name}={value:?}`"),
         Advised::Option(name, None) => format!("`{name}`"),
         Advised::Verb("add") => "`with_effect()`".to_owned(),
-        Advised::Verb("adopt") => "`with_fit()`".to_owned(),
         Advised::Verb(name) => format!("`{name}()`"),
     })
 }

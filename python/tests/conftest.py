@@ -24,7 +24,7 @@ def _at_the_root(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session")
 def program() -> Callable[..., Any]:
-    """Runs the program and reads its JSON."""
+    """Runs the program and reads its JSON, if it prints any."""
     given = os.environ.get("MODELMILL_PROGRAM")
     path = Path(given) if given else ROOT / "target" / "debug" / "modelmill"
     if not path.is_file():
@@ -33,6 +33,6 @@ def program() -> Callable[..., Any]:
     def run(*arguments: str) -> Any:
         done = subprocess.run([path, *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
-        return json.loads(done.stdout)
+        return json.loads(done.stdout) if done.stdout else None
 
     return run

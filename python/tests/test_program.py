@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -137,6 +138,74 @@ def test_runs_that_cannot_be_read_are_named(program: Program, tmp_path: Any) -> 
     found = modelmill.load(path).runs(days)
     same(found.to_dict(), program("runs", path, "--data", *days, "--json"))
     assert [one["file"] for one in found.unread] == ["nowhere.csv"]
+
+
+def test_interpret(program: Program, tmp_path: Any) -> None:
+    model = modelmill.load(PAPER)
+    path = tmp_path / "fit.json"
+    fit = model.identify(f"{RUNS}/plain-fit.csv")
+    fit.save(path)
+    names = ["m2", "m4", "dc3", "Ic12", "Ic32"]
+    told = program("interpret", PAPER, "--fit", str(path), "--unknown", ",".join(names), "--json")
+    for given in (fit, path):
+        found = model.interpret(given, names)
+        same(found.to_dict(), told)
+    assert len(found.solutions) == 2 and found.identifiable
+    assert len(found.to_pandas()) == 10
+    with pytest.raises(modelmill.ModelmillError, match="list of names"):
+        model.interpret(fit, "m2")
+
+
+def test_adopt(program: Program, m: modelmill.Model, tmp_path: Any) -> None:
+    path, out = tmp_path / "fit.json", tmp_path / "adopted.toml"
+    fit = m.identify(f"{RUNS}/with-rods-fit.csv")
+    fit.save(path)
+    program("adopt", MODEL, str(path), "--out", str(out), "--json")
+    assert m.adopt(path).text == out.read_text()
+    assert np.allclose(m.adopt(fit).p_min.values, fit.values, rtol=1e-12)
+    with pytest.raises(modelmill.ModelmillError, match="no fit"):
+        m.adopt(3.0)  # type: ignore[arg-type]
+
+
+def test_diff(program: Program, m: modelmill.Model) -> None:
+    run = f"{RUNS}/plain-check.csv"
+    paper = modelmill.load(PAPER)
+    same(m.diff(paper).to_dict(), program("diff", MODEL, PAPER, "--json"))
+    found = m.diff(paper, run)
+    same(found.to_dict(), program("diff", MODEL, PAPER, "--data", run, "--json"))
+    assert found.along is not None and found.base
+
+
+def test_export(program: Program, tmp_path: Any) -> None:
+    for path, format, ending in (("panda", "urdf", "urdf"), ("five_bar", "mjcf", "xml")):
+        model, out = f"model-spec/models/{path}.toml", tmp_path / f"{path}.{ending}"
+        program("export", model, "--out", str(out))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", modelmill.ModelmillWarning)
+            assert modelmill.load(model).export(format) == out.read_text()
+    with pytest.raises(modelmill.ModelmillError, match="urdf, mjcf"):
+        modelmill.load(PAPER).export("sdf")
+
+
+def test_simulate_and_reduce(program: Program, tmp_path: Any) -> None:
+    rig, plan = "model-spec/rigs/spidermill-full.toml", "model-spec/rigs/spidermill-plan.toml"
+    motion, out, reduced = f"{RUNS}/plain-fit.csv", tmp_path / "run.csv", tmp_path / "reduced.toml"
+    found = modelmill.simulate(rig, motion, seed=3)
+    told = program("simulate", rig, "--trajectory", motion, "--seed", "3", "--out", str(out), "--json")
+    del told["out"]
+    same(found.to_dict(), told)
+    found.to_csv(tmp_path / "again.csv")
+    assert (tmp_path / "again.csv").read_text() == out.read_text()
+    again = modelmill.simulate(rig, np.genfromtxt(motion, delimiter=",", names=True), seed=3)
+    drive = "spindle_left"
+    assert np.array_equal(again.columns[drive], found.columns[drive])
+    told = program("reduce", rig, "--plan", plan, "--out", str(reduced), "--json")
+    del told["out"]
+    made = modelmill.reduce(rig, plan)
+    same(made.to_dict(), told)
+    assert made.text == reduced.read_text()
+    nrms = made.model.compare(found.columns).nrms
+    assert nrms is not None and nrms < 0.1
 
 
 def test_excite(program: Program, tmp_path: Any) -> None:

@@ -22,5 +22,13 @@ def use() -> float:
     better.report(run).save("page.html")
     motion = better.excite(limits={"q1": (-1, 1), "q1_d": 2.0})
     changed = m.runs(["a.csv", "b.csv"], per_run=["friction"])
+    adopted = m.adopt(fit)
+    masses: list[dict[str, dict[str, object]]] = m.interpret(fit, ["m1"]).solutions
+    cost = m.diff(adopted, {"t": [0.0, 1.0], "q1": [0.0, 1.0]}, cutoff_hz=20).along
+    description: str = m.export("mjcf", parameters=fit)
+    made = modelmill.simulate("rig.toml", motion, seed=1)
+    reduced: modelmill.Model = modelmill.reduce("rig.toml", "plan.toml").model
+    reduced.compare(made.columns)
+    print(masses, cost, description)
     nrms = m.compare(run, parameters=fit).nrms or 0.0
     return float(forces.sum() + mass.sum() + motion.q.max() + len(changed.changes) + len(values) + (first.value or 0.0)) + nrms

@@ -23,8 +23,10 @@ from ._results import (
     Check,
     Comparison,
     Diagnosis,
+    Difference,
     Excitation,
     Identification,
+    Interpretation,
     Page,
     Remarks,
     Result,
@@ -926,6 +928,81 @@ class Model:
     def with_fit(self, parameters: Values) -> Model:
         """The model with other values of its base parameters, such as those of an :class:`Identification`."""
         return Model(self._core.with_values(self._values(parameters)[0]))
+
+    def adopt(self, fit: Identification | PathText) -> Model:
+        """The model with a fit written into its file, in the place of nominal values; ``save`` keeps it.
+
+        Parameters
+        ----------
+        fit
+            What :meth:`identify` found, or the path of a file that it was saved to. A fit with ``physical=True`` becomes values of
+            parameters, which bodies can have; any other one values of base parameters, which say nothing of single bodies.
+        """
+        model, notes = self._core.adopt(*_fit(fit))
+        _warn(notes)
+        return Model(model)
+
+    # What else can be asked of a model.
+
+    def interpret(self, fit: Identification | PathText, unknown: Sequence[str]) -> Interpretation:
+        """Physical parameters from identified base parameters, the others held at their nominal values: all real solutions.
+
+        Parameters
+        ----------
+        fit
+            What :meth:`identify` found, or the path of a file that it was saved to.
+        unknown : list of str
+            Names of the parameters that are solved for.
+        """
+        if isinstance(unknown, str):
+            raise ModelmillError(f"unknown={unknown!r}: pass a list of names, as in unknown=[{unknown!r}]")
+        found = self._core.interpret(*_fit(fit), list(unknown))
+        _warn(found.notes)
+        return Interpretation(found.json, found.text, found.notes)
+
+    def diff(
+        self, variant: Model, data: Source = None, *, progress: Progress = None, **reading: Unpack[ReadingOptions]
+    ) -> Difference:
+        """What a variant changes; along recordings, what it costs: forces, power and work of each drive, limits, error.
+
+        Parameters
+        ----------
+        variant : Model
+            What this model is held beside.
+        data : optional
+            A recording, or a list of them; motions alone will do. It is a path or a table, since both models read it.
+        progress, **reading
+            As for :meth:`compare`.
+        """
+        sources = [] if data is None else data if isinstance(data, list) else [data]
+        read, again = (model._recordings(sources, reading, progress, "data") for model in (self, variant))
+        with told(progress) as hears:
+            found = self._core.diff(variant._core, read, again, hears)
+        _warn(found.notes)
+        return Difference(found.json, found.text, found.notes)
+
+    def export(self, format: str = "urdf", *, parameters: Identification | PathText | None = None) -> str:
+        """The model as a robot description of other programs; what the format cannot say is warned of.
+
+        Parameters
+        ----------
+        format : {"urdf", "mjcf"}
+            Loops and drives between two points need MJCF.
+        parameters : optional
+            A fit made with ``physical=True``, or the path of one; nominal values if not given.
+        """
+        text, notes = self._core.export(format, *((None, None) if parameters is None else _fit(parameters)))
+        _warn(notes)
+        return text
+
+
+def _fit(fit: Identification | PathText) -> tuple[str | None, str]:
+    """The text of a fit with what messages call it, or no text and the path of its file."""
+    if isinstance(fit, Identification):
+        return json.dumps(fit.to_dict()), "fit"
+    if isinstance(fit, (str, os.PathLike)):
+        return None, os.fspath(fit)
+    raise ModelmillError(f"a {type(fit).__name__} is no fit; expected is what identify() found, or the path of its file")
 
 
 class Picture:

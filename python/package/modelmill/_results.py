@@ -330,6 +330,48 @@ class Diagnosis(Result):
         return frame(self.candidates)
 
 
+class Interpretation(Result):
+    """Physical parameters that explain the base parameters of a fit, all real solutions."""
+
+    @property
+    def solutions(self) -> list[dict[str, dict[str, Any]]]:
+        """By the name of each unknown: ``value``, ``std``, ``unit``, ``nominal``, and whether it is ``plausible``."""
+        solutions: list[dict[str, dict[str, Any]]] = self._object["solutions"]
+        return solutions
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether the fit determines all unknowns; :attr:`undetermined` says what it does not."""
+        return bool(self._object["identifiable"])
+
+    @property
+    def undetermined(self) -> Any:
+        """What is not determined, in words."""
+        return self._object["undetermined"]
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A row for each solution and unknown."""
+        return frame(
+            {"solution": k + 1, "name": name, **one} for k, all in enumerate(self.solutions) for name, one in all.items()
+        )
+
+
+class Difference(Result):
+    """What a variant of a model changes, and along recordings what it costs."""
+
+    @property
+    def base(self) -> list[dict[str, Any]]:
+        """Base parameters that changed: ``name``, ``before``, ``after``."""
+        changed: list[dict[str, Any]] = self._object["base"]
+        return changed
+
+    @property
+    def along(self) -> dict[str, Any] | None:
+        """What it costs along recordings: drives before and after, limits, errors; None without recordings."""
+        along: dict[str, Any] | None = self._object.get("along")
+        return along
+
+
 class Runs(Result):
     """What changed between recordings of one machine."""
 

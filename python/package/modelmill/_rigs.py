@@ -1,0 +1,131 @@
+"""Whole machines in numbers: recordings without hardware, and the models that they reduce to."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _core
+from ._errors import ModelmillError
+from ._model import Floats, Model, PathText, Progress, _warn, load
+from ._progress import told
+from ._results import Excitation, Result, frame
+from ._tables import columns as columns_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class Simulation(Result):
+    """What the sensors of a rig read along a trajectory; ``columns`` is a recording for the verbs of a model.
+
+    Attributes
+    ----------
+    columns : dict of str to numpy.ndarray, each of shape (n,)
+        ``t`` (s), the coordinates (rad or m), and the forces of the drives (N or N m).
+    """
+
+    def __init__(self, made: _core.Simulated) -> None:
+        super().__init__(made.json, made.text, made.notes)
+        self.columns: dict[str, Floats] = dict(made.columns())
+        self._csv = made.csv
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The columns as a table."""
+        whole = frame([{"t": float(t)} for t in self.columns["t"]])
+        for name, values in self.columns.items():
+            whole[name] = values
+        return whole
+
+    def to_csv(self, path: PathText) -> None:
+        """Writes the recording as the program does."""
+        Path(path).write_text(self._csv, encoding="utf-8")
+
+
+class Reduction(Result):
+    """What a reduction assumed, with the size of every approximation.
+
+    Attributes
+    ----------
+    text : str
+        The model file.
+    """
+
+    def __init__(self, found: _core.Found, text: str) -> None:
+        super().__init__(found.json, found.text, found.notes)
+        self.text = text
+
+    @property
+    def model(self) -> Model:
+        """The model, derived."""
+        return load(self.text, name=f"{self._object['rig']}.toml")
+
+
+def simulate(
+    rig: PathText,
+    trajectory: Any,
+    *,
+    columns: Mapping[str, str] | None = None,
+    seed: int | None = None,
+    progress: Progress = None,
+) -> Simulation:
+    """Drives a rig along a trajectory and records what its sensors read.
+
+    Parameters
+    ----------
+    rig : path
+        A rig file (TOML).
+    trajectory
+        The motion: a path, what :meth:`Model.excite` found, or a table, with ``t`` (s) and the coordinates of the rig, and with
+        ``_d`` and ``_dd`` their rates and accelerations if these are known.
+    columns : dict of str to str, optional
+        Our names with what the trajectory calls them.
+    seed : int, optional
+        Of the noise of the sensors; the rig file's own if not given.
+    progress : callable or bool, optional
+        Called as ``progress(what, done, total)``; False is silent.
+    """
+    renamed = [(str(ours), str(theirs)) for ours, theirs in (columns or {}).items()]
+    with tempfile.TemporaryDirectory() as folder:
+        if isinstance(trajectory, (str, os.PathLike)):
+            path = os.fspath(trajectory)
+        else:
+            path = os.path.join(folder, "trajectory.csv")
+            if isinstance(trajectory, Excitation):
+                trajectory.to_csv(path)
+            else:
+                _write(trajectory, path)
+        with told(progress) as hears:
+            made = _core.simulate(rig, path, renamed, seed, hears)
+    _warn(made.notes)
+    return Simulation(made)
+
+
+def _write(table: Any, path: str) -> None:
+    found, _ = columns_of(table)
+    if len({len(values) for _, values in found}) > 1:
+        raise ModelmillError("the columns of the trajectory have different lengths")
+    head = ",".join(name for name, _ in found)
+    np.savetxt(path, np.stack([values for _, values in found], axis=1), fmt="%.17g", delimiter=",", header=head, comments="")
+
+
+def reduce(rig: PathText, plan: PathText | None = None, *, progress: Progress = None) -> Reduction:
+    """Reduces a rig to a planar model, and says the size of every approximation.
+
+    Parameters
+    ----------
+    rig : path
+        A rig file (TOML).
+    plan : path, optional
+        What becomes of which body; every body becomes a part of its own if not given.
+    progress : callable or bool, optional
+        As for :func:`simulate`.
+    """
+    with told(progress) as hears:
+        found, text = _core.reduce(rig, plan, hears)
+    return Reduction(found, text)

@@ -1,0 +1,99 @@
+//! Whole machines in numbers: their recordings, and the models that they reduce to.
+
+use std::path::PathBuf;
+
+use modelmill::text::table::count;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use serde_json::json;
+
+use crate::model::host;
+use crate::results::{Found, Remarks};
+use crate::work::work;
+
+/// What the sensors of a rig read.
+#[pyclass(frozen)]
+pub(crate) struct Simulated {
+    made: modelmill::simulate::Simulated,
+}
+
+#[pymethods]
+impl Simulated {
+    #[getter]
+    fn json(&self) -> String {
+        let made = &self.made;
+        let columns = made.run.columns.iter();
+        let columns: Vec<&str> = columns.map(|(name, _)| name.as_str()).collect();
+        json!({
+            "rig": made.rig,
+            "samples": made.samples(),
+            "seed": made.seed,
+            "columns": columns,
+            "notes": made.notes,
+        })
+        .to_string()
+    }
+
+    #[getter]
+    fn text(&self) -> String {
+        let made = &self.made;
+        let samples = count(made.samples(), "sample", "samples");
+        let drives = made.drives.join(", ");
+        format!("{}: {samples} of {drives}, seed {}", made.rig, made.seed)
+    }
+
+    #[getter]
+    fn notes(&self) -> Remarks {
+        let notes = self.made.notes.iter();
+        notes.map(|says| ("info", says.clone())).collect()
+    }
+
+    #[getter]
+    fn csv(&self) -> String {
+        self.made.csv()
+    }
+
+    fn columns<'py>(&self, py: Python<'py>) -> Vec<(String, Bound<'py, PyArray1<f64>>)> {
+        let columns = self.made.run.columns.iter();
+        columns
+            .map(|(name, values)| (name.clone(), PyArray1::from_slice(py, values)))
+            .collect()
+    }
+}
+
+/// Drives a rig along a trajectory.
+#[pyfunction]
+pub(crate) fn simulate(
+    py: Python<'_>,
+    rig: PathBuf,
+    trajectory: PathBuf,
+    columns: Vec<(String, String)>,
+    seed: Option<u64>,
+    progress: Option<Bound<'_, PyAny>>,
+) -> PyResult<Simulated> {
+    let (host, listener) = host(Vec::new(), false);
+    let made = work(py, &listener, progress.as_ref(), || {
+        host.simulate(&rig, &trajectory, &columns, seed)
+    })?;
+    Ok(Simulated { made })
+}
+
+/// Reduces a rig to a planar model: what was assumed, and the text of the model file.
+#[pyfunction]
+pub(crate) fn reduce(
+    py: Python<'_>,
+    rig: PathBuf,
+    plan: Option<PathBuf>,
+    progress: Option<Bound<'_, PyAny>>,
+) -> PyResult<(Found, String)> {
+    let (host, listener) = host(Vec::new(), false);
+    let reduced = work(py, &listener, progress.as_ref(), || {
+        host.reduce(&rig, plan.as_deref())
+    })?;
+    let mut object = reduced.json("");
+    if let Some(object) = object.as_object_mut() {
+        object.shift_remove("out");
+    }
+    let found = Found::new(&object, &reduced.text(), Remarks::new());
+    Ok((found, reduced.reduction.model))
+}
