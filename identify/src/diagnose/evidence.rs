@@ -2,8 +2,9 @@
 //!
 //! Residuals of mechanisms resemble their neighbours, so that tests that count samples find effects everywhere. Blocks of
 //! time that follow each other are compared instead: on the recordings of the check if there are any, else each fold of the
-//! fit with factors from the others. The information criterion counts as many samples as the residual is worth, and asks
-//! more of the best of many candidates than of the only one.
+//! fit with factors from the others; where nothing but white noise is left and the check agrees, folds of both. The
+//! information criterion counts as many samples as the residual is worth, and asks more of the best of many candidates than
+//! of the only one.
 //! Sources: J. Racine, "Consistent cross-validatory model-selection for dependent data: hv-block cross-validation",
 //! J. Econometrics 99 (2000); G. Schwarz, Annals of Statistics 6 (1978); J. Chen and Z. Chen, "Extended Bayesian
 //! information criteria for model selection with large model spaces", Biometrika 95 (2008).
@@ -106,9 +107,27 @@ impl Evidence {
 impl Bench<'_> {
     /// Evidence for the set `after` beside `before`; `channels` are those on which they differ.
     pub(crate) fn evidence(&self, before: &[Pick], after: &[Pick], channels: &[usize]) -> Evidence {
+        let [old_rest, new_rest] = [before, after].map(|picks| {
+            let (factors, _) = self.fit(picks, On::All);
+            self.rest(picks, &factors)
+        });
+        let squares = |rest: &[Vec<f64>]| -> f64 {
+            let of = |d: &usize| self.weights[*d] * dot(&rest[*d], &rest[*d]);
+            channels.iter().map(of).sum()
+        };
+        let [old_squares, new_squares] = [squares(&old_rest), squares(&new_rest)];
+        let is_noise_known = self.is_white(&new_rest, channels)
+            && self.is_no_remainder(before, old_squares - new_squares, channels);
+        let held_out =
+            |by_folds: bool| [before, after].map(|picks| self.held_out(picks, channels, by_folds));
         let is_per_run = |pick: &Pick| self.candidate(pick).is_per_run;
-        let by_folds = before.iter().chain(after).any(is_per_run);
-        let [old, new] = [before, after].map(|picks| self.held_out(picks, channels, by_folds));
+        let mut compared = held_out(before.iter().chain(after).any(is_per_run));
+        // A check that speaks for a change, however softly, joins the fit where all that is left is white noise: both together
+        // show effects that neither shows alone.
+        if is_noise_known && sum(&compared[0]) > sum(&compared[1]) {
+            compared = held_out(true);
+        }
+        let [old, new] = compared;
         let n = old.len() as f64;
         let differences: Vec<f64> = old.iter().zip(&new).map(|(a, b)| a - b).collect();
         let mean = differences.iter().sum::<f64>() / n;
@@ -123,16 +142,7 @@ impl Bench<'_> {
         let spread = shares.iter().map(|s| (s - mean_share).powi(2)).sum::<f64>();
         let error_share = (spread / (n * (n - 1.0).max(1.0))).sqrt().max(1e-3);
         let shares_t = mean_share / error_share;
-        let total: f64 = old.iter().sum();
-        let [old_rest, new_rest] = [before, after].map(|picks| {
-            let (factors, _) = self.fit(picks, On::All);
-            self.rest(picks, &factors)
-        });
-        let squares = |rest: &[Vec<f64>]| -> f64 {
-            let of = |d: &usize| self.weights[*d] * dot(&rest[*d], &rest[*d]);
-            channels.iter().map(of).sum()
-        };
-        let [old_squares, new_squares] = [squares(&old_rest), squares(&new_rest)];
+        let total = sum(&old);
         let count = |picks: &[Pick]| -> f64 {
             let freedoms = picks.iter().map(|p| self.freedoms(p));
             freedoms.sum::<usize>() as f64
@@ -150,13 +160,11 @@ impl Bench<'_> {
             effective_samples: worth,
             above_noise: self.above_noise(&old_rest, channels),
             least_gain: {
-                let is_known = self.is_white(&new_rest, channels)
-                    && self.is_no_remainder(before, old_squares - new_squares, channels);
                 // Weights are one over the variance of what is left, which is the noise where it is known.
                 let of_noise = LEAST_OF_NOISE / total.max(f64::MIN_POSITIVE);
                 if !self.is_beyond_smoothing(old_squares - new_squares, channels) {
                     f64::INFINITY
-                } else if is_known {
+                } else if is_noise_known {
                     of_noise.min(LEAST_GAIN)
                 } else {
                     LEAST_GAIN
@@ -263,4 +271,8 @@ impl Bench<'_> {
         channels.dedup();
         channels
     }
+}
+
+fn sum(errors: &[f64]) -> f64 {
+    errors.iter().sum()
 }
