@@ -11,7 +11,7 @@ use modelmill_spec::Mechanism;
 
 use super::closure::Closure;
 use super::relation::AngleRelation;
-use super::solved::turn;
+use super::solved::{times, turn};
 use crate::DeriveError;
 use crate::expr::{AngleSum, Atom, ExprId, Graph, Node, Rational, Unary, coordinates_of};
 use crate::tree::expressions::expression;
@@ -188,28 +188,16 @@ fn circle(
         return [c, s];
     }
     let n_parts = Rational::integer(parts[&base]);
-    let times = (factor * &n_parts).as_small();
-    let times = times.filter(|(n, d)| *d == 1 && n.abs() <= MOST_PARTS);
+    let count = (factor * &n_parts).as_small();
+    let count = count.filter(|(n, d)| *d == 1 && n.abs() <= MOST_PARTS);
     // What has no parts in common with others is an angle of its own.
-    let (part, times) = match times {
+    let (part, n) = match count {
         Some((n, _)) => (n_parts.recip(), n),
         None => (factor.clone(), 1),
     };
     let part = graph.scale(base, &part);
-    let mut power = [Unary::Cos, Unary::Sin].map(|function| graph.unary(function, part));
-    if times < 0 {
-        power[1] = graph.neg(power[1]);
-    }
-    let mut total = [Graph::ONE, Graph::ZERO];
-    let mut left = times.abs();
-    while left > 0 {
-        if left % 2 == 1 {
-            total = turn(graph, power, total);
-        }
-        power = turn(graph, power, power);
-        left /= 2;
-    }
-    total
+    let circle = [Unary::Cos, Unary::Sin].map(|function| graph.unary(function, part));
+    times(graph, circle, n)
 }
 
 fn lcm(a: i64, b: i64) -> i64 {

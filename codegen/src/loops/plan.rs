@@ -242,6 +242,10 @@ fn solve(
         return Some(single_steps(steps));
     }
     let mut solved = planar::solve(graph, closure, &unknown, true)?;
+    let follower = closure.follower.as_ref();
+    solved
+        .values
+        .extend(follower.map(|follower| (follower.coordinate, follower.value)));
     if let Some(root) = solved.root {
         let mut sign = nominal_value(graph, mechanism, root.witness).unwrap_or(1.0);
         if let Some(whole) = root.whole {

@@ -27,6 +27,25 @@ pub(crate) struct Root {
     pub(crate) whole: Option<ExprId>,
 }
 
+/// Cosine and sine of so many times an angle.
+pub(crate) fn times(graph: &mut Graph, mut power: [ExprId; 2], n: i64) -> [ExprId; 2] {
+    if n < 0 {
+        power[1] = graph.neg(power[1]);
+    }
+    let mut total = [Graph::ONE, Graph::ZERO];
+    let mut left = n.unsigned_abs();
+    while left > 0 {
+        if left % 2 == 1 {
+            total = turn(graph, power, total);
+        }
+        left /= 2;
+        if left > 0 {
+            power = turn(graph, power, power);
+        }
+    }
+    total
+}
+
 /// The vector turned by the angle of the given cosine and sine.
 pub(crate) fn turn(graph: &mut Graph, [c, s]: [ExprId; 2], [x, y]: [ExprId; 2]) -> [ExprId; 2] {
     let products = [(c, x), (s, y), (s, x), (c, y)].map(|(a, b)| graph.mul(a, b));

@@ -10,7 +10,7 @@ use crate::expr::{AngleSum, Atom, ExprId, Graph, Node, nominal_value};
 use crate::loops::branches::closed_form;
 use crate::loops::magnitude::{self, Size};
 use crate::loops::solve_step::Plan;
-use crate::loops::solved::turn;
+use crate::loops::solved::{times, turn};
 use crate::lower::SINGULAR;
 use crate::lower::cost::cost;
 use crate::lower::{By, Definition, PASSES, Pass, Program, Request, lower_by};
@@ -130,13 +130,17 @@ impl Closing {
                     closing.position.insert(atom, value);
                     continue;
                 }
-                let [cosine, sine] =
-                    closing.cos_sin(graph, &AngleSum::new([(Atom::Coordinate(*p), 1)]));
+                // A follower has its value; its turn alone would not say how often it went round.
+                let atom = Atom::Coordinate(*p);
+                if closing.definitions.iter().any(|d| d.atom == atom) {
+                    continue;
+                }
+                let [cosine, sine] = closing.cos_sin(graph, &AngleSum::new([(atom, 1)]));
                 let quarters = quarter_turns(mechanism.coordinates[*p].nominal);
                 let back = graph.cos_sin(&AngleSum::NONE, -6 * quarters);
                 let [cosine, sine] = turn(graph, [back.0, back.1], [cosine, sine]);
                 closing.definitions.push(Definition {
-                    atom: Atom::Coordinate(*p),
+                    atom,
                     by: By::Turn {
                         quarters,
                         sine,
@@ -232,18 +236,8 @@ impl Closing {
         let (c, s) = graph.cos_sin(&parts.known, parts.pi12);
         let mut total = [c, s];
         for (piece, n) in parts.solved {
-            let [c, mut s] = self.solved[piece];
-            if n < 0 {
-                s = graph.neg(s);
-            }
-            for _ in 0..n.abs() {
-                let products = [(total[0], c), (total[1], s), (total[1], c), (total[0], s)]
-                    .map(|(a, b)| graph.mul(a, b));
-                total = [
-                    graph.sub(products[0], products[1]),
-                    graph.add(products[2], products[3]),
-                ];
-            }
+            let turned = times(graph, self.solved[piece], n.into());
+            total = turn(graph, turned, total);
         }
         total
     }
