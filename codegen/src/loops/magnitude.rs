@@ -10,17 +10,31 @@ use num_traits::One;
 use crate::expr::{Atom, ExprId, F64, Graph, Node, Tape, Unary, nominal_of, nominal_value};
 
 /// The sum of the magnitudes of all terms of some expressions at the nominal pose: the size of a mechanism's loops in m.
-/// It is 1 where there is none.
+/// It is 1 where there is none; what couples angles has no length.
 pub(crate) fn at_nominal(graph: &mut Graph, mechanism: &Mechanism, roots: &[ExprId]) -> f64 {
     let mut known = HashMap::new();
-    let terms: Vec<ExprId> = roots
-        .iter()
-        .map(|root| magnitude(graph, mechanism, &mut known, *root))
+    let mut lengths = roots.to_vec();
+    lengths.retain(|root| !couples_angles(graph, mechanism, *root));
+    let terms: Vec<ExprId> = lengths
+        .into_iter()
+        .map(|root| magnitude(graph, mechanism, &mut known, root))
         .collect();
     let total = graph.add_all(&terms);
     nominal_value(graph, mechanism, total)
         .filter(|size| size.is_normal())
         .unwrap_or(1.0)
+}
+
+/// Whether an angle itself, not its sine or cosine, is a term of a sum.
+fn couples_angles(graph: &Graph, mechanism: &Mechanism, root: ExprId) -> bool {
+    let is_angle = |id: ExprId| {
+        matches!(graph.node(id), Node::Atom(Atom::Coordinate(i))
+            if mechanism.coordinates[*i].motion.is_angle())
+    };
+    match graph.node(root) {
+        Node::Sum(terms) => terms.iter().any(|(term, _)| is_angle(*term)),
+        _ => is_angle(root),
+    }
 }
 
 /// The size of a mechanism's loops: the magnitudes of all lengths in them, without those that move.

@@ -47,6 +47,7 @@ pub(crate) fn find(graph: &mut Graph, mechanism: &Mechanism, closures: &mut [Clo
         known.extend(&unknown);
         if !closure.given().is_empty() {
             related.extend(closure.relations.iter().cloned());
+            solved.extend(&closure.residual);
             continue;
         }
         // What is known of other loops' angles may be what makes this one a parallelogram.

@@ -2,7 +2,8 @@
 //! every loop is closed, in all its equations and on the branch on which the machine lives.
 //!
 //! Each step goes along the tangent of the motion and is closed again at once. It is the shorter the nearer a pose is at which
-//! branches meet, so that none is passed over. Drives' dead points are passed: motion is smooth there.
+//! branches meet, so that none is passed over. Drives' dead points are passed: motion is smooth there. Of mechanisms that are
+//! always near such poses, such as planar ones that digits have tilted, steps follow from how fast they come nearer.
 
 use modelmill_algebra::field::Stream;
 use modelmill_spec::Mechanism;
@@ -18,8 +19,11 @@ use crate::expr::{ExprId, Graph};
 /// derivatives, which says how near branches meet.
 const LONGEST: f64 = 0.15;
 const SHARE: f64 = 0.5;
-/// Nearer than this to a pose where branches meet the walk turns round.
+/// Nearer than this to a pose where branches meet the walk turns round; or than this share of how near the nominal pose is.
 const NEAR: f64 = 2e-3;
+const NEAR_OF_NOMINAL: f64 = 0.3;
+/// A step at whose end the least singular value has fallen to less than this share was too long.
+const FALLEN: f64 = 0.25;
 /// How far the coordinates that move the mechanism may go from the nominal pose.
 const FARTHEST: f64 = 2.0;
 /// Steps between two poses that are shown.
@@ -28,8 +32,10 @@ const STEPS: usize = 6;
 /// leave where a loop has equations that follow from others.
 const CLOSED: f64 = 1e-12;
 pub(crate) const NEARLY_CLOSED: f64 = 1e-7;
-/// The least singular value by the passive coordinates relative to the largest: below, rates say little but rounding.
+/// The least singular value by the passive coordinates relative to the largest: below, rates say little but rounding. Or this
+/// share of what it is at the nominal pose.
 const DEAD: f64 = 1e-3;
+const DEAD_OF_NOMINAL: f64 = 0.1;
 
 /// Where a walk is.
 pub(crate) struct Walk<'a> {
@@ -39,10 +45,16 @@ pub(crate) struct Walk<'a> {
     passive: Vec<usize>,
     /// The size of the loop of each equation, m: small loops count as much as large ones.
     sizes: Vec<f64>,
+    /// That of the largest loop.
+    length: f64,
     nominal: Vec<f64>,
     q: Vec<f64>,
     /// The direction of the last step, in units of the coordinates.
     heading: Option<DVector<f64>>,
+    /// How long the next step may be where it follows from how fast branches come nearer.
+    trusted: Option<f64>,
+    near: f64,
+    dead: f64,
 }
 
 /// The loops' equations at a pose.
@@ -64,19 +76,37 @@ impl<'a> Walk<'a> {
         let all: Vec<usize> = (0..mechanism.coordinates.len()).collect();
         let numeric = NumericLoops::solved_for(graph, mechanism, &residual, all.clone(), &[]);
         let nominal = numeric.as_written();
+        let sizes = sizes(graph, mechanism, loops);
+        let of_lengths = loops.closures.iter().filter(|c| c.given().is_empty());
+        let of_lengths = of_lengths.map(|c| magnitude::at_nominal(graph, mechanism, &c.residual));
+        let length = of_lengths.reduce(f64::max).unwrap_or(1.0);
         let mut walk = Self {
+            length,
             units: all.iter().map(|i| numeric.unit(*i)).collect(),
             active: loops.active.clone(),
             passive: loops.passive.clone(),
-            sizes: sizes(graph, mechanism, loops),
+            sizes,
             q: nominal.clone(),
             nominal,
             heading: None,
+            trusted: None,
+            near: NEAR,
+            dead: DEAD,
             loops: numeric,
         };
+        walk.measure_couplings(loops)?;
         // The file's pose is as good as its last digit.
         walk.q = walk.closed(walk.q.clone())?;
         walk.nominal.clone_from(&walk.q);
+        let least = walk.tangent(&walk.q)?.least;
+        if least < NEAR {
+            walk.trusted = Some(SHARE * least);
+            walk.near = NEAR_OF_NOMINAL * least;
+        }
+        let determined_by = walk.determined_by()?;
+        if determined_by < DEAD {
+            walk.dead = DEAD_OF_NOMINAL * determined_by;
+        }
         Some(walk)
     }
 
@@ -102,6 +132,11 @@ impl<'a> Walk<'a> {
         self.units[coordinate]
     }
 
+    /// The size of the largest loop, m.
+    pub(crate) fn length(&self) -> f64 {
+        self.length
+    }
+
     /// What each residual is held against, in m.
     pub(crate) fn sizes(&self) -> &[f64] {
         &self.sizes
@@ -122,8 +157,8 @@ impl<'a> Walk<'a> {
         if self.heading.as_ref().is_some_and(|h| h.dot(&towards) < 0.0) {
             towards = -towards;
         }
-        let length = LONGEST.min(SHARE * here.least) * (0.65 + 0.35 * symmetric(stream));
         let step = towards / size;
+        let length = self.step_length(&here, &step)? * (0.65 + 0.35 * symmetric(stream));
         let there: Vec<f64> = (0..n)
             .map(|i| self.q[i] + length * step[i] * self.units[i])
             .collect();
@@ -131,11 +166,53 @@ impl<'a> Walk<'a> {
         let by = |a: &[f64], b: &[f64], i: usize| ((a[i] - b[i]) / self.units[i]).abs();
         let is_far = (0..n).any(|i| by(&closed, &there, i) > 0.5 * length)
             || (self.active.iter()).any(|i| by(&closed, &self.nominal, *i) > FARTHEST);
-        if is_far || self.tangent(&closed)?.least < NEAR {
+        let least = self.tangent(&closed)?.least;
+        let has_fallen = self.trusted.is_some() && least < FALLEN * here.least;
+        if is_far || least < self.near || has_fallen {
+            self.trusted = self.trusted.map(|_| 0.5 * length);
             return None;
         }
+        self.trusted = self.trusted.map(|_| 2.0 * length);
         self.q = closed;
         self.heading = Some(step);
+        Some(())
+    }
+
+    /// How long a step may be in a direction.
+    fn step_length(&self, here: &Tangent, step: &DVector<f64>) -> Option<f64> {
+        /// A small step, in units of the coordinates.
+        const SMALL: f64 = 1e-4;
+        let sure = SHARE * here.least;
+        let Some(trusted) = self.trusted else {
+            return Some(LONGEST.min(sure));
+        };
+        // As far as the least singular value would fall by a share if it went on as it does here.
+        let after = |by: f64| -> Option<f64> {
+            let moved = (0..self.q.len()).map(|i| self.q[i] + by * step[i] * self.units[i]);
+            Some(self.tangent(&moved.collect::<Vec<_>>())?.least)
+        };
+        let changes = [after(SMALL)?, after(-SMALL)?].map(|least| (least - here.least).abs());
+        let reach = sure * SMALL / changes[0].max(changes[1]).max(f64::MIN_POSITIVE);
+        Some(LONGEST.min(sure.max(reach.min(trusted))))
+    }
+
+    /// What couples coordinates has the norm of its row for a size.
+    fn measure_couplings(&mut self, loops: &Loops) -> Option<()> {
+        let (_, jacobian) = self.loops.linearise(&self.nominal)?;
+        let mut row = 0;
+        for closure in &loops.closures {
+            for k in row..row + closure.residual.len() {
+                if closure.follower.is_some() {
+                    let row = jacobian.row(k);
+                    let squares = row
+                        .iter()
+                        .zip(&self.units)
+                        .map(|(x, unit)| (x * unit).powi(2));
+                    self.sizes[k] = squares.sum::<f64>().sqrt();
+                }
+            }
+            row += closure.residual.len();
+        }
         Some(())
     }
 
@@ -209,22 +286,23 @@ impl<'a> Walk<'a> {
 
     /// Whether the passive coordinates follow from the others, and not only just.
     fn is_determined(&self) -> bool {
+        self.determined_by().is_some_and(|x| x > self.dead)
+    }
+
+    /// The least singular value by the passive coordinates relative to the largest.
+    fn determined_by(&self) -> Option<f64> {
         if self.passive.is_empty() {
-            return true;
+            return Some(1.0);
         }
-        let Some((_, jacobian)) = self.linearise(&self.q) else {
-            return false;
-        };
+        let (_, jacobian) = self.linearise(&self.q)?;
         let jacobian = jacobian.select_columns(&self.passive);
         let mut values: Vec<f64> = jacobian.singular_values().iter().copied().collect();
         values.sort_by(|a, b| b.total_cmp(a));
-        values
-            .get(self.passive.len() - 1)
-            .is_some_and(|x| *x > DEAD * values[0])
+        Some(values.get(self.passive.len() - 1)? / values[0])
     }
 }
 
-/// The size of the loop that each of [`all_residuals`] belongs to.
+/// The size of the loop that each of [`all_residuals`] belongs to; 1 for what couples coordinates.
 fn sizes(graph: &mut Graph, mechanism: &Mechanism, loops: &Loops) -> Vec<f64> {
     let of_one = |closure: &Closure| {
         let size = match closure.follower {

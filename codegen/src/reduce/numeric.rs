@@ -10,7 +10,8 @@ use modelmill_algebra::field::Stream;
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
-use super::recognise::Constants;
+use super::base;
+use super::recognise::{Constants, metres};
 use super::reduction::{Dependency, Method, Reduction};
 use super::states::States;
 use crate::DeriveError;
@@ -20,18 +21,22 @@ use crate::loops::numeric_poses::{NumericLoops, symmetric};
 use crate::regressor::projection::Projection;
 use crate::tree::expressions::Monomial;
 
-/// What others leave of a column, relative to its size, below which it counts as dependent, and the size relative to the
-/// largest below which it counts as none; and the same as a multiple of what the digits of the file leave open in its loops.
+/// A column counts as dependent where others leave less than this of it, relative to its size; and as none where it is smaller
+/// than this, relative to the largest. So does a column at a pose in machine numbers.
 const DEPENDENT: f64 = 1e-13;
+/// The same where the digits of the file leave loops open: as a multiple of what they leave, relative to the size of a loop.
 const PER_OFF: f64 = 100.0;
-/// A column this much smaller than the largest is rounding.
-const NOTHING: f64 = 1e-13;
-/// What written factors may leave of a column at further states, relative to its terms; and as a multiple of the same.
+/// What written factors may leave of a column at further states, relative to its terms.
 const SHOWN: f64 = 1e-10;
+/// The same where loops are left open, as a multiple of that.
+const SHOWN_PER_OFF: f64 = 1000.0;
 /// How far poses lie from the nominal one, in rad or relative to the size of the loops, and how often that is halved
 /// where most of such poses cannot be reached.
 pub(super) const REACH: f64 = 0.4;
 const HALVINGS: u32 = 7;
+
+/// How often states are added where dependences do not hold further along the motion.
+const ROUNDS: usize = 4;
 
 /// Reduces `columns[k][d]`, trying them in the given order.
 pub(super) fn reduce(
@@ -45,14 +50,54 @@ pub(super) fn reduce(
 ) -> Result<Reduction, DeriveError> {
     let mut states = States::new(graph, mechanism, projection, columns)?;
     let n_rows = columns.len() + columns.len() / 4 + 20;
-    let w = Columns::new(&states.rows(n_rows)?, columns.len());
-    let limit = DEPENDENT.max(PER_OFF * states.off());
-    let largest = w.norms.iter().fold(0.0, |a: f64, b| a.max(*b));
-    let is_effective = |k: usize| w.norms[k] > limit * largest;
-    let tried: Vec<usize> = order.iter().copied().filter(|k| is_effective(*k)).collect();
-    let base = Base::new(&w, &tried, limit);
+    let values: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
+    let mut rows = states.rows(n_rows)?;
+    for _ in 0..ROUNDS {
+        let w = Columns::new(&rows, columns.len());
+        let limit = DEPENDENT.max(PER_OFF * states.off());
+        // Masses and their moments are compared at the length of the largest loop.
+        let sized = |k: usize| {
+            let metres = metres(&base::unit(mechanism, &candidates[k])).unwrap_or(2);
+            w.norms[k] / states.length().powi(2 - metres)
+        };
+        let sizes: Vec<f64> = (0..columns.len()).map(sized).collect();
+        let largest = sizes.iter().fold(0.0, |a: f64, b| a.max(*b));
+        let is_effective = |k: &usize| sizes[*k] > limit * largest;
+        let tried: Vec<usize> = order.iter().copied().filter(is_effective).collect();
+        let base = Base::new(&w, &tried, limit);
+        // What contributes less than is dropped is rounding.
+        let rounding = (1e3 * base.most_dropped).clamp(1e-60, 1e-9);
+        let (mut found, effective) = written(mechanism, candidates, &w, &tried, &base, rounding);
+        let further = states.rows(n_rows)?;
+        let residual = Columns::new(&further, columns.len()).left(&found, &effective, &values);
+        // Terms that count as rounding are left out, each by itself.
+        let left_out = rounding * base.kept.len() as f64;
+        if residual <= SHOWN.max(SHOWN_PER_OFF * states.off()).max(left_out) {
+            found.method = Method::Numeric {
+                least_kept: base.least_kept,
+                most_dropped: base.most_dropped,
+                residual,
+                because: Box::new(because),
+            };
+            return Ok(found);
+        }
+        // The path was too short for what is so small on it.
+        rows.extend(further);
+    }
+    Err(DeriveError::NotConfirmed)
+}
 
-    let mut effective = tried.clone();
+/// What was found as dependences of columns that have an effect, with the positions of these; factors as a person would write
+/// them.
+fn written(
+    mechanism: &Mechanism,
+    candidates: &[Monomial],
+    w: &Columns,
+    tried: &[usize],
+    base: &Base,
+    rounding: f64,
+) -> (Reduction, Vec<usize>) {
+    let mut effective = tried.to_vec();
     effective.sort_unstable();
     let at = |k: usize| {
         effective
@@ -68,8 +113,6 @@ pub(super) fn reduce(
             .position(|x| *x == k)
             .expect("a kept column is kept")
     };
-    // What contributes less than is dropped is rounding.
-    let rounding = (1e3 * base.most_dropped).clamp(1e-60, 1e-9);
     let constants = Constants::new(mechanism, rounding.min(1e-10));
     let mut dependencies: Vec<Dependency> = Vec::new();
     for j in tried.iter().copied().filter(|j| !base.kept.contains(j)) {
@@ -92,7 +135,7 @@ pub(super) fn reduce(
     }
     dependencies.sort_by_key(|line| line.product);
     let products: Vec<Monomial> = effective.iter().map(|k| candidates[*k].clone()).collect();
-    let mut found = Reduction {
+    let found = Reduction {
         without_effect: candidates
             .iter()
             .filter(|c| !products.contains(c))
@@ -103,21 +146,7 @@ pub(super) fn reduce(
         dependencies,
         method: Method::Unreduced,
     };
-    let values: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
-    let fresh = Columns::new(&states.rows(n_rows)?, columns.len());
-    let residual = fresh.left(&found, &effective, &values);
-    // Terms that count as rounding are left out, each by itself.
-    let left_out = rounding * base.kept.len() as f64;
-    if residual > SHOWN.max(10.0 * PER_OFF * states.off()).max(left_out) {
-        return Err(DeriveError::NotConfirmed);
-    }
-    found.method = Method::Numeric {
-        least_kept: base.least_kept,
-        most_dropped: base.most_dropped,
-        residual,
-        because: Box::new(because),
-    };
-    Ok(found)
+    (found, effective)
 }
 
 /// Columns of W.
@@ -271,7 +300,7 @@ pub(super) fn contradicts(
                 size += term.norm();
                 left -= term;
             }
-            left.norm() > WRONG * size && left.norm() > NOTHING * largest
+            left.norm() > WRONG * size && left.norm() > DEPENDENT * largest
         })
 }
 

@@ -14,6 +14,8 @@ use crate::tree::expressions::Monomial;
 const LARGEST_DENOMINATOR: i64 = 24;
 const LARGEST_NUMERATOR: f64 = 1000.0;
 
+/// Constants are put together only where so many digits are known.
+const TOGETHER: f64 = 1e-20;
 /// Three constants are put together only where no more than this many stand in a file.
 const MOST_IN_THREES: usize = 12;
 /// The same for two.
@@ -35,6 +37,12 @@ struct Power {
     rough: f64,
     /// Its unit as a power of metres.
     metres: i32,
+}
+
+impl Power {
+    fn is_one(&self) -> bool {
+        self.above.is_empty() && self.below.is_empty()
+    }
 }
 
 impl<'a> Constants<'a> {
@@ -81,7 +89,13 @@ impl<'a> Constants<'a> {
             push(&[i], &[]);
             push(&[], &[i]);
         }
-        for i in 0..lengths.len() {
+        // Of so many products some equal any number to a few digits.
+        let together = if rounding <= TOGETHER {
+            lengths.len()
+        } else {
+            0
+        };
+        for i in 0..together {
             for j in (0..lengths.len()).filter(|_| lengths.len() <= MOST_IN_PAIRS) {
                 if i <= j {
                     push(&[i, j], &[]);
@@ -111,13 +125,19 @@ impl<'a> Constants<'a> {
         product: &Monomial,
         kept: &Monomial,
     ) -> RationalFunction {
-        let unit = |of: &Monomial| metres(&base::unit(self.mechanism, of));
+        let [of_product, of_kept] = [product, kept].map(|of| base::unit(self.mechanism, of));
         // The column of a product has its inverse unit.
-        let wanted = unit(product).zip(unit(kept)).map(|(a, b)| b - a);
-        let fitting = self
-            .powers
-            .iter()
-            .filter(|p| wanted.is_none_or(|n| p.metres == n));
+        let wanted = if of_product == of_kept {
+            Some(0)
+        } else {
+            metres(&of_product)
+                .zip(metres(&of_kept))
+                .map(|(a, b)| b - a)
+        };
+        let fitting = self.powers.iter().filter(|p| match wanted {
+            Some(n) => p.metres == n,
+            None => p.is_one(),
+        });
         let found = fitting.filter_map(|power| {
             let number = self.small_rational(value, power)?;
             let (n, d) = number.as_small()?;
@@ -169,7 +189,7 @@ fn written(number: Rational, power: &Power) -> RationalFunction {
 }
 
 /// The power of metres in the unit of a mass or one of its moments.
-fn metres(unit: &str) -> Option<i32> {
+pub(super) fn metres(unit: &str) -> Option<i32> {
     match unit {
         "kg" => Some(0),
         "kg m" => Some(1),

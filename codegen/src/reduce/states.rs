@@ -122,6 +122,11 @@ impl<'a> States<'a> {
         Ok(rows)
     }
 
+    /// The size of the largest loop, m.
+    pub(super) fn length(&self) -> f64 {
+        self.walk.length()
+    }
+
     /// What the digits of the file's constants leave open in loops with more equations than they need, relative to their size:
     /// the largest at all states so far.
     pub(super) fn off(&self) -> f64 {

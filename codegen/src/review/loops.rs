@@ -141,7 +141,8 @@ fn couplings(page: &mut Document, derivation: &Derivation) {
     }
     page.heading("Couplings");
     page.paragraph([text(
-        "These coordinates follow others, and their rates and accelerations do alike. Forces on them act on what they          follow, times the factor.",
+        "These coordinates follow others, and their rates and accelerations do alike. Forces on them act on what they \
+         follow, times the factor.",
     )]);
     page.equations("couplings", lines);
 }

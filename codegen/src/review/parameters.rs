@@ -90,17 +90,24 @@ pub(super) fn quantities(page: &mut Document, mechanism: &Mechanism) {
     let head = vec!["symbol", "nominal", "unit", "meaning"];
     page.table("parameters", Table { head, rows });
     page.heading("Coordinates");
+    let follows = |i: usize| {
+        let mut couplings = mechanism.couplings.iter();
+        couplings.any(|coupling| coupling.coordinate.0 == i)
+    };
     let rows = mechanism
         .coordinates
         .iter()
-        .map(|c| {
+        .enumerate()
+        .map(|(i, c)| {
             let in_unit = c.motion.unit();
             let kind = if c.motion.is_angle() {
                 "angle"
             } else {
                 "length"
             };
-            let role = if c.passive {
+            let role = if follows(i) {
+                "passive, follows others"
+            } else if c.passive {
                 "passive, follows from the loops"
             } else {
                 "independent"
