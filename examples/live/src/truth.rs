@@ -36,6 +36,8 @@ struct Bench {
     /// Share of the noise that is coloured.
     colour: f64,
     wandering: [f64; 2],
+    /// Drives whose forces are not measured.
+    silent: [bool; 2],
     n: usize,
 }
 
@@ -48,6 +50,7 @@ impl Bench {
             random: Random::new(seed),
             colour,
             wandering: [0.0; 2],
+            silent: [false; 2],
             n: 0,
         }
     }
@@ -71,6 +74,9 @@ impl Bench {
                 let noise = (1.0 - self.colour) * fresh + self.colour * self.wandering[d];
                 let terms = sample[d].iter().zip(&self.parameters);
                 forces[d] = terms.map(|(h, p)| h * p).sum::<f64>() + 8.0 * noise;
+                if self.silent[d] {
+                    forces[d] = f64::NAN;
+                }
             }
             if let Verdict::Changed(change) = self.watch.step(sample, &forces) {
                 changes.push(change.is_told().then_some(change.parameter));
@@ -112,6 +118,20 @@ fn each_parameter_is_named_within_ten_seconds_and_no_other() {
             assert!(missing.abs() < 0.7, "{parameter}: {missing}");
         }
     }
+}
+
+#[test]
+fn a_drive_that_is_never_measured_keeps_no_other_waiting() {
+    let rows = rows(false);
+    let mut bench = Bench::new(0.3, 3);
+    bench.silent[1] = true;
+    assert!(bench.go_on(&rows, 120).is_empty());
+    assert_eq!(*bench.watch.verdict(), Verdict::Quiet);
+    assert_eq!(bench.watch.watched(), [true, false]);
+    // Friction of the drive that is measured.
+    bench.parameters[6] += 20.0;
+    let found = bench.go_on(&rows, 10);
+    assert_eq!(found.last(), Some(&Some(6)));
 }
 
 #[test]

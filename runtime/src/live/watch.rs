@@ -87,6 +87,7 @@ pub struct Watch<T, const NB: usize, const NQ: usize> {
     /// Blocks in this stage: of each drive, and with any drive in them.
     counted: [u32; NQ],
     blocks: u32,
+    watched: [bool; NQ],
     left_out: u64,
     verdict: Verdict<T, NB>,
     /// In how many comparisons the parameter of the verdict came out, one after the other.
@@ -117,6 +118,7 @@ impl<T: Real, const NB: usize, const NQ: usize> Watch<T, NB, NQ> {
             since: 0,
             counted: [0; NQ],
             blocks: 0,
+            watched: [true; NQ],
             left_out: 0,
             verdict: Verdict::Learning,
             same: 0,
@@ -184,6 +186,12 @@ impl<T: Real, const NB: usize, const NQ: usize> Watch<T, NB, NQ> {
         estimate
     }
 
+    /// Drives that are watched. Those that were hardly measured while the watch learned have no noise to hold a change
+    /// against; they are left out until a new watch is made.
+    pub fn watched(&self) -> [bool; NQ] {
+        self.watched
+    }
+
     /// Blocks of a drive that were left out because something in them was no number.
     pub fn left_out(&self) -> u64 {
         self.left_out
@@ -229,9 +237,9 @@ impl<T: Real, const NB: usize, const NQ: usize> Watch<T, NB, NQ> {
             self.reference.scale(self.plan.memory_root);
         }
         let drives = self.drives.iter_mut().zip(&mut self.waiting);
-        let drives = drives.zip(&mut self.counted).zip(means);
-        for (((drive, waiting), counted), mean) in drives {
-            let Some(mean) = mean else {
+        let drives = drives.zip(&mut self.counted).zip(&self.watched).zip(means);
+        for ((((drive, waiting), counted), watched), mean) in drives {
+            let Some(mean) = mean.filter(|_| *watched) else {
                 continue;
             };
             *counted = counted.saturating_add(1);
@@ -248,11 +256,29 @@ impl<T: Real, const NB: usize, const NQ: usize> Watch<T, NB, NQ> {
         self.next = 0;
     }
 
+    /// Whether the noise is known: of all drives, or after twice the time of those that were measured.
+    fn has_noise(&self) -> bool {
+        let mut known = self.counted.iter().map(|n| *n >= self.plan.noise);
+        if self.blocks >= self.plan.noise.saturating_mul(2) {
+            known.any(|is| is)
+        } else {
+            known.all(|is| is)
+        }
+    }
+
     /// Goes on to the next stage, or begins a comparison, where it is time for it.
     fn look(&mut self) {
         match self.stage {
-            Stage::Noise if self.counted.iter().all(|n| *n >= self.plan.noise) => {
-                self.drives.iter_mut().for_each(Averages::settle);
+            Stage::Noise if self.has_noise() => {
+                for ((drive, counted), watched) in self
+                    .drives
+                    .iter_mut()
+                    .zip(&self.counted)
+                    .zip(&mut self.watched)
+                {
+                    *watched = *counted >= self.plan.noise;
+                    drive.settle();
+                }
                 self.window = Estimator::new();
                 self.reference = Estimator::new();
                 self.blocks = 0;
@@ -297,7 +323,7 @@ impl<T: Real, const NB: usize, const NQ: usize> Watch<T, NB, NQ> {
                 change.steady = self.same >= self.plan.steady;
                 self.verdict = Verdict::Changed(change);
             }
-            (Verdict::Changed(_), None) => {}
+            (Verdict::Changed(_), None) => self.same = 0,
             (_, Some(change)) => {
                 self.verdict = Verdict::Changed(change);
                 // A change that holds for part of a window only looks like one of other parameters.
