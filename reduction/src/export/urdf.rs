@@ -178,7 +178,8 @@ fn joint(
             number(one.factor),
             number(one.offset)
         );
-    } else if own != Passive::default() {
+    }
+    if moving.name == *coordinate && own != Passive::default() {
         let _ = writeln!(
             text,
             "    <dynamics damping=\"{}\" friction=\"{}\"/>",

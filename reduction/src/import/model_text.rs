@@ -365,9 +365,12 @@ impl Build<'_> {
                     .map_or(ends, |old| [old[0].max(ends[0]), old[1].min(ends[1])]),
             );
         }
+        if let Some(rate) = joint.rate {
+            let rate = rate / ratio.abs();
+            acts.rate = Some(acts.rate.map_or(rate, |old| old.min(rate)));
+        }
         let is_leader = self.couplings.variables[variable].joint == joint.name;
         if is_leader {
-            acts.rate = joint.rate.map(|rate| rate / ratio.abs());
             acts.force = joint.force.map(|force| force.map(|force| force * ratio));
         }
         let given = description
