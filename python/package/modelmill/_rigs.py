@@ -107,7 +107,11 @@ def simulate(
 
 
 def _write(table: Any, path: str) -> None:
-    found, _ = columns_of(table)
+    found, left_out = columns_of(table)
+    _warn([("warning", f"column `{name}` holds no numbers and is left out") for name in left_out])
+    for name, _ in found:
+        if any(sign in name for sign in ',"\n'):
+            raise ModelmillError(f"the column name {name!r} holds a comma, a quote or a new line; rename it")
     if len({len(values) for _, values in found}) > 1:
         raise ModelmillError("the columns of the trajectory have different lengths")
     head = ",".join(name for name, _ in found)
