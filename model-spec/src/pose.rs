@@ -347,8 +347,8 @@ fn check_tied(mechanism: &Mechanism, places: &Places, log: &mut Log) -> bool {
     if n_equations <= n_passive && n_passive < n_coordinates {
         return true;
     }
-    let first_loop = places.loops.first().or(places.coordinates.first());
-    let Some(span) = first_loop.copied() else {
+    let place = places.loops.first().or(places.coordinates.first());
+    let Some(span) = place.copied() else {
         return false;
     };
     if n_equations < n_passive {
