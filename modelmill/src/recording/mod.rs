@@ -346,6 +346,12 @@ impl Recording {
         self.raw.file()
     }
 
+    /// The readings of a column by our name, one for each sample, as they were before anything was filtered; `None` where there
+    /// is none that holds numbers alone.
+    pub fn raw_column(&self, name: &str) -> Option<&[f64]> {
+        self.raw.column(name).ok()
+    }
+
     /// Remarks on all stretches.
     pub fn notes(&self) -> impl Iterator<Item = &Note> {
         self.stretches.iter().flat_map(Stretch::notes)
