@@ -13,6 +13,7 @@
 //! No engine is needed for any of this; those that spread it over computers stand in crates beside this one.
 
 mod bytes;
+mod files;
 pub mod folder;
 mod ground;
 mod onset;

@@ -4,12 +4,14 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use modelmill::files::{Disk, Memory};
 use modelmill::recording::{Preparation, Reading, Recording, Smoothing};
 use modelmill::runs::CommonGround;
 use modelmill::{Host, Model};
 use modelmill_identify::changes::Moments;
 use serde::{Deserialize, Serialize};
 
+use crate::files::Both;
 use crate::sensors::Silence;
 use crate::{Fault, Ground};
 
@@ -199,9 +201,12 @@ impl Plan {
     ///
     /// Fails where the model has no meaning or the reference is of another.
     pub fn ground(&self) -> Result<Ground, Fault> {
-        let mut files = modelmill::files::Memory::default();
+        let mut files = Both {
+            memory: Memory::default(),
+            disk: Disk::default(),
+        };
         for (name, text) in &self.files {
-            files.insert(name, text.as_bytes());
+            files.memory.insert(name, text.as_bytes());
         }
         let host = Host::new().with_files(Arc::new(files));
         let model = host.model(&self.model)?;

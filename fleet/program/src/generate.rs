@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use modelmill_fleet::Fault;
-use modelmill_rig::{Body, Channel, Noise, Rig, State, Tracker, forces};
+use modelmill_rig::{Body, Channel, Noise, State, Tracker, forces};
 use nalgebra::{Matrix3, Vector3};
 use parquet::basic::{Compression, Repetition, Type as Physical};
 use parquet::data_type::{DoubleType, FloatType};
@@ -528,7 +528,6 @@ mod tests {
             qd: vec![motion.qd[0][i], motion.qd[1][i]],
             qdd: qdd.collect(),
         };
-        let rig: Rig = rig;
         let moved = Tracker::new(&rig).unwrap().follow(&state).unwrap();
         let expected = forces(&rig, &moved).unwrap();
         for d in 0..2 {
