@@ -51,6 +51,11 @@ impl Ground {
         &self.plan
     }
 
+    /// [`Plan::mark`] of the plan.
+    pub fn mark(&self) -> u64 {
+        self.mark
+    }
+
     /// The base parameters, in the order in which fits have them.
     pub fn parameters(&self) -> Vec<ParameterInfo> {
         self.common.model().infos()

@@ -11,9 +11,11 @@ use crate::{Fault, Ground, Summary};
 const PARTS: usize = 8;
 /// Robots are alike up to so many robust deviations in each parameter.
 const ALIKE: f64 = 3.5;
-/// So many robots are held against each other to see what is usual, a few at a time.
-const TOGETHER: usize = 4;
-const LOOKED_AT: usize = 200;
+/// What a change explains of a robot must lie, as a root, so many median distances above the median over the robots: a change of
+/// one value of robots that are distributed normally does so once in a million.
+const BEYOND: f64 = 12.0;
+/// A change that stands for less than this part of the clearest one is told with it, and not by itself.
+const BESIDE: f64 = 0.5;
 
 /// A robot as it is held against others.
 #[derive(Clone, Debug)]
@@ -41,7 +43,7 @@ pub struct Outliers {
     pub usual: Vec<Option<Fitted>>,
     /// For each robot and base parameter how far it lies from the median, in deviations of the robots and of its own.
     pub apart: Vec<Vec<Option<f64>>>,
-    /// Robots that differ in something that physics has a name for, by more than twice what robots of this fleet differ by.
+    /// Robots that differ in something that physics has a name for, by far more than robots of this fleet do.
     pub found: Vec<Outlier>,
 }
 
@@ -56,7 +58,7 @@ pub fn outliers(ground: &Ground, robots: &[One]) -> Result<Outliers, Fault> {
     }
     let n = ground.parameters().len();
     let usual: Vec<Option<Fitted>> = (0..n)
-        .map(|k| usual(fits.iter().flatten().filter_map(|fit| told(fit[k])).map(|(x, _)| x).collect()))
+        .map(|k| middle(fits.iter().flatten().filter_map(|fit| told(fit[k])).map(|(x, _)| x).collect()))
         .collect();
     let apart: Vec<Vec<Option<f64>>> = fits
         .iter()
@@ -81,12 +83,35 @@ pub fn outliers(ground: &Ground, robots: &[One]) -> Result<Outliers, Fault> {
             parts[i % PARTS].merge(&robots[*k].summary)?;
         }
         let parts: Vec<Moments> = parts.into_iter().map(|part| part.whole).collect();
-        let within = within(ground, robots, &alike);
-        for which in (0..robots.len()).filter(|k| fits[*k].is_some()) {
-            let own = [robots[which].summary.whole.clone()];
-            let changes = ground.common.changes(&parts, &own, within);
-            if !changes.is_empty() {
-                found.push(Outlier { which, changes });
+        let known: Vec<usize> = (0..robots.len()).filter(|k| fits[*k].is_some()).collect();
+        // Roots of gains are proportional to differences.
+        let roots: Vec<Vec<f64>> = known
+            .iter()
+            .map(|k| {
+                let gains = ground.common.gains(&parts, &robots[*k].summary.whole);
+                gains.into_iter().map(|gain| gain.max(0.0).sqrt()).collect()
+            })
+            .collect();
+        let possible = roots.first().map_or(0, Vec::len);
+        let bounds: Vec<(f64, f64)> = (0..possible)
+            .map(|g| {
+                let of_all = middle(roots.iter().map(|roots| roots[g]).collect());
+                let (median, spread) = of_all.map_or((0.0, 0.0), |all| (all.value, all.deviation.unwrap_or(0.0)));
+                (median, (spread / 1.4826).max(1.0))
+            })
+            .collect();
+        for (which, roots) in known.iter().zip(&roots) {
+            let beyond = |g: usize| (roots[g] - bounds[g].0) / bounds[g].1;
+            let clearest = (0..possible).max_by(|a, b| beyond(*a).total_cmp(&beyond(*b)));
+            if let Some(g) = clearest.filter(|g| beyond(*g) > BEYOND) {
+                let mut change = ground.common.alone(&parts, &robots[*which].summary.whole, g);
+                let rivals = (0..possible).filter(|other| *other != g && beyond(*other) > BEYOND && beyond(*other) > BESIDE * beyond(g));
+                let rivals = rivals.map(|other| ground.common.name_of_change(other));
+                change.rivals = rivals.collect();
+                found.push(Outlier {
+                    which: *which,
+                    changes: vec![change],
+                });
             }
         }
     }
@@ -95,24 +120,12 @@ pub fn outliers(ground: &Ground, robots: &[One]) -> Result<Outliers, Fault> {
     Ok(Outliers { usual, apart, found })
 }
 
-/// By what robots that are alike differ among themselves, a few held against each other at a time.
-fn within(ground: &Ground, robots: &[One], alike: &[usize]) -> f64 {
-    let every = (alike.len() / LOOKED_AT).max(1);
-    let some: Vec<usize> = alike.iter().copied().step_by(every).collect();
-    let groups = some.chunks_exact(TOGETHER);
-    let of = |group: &[usize]| {
-        let parts: Vec<Moments> = group.iter().map(|k| robots[*k].summary.whole.clone()).collect();
-        ground.common.within(&parts)
-    };
-    groups.map(of).fold(0.0, f64::max)
-}
-
 fn told(fitted: Fitted) -> Option<(f64, f64)> {
     Some((fitted.value, fitted.deviation?))
 }
 
 /// Median and robust deviation.
-fn usual(mut values: Vec<f64>) -> Option<Fitted> {
+fn middle(mut values: Vec<f64>) -> Option<Fitted> {
     if values.is_empty() {
         return None;
     }

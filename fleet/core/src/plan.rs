@@ -186,7 +186,10 @@ impl Plan {
     pub fn reading(&self) -> Reading {
         Reading {
             columns: self.columns.clone(),
-            preparation: self.preparation.clone(),
+            preparation: Preparation {
+                unexamined: true,
+                ..self.preparation.clone()
+            },
             skip_bad_samples: self.skip_bad_samples,
             ..Reading::default()
         }
@@ -219,23 +222,42 @@ impl Plan {
     }
 }
 
+/// A low-pass that is to leave the highest harmonic of a motion as it is stands so many times higher.
+const ABOVE: f64 = 3.5;
+/// One sample is kept of so many as leave this many in a period of the cut-off.
+const KEPT: f64 = 8.0;
+
 /// The preparation with nothing left open: the cut-off and decimation that suit the first recording, by the filter that all can be
-/// given alike.
+/// given alike. Where the first is best taken for a Fourier series, which others need not share, a low-pass well above its highest
+/// harmonic stands in.
 fn settled(chosen: &Recording, reading: &Reading) -> Result<Preparation, Fault> {
-    let prepared = chosen
+    let run = chosen
         .stretches
         .first()
-        .map(|stretch| &stretch.run.prepared)
+        .map(|stretch| &stretch.run)
         .ok_or_else(|| Fault::new(format!("{} holds no samples", chosen.file())))?;
-    let asked = &reading.preparation;
+    let (prepared, asked) = (&run.prepared, &reading.preparation);
+    let mut cutoff_hz = asked.cutoff_hz.or(prepared.cutoff_hz);
+    let mut decimate = prepared.decimate.max(asked.decimate).max(1);
+    if let (None, Some(_), Some(highest)) = (asked.cutoff_hz, prepared.period, prepared.cutoff_hz) {
+        let rate = match run.time.as_slice() {
+            [first, .., last] => (run.time.len() - 1) as f64 / (last - first),
+            _ => 0.0,
+        };
+        let cutoff = ABOVE * highest;
+        // Beyond a quarter of the rate no filter can be designed; motion is there no more.
+        let cutoff = cutoff.min(0.2 * rate);
+        let every = (1..).take_while(|every| KEPT * cutoff * f64::from(*every) <= rate).last();
+        decimate = decimate.max(every.and_then(|every: u32| usize::try_from(every).ok()).unwrap_or(1));
+        cutoff_hz = Some(cutoff);
+    }
     Ok(Preparation {
-        cutoff_hz: asked.cutoff_hz.or(prepared.cutoff_hz),
-        decimate: prepared.decimate.max(asked.decimate).max(1),
+        cutoff_hz,
+        decimate,
         smoothing: match asked.smoothing {
-            Smoothing::Automatic => Smoothing::Butterworth,
-            asked => asked,
+            Smoothing::SavitzkyGolay => Smoothing::SavitzkyGolay,
+            _ => Smoothing::Butterworth,
         },
-        // Figures beside the raw ones are none of a summary.
         ..asked.clone()
     })
 }

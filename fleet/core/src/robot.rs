@@ -1,15 +1,15 @@
 //! The days of one robot: parameters over time, when something changed and stayed changed, and which sensors died.
 
-use modelmill::runs::{ChangePoint, Changed};
-use modelmill_identify::changes::Moments;
+use modelmill::runs::{Changed, Fitted, Step};
+use modelmill_identify::changes::{Moments, Told, mean};
 use serde_json::{Value, json};
 
 use crate::onset::onset;
 use crate::sensors::SensorFault;
 use crate::{Bad, Fault, Fit, Ground, Summary};
 
-/// An onset is looked for so many days around the change.
-const NEAR: usize = 2;
+/// A parameter is told to have moved from so many deviations on.
+const MOVED: f64 = 4.0;
 
 /// A day of a robot.
 #[derive(Clone, Debug)]
@@ -30,10 +30,10 @@ pub struct Since {
     /// The day, by place.
     pub day: usize,
     /// Base parameters that changed, by place, the clearest first: value before and since, with deviations.
-    pub steps: Vec<modelmill::runs::Step>,
-    /// By how much the clearest of them grows each day, in its unit, where it grows rather than stepped.
+    pub steps: Vec<Step>,
+    /// By how much the parameter that told it grows each day, in its unit, where it grows rather than stepped.
     pub per_day: Option<f64>,
-    /// What it is in physics, the clearest first; none where no single change explains it.
+    /// What it is in physics, the clearest first.
     pub changes: Vec<Changed>,
 }
 
@@ -85,7 +85,7 @@ pub fn robot(ground: &Ground, name: &str, days: Vec<(String, Summary)>) -> Resul
         .collect();
     // Days without an answer have no place among the runs.
     let known: Vec<usize> = (0..days.len()).filter(|k| looked_at[*k].fit.is_some()).collect();
-    let runs: Vec<(Vec<modelmill::runs::Fitted>, Moments, f64)> = known
+    let runs: Vec<Run> = known
         .iter()
         .filter_map(|k| {
             let fit = looked_at[*k].fit.as_ref()?;
@@ -93,11 +93,7 @@ pub fn robot(ground: &Ground, name: &str, days: Vec<(String, Summary)>) -> Resul
             Some((fit.parameters.clone(), summary.whole.clone(), summary.within))
         })
         .collect();
-    let points = match runs.len() {
-        0 | 1 => Vec::new(),
-        _ => ground.common.points(&runs),
-    };
-    let since = sinces(ground, &runs, &known, points);
+    let since = sinces(ground, &runs, &known);
     let end = since.first().map_or(days.len(), |one| one.day);
     let mut before = ground.empty();
     for (_, summary) in &days[..end] {
@@ -113,62 +109,85 @@ pub fn robot(ground: &Ground, name: &str, days: Vec<(String, Summary)>) -> Resul
     })
 }
 
-/// Change points as days, each with its onset. Growth is seen as several steps of one parameter in one direction, which are one.
-fn sinces(
-    ground: &Ground,
-    runs: &[(Vec<modelmill::runs::Fitted>, Moments, f64)],
-    known: &[usize],
-    points: Vec<ChangePoint>,
-) -> Vec<Since> {
+/// A day as a run: base parameters, sums, and by what its parts differ.
+type Run = (Vec<Fitted>, Moments, f64);
+
+/// When something began, over the days that gave an answer; what is found splits them, and both sides are looked at again. What
+/// physics has no name for is no change of the machine, and stands in the values of the days alone.
+fn sinces(ground: &Ground, runs: &[Run], known: &[usize]) -> Vec<Since> {
     let mut within: Vec<f64> = runs.iter().map(|run| run.2).collect();
     within.sort_by(f64::total_cmp);
-    let sums = |some: std::ops::Range<usize>| -> Vec<Moments> {
-        runs[some].iter().map(|run| run.1.clone()).collect()
+    let Some(within) = within.get(within.len() / 2) else {
+        return Vec::new();
     };
-    let mut all: Vec<Since> = Vec::new();
-    let mut points = points.into_iter().peekable();
-    let mut from = 0;
-    while let Some(point) = points.next() {
-        let Some(first) = point.steps.first().copied() else {
+    let mut all = Vec::new();
+    let mut open = vec![0..runs.len()];
+    while let Some(window) = open.pop() {
+        let Some(since) = clearest(ground, &runs[window.clone()], *within) else {
             continue;
         };
-        let by = first.now.value - first.before.value;
-        let goes_on = |next: &ChangePoint| {
-            let mut steps = next.steps.iter();
-            steps.any(|step| {
-                step.parameter == first.parameter && (step.now.value - step.before.value) * by > 0.0
-            })
-        };
-        let mut is_several = false;
-        while points.next_if(|next| goes_on(next)).is_some() {
-            is_several = true;
+        let at = window.start + since.day;
+        open.push(window.start..at);
+        // Growth goes on to the end of its window.
+        if since.per_day.is_none() {
+            open.push(at..window.end);
         }
-        let end = points.peek().map_or(runs.len(), |next| next.run);
-        let told: Vec<Option<(f64, f64)>> = runs[from..end]
-            .iter()
-            .map(|run| {
-                let fitted = run.0[first.parameter];
-                Some((fitted.value, fitted.deviation.filter(|d| *d > 0.0)?))
-            })
-            .collect();
-        let found = onset(&told, point.run - from, NEAR);
-        let at = (from + found.day).clamp(from + 1, end - 1);
-        let per_day = found.per_day.filter(|slope| slope * by > 0.0);
-        let changes = if is_several || per_day.is_some() || at != point.run {
-            // What grew is held against what was before at its mean.
-            ground.common.changes(&sums(from..at), &sums(at..end), within[within.len() / 2])
-        } else {
-            point.changes
-        };
         all.push(Since {
             day: known[at],
-            steps: point.steps,
-            per_day,
-            changes,
+            ..since
         });
-        from = at;
     }
+    all.sort_by_key(|since| since.day);
     all
+}
+
+/// The clearest onset of any parameter, if physics has a name for what began there.
+fn clearest(ground: &Ground, runs: &[Run], within: f64) -> Option<Since> {
+    let series = |k: usize| -> Vec<Option<Told>> {
+        let told = runs.iter().map(|run| {
+            let fitted = run.0[k];
+            Some((fitted.value, fitted.deviation.filter(|d| *d > 0.0)?))
+        });
+        told.collect()
+    };
+    let parameters = runs.first()?.0.len();
+    let onsets = (0..parameters).filter_map(|k| Some((k, onset(&series(k))?)));
+    let (_, found) = onsets.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain))?;
+    let sums = |some: &[Run]| -> Vec<Moments> { some.iter().map(|run| run.1.clone()).collect() };
+    let (before, later) = runs.split_at(found.day);
+    let changes = ground.common.changes(&sums(before), &sums(later), within);
+    if changes.is_empty() {
+        return None;
+    }
+    let mut steps: Vec<Step> = (0..parameters)
+        .filter_map(|parameter| {
+            let told = series(parameter);
+            let [before, now] = [&told[..found.day], &told[found.day..]].map(|some| {
+                let (value, deviation) = mean(some)?;
+                Some(Fitted {
+                    value,
+                    deviation: Some(deviation),
+                })
+            });
+            let step = Step {
+                parameter,
+                before: before?,
+                now: now?,
+            };
+            (apart(&step) > MOVED).then_some(step)
+        })
+        .collect();
+    steps.sort_by(|a, b| apart(b).total_cmp(&apart(a)));
+    Some(Since {
+        day: found.day,
+        steps,
+        per_day: found.per_day,
+        changes,
+    })
+}
+
+fn apart(step: &Step) -> f64 {
+    (step.now.value - step.before.value).abs() / step.before.beside(step.now)
 }
 
 /// Sensors that died, each with its first day.

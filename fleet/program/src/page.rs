@@ -114,7 +114,7 @@ fn changed(found: &Found) -> String {
 
 fn differ(found: &Found) -> String {
     if found.outliers.found.is_empty() {
-        return "<p>No robot differs from the others by more than twice what they differ by among themselves.</p>\n".to_owned();
+        return "<p>No robot differs from the others by far more than they differ by among themselves.</p>\n".to_owned();
     }
     let rows: Vec<Vec<Cell>> = (found.outliers.found.iter())
         .map(|one| {

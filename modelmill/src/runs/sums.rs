@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use modelmill_identify::changes::{Moments, Runs};
+use modelmill_identify::changes::{Moments, Runs, alone, gains};
 use modelmill_identify::{LeastSquaresError, Triangle};
 use nalgebra::DVector;
 
@@ -16,7 +16,7 @@ use crate::recording::Recording;
 use crate::runs::layout::Layout;
 use crate::runs::payload::Payloads;
 use crate::runs::rows::{Rows, Sizes};
-use crate::runs::{Bench, ChangePoint, Changed, Fitted, beside_known, points};
+use crate::runs::{Bench, Changed, Fitted, beside_known, changes};
 
 /// What all runs of a fleet are summed up and held against.
 #[derive(Clone)]
@@ -175,24 +175,32 @@ impl CommonGround {
         bench.told(&bench.large(&runs, &self.sizes), &self.values)
     }
 
-    /// By what runs, or parts of one, that are taken to be alike differ among themselves.
-    pub fn within(&self, parts: &[Moments]) -> f64 {
-        modelmill_identify::changes::within(parts, &self.bench().search)
+    /// By how much every possible change, each with no other beside it, explains what a later run does not share with those
+    /// before: sums of squares over the variance of what is left. The order is always the same.
+    pub fn gains(&self, before: &[Moments], later: &Moments) -> Vec<f64> {
+        gains(&pair(before, later), &self.bench().search)
     }
 
-    /// From which runs on something was different and stayed so; each run has its base parameters, its sums and by what its parts
-    /// differ.
-    pub fn points(&self, runs: &[(Vec<Fitted>, Moments, f64)]) -> Vec<ChangePoint> {
-        let alone: Vec<&[Fitted]> = runs.iter().map(|run| &run.0[..]).collect();
-        let wholes: Vec<Moments> = runs.iter().map(|run| run.1.clone()).collect();
-        let within: Vec<f64> = runs.iter().map(|run| run.2).collect();
-        points::found(
-            &self.bench(),
-            &alone,
-            &wholes,
-            &within,
-            &self.sizes,
-            &self.values,
-        )
+    /// One of these changes, by its place among them, whatever it explains.
+    pub fn alone(&self, before: &[Moments], later: &Moments, which: usize) -> Changed {
+        let bench = self.bench();
+        let found = alone(&pair(before, later), &bench.search, which);
+        changes::told(&self.model, &bench.possible, &found, &self.values)
+    }
+
+    /// What one of these changes is called.
+    pub fn name_of_change(&self, which: usize) -> String {
+        self.bench()
+            .possible
+            .get(which)
+            .map_or_else(String::new, |possible| changes::name(&self.model, &possible.kind))
+    }
+}
+
+fn pair(before: &[Moments], later: &Moments) -> Runs {
+    Runs {
+        reference: before.to_vec(),
+        later: vec![later.clone()],
+        within: 0.0,
     }
 }
