@@ -96,12 +96,19 @@ fn main() -> ExitCode {
             return ExitCode::from(status);
         }
     };
+    let told = tracing_subscriber::EnvFilter::from_default_env();
+    tracing_subscriber::fmt()
+        .with_writer(std::io::stderr)
+        .with_env_filter(told)
+        .init();
     // Plans are deep, and planners recurse.
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
         .thread_stack_size(16 << 20)
         .build();
-    let done = runtime.map_err(Fault::new).and_then(|runtime| runtime.block_on(run(cli)));
+    let done = runtime
+        .map_err(Fault::new)
+        .and_then(|runtime| runtime.block_on(run(cli)));
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => {
@@ -113,9 +120,14 @@ fn main() -> ExitCode {
 
 fn ground(path: &Path) -> Result<Arc<Ground>, Fault> {
     let text = std::fs::read_to_string(path).map_err(|error| {
-        Fault::new(format!("{} cannot be read: {error}; make a plan with `modelmill-fleet plan`", path.display()))
+        Fault::new(format!(
+            "{} cannot be read: {error}; make a plan with `modelmill-fleet plan`",
+            path.display()
+        ))
     })?;
-    Ok(Arc::new(Plan::parse(&path.display().to_string(), &text)?.ground()?))
+    Ok(Arc::new(
+        Plan::parse(&path.display().to_string(), &text)?.ground()?,
+    ))
 }
 
 /// Samples of a recording are long: messages between processes may be so large, in bytes.
@@ -124,7 +136,11 @@ const LONGEST_MESSAGE: u32 = 256 << 20;
 async fn run(cli: Cli) -> Result<(), Fault> {
     let ground = ground(&cli.plan)?;
     match cli.command {
-        Command::Scheduler { host, port, timeout } => scheduler(&ground, &host, port, timeout).await,
+        Command::Scheduler {
+            host,
+            port,
+            timeout,
+        } => scheduler(&ground, &host, port, timeout).await,
         Command::Executor {
             host,
             port,
@@ -135,7 +151,9 @@ async fn run(cli: Cli) -> Result<(), Fault> {
         } => {
             let mut registry = BallistaFunctionRegistry::default();
             for function in aggregates(&ground) {
-                registry.aggregate_functions.insert(function.name().to_owned(), function);
+                registry
+                    .aggregate_functions
+                    .insert(function.name().to_owned(), function);
             }
             let longest = LONGEST_MESSAGE;
             let config = ExecutorProcessConfig {
@@ -153,14 +171,18 @@ async fn run(cli: Cli) -> Result<(), Fault> {
                 override_function_registry: Some(Arc::new(registry)),
                 ..ExecutorProcessConfig::default()
             };
-            start_executor_process(Arc::new(config)).await.map_err(Fault::new)
+            start_executor_process(Arc::new(config))
+                .await
+                .map_err(Fault::new)
         }
         Command::Query {
             sql,
             tables,
             scheduler,
             partitions,
-        } => query(&ground, &sql, &tables, scheduler.as_deref(), partitions).await.map_err(Fault::new),
+        } => query(&ground, &sql, &tables, scheduler.as_deref(), partitions)
+            .await
+            .map_err(Fault::new),
     }
 }
 
@@ -170,7 +192,9 @@ async fn scheduler(ground: &Arc<Ground>, host: &str, port: u16, timeout: u64) ->
         let state = default_session_builder(config)?;
         let known = state.aggregate_functions().values().cloned();
         let all = known.chain(aggregates(&functions)).collect();
-        Ok(SessionStateBuilder::new_from_existing(state).with_aggregate_functions(all).build())
+        Ok(SessionStateBuilder::new_from_existing(state)
+            .with_aggregate_functions(all)
+            .build())
     };
     let config = SchedulerConfig {
         bind_host: host.to_owned(),
@@ -185,10 +209,16 @@ async fn scheduler(ground: &Arc<Ground>, host: &str, port: u16, timeout: u64) ->
         ..SchedulerConfig::default()
     };
     let address = format!("{host}:{port}").parse().map_err(|error| {
-        Fault::new(format!("`{host}:{port}` is no address: {error}; give a number such as 127.0.0.1"))
+        Fault::new(format!(
+            "`{host}:{port}` is no address: {error}; give a number such as 127.0.0.1"
+        ))
     })?;
-    let cluster = BallistaCluster::new_from_config(&config).await.map_err(Fault::new)?;
-    start_server(cluster, address, Arc::new(config)).await.map_err(Fault::new)
+    let cluster = BallistaCluster::new_from_config(&config)
+        .await
+        .map_err(Fault::new)?;
+    start_server(cluster, address, Arc::new(config))
+        .await
+        .map_err(Fault::new)
 }
 
 async fn query(
@@ -201,20 +231,35 @@ async fn query(
     let session = match scheduler {
         Some(url) => {
             let config = SessionConfig::new_with_ballista().with_target_partitions(partitions);
-            let state = SessionStateBuilder::new().with_default_features().with_config(config).build();
+            let state = SessionStateBuilder::new()
+                .with_default_features()
+                .with_config(config)
+                .build();
             SessionContext::remote_with_state(url, state).await?
         }
-        None => SessionContext::new_with_config(SessionConfig::new().with_target_partitions(partitions)),
+        None => {
+            SessionContext::new_with_config(SessionConfig::new().with_target_partitions(partitions))
+        }
     };
     register(&session, ground);
     for table in tables {
         let Some((name, folder)) = table.split_once('=') else {
-            return Err(DataFusionError::Plan(format!("`--table {table}` names no folder; write it as `--table samples=recordings/`")));
+            return Err(DataFusionError::Plan(format!(
+                "`--table {table}` names no folder; write it as `--table samples=recordings/`"
+            )));
         };
         let external = format!(
-            "CREATE EXTERNAL TABLE {name} STORED AS PARQUET PARTITIONED BY (robot, day, recording) LOCATION '{folder}'"
+            "CREATE EXTERNAL TABLE {name}_files STORED AS PARQUET PARTITIONED BY (robot, day, recording) LOCATION '{folder}'"
         );
         session.sql(&external).await?.collect().await?;
+        // Parts of paths are dictionaries, which shuffles between processes unpack: groups must be texts from the start.
+        let texts = ["robot", "day", "recording"]
+            .map(|part| format!("arrow_cast({part}, 'Utf8') AS {part}"));
+        let view = format!(
+            "CREATE VIEW {name} AS SELECT * EXCEPT (robot, day, recording), {} FROM {name}_files",
+            texts.join(", ")
+        );
+        session.sql(&view).await?.collect().await?;
     }
     let frame = session.sql(sql).await?;
     // A struct has no place in CSV; its fields have.
@@ -224,7 +269,10 @@ async fn query(
         let column = datafusion::prelude::Expr::Column((qualifier, field).into());
         if let datafusion::arrow::datatypes::DataType::Struct(fields) = field.data_type() {
             for inner in fields {
-                let of = datafusion::functions::core::expr_fn::get_field(column.clone(), inner.name().as_str());
+                let of = datafusion::functions::core::expr_fn::get_field(
+                    column.clone(),
+                    inner.name().as_str(),
+                );
                 columns.push(of.alias(inner.name()));
             }
         } else {
@@ -234,7 +282,9 @@ async fn query(
     let batches = frame.select(columns)?.collect().await?;
     let mut header = true;
     for batch in batches.iter().filter(|batch| batch.num_rows() > 0) {
-        let mut writer = WriterBuilder::new().with_header(header).build(std::io::stdout());
+        let mut writer = WriterBuilder::new()
+            .with_header(header)
+            .build(std::io::stdout());
         writer.write(batch)?;
         header = false;
     }

@@ -30,7 +30,10 @@ pub fn robots(folder: &Path) -> Result<BTreeMap<String, Vec<File>>, Fault> {
     let mut robots: BTreeMap<String, Vec<File>> = BTreeMap::new();
     for path in found {
         let below = path.strip_prefix(folder).unwrap_or(&path);
-        let parts: Vec<String> = below.iter().map(|part| part.to_string_lossy().into_owned()).collect();
+        let parts: Vec<String> = below
+            .iter()
+            .map(|part| part.to_string_lossy().into_owned())
+            .collect();
         let name = parts.join("/");
         let Some((robot, day)) = place(&parts) else {
             return Err(Fault::new(format!(
@@ -42,8 +45,17 @@ pub fn robots(folder: &Path) -> Result<BTreeMap<String, Vec<File>>, Fault> {
         let about = fs::metadata(&path).map_err(|error| unread(&path, &error))?;
         let changed = about.modified().ok();
         let changed = changed.and_then(|at| at.duration_since(std::time::UNIX_EPOCH).ok());
-        let key = format!("{name} {} {}", about.len(), changed.map_or(0, |at| at.as_nanos()));
-        robots.entry(robot).or_default().push(File { name, path, day, key });
+        let key = format!(
+            "{name} {} {}",
+            about.len(),
+            changed.map_or(0, |at| at.as_nanos())
+        );
+        robots.entry(robot).or_default().push(File {
+            name,
+            path,
+            day,
+            key,
+        });
     }
     if robots.is_empty() {
         return Err(Fault::new(format!(
@@ -58,7 +70,10 @@ pub fn robots(folder: &Path) -> Result<BTreeMap<String, Vec<File>>, Fault> {
 }
 
 fn unread(path: &Path, error: &std::io::Error) -> Fault {
-    Fault::new(format!("{} cannot be read: {error}; check the path and who may read it", path.display()))
+    Fault::new(format!(
+        "{} cannot be read: {error}; check the path and who may read it",
+        path.display()
+    ))
 }
 
 fn walk(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), Fault> {
@@ -80,17 +95,27 @@ fn walk(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), Fault> {
 
 /// Robot and day of a path: by `robot=` and `day=`, else by the first folder and the second, or what the name begins with.
 fn place(parts: &[String]) -> Option<(String, String)> {
-    let named = |key: &str| parts.iter().find_map(|part| part.strip_prefix(key).map(str::to_owned));
+    let named = |key: &str| {
+        parts
+            .iter()
+            .find_map(|part| part.strip_prefix(key).map(str::to_owned))
+    };
     if let (Some(robot), Some(day)) = (named("robot="), named("day=")) {
         return Some((robot, day));
     }
     let (file, folders) = parts.split_last()?;
     let robot = folders.first()?.clone();
     let day = folders.get(1).cloned().unwrap_or_else(|| {
-        let digits: String = file.chars().take_while(|c| c.is_ascii_digit() || "-_".contains(*c)).take(10).collect();
+        let digits: String = file
+            .chars()
+            .take_while(|c| c.is_ascii_digit() || "-_".contains(*c))
+            .take(10)
+            .collect();
         let digits = digits.trim_matches(['-', '_']);
         if digits.is_empty() {
-            Path::new(file).file_stem().map_or_else(|| file.clone(), |stem| stem.to_string_lossy().into_owned())
+            Path::new(file)
+                .file_stem()
+                .map_or_else(|| file.clone(), |stem| stem.to_string_lossy().into_owned())
         } else {
             digits.to_owned()
         }
@@ -103,7 +128,10 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Fault> {
     let beside = path.with_extension("part");
     let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, path));
     written.map_err(|error| {
-        Fault::new(format!("{} cannot be written: {error}; choose another place, or make room", path.display()))
+        Fault::new(format!(
+            "{} cannot be written: {error}; choose another place, or make room",
+            path.display()
+        ))
     })
 }
 
@@ -120,7 +148,10 @@ mod tests {
 
     #[test]
     fn a_path_names_robot_and_day() {
-        check("robot=R1/day=2026-03-01/recording=0/data.parquet", Some(("R1", "2026-03-01")));
+        check(
+            "robot=R1/day=2026-03-01/recording=0/data.parquet",
+            Some(("R1", "2026-03-01")),
+        );
         check("site/robot=R1/day=3/x.csv", Some(("R1", "3")));
         check("R1/2026-03-01/a.csv", Some(("R1", "2026-03-01")));
         check("R1/2026-03-01_0815.csv", Some(("R1", "2026-03-01")));

@@ -181,7 +181,9 @@ impl Ground {
                     first.says
                 ),
             };
-            return Err(Fault::new(format!("this summary holds no recording that could be used: {why}")));
+            return Err(Fault::new(format!(
+                "this summary holds no recording that could be used: {why}"
+            )));
         };
         Ok(Fit {
             parameters: self.common.fitted(base)?,
@@ -205,15 +207,18 @@ impl Ground {
     /// A fit as JSON: `parameters` with `name`, `expression`, `value`, `std` (null where not determined) and `unit`.
     pub fn json(&self, fit: &Fit) -> Value {
         let parameters = self.parameters();
-        let parameters = parameters.iter().zip(&fit.parameters).map(|(info, fitted)| {
-            json!({
-                "name": info.name,
-                "expression": info.expression,
-                "value": fitted.value,
-                "std": fitted.deviation,
-                "unit": info.unit,
-            })
-        });
+        let parameters = parameters
+            .iter()
+            .zip(&fit.parameters)
+            .map(|(info, fitted)| {
+                json!({
+                    "name": info.name,
+                    "expression": info.expression,
+                    "value": fitted.value,
+                    "std": fitted.deviation,
+                    "unit": info.unit,
+                })
+            });
         json!({
             "parameters": parameters.collect::<Vec<_>>(),
             "left": self.drives().into_iter().zip(fit.left.iter().map(|x| json!(x))).collect::<serde_json::Map<_, _>>(),
@@ -236,7 +241,12 @@ fn leave_out(recording: &mut Recording, drives: &[String], sensors: &[SensorFaul
         if run.left_out.is_empty() {
             run.left_out = vec![vec![false; run.time.len()]; drives.len()];
         }
-        for (out, _) in run.left_out.iter_mut().zip(&is_dead).filter(|(_, dead)| **dead) {
+        for (out, _) in run
+            .left_out
+            .iter_mut()
+            .zip(&is_dead)
+            .filter(|(_, dead)| **dead)
+        {
             out.fill(true);
         }
     }

@@ -26,7 +26,7 @@ mod summary;
 pub use ground::{Fit, Ground};
 pub use modelmill::runs::Fitted;
 pub use plan::{Plan, Reference};
-pub use sensors::{Silence, SensorFault};
+pub use sensors::{SensorFault, Silence};
 pub use summary::{Bad, Summary};
 
 /// Why something cannot be done, in one sentence with a remedy.

@@ -48,7 +48,10 @@ pub(crate) fn onset(values: &[Option<Told>]) -> Option<Onset> {
     for at in FEWEST..=known.len() - FEWEST {
         let day = known[at].0;
         let step = fit(&known, |k| f64::from(u8::from(k >= day)));
-        let ramp = fit(&known, |k| if k >= day { (k - day + 1) as f64 } else { 0.0 });
+        let ramp = fit(
+            &known,
+            |k| if k >= day { (k - day + 1) as f64 } else { 0.0 },
+        );
         let tried = [(step, false, 0.0), (ramp, true, CLEARER)];
         for (found, is_ramp, price) in tried {
             let Some((left, slope)) = found else { continue };
@@ -59,7 +62,8 @@ pub(crate) fn onset(values: &[Option<Told>]) -> Option<Onset> {
             }
         }
     }
-    best.map(|(_, onset)| onset).filter(|onset| onset.gain > LEAST)
+    best.map(|(_, onset)| onset)
+        .filter(|onset| onset.gain > LEAST)
 }
 
 /// What a level and a multiple of a shape leave of values, in deviations squared, and that multiple.
@@ -75,11 +79,15 @@ fn fit(known: &[(usize, Told)], shape: impl Fn(usize) -> f64) -> Option<(f64, f6
         sx += weight * z * value;
     }
     let determinant = w * ss - s * s;
-    let slope = if determinant > 1e-12 * w * ss { (w * sx - s * x) / determinant } else { 0.0 };
+    let slope = if determinant > 1e-12 * w * ss {
+        (w * sx - s * x) / determinant
+    } else {
+        0.0
+    };
     let level = (x - slope * s) / w;
-    let left = known
-        .iter()
-        .map(|(k, (value, deviation))| ((value - origin - level - slope * shape(*k)) / deviation).powi(2));
+    let left = known.iter().map(|(k, (value, deviation))| {
+        ((value - origin - level - slope * shape(*k)) / deviation).powi(2)
+    });
     Some((left.sum(), slope))
 }
 
@@ -89,7 +97,9 @@ mod tests {
 
     fn series(shape: &dyn Fn(usize) -> f64) -> Vec<Option<Told>> {
         let noise = [0.3, -0.5, 0.1, 0.6, -0.2, -0.4, 0.5, 0.0, -0.3, 0.2];
-        (0..10).map(|k| (k != 2).then(|| (100.0 + shape(k) + noise[k], 1.0))).collect()
+        (0..10)
+            .map(|k| (k != 2).then(|| (100.0 + shape(k) + noise[k], 1.0)))
+            .collect()
     }
 
     #[test]
@@ -98,7 +108,10 @@ mod tests {
         for slope in [8.0, 300.0] {
             let found = onset(&series(&|k| slope * (k as f64 - 3.0).max(0.0))).expect("an onset");
             assert_eq!(found.day, 4);
-            assert!((found.per_day.expect("a ramp") - slope).abs() < 0.3, "{found:?}");
+            assert!(
+                (found.per_day.expect("a ramp") - slope).abs() < 0.3,
+                "{found:?}"
+            );
         }
         let found = onset(&series(&|k| if k >= 6 { 12.0 } else { 0.0 })).expect("an onset");
         assert_eq!((found.day, found.per_day), (6, None));

@@ -58,7 +58,15 @@ pub fn outliers(ground: &Ground, robots: &[One]) -> Result<Outliers, Fault> {
     }
     let n = ground.parameters().len();
     let usual: Vec<Option<Fitted>> = (0..n)
-        .map(|k| middle(fits.iter().flatten().filter_map(|fit| told(fit[k])).map(|(x, _)| x).collect()))
+        .map(|k| {
+            middle(
+                fits.iter()
+                    .flatten()
+                    .filter_map(|fit| told(fit[k]))
+                    .map(|(x, _)| x)
+                    .collect(),
+            )
+        })
         .collect();
     let apart: Vec<Vec<Option<f64>>> = fits
         .iter()
@@ -96,7 +104,8 @@ pub fn outliers(ground: &Ground, robots: &[One]) -> Result<Outliers, Fault> {
         let bounds: Vec<(f64, f64)> = (0..possible)
             .map(|g| {
                 let of_all = middle(roots.iter().map(|roots| roots[g]).collect());
-                let (median, spread) = of_all.map_or((0.0, 0.0), |all| (all.value, all.deviation.unwrap_or(0.0)));
+                let (median, spread) =
+                    of_all.map_or((0.0, 0.0), |all| (all.value, all.deviation.unwrap_or(0.0)));
                 (median, (spread / 1.4826).max(1.0))
             })
             .collect();
@@ -104,8 +113,12 @@ pub fn outliers(ground: &Ground, robots: &[One]) -> Result<Outliers, Fault> {
             let beyond = |g: usize| (roots[g] - bounds[g].0) / bounds[g].1;
             let clearest = (0..possible).max_by(|a, b| beyond(*a).total_cmp(&beyond(*b)));
             if let Some(g) = clearest.filter(|g| beyond(*g) > BEYOND) {
-                let mut change = ground.common.alone(&parts, &robots[*which].summary.whole, g);
-                let rivals = (0..possible).filter(|other| *other != g && beyond(*other) > BEYOND && beyond(*other) > BESIDE * beyond(g));
+                let mut change = ground
+                    .common
+                    .alone(&parts, &robots[*which].summary.whole, g);
+                let rivals = (0..possible).filter(|other| {
+                    *other != g && beyond(*other) > BEYOND && beyond(*other) > BESIDE * beyond(g)
+                });
                 let rivals = rivals.map(|other| ground.common.name_of_change(other));
                 change.rivals = rivals.collect();
                 found.push(Outlier {
@@ -117,7 +130,11 @@ pub fn outliers(ground: &Ground, robots: &[One]) -> Result<Outliers, Fault> {
     }
     let gain = |one: &Outlier| one.changes.first().map_or(0.0, |change| change.gain);
     found.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
-    Ok(Outliers { usual, apart, found })
+    Ok(Outliers {
+        usual,
+        apart,
+        found,
+    })
 }
 
 fn told(fitted: Fitted) -> Option<(f64, f64)> {

@@ -120,7 +120,8 @@ impl Plan {
             .map(|file| (file.path.display().to_string(), file.text.clone()))
             .collect();
         let path = model.display().to_string();
-        let mut last = Fault::new("there is no reference recording; name one or more of sound machines");
+        let mut last =
+            Fault::new("there is no reference recording; name one or more of sound machines");
         let mut readable = reference.iter().filter_map(|path| {
             let read = derived.recording(path, reading);
             read.map_err(|error| last = error.into()).ok()
@@ -170,15 +171,20 @@ impl Plan {
                 return Ok(plan);
             }
         }
-        Err(Fault::new("the numbers of the plan do not settle as text; take another reference recording"))
+        Err(Fault::new(
+            "the numbers of the plan do not settle as text; take another reference recording",
+        ))
     }
 
     /// Reads a plan from its JSON; `name` is what messages call it.
     ///
     /// Fails where it is none, or of another version.
     pub fn parse(name: &str, text: &str) -> Result<Self, Fault> {
-        let plan: Self = serde_json::from_str(text)
-            .map_err(|error| Fault::new(format!("{name} is no plan of a fleet: {error}; make one with `modelmill-fleet plan`")))?;
+        let plan: Self = serde_json::from_str(text).map_err(|error| {
+            Fault::new(format!(
+                "{name} is no plan of a fleet: {error}; make one with `modelmill-fleet plan`"
+            ))
+        })?;
         if plan.version != VERSION {
             return Err(Fault::new(format!(
                 "{name} is a plan of version {}, and this program knows version {VERSION}; make it anew",
@@ -263,8 +269,14 @@ fn settled(chosen: &Recording, reading: &Reading) -> Result<Preparation, Fault> 
         let cutoff = ABOVE * highest;
         // Beyond a quarter of the rate no filter can be designed; motion is there no more.
         let cutoff = cutoff.min(0.2 * rate);
-        let every = (1..).take_while(|every| KEPT * cutoff * f64::from(*every) <= rate).last();
-        decimate = decimate.max(every.and_then(|every: u32| usize::try_from(every).ok()).unwrap_or(1));
+        let every = (1..)
+            .take_while(|every| KEPT * cutoff * f64::from(*every) <= rate)
+            .last();
+        decimate = decimate.max(
+            every
+                .and_then(|every: u32| usize::try_from(every).ok())
+                .unwrap_or(1),
+        );
         cutoff_hz = Some(cutoff);
     }
     Ok(Preparation {

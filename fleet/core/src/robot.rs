@@ -84,13 +84,19 @@ pub fn robot(ground: &Ground, name: &str, days: Vec<(String, Summary)>) -> Resul
         })
         .collect();
     // Days without an answer have no place among the runs.
-    let known: Vec<usize> = (0..days.len()).filter(|k| looked_at[*k].fit.is_some()).collect();
+    let known: Vec<usize> = (0..days.len())
+        .filter(|k| looked_at[*k].fit.is_some())
+        .collect();
     let runs: Vec<Run> = known
         .iter()
         .filter_map(|k| {
             let fit = looked_at[*k].fit.as_ref()?;
             let summary = &days[*k].1;
-            Some((fit.parameters.clone(), summary.whole.clone(), summary.within))
+            Some((
+                fit.parameters.clone(),
+                summary.whole.clone(),
+                summary.within,
+            ))
         })
         .collect();
     let since = sinces(ground, &runs, &known);

@@ -88,7 +88,8 @@ impl Summary {
             *mine += theirs;
         }
         self.sensors.extend(other.sensors.iter().cloned());
-        self.sensors.sort_by(|a, b| (&a.recording, &a.of).cmp(&(&b.recording, &b.of)));
+        self.sensors
+            .sort_by(|a, b| (&a.recording, &a.of).cmp(&(&b.recording, &b.of)));
         self.remarks.extend(other.remarks.iter().cloned());
         self.remarks.sort();
         self.bad.extend(other.bad.iter().cloned());
@@ -170,7 +171,9 @@ impl Summary {
         let columns = from.size()?;
         // A column costs bytes only where it is not zero; no model has more than this.
         if columns > 100_000 {
-            return Err(Fault::new(format!("{what} claims {columns} columns, which no model has; make it again")));
+            return Err(Fault::new(format!(
+                "{what} claims {columns} columns, which no model has; make it again"
+            )));
         }
         let whole = from.moments(columns)?;
         let base = match from.whole()? {

@@ -4,12 +4,16 @@ use std::fmt;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
-use datafusion::arrow::array::{Array, ArrayRef, BinaryArray, Float64Array, StructArray, UInt64Array};
+use datafusion::arrow::array::{
+    Array, ArrayRef, BinaryArray, Float64Array, StructArray, UInt64Array,
+};
 use datafusion::arrow::compute::cast;
 use datafusion::arrow::datatypes::{DataType, Field, FieldRef, Fields};
 use datafusion::common::{Result, ScalarValue, exec_err};
 use datafusion::logical_expr::function::{AccumulatorArgs, StateFieldsArgs};
-use datafusion::logical_expr::{Accumulator, AggregateUDFImpl, Signature, TypeSignature, Volatility};
+use datafusion::logical_expr::{
+    Accumulator, AggregateUDFImpl, Signature, TypeSignature, Volatility,
+};
 use modelmill_fleet::{Ground, Summary};
 
 use crate::samples::{Samples, external};
@@ -70,7 +74,8 @@ impl Fleet {
         let counts = ["recordings", "bad"].map(|name| Field::new(name, DataType::UInt64, true));
         let parameters = self.ground.parameters();
         let parameters = parameters.iter().flat_map(|info| {
-            [info.name.clone(), format!("{}_std", info.name)].map(|name| Field::new(name, DataType::Float64, true))
+            [info.name.clone(), format!("{}_std", info.name)]
+                .map(|name| Field::new(name, DataType::Float64, true))
         });
         counts.into_iter().chain(parameters).collect()
     }
@@ -115,7 +120,10 @@ impl AggregateUDFImpl for Fleet {
 
     fn accumulator(&self, args: AccumulatorArgs<'_>) -> Result<Box<dyn Accumulator>> {
         if args.is_distinct {
-            return exec_err!("{}(DISTINCT ...) has no meaning: samples that are alike count as often as they are there", self.name());
+            return exec_err!(
+                "{}(DISTINCT ...) has no meaning: samples that are alike count as often as they are there",
+                self.name()
+            );
         }
         Ok(Box::new(Summing {
             fleet: self.clone(),
@@ -126,7 +134,11 @@ impl AggregateUDFImpl for Fleet {
     }
 
     fn state_fields(&self, args: StateFieldsArgs<'_>) -> Result<Vec<FieldRef>> {
-        Ok(vec![Arc::new(Field::new(format!("{}[state]", args.name), DataType::Binary, true))])
+        Ok(vec![Arc::new(Field::new(
+            format!("{}[state]", args.name),
+            DataType::Binary,
+            true,
+        ))])
     }
 }
 
@@ -164,7 +176,10 @@ impl Summing {
     fn summed(&mut self) -> Result<Option<Summary>> {
         if self.of_samples {
             let fleet = self.fleet.clone();
-            return self.samples.summary(&fleet.ground, &fleet.columns).map(Some);
+            return self
+                .samples
+                .summary(&fleet.ground, &fleet.columns)
+                .map(Some);
         }
         Ok(self.sum.take())
     }
@@ -213,8 +228,12 @@ impl Accumulator for Summing {
                 ];
                 for k in 0..n {
                     let fitted = fit.as_ref().map(|fit| fit.parameters[k]);
-                    columns.push(Arc::new(Float64Array::from(vec![fitted.map(|fitted| fitted.value)])));
-                    columns.push(Arc::new(Float64Array::from(vec![fitted.and_then(|fitted| fitted.deviation)])));
+                    columns.push(Arc::new(Float64Array::from(vec![
+                        fitted.map(|fitted| fitted.value),
+                    ])));
+                    columns.push(Arc::new(Float64Array::from(vec![
+                        fitted.and_then(|fitted| fitted.deviation),
+                    ])));
                 }
                 let answer = StructArray::try_new(self.fleet.fields(), columns, None)?;
                 Ok(ScalarValue::Struct(Arc::new(answer)))

@@ -44,5 +44,8 @@ pub fn register(session: &SessionContext, ground: &Arc<Ground>) {
     for function in aggregates(ground) {
         session.register_udaf(function.as_ref().clone());
     }
-    session.register_udtf("modelmill_recordings", Arc::new(Recordings::new(ground.clone())));
+    session.register_udtf(
+        "modelmill_recordings",
+        Arc::new(Recordings::new(ground.clone())),
+    );
 }

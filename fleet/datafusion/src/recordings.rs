@@ -40,7 +40,9 @@ impl std::fmt::Debug for Recordings {
 impl TableFunctionImpl for Recordings {
     fn call(&self, arguments: &[Expr]) -> Result<Arc<dyn TableProvider>> {
         let [Expr::Literal(ScalarValue::Utf8(Some(folder)), _)] = arguments else {
-            return plan_err!("modelmill_recordings takes one text, the folder above those of the robots");
+            return plan_err!(
+                "modelmill_recordings takes one text, the folder above those of the robots"
+            );
         };
         let files: Vec<(String, File)> = robots(Path::new(folder))
             .map_err(external)?
@@ -57,7 +59,10 @@ impl TableFunctionImpl for Recordings {
                 files: files.to_vec(),
             }) as Arc<dyn PartitionStream>
         });
-        Ok(Arc::new(StreamingTable::try_new(schema.clone(), partitions.collect())?))
+        Ok(Arc::new(StreamingTable::try_new(
+            schema.clone(),
+            partitions.collect(),
+        )?))
     }
 }
 
@@ -96,7 +101,8 @@ impl PartitionStream for Part {
             let (ground, schema) = (ground.clone(), schema.clone());
             async move {
                 let read = tokio::task::spawn_blocking(move || one(&ground, schema, &robot, &file));
-                read.await.map_err(|error| DataFusionError::External(Box::new(error)))?
+                read.await
+                    .map_err(|error| DataFusionError::External(Box::new(error)))?
             }
         });
         Box::pin(RecordBatchStreamAdapter::new(self.schema.clone(), batches))

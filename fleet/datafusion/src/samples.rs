@@ -19,35 +19,58 @@ impl Samples {
     /// out as the plan says.
     pub(crate) fn add(&mut self, values: &[ArrayRef]) -> Result<()> {
         let Some((names, columns)) = values.split_first() else {
-            return exec_err!("samples have no columns; give the recording's name, time, coordinates and forces");
+            return exec_err!(
+                "samples have no columns; give the recording's name, time, coordinates and forces"
+            );
         };
         let names = cast(names, &DataType::Utf8)?;
         let Some(names) = names.as_any().downcast_ref::<StringArray>() else {
-            return exec_err!("the names of recordings are no texts; cast the first column to text");
+            return exec_err!(
+                "the names of recordings are no texts; cast the first column to text"
+            );
         };
         let columns: Vec<Float64Array> = columns
             .iter()
             .map(|column| {
                 let column = cast(column, &DataType::Float64)?;
                 let column = column.as_any().downcast_ref::<Float64Array>().cloned();
-                column.ok_or_else(|| DataFusionError::Execution("a column of samples holds no numbers; cast it to double".to_owned()))
+                column.ok_or_else(|| {
+                    DataFusionError::Execution(
+                        "a column of samples holds no numbers; cast it to double".to_owned(),
+                    )
+                })
             })
             .collect::<Result<_>>()?;
-        let name = |row: usize| if names.is_null(row) { "" } else { names.value(row) };
+        let name = |row: usize| {
+            if names.is_null(row) {
+                ""
+            } else {
+                names.value(row)
+            }
+        };
         let mut from = 0;
         while from < names.len() {
             // Rows of one recording mostly come together.
             let this = name(from);
-            let to = (from..names.len()).find(|row| name(*row) != this).unwrap_or(names.len());
+            let to = (from..names.len())
+                .find(|row| name(*row) != this)
+                .unwrap_or(names.len());
             if !self.recordings.contains_key(this) {
-                self.recordings.insert(this.to_owned(), vec![Vec::new(); columns.len()]);
+                self.recordings
+                    .insert(this.to_owned(), vec![Vec::new(); columns.len()]);
             }
             if let Some(kept) = self.recordings.get_mut(this) {
                 for (kept, column) in kept.iter_mut().zip(&columns) {
                     if column.null_count() == 0 {
                         kept.extend_from_slice(&column.values()[from..to]);
                     } else {
-                        let value = |row: usize| if column.is_null(row) { f64::NAN } else { column.value(row) };
+                        let value = |row: usize| {
+                            if column.is_null(row) {
+                                f64::NAN
+                            } else {
+                                column.value(row)
+                            }
+                        };
                         kept.extend((from..to).map(value));
                     }
                 }
@@ -62,7 +85,8 @@ impl Samples {
         let mut sum = ground.empty();
         for (recording, columns) in std::mem::take(&mut self.recordings) {
             let columns = names.iter().cloned().zip(columns).collect();
-            sum.merge(&ground.summarise(&recording, columns)).map_err(external)?;
+            sum.merge(&ground.summarise(&recording, columns))
+                .map_err(external)?;
         }
         Ok(sum)
     }
@@ -98,20 +122,28 @@ impl Samples {
         let mut left = bytes;
         while !left.is_empty() {
             self.add_one(&mut left).ok_or_else(|| {
-                DataFusionError::Execution("samples from another partition are cut off; run the query again".to_owned())
+                DataFusionError::Execution(
+                    "samples from another partition are cut off; run the query again".to_owned(),
+                )
             })?;
         }
         Ok(())
     }
 
     fn add_one(&mut self, left: &mut &[u8]) -> Option<()> {
-        let mut number = || usize::try_from(u64::from_le_bytes(take(left, 8)?.try_into().ok()?)).ok();
+        let mut number =
+            || usize::try_from(u64::from_le_bytes(take(left, 8)?.try_into().ok()?)).ok();
         let [length, columns, rows] = [number()?, number()?, number()?];
         let name = std::str::from_utf8(take(left, length)?).ok()?.to_owned();
         let all = take(left, columns.checked_mul(rows)?.checked_mul(8)?)?;
-        let kept = self.recordings.entry(name).or_insert_with(|| vec![Vec::new(); columns]);
+        let kept = self
+            .recordings
+            .entry(name)
+            .or_insert_with(|| vec![Vec::new(); columns]);
         for (kept, column) in kept.iter_mut().zip(all.chunks_exact((8 * rows).max(1))) {
-            let values = column.chunks_exact(8).filter_map(|eight| Some(f64::from_le_bytes(eight.try_into().ok()?)));
+            let values = column
+                .chunks_exact(8)
+                .filter_map(|eight| Some(f64::from_le_bytes(eight.try_into().ok()?)));
             kept.extend(values);
         }
         Some(())

@@ -93,14 +93,21 @@ const TORQUE: Channel = Channel {
 
 /// How large a fleet, and from which seed.
 #[derive(Clone, Debug)]
-pub(crate) struct Size {
-    pub(crate) robots: usize,
-    pub(crate) days: usize,
-    pub(crate) per_day: usize,
-    pub(crate) seconds: f64,
-    pub(crate) rate: f64,
-    pub(crate) seed: u64,
-    pub(crate) bad: usize,
+pub struct Size {
+    /// How many robots.
+    pub robots: usize,
+    /// On how many days, six or more.
+    pub days: usize,
+    /// Recordings of a robot on a day.
+    pub per_day: usize,
+    /// How long each is, s.
+    pub seconds: f64,
+    /// Samples a second.
+    pub rate: f64,
+    /// Another seed makes another fleet.
+    pub seed: u64,
+    /// How many recordings are cut off.
+    pub bad: usize,
 }
 
 /// What a robot has beyond small differences.
@@ -108,13 +115,25 @@ pub(crate) struct Size {
 enum Planted {
     Nothing,
     /// Friction of a motor grows by so large a part of its own each day, from a day on.
-    Wear { drive: usize, day: usize, per_day: f64 },
+    Wear {
+        drive: usize,
+        day: usize,
+        per_day: f64,
+    },
     /// A mass at the tip, kg, from a day on.
-    Load { day: usize, mass: f64 },
+    Load {
+        day: usize,
+        mass: f64,
+    },
     /// The torque sensor of a motor stands still from a day on.
-    Dead { drive: usize, day: usize },
+    Dead {
+        drive: usize,
+        day: usize,
+    },
     /// A mass at the tip, kg, from the first day on: it differs from the others.
-    Odd { mass: f64 },
+    Odd {
+        mass: f64,
+    },
 }
 
 impl Planted {
@@ -122,7 +141,11 @@ impl Planted {
         let motor = |drive: &usize| ["motor_left", "motor_right"][*drive];
         match self {
             Self::Nothing => json!({ "kind": "none" }),
-            Self::Wear { drive, day, per_day } => {
+            Self::Wear {
+                drive,
+                day,
+                per_day,
+            } => {
                 json!({ "kind": "wear", "at": motor(drive), "day": days[*day], "place": day, "per_day": per_day })
             }
             Self::Load { day, mass } => {
@@ -144,9 +167,16 @@ struct Motion {
     columns: Vec<[[Vec<f64>; 2]; 4]>,
 }
 
-/// Makes a fleet in a folder: a model file, Parquet by robot, day and recording, and the truth.
-pub(crate) fn generate(folder: &Path, size: &Size) -> Result<Value, Fault> {
-    if size.robots == 0 || size.days < 6 || size.per_day == 0 || !(size.seconds >= 5.0) || !(size.rate >= 20.0) {
+/// Makes a fleet in a folder: a model file, Parquet by robot, day and recording, and the truth, which comes back too.
+///
+/// Fails where the size makes no fleet, or the folder cannot be written to.
+pub fn generate(folder: &Path, size: &Size) -> Result<Value, Fault> {
+    if size.robots == 0
+        || size.days < 6
+        || size.per_day == 0
+        || !(size.seconds >= 5.0)
+        || !(size.rate >= 20.0)
+    {
         return Err(Fault::new(
             "a fleet has one robot or more, six days or more, one recording a day or more, each of 5 s or more at 20 Hz or more",
         ));
@@ -163,26 +193,32 @@ pub(crate) fn generate(folder: &Path, size: &Size) -> Result<Value, Fault> {
         .map(|r| (format!("R{r:05}"), planted(size, r)))
         .collect();
     let bad = bad_recordings(size);
-    robots.par_iter().enumerate().try_for_each(|(r, (name, planted))| {
-        let robot = robot(size, r);
-        for day in 0..size.days {
-            for k in 0..size.per_day {
-                let path = data
-                    .join(format!("robot={name}"))
-                    .join(format!("day={}", days[day]))
-                    .join(format!("recording={k}"));
-                fs::create_dir_all(&path).map_err(|error| unwritten(&path, &error))?;
-                let path = path.join("data.parquet");
-                record(&path, size, &motions, &robot, planted, (r, day, k))?;
-                if bad.contains(&(r, day, k)) {
-                    spoil(&path)?;
+    robots
+        .par_iter()
+        .enumerate()
+        .try_for_each(|(r, (name, planted))| {
+            let robot = robot(size, r);
+            for day in 0..size.days {
+                for k in 0..size.per_day {
+                    let path = data
+                        .join(format!("robot={name}"))
+                        .join(format!("day={}", days[day]))
+                        .join(format!("recording={k}"));
+                    fs::create_dir_all(&path).map_err(|error| unwritten(&path, &error))?;
+                    let path = path.join("data.parquet");
+                    record(&path, size, &motions, &robot, planted, (r, day, k))?;
+                    if bad.contains(&(r, day, k)) {
+                        spoil(&path)?;
+                    }
                 }
             }
-        }
-        Ok::<_, Fault>(())
-    })?;
+            Ok::<_, Fault>(())
+        })?;
     let bad = bad.iter().map(|(r, day, k)| {
-        format!("robot={}/day={}/recording={k}/data.parquet", robots[*r].0, days[*day])
+        format!(
+            "robot={}/day={}/recording={k}/data.parquet",
+            robots[*r].0, days[*day]
+        )
     });
     let truth = json!({
         "seed": size.seed,
@@ -270,7 +306,9 @@ fn motion(size: &Size, k: usize) -> Result<Motion, Fault> {
     let mut one = Motion {
         q: [Vec::with_capacity(n), Vec::with_capacity(n)],
         qd: [Vec::with_capacity(n), Vec::with_capacity(n)],
-        columns: (0..LINKS.len()).map(|_| std::array::from_fn(|_| [Vec::new(), Vec::new()])).collect(),
+        columns: (0..LINKS.len())
+            .map(|_| std::array::from_fn(|_| [Vec::new(), Vec::new()]))
+            .collect(),
     };
     for body in &mut rig.bodies {
         set(body, [0.0; 4]);
@@ -296,7 +334,10 @@ fn motion(size: &Size, k: usize) -> Result<Motion, Fault> {
             let with_y = of([1.0, 0.0, 1.0, 1.0])?;
             for d in 0..2 {
                 let base = zz[d] + m[d];
-                for (number, force) in [zz[d], with_x[d] - base, with_y[d] - base, m[d]].into_iter().enumerate() {
+                for (number, force) in [zz[d], with_x[d] - base, with_y[d] - base, m[d]]
+                    .into_iter()
+                    .enumerate()
+                {
                     one.columns[link][number][d].push(force);
                 }
             }
@@ -308,7 +349,11 @@ fn motion(size: &Size, k: usize) -> Result<Motion, Fault> {
 /// Gives a body of the rig the numbers ZZ, MX, MY and M about its joint.
 fn set(body: &mut Body, [zz, mx, my, m]: [f64; 4]) {
     body.mass = m;
-    body.centre = if m == 0.0 { Vector3::zeros() } else { Vector3::new(mx / m, my / m, 0.0) };
+    body.centre = if m == 0.0 {
+        Vector3::zeros()
+    } else {
+        Vector3::new(mx / m, my / m, 0.0)
+    };
     let about_centre = zz - m * body.centre.norm_squared();
     body.inertia = Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, about_centre));
 }
@@ -347,10 +392,19 @@ fn planted(size: &Size, r: usize) -> Planted {
     let much = noise.uniform();
     // Small fleets have one of each as well.
     match r % 100 {
-        7 | 38 | 71 => Planted::Wear { drive, day, per_day: 0.08 + 0.10 * much },
-        3 | 45 | 82 => Planted::Load { day, mass: 0.15 + 0.25 * much },
+        7 | 38 | 71 => Planted::Wear {
+            drive,
+            day,
+            per_day: 0.08 + 0.10 * much,
+        },
+        3 | 45 | 82 => Planted::Load {
+            day,
+            mass: 0.15 + 0.25 * much,
+        },
         5 | 60 => Planted::Dead { drive, day },
-        9 => Planted::Odd { mass: 0.25 + 0.2 * much },
+        9 => Planted::Odd {
+            mass: 0.25 + 0.2 * much,
+        },
         _ => Planted::Nothing,
     }
 }
@@ -383,7 +437,8 @@ fn record(
     planted: &Planted,
     (r, day, k): (usize, usize, usize),
 ) -> Result<(), Fault> {
-    let seed = size.seed ^ ((r as u64) << 24 | (day as u64) << 8 | k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let seed = size.seed
+        ^ ((r as u64) << 24 | (day as u64) << 8 | k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     let mut noise = Noise::new(seed, 3);
     let motion = &motions[((noise.uniform() * MOTIONS as f64) as usize).min(MOTIONS - 1)];
     let n = motion.q[0].len();
@@ -394,7 +449,11 @@ fn record(
     let mut dead = None;
     let mut load = 0.0;
     match planted {
-        Planted::Wear { drive, day: from, per_day } if day >= *from => {
+        Planted::Wear {
+            drive,
+            day: from,
+            per_day,
+        } if day >= *from => {
             let grown = 1.0 + per_day * (day - from + 1) as f64;
             dry[*drive] *= grown;
             viscous[*drive] *= grown;
@@ -451,7 +510,12 @@ fn sign(x: f64) -> f64 {
 }
 
 /// The columns as Parquet.
-fn store(path: &Path, time: &[f64], positions: &[Vec<f64>; 2], torques: &[Vec<f32>; 2]) -> Result<(), Fault> {
+fn store(
+    path: &Path,
+    time: &[f64],
+    positions: &[Vec<f64>; 2],
+    torques: &[Vec<f32>; 2],
+) -> Result<(), Fault> {
     let fault = |error: &dyn std::fmt::Display| unwritten(path, error);
     let column = |name: &str, kind: Physical| {
         Type::primitive_type_builder(name, kind)
@@ -469,7 +533,11 @@ fn store(path: &Path, time: &[f64], positions: &[Vec<f64>; 2], torques: &[Vec<f3
     .into_iter()
     .map(|(name, kind)| column(name, kind))
     .collect();
-    let schema = fields.and_then(|fields| Type::group_type_builder("recording").with_fields(fields).build());
+    let schema = fields.and_then(|fields| {
+        Type::group_type_builder("recording")
+            .with_fields(fields)
+            .build()
+    });
     let schema = Arc::new(schema.map_err(|error| fault(&error))?);
     let properties = WriterProperties::builder()
         .set_compression(Compression::UNCOMPRESSED)
@@ -477,17 +545,22 @@ fn store(path: &Path, time: &[f64], positions: &[Vec<f64>; 2], torques: &[Vec<f3
         .build();
     let file = fs::File::create(path).map_err(|error| fault(&error))?;
     let written = (|| {
-        let mut writer = SerializedFileWriter::new(BufWriter::new(file), schema, Arc::new(properties))?;
+        let mut writer =
+            SerializedFileWriter::new(BufWriter::new(file), schema, Arc::new(properties))?;
         let mut group = writer.next_row_group()?;
         for values in [time, &positions[0], &positions[1]] {
             if let Some(mut column) = group.next_column()? {
-                column.typed::<DoubleType>().write_batch(values, None, None)?;
+                column
+                    .typed::<DoubleType>()
+                    .write_batch(values, None, None)?;
                 column.close()?;
             }
         }
         for values in torques {
             if let Some(mut column) = group.next_column()? {
-                column.typed::<FloatType>().write_batch(values, None, None)?;
+                column
+                    .typed::<FloatType>()
+                    .write_batch(values, None, None)?;
                 column.close()?;
             }
         }
@@ -497,7 +570,6 @@ fn store(path: &Path, time: &[f64], positions: &[Vec<f64>; 2], torques: &[Vec<f3
     written.map_err(|error: parquet::errors::ParquetError| fault(&error))
 }
 
-/// Names of the robots and what was planted in them stand in the truth, which scoring reads.
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -537,12 +609,19 @@ mod tests {
                 .flat_map(|(numbers, columns)| numbers.iter().zip(columns))
                 .map(|(number, column)| number * column[d][i])
                 .sum();
-            assert!((sum - expected[d]).abs() < 0.02 * expected[d].abs().max(1.0), "{sum} is not {}", expected[d]);
+            assert!(
+                (sum - expected[d]).abs() < 0.02 * expected[d].abs().max(1.0),
+                "{sum} is not {}",
+                expected[d]
+            );
         }
     }
 
     #[test]
     fn days_follow_each_other() {
-        assert_eq!([date(0), date(30), date(31), date(61)], ["2026-03-01", "2026-03-31", "2026-04-01", "2026-05-01"]);
+        assert_eq!(
+            [date(0), date(30), date(31), date(61)],
+            ["2026-03-01", "2026-03-31", "2026-04-01", "2026-05-01"]
+        );
     }
 }

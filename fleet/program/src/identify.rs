@@ -21,12 +21,17 @@ use crate::state::State;
 const REFERENCE: usize = 8;
 
 /// What is asked.
-pub(crate) struct Asked<'a> {
-    pub(crate) model: &'a Path,
-    pub(crate) recordings: &'a Path,
-    pub(crate) out: &'a Path,
-    pub(crate) plan: Option<&'a Path>,
-    pub(crate) reading: &'a Reading,
+pub struct Asked<'a> {
+    /// The model file.
+    pub model: &'a Path,
+    /// The folder of recordings.
+    pub recordings: &'a Path,
+    /// Where states, results and page go.
+    pub out: &'a Path,
+    /// The plan; made from recordings of several robots where there is none.
+    pub plan: Option<&'a Path>,
+    /// How recordings are read, where no plan says it.
+    pub reading: &'a Reading,
 }
 
 /// What was found.
@@ -41,19 +46,29 @@ pub(crate) struct Found {
 
 impl Found {
     pub(crate) fn bad(&self) -> impl Iterator<Item = &modelmill_fleet::Bad> {
-        self.robots.iter().flat_map(|robot| robot.days.iter().flat_map(|day| &day.bad))
+        self.robots
+            .iter()
+            .flat_map(|robot| robot.days.iter().flat_map(|day| &day.bad))
     }
 }
 
 /// Identifies a fleet; the result is what is said in the end.
-pub(crate) fn identify(asked: &Asked<'_>) -> Result<String, Fault> {
+///
+/// Fails where the folder holds no recordings, the model has no meaning, or results cannot be written.
+pub fn identify(asked: &Asked<'_>) -> Result<String, Fault> {
     let begin = Instant::now();
     let robots = folder::robots(asked.recordings)?;
     let states = asked.out.join("state");
     fs::create_dir_all(&states).map_err(|error| {
-        Fault::new(format!("{} cannot be made: {error}; choose another place", states.display()))
+        Fault::new(format!(
+            "{} cannot be made: {error}; choose another place",
+            states.display()
+        ))
     })?;
-    let plan = plan(asked, &robots.values().map(Vec::as_slice).collect::<Vec<_>>())?;
+    let plan = plan(
+        asked,
+        &robots.values().map(Vec::as_slice).collect::<Vec<_>>(),
+    )?;
     let ground = plan.ground()?;
     let total: usize = robots.values().map(Vec::len).sum();
     let [done, kept_ones] = [AtomicUsize::new(0), AtomicUsize::new(0)];
@@ -89,7 +104,10 @@ pub(crate) fn identify(asked: &Asked<'_>) -> Result<String, Fault> {
         recordings: total,
         samples,
     };
-    folder::write(&asked.out.join("results.json"), format!("{}\n", json(&found)).as_bytes())?;
+    folder::write(
+        &asked.out.join("results.json"),
+        format!("{}\n", json(&found)).as_bytes(),
+    )?;
     folder::write(&asked.out.join("fleet.html"), page::page(&found).as_bytes())?;
     let kept = kept_ones.into_inner();
     let seconds = (summed - planned).as_secs_f64();
@@ -101,7 +119,11 @@ pub(crate) fn identify(asked: &Asked<'_>) -> Result<String, Fault> {
         total,
         kept,
         found.samples as f64,
-        if kept < total { format!(", {rate:.3e} samples a second") } else { String::new() },
+        if kept < total {
+            format!(", {rate:.3e} samples a second")
+        } else {
+            String::new()
+        },
         begin.elapsed().as_secs_f64(),
         most_memory(),
         asked.out.join("results.json").display(),
@@ -111,8 +133,16 @@ pub(crate) fn identify(asked: &Asked<'_>) -> Result<String, Fault> {
 
 /// In one sentence.
 pub(crate) fn says(found: &Found) -> String {
-    let changed = found.robots.iter().filter(|robot| !robot.since.is_empty()).count();
-    let dead = found.robots.iter().filter(|robot| !robot.dead.is_empty()).count();
+    let changed = found
+        .robots
+        .iter()
+        .filter(|robot| !robot.since.is_empty())
+        .count();
+    let dead = found
+        .robots
+        .iter()
+        .filter(|robot| !robot.dead.is_empty())
+        .count();
     format!(
         "{} robots: {changed} changed on some day, {dead} lost a sensor, {} differ from the others; {} recordings gave no answer",
         found.robots.len(),
@@ -125,7 +155,10 @@ pub(crate) fn says(found: &Found) -> String {
 fn most_memory() -> String {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    line.map_or_else(|| "an unknown part".to_owned(), |most| most.trim().to_owned())
+    line.map_or_else(
+        || "an unknown part".to_owned(),
+        |most| most.trim().to_owned(),
+    )
 }
 
 /// The plan of the folder: the one that is given, the one that is there, or a new one.
@@ -133,11 +166,19 @@ fn plan(asked: &Asked<'_>, robots: &[&[File]]) -> Result<Plan, Fault> {
     let there = asked.out.join("plan.json");
     let path = asked.plan.unwrap_or(&there);
     if asked.plan.is_some() || path.exists() {
-        let text = fs::read_to_string(path)
-            .map_err(|error| Fault::new(format!("{} cannot be read: {error}; name a plan that is there", path.display())))?;
+        let text = fs::read_to_string(path).map_err(|error| {
+            Fault::new(format!(
+                "{} cannot be read: {error}; name a plan that is there",
+                path.display()
+            ))
+        })?;
         let plan = Plan::parse(&path.display().to_string(), &text)?;
-        let model = fs::read_to_string(asked.model)
-            .map_err(|error| Fault::new(format!("{} cannot be read: {error}; name the model file", asked.model.display())))?;
+        let model = fs::read_to_string(asked.model).map_err(|error| {
+            Fault::new(format!(
+                "{} cannot be read: {error}; name the model file",
+                asked.model.display()
+            ))
+        })?;
         if plan.files.first().is_none_or(|(_, text)| *text != model) {
             return Err(Fault::new(format!(
                 "{} is of another model than {}: what was summed up by it does not fit; choose another folder with `--out`, or \
@@ -200,9 +241,9 @@ fn days(
 fn json(found: &Found) -> Value {
     let ground = &found.ground;
     let parameters = ground.parameters();
-    let parameters = parameters.iter().map(|info| {
-        json!({ "name": info.name, "expression": info.expression, "unit": info.unit })
-    });
+    let parameters = parameters
+        .iter()
+        .map(|info| json!({ "name": info.name, "expression": info.expression, "unit": info.unit }));
     json!({
         "version": 1,
         "model": ground.plan().model,

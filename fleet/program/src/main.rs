@@ -3,19 +3,13 @@
 //! `make` makes a fleet with a truth, `plan` settles how recordings are summed up, `identify` sums them up and says what every
 //! robot is and what changed, and `score` holds that against a truth.
 
-
-mod generate;
-mod identify;
-mod page;
-mod score;
-mod state;
-
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use modelmill::recording::{Preparation, Reading};
 use modelmill_fleet::{Fault, folder};
+use modelmill_fleet_program::{generate, identify, score};
 
 /// Recordings of many machines of one kind: parameters per robot and day, what changed and when, and who differs.
 #[derive(Parser)]
@@ -90,7 +84,9 @@ impl ReadingArgs {
     fn reading(&self) -> Result<Reading, Fault> {
         let columns = self.map.iter().map(|text| {
             let (ours, theirs) = text.split_once('=').ok_or_else(|| {
-                Fault::new(format!("`--map {text}` names no column; write it as `--map q1=pos_left`"))
+                Fault::new(format!(
+                    "`--map {text}` names no column; write it as `--map q1=pos_left`"
+                ))
             })?;
             Ok((ours.to_owned(), theirs.to_owned()))
         });
@@ -182,20 +178,26 @@ fn run(command: Command) -> Result<String, Fault> {
             ))
         }
         Command::Plan(args) => {
-            let reference: Vec<&std::path::Path> = args.reference.iter().map(PathBuf::as_path).collect();
-            let plan = modelmill_fleet::Plan::make(&args.model, &args.reading.reading()?, &reference)?;
+            let reference: Vec<&std::path::Path> =
+                args.reference.iter().map(PathBuf::as_path).collect();
+            let plan =
+                modelmill_fleet::Plan::make(&args.model, &args.reading.reading()?, &reference)?;
             folder::write(&args.out, plan.json().as_bytes())?;
             Ok(format!(
                 "{} from {} reference recordings: cut-off {} Hz, one in {} samples kept\n",
                 args.out.display(),
                 plan.reference.recordings.len(),
-                plan.preparation.cutoff_hz.map_or("none".to_owned(), |hz| format!("{hz:.3}")),
+                plan.preparation
+                    .cutoff_hz
+                    .map_or("none".to_owned(), |hz| format!("{hz:.3}")),
                 plan.preparation.decimate
             ))
         }
         Command::Identify(args) => {
             if let Some(threads) = args.threads {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+                let pool = rayon::ThreadPoolBuilder::new()
+                    .num_threads(threads)
+                    .build_global();
                 pool.map_err(Fault::new)?;
             }
             identify::identify(&identify::Asked {

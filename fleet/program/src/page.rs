@@ -19,16 +19,27 @@ pub(crate) fn page(found: &Found) -> String {
     let mut page = begin_page(&title);
     let is_quiet = found.outliers.found.is_empty() && found.robots.iter().all(Robot::is_quiet);
     let class = if is_quiet { "adequate" } else { "missing" };
-    let _ = writeln!(page, "<p class=\"verdict {class}\">{}.</p>", escape(&says(found)));
+    let _ = writeln!(
+        page,
+        "<p class=\"verdict {class}\">{}.</p>",
+        escape(&says(found))
+    );
     let sections = [
         ("changed", "Robots that changed", changed(found)),
-        ("differ", "Robots that differ from the others", differ(found)),
+        (
+            "differ",
+            "Robots that differ from the others",
+            differ(found),
+        ),
         ("sensors", "Sensors that died", sensors(found)),
         ("usual", "What is usual in this fleet", usual(found)),
         ("bad", "Recordings that gave no answer", bad(found)),
     ];
     for (id, title, html) in sections {
-        let _ = write!(page, "<section id=\"fleet-{id}\">\n<h2>{title}</h2>\n{html}</section>\n");
+        let _ = write!(
+            page,
+            "<section id=\"fleet-{id}\">\n<h2>{title}</h2>\n{html}</section>\n"
+        );
     }
     page.push_str(&end_page(&scripts().collect::<Vec<_>>()));
     page
@@ -42,7 +53,11 @@ fn said(changes: &[Changed]) -> String {
     for one in changes {
         let _ = write!(html, "<li>{}", escape(&one.says));
         if !one.rivals.is_empty() {
-            let _ = write!(html, "<br><small>not told from: {}</small>", escape(&one.rivals.join("; ")));
+            let _ = write!(
+                html,
+                "<br><small>not told from: {}</small>",
+                escape(&one.rivals.join("; "))
+            );
         }
         html.push_str("</li>\n");
     }
@@ -60,7 +75,11 @@ fn clear(robot: &Robot) -> f64 {
 }
 
 fn changed(found: &Found) -> String {
-    let mut robots: Vec<&Robot> = found.robots.iter().filter(|robot| !robot.since.is_empty()).collect();
+    let mut robots: Vec<&Robot> = found
+        .robots
+        .iter()
+        .filter(|robot| !robot.since.is_empty())
+        .collect();
     if robots.is_empty() {
         return "<p>No robot changed and stayed changed.</p>\n".to_owned();
     }
@@ -73,15 +92,27 @@ fn changed(found: &Found) -> String {
             let grows = match (since.per_day, since.steps.first()) {
                 (Some(per_day), Some(step)) => {
                     let info = &infos[step.parameter];
-                    format!(", {} growing by {} {} a day", info.expression, significant(per_day, 2), info.unit)
+                    format!(
+                        ", {} growing by {} {} a day",
+                        info.expression,
+                        significant(per_day, 2),
+                        info.unit
+                    )
                 }
                 _ => String::new(),
             };
-            let _ = writeln!(html, "<p>From <b>{}</b> on{}:</p>", escape(&robot.days[since.day].name), escape(&grows));
+            let _ = writeln!(
+                html,
+                "<p>From <b>{}</b> on{}:</p>",
+                escape(&robot.days[since.day].name),
+                escape(&grows)
+            );
             html.push_str(&said(&since.changes));
         }
         // The clearest parameter says it in one picture.
-        let Some(step) = robot.since.first().and_then(|since| since.steps.first()) else { continue };
+        let Some(step) = robot.since.first().and_then(|since| since.steps.first()) else {
+            continue;
+        };
         let k = step.parameter;
         let known: Vec<(usize, [f64; 2])> = (robot.days.iter().enumerate())
             .filter_map(|(at, day)| {
@@ -95,19 +126,37 @@ fn changed(found: &Found) -> String {
                 Some((since.day, [own.before.value, own.now.value]))
             })
             .collect();
-        html.push_str(&over_runs(&infos[k], "day", robot.days.len(), &known, &steps));
+        html.push_str(&over_runs(
+            &infos[k],
+            "day",
+            robot.days.len(),
+            &known,
+            &steps,
+        ));
     }
     if robots.len() > SHOWN {
-        let _ = writeln!(html, "<p>And {} more, which stand in <code>results.json</code>:</p>", robots.len() - SHOWN);
+        let _ = writeln!(
+            html,
+            "<p>And {} more, which stand in <code>results.json</code>:</p>",
+            robots.len() - SHOWN
+        );
         let rows: Vec<Vec<Cell>> = robots[SHOWN..]
             .iter()
             .flat_map(|robot| {
                 robot.since.iter().map(|since| {
-                    vec![Cell::text(&robot.name), Cell::text(&robot.days[since.day].name), Cell::html(said(&since.changes))]
+                    vec![
+                        Cell::text(&robot.name),
+                        Cell::text(&robot.days[since.day].name),
+                        Cell::html(said(&since.changes)),
+                    ]
                 })
             })
             .collect();
-        html.push_str(&table("changes", &["robot", "from", "what is different"], &rows));
+        html.push_str(&table(
+            "changes",
+            &["robot", "from", "what is different"],
+            &rows,
+        ));
     }
     html
 }
@@ -118,7 +167,10 @@ fn differ(found: &Found) -> String {
     }
     let rows: Vec<Vec<Cell>> = (found.outliers.found.iter())
         .map(|one| {
-            let apart = found.outliers.apart[one.which].iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
+            let apart = found.outliers.apart[one.which]
+                .iter()
+                .flatten()
+                .fold(0.0_f64, |most, x| most.max(x.abs()));
             vec![
                 Cell::text(&found.robots[one.which].name),
                 Cell::html(said(&one.changes)),
@@ -126,7 +178,11 @@ fn differ(found: &Found) -> String {
             ]
         })
         .collect();
-    let head = ["robot", "what is different from the others", "#parameter farthest from the median, deviations"];
+    let head = [
+        "robot",
+        "what is different from the others",
+        "#parameter farthest from the median, deviations",
+    ];
     table("changes", &head, &rows)
 }
 
@@ -139,7 +195,10 @@ fn sensors(found: &Found) -> String {
                     Cell::text(&dead.of),
                     Cell::text(&robot.days[dead.day].name),
                     Cell::number(&dead.days.to_string(), dead.days as f64),
-                    Cell::number(&format!("{:.0} %", 100.0 * dead.first.still), dead.first.still),
+                    Cell::number(
+                        &format!("{:.0} %", 100.0 * dead.first.still),
+                        dead.first.still,
+                    ),
                     Cell::text(&dead.first.recording),
                 ]
             })
@@ -148,7 +207,14 @@ fn sensors(found: &Found) -> String {
     if rows.is_empty() {
         return "<p>All sensors move while their machines do.</p>\n".to_owned();
     }
-    let head = ["robot", "sensor", "from", "#days", "#stood still for", "first recording"];
+    let head = [
+        "robot",
+        "sensor",
+        "from",
+        "#days",
+        "#stood still for",
+        "first recording",
+    ];
     table("sensors", &head, &rows)
 }
 
@@ -163,11 +229,20 @@ fn usual(found: &Found) -> String {
                 Cell::number(&significant(usual.value, 5), usual.value),
                 Cell::number(&significant(spread, 2), spread),
                 Cell::text(&info.unit),
-                Cell::html(format!("<code class=\"expression\">{}</code>", escape(&info.expression))),
+                Cell::html(format!(
+                    "<code class=\"expression\">{}</code>",
+                    escape(&info.expression)
+                )),
             ])
         })
         .collect();
-    let head = ["parameter", "#median", "#spread of the robots", "unit", "expression"];
+    let head = [
+        "parameter",
+        "#median",
+        "#spread of the robots",
+        "unit",
+        "expression",
+    ];
     format!(
         "<p>Of each robot the days before anything changed.</p>\n{}",
         table("parameters", &head, &rows)
@@ -175,8 +250,10 @@ fn usual(found: &Found) -> String {
 }
 
 fn bad(found: &Found) -> String {
-    let rows: Vec<Vec<Cell>> =
-        found.bad().map(|one| vec![Cell::text(&one.recording), Cell::text(&one.says)]).collect();
+    let rows: Vec<Vec<Cell>> = found
+        .bad()
+        .map(|one| vec![Cell::text(&one.recording), Cell::text(&one.says)])
+        .collect();
     if rows.is_empty() {
         return "<p>All gave one.</p>\n".to_owned();
     }

@@ -18,16 +18,31 @@ pub(crate) struct State {
 impl State {
     /// Opens the file of a robot, with the summaries that it holds by the keys of their recordings; those of another plan do not
     /// count.
-    pub(crate) fn open(folder: &Path, robot: &str, mark: u64) -> Result<(Self, HashMap<String, Summary>), Fault> {
+    pub(crate) fn open(
+        folder: &Path,
+        robot: &str,
+        mark: u64,
+    ) -> Result<(Self, HashMap<String, Summary>), Fault> {
         let name: String = robot
             .chars()
-            .map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' })
+            .map(|c| {
+                if c.is_alphanumeric() || "-_.".contains(c) {
+                    c
+                } else {
+                    '_'
+                }
+            })
             .collect();
         // Two names may become one; their numbers tell them apart.
-        let number = robot.bytes().fold(0_u32, |n, b| n.wrapping_mul(31).wrapping_add(u32::from(b)));
+        let number = robot
+            .bytes()
+            .fold(0_u32, |n, b| n.wrapping_mul(31).wrapping_add(u32::from(b)));
         let path = folder.join(format!("{name}-{number:08x}.sums"));
         let fault = |error: std::io::Error| {
-            Fault::new(format!("{} cannot be kept: {error}; choose another folder, or make room", path.display()))
+            Fault::new(format!(
+                "{} cannot be kept: {error}; choose another folder, or make room",
+                path.display()
+            ))
         };
         let bytes = match fs::read(&path) {
             Ok(bytes) => bytes,
@@ -42,7 +57,11 @@ impl State {
             }
             sound = end;
         }
-        let file = OpenOptions::new().create(true).append(true).open(&path).map_err(fault)?;
+        let file = OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(&path)
+            .map_err(fault)?;
         if sound < bytes.len() {
             file.set_len(sound as u64).map_err(fault)?;
         }
@@ -58,9 +77,15 @@ impl State {
             entry.extend_from_slice(&(part.len() as u64).to_le_bytes());
             entry.extend_from_slice(part);
         }
-        let mut file = self.file.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut file = self
+            .file
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
         file.write_all(&entry).map_err(|error| {
-            Fault::new(format!("{} cannot be kept: {error}; make room and start again: it goes on", self.path.display()))
+            Fault::new(format!(
+                "{} cannot be kept: {error}; make room and start again: it goes on",
+                self.path.display()
+            ))
         })
     }
 }

@@ -46,7 +46,10 @@ impl Triangle {
         let mut whole = vec![0.0; width * width];
         let mut next = entries.iter();
         for i in 0..width {
-            for (x, entry) in whole[i * width + i..(i + 1) * width].iter_mut().zip(next.by_ref()) {
+            for (x, entry) in whole[i * width + i..(i + 1) * width]
+                .iter_mut()
+                .zip(next.by_ref())
+            {
                 *x = *entry;
             }
         }
@@ -78,7 +81,10 @@ impl Triangle {
             });
         }
         let mut regression = LeastSquares::new(self.n);
-        for row in [self, other].iter().flat_map(|one| one.entries.chunks_exact(self.n + 1)) {
+        for row in [self, other]
+            .iter()
+            .flat_map(|one| one.entries.chunks_exact(self.n + 1))
+        {
             regression.add_rows(&row[..self.n], &row[self.n..])?;
         }
         Ok(Self {

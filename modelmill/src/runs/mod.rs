@@ -33,8 +33,8 @@ use layout::Layout;
 use payload::Payloads;
 pub use per_run::{KnownLoad, PerRun, SharedFit, Valued};
 pub use points::{ChangePoint, Step};
-pub use sums::{CommonGround, RunSums};
 use rows::{Rows, Sizes, White};
+pub use sums::{CommonGround, RunSums};
 
 /// A difference of a base parameter counts as moved from this many standard deviations on.
 const MOVED: f64 = 4.0;

@@ -182,10 +182,14 @@ impl<'a> Rows<'a> {
                         white.blocks[block.min(BLOCKS - 1)].merge(&sums);
                         white.drives[drive].merge(&sums);
                         let z = z[..layout.base].iter();
-                        let z: Vec<&[f64]> =
-                            z.map(|column| column.unwrap_or(&zeros[..y.len()])).collect();
+                        let z: Vec<&[f64]> = z
+                            .map(|column| column.unwrap_or(&zeros[..y.len()]))
+                            .collect();
                         white.base.add_columns(drive, &z, y).map_err(|error| {
-                            Error::input(format!("the rows of {}: {error}", drive_name(self.model, drive)))
+                            Error::input(format!(
+                                "the rows of {}: {error}",
+                                drive_name(self.model, drive)
+                            ))
                         })
                     })?;
                 }

@@ -193,7 +193,9 @@ impl CommonGround {
         self.bench()
             .possible
             .get(which)
-            .map_or_else(String::new, |possible| changes::name(&self.model, &possible.kind))
+            .map_or_else(String::new, |possible| {
+                changes::name(&self.model, &possible.kind)
+            })
     }
 }
 
