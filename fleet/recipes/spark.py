@@ -1,4 +1,9 @@
-"""A fleet through Spark Connect: one recording a group for summaries, one robot and day a group for parameters."""
+"""A fleet through Spark Connect: one recording a group for summaries, one robot and day a group for parameters.
+
+    python spark.py sc://HOST:PORT FOLDER plan.json out.csv
+
+The folder has partitions `robot=`, `day=` and `recording=`. Workers need the wheel; tried with pysail 0.7.2 and pyspark 4.0.
+"""
 
 import sys
 

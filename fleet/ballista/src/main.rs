@@ -9,6 +9,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use ballista::prelude::SessionContextExt;
+use ballista_core::config::TaskSchedulingPolicy;
 use ballista_core::extension::SessionConfigExt;
 use ballista_core::registry::BallistaFunctionRegistry;
 use ballista_core::utils::default_session_builder;
@@ -46,7 +47,7 @@ enum Command {
         /// Its port.
         #[arg(long, default_value_t = 50050)]
         port: u16,
-        /// An executor that is not heard of for so long is taken for dead, s.
+        /// An executor that is not heard of for so long is taken for dead, s; one that works is heard of every five.
         #[arg(long, default_value_t = 20)]
         timeout: u64,
     },
@@ -96,11 +97,6 @@ fn main() -> ExitCode {
             return ExitCode::from(status);
         }
     };
-    let told = tracing_subscriber::EnvFilter::from_default_env();
-    tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
-        .with_env_filter(told)
-        .init();
     // Plans are deep, and planners recurse.
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
@@ -165,7 +161,7 @@ async fn run(cli: Cli) -> Result<(), Fault> {
                 scheduler_connect_timeout_seconds: 30,
                 vcores: tasks,
                 work_dir: work.map(|path| path.display().to_string()),
-                executor_heartbeat_interval_seconds: 2,
+                task_scheduling_policy: TaskSchedulingPolicy::PullStaged,
                 grpc_max_decoding_message_size: longest,
                 grpc_max_encoding_message_size: longest,
                 override_function_registry: Some(Arc::new(registry)),
@@ -200,6 +196,8 @@ async fn scheduler(ground: &Arc<Ground>, host: &str, port: u16, timeout: u64) ->
         bind_host: host.to_owned(),
         external_host: host.to_owned(),
         bind_port: port,
+        // Executors ask for work, and whoever asks is alive: tasks of one that asks no more go to the others.
+        scheduling_policy: TaskSchedulingPolicy::PullStaged,
         executor_timeout_seconds: timeout,
         expire_dead_executor_interval_seconds: (timeout / 4).max(1),
         grpc_server_max_decoding_message_size: LONGEST_MESSAGE,
