@@ -103,7 +103,7 @@ impl Summary {
         (squares / (self.samples as f64).max(1.0)).sqrt()
     }
 
-    /// The summary as bytes, which [`Summary::of_bytes`] reads back exactly.
+    /// The summary as bytes; what [`Summary::of_bytes`] reads of them has the same bytes again.
     pub fn bytes(&self) -> Vec<u8> {
         let mut to = Writer::default();
         to.bytes(BEGIN);

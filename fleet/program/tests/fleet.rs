@@ -160,7 +160,9 @@ fn summaries_add_in_any_order_and_samples_come_in_any() {
     near(&whole, &sum(&mut parts.iter().rev()), &ground);
     // As bytes, which are told apart from bytes that were changed.
     let bytes = whole.bytes();
-    assert_eq!(Summary::of_bytes(&bytes).expect("a summary"), whole);
+    let again = Summary::of_bytes(&bytes).expect("a summary");
+    assert_eq!(again.bytes(), bytes);
+    near(&again, &whole, &ground);
     for broken in [&bytes[..bytes.len() - 3], &bytes[1..], &[][..]] {
         assert!(Summary::of_bytes(broken).is_err());
     }
@@ -201,7 +203,7 @@ fn recordings_that_give_no_answer_are_named() {
         ("dead", dead, "q1 stands still"),
         ("missing", missing, "motor_left"),
         ("ragged", ragged, "q3"),
-        ("none", Vec::new(), "`t`"),
+        ("none", Vec::new(), "no sample"),
     ] {
         let summary = ground.summarise(name, columns);
         assert_eq!((summary.recordings, summary.bad.len()), (0, 1));
