@@ -123,7 +123,9 @@ impl FleetGround {
     /// The days of a robot in order, each with its summary, as JSON.
     fn robot(&self, py: Python<'_>, name: &str, days: Vec<(String, Vec<u8>)>) -> PyResult<String> {
         let found = py.detach(|| {
-            let days = days.iter().map(|(day, bytes)| Ok((day.clone(), Summary::of_bytes(bytes)?)));
+            let days = days
+                .iter()
+                .map(|(day, bytes)| Ok((day.clone(), Summary::of_bytes(bytes)?)));
             let days = days.collect::<Result<Vec<_>, Fault>>()?;
             let robot = modelmill_fleet::robot::robot(&self.ground, name, days)?;
             Ok(robot.json(&self.ground).to_string())
