@@ -3,6 +3,7 @@
 
 mod arrays;
 mod errors;
+mod fleet;
 mod model;
 mod options;
 mod results;
@@ -15,6 +16,8 @@ use pyo3::prelude::*;
 /// The compiled part of `modelmill`.
 #[pymodule]
 mod _core {
+    #[pymodule_export]
+    use crate::fleet::{FleetGround, fleet_merge, fleet_plan};
     #[pymodule_export]
     use crate::model::{CoreModel, contents, import_text, kinds, load, load_text};
     #[pymodule_export]

@@ -44,6 +44,7 @@ pub use kinematics::{Motion, PoseError, State, Tracker};
 pub use load::{Loaded, fault, load, load_file, load_file_with, parse, span};
 pub use log::Log;
 pub use modelmill_spec::Failure;
+pub use noise::Noise;
 pub use pair::{Anchor, Pair};
 pub use plant::{Plant, PlantError};
 pub use pose::{BodyMotion, Pose};

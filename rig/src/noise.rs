@@ -2,11 +2,11 @@
 
 /// A stream of random numbers.
 #[derive(Clone, Debug)]
-pub(crate) struct Noise(u64);
+pub struct Noise(u64);
 
 impl Noise {
     /// The stream `channel` of a seed; channels of one seed are independent of each other.
-    pub(crate) fn new(seed: u64, channel: u64) -> Self {
+    pub fn new(seed: u64, channel: u64) -> Self {
         let mut mixed = Self(seed ^ 0x6D6F_6465_6C6D_696C);
         let start = mixed.bits() ^ channel.wrapping_mul(0xD134_2543_DE82_EF95);
         let mut stream = Self(start);
@@ -24,12 +24,12 @@ impl Noise {
     }
 
     /// Uniform in `(0, 1]`.
-    fn uniform(&mut self) -> f64 {
+    pub fn uniform(&mut self) -> f64 {
         ((self.bits() >> 11) as f64 + 1.0) / (1_u64 << 53) as f64
     }
 
     /// Normal with mean zero and deviation one (G. Box, M. Muller 1958).
-    pub(crate) fn normal(&mut self) -> f64 {
+    pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * libm::log(self.uniform())).sqrt();
         radius * libm::cos(2.0 * std::f64::consts::PI * self.uniform())
     }

@@ -31,7 +31,7 @@ pub struct Channel {
 
 impl Channel {
     /// Reads a value.
-    pub(crate) fn read(&self, value: f64, noise: &mut Noise) -> f64 {
+    pub fn read(&self, value: f64, noise: &mut Noise) -> f64 {
         let mut reading = value;
         if self.noise > 0.0 {
             reading += self.noise * noise.normal();

@@ -24,5 +24,5 @@ mod segments;
 pub use coloured::Coloured;
 pub use joint::{Joint, Part, Values, joint};
 pub use moments::{Moments, Solved};
-pub use search::{Candidate, Change, Runs, Search, search, within};
+pub use search::{Candidate, Change, Runs, Search, alone, gains, search, within};
 pub use segments::{Told, mean, segments};

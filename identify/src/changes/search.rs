@@ -97,6 +97,20 @@ pub fn search(runs: &Runs, search: &Search) -> Vec<Change> {
     found
 }
 
+/// By how much each change, with no other beside it, lowers the sum of squares, over the variance of what all of them leave; of
+/// many machines this says what is usual among them.
+pub fn gains(runs: &Runs, search: &Search) -> Vec<f64> {
+    let bench = Bench::new(runs, search);
+    (0..search.changes.len())
+        .map(|which| bench.gain(&[], which))
+        .collect()
+}
+
+/// One change with no other beside it, whatever it explains.
+pub fn alone(runs: &Runs, search: &Search, which: usize) -> Change {
+    Bench::new(runs, search).change(&[which], which)
+}
+
 /// By what parts of one run differ among themselves: the largest sum of squares that a single change between parts of it explains,
 /// over the rows that a difference of its parts is worth. Noise makes it small; what a model lacks, and friction that drifts, make
 /// it large, and then the same must be expected between two runs.
@@ -326,6 +340,10 @@ impl<'a> Bench<'a> {
     }
 
     fn holds(&self, chosen: &[usize], further: usize) -> bool {
+        // Held-out blocks take the most time, and most candidates fail before.
+        if self.gain(chosen, further) <= self.least {
+            return false;
+        }
         let (gain, held_out) = self.gains(chosen, further);
         gain > self.least && held_out > HELD_OUT * gain
     }
@@ -417,6 +435,11 @@ mod tests {
             assert!((single.values[0] - 0.6).abs() < 5.0 * single.covariance[(0, 0)].sqrt());
             assert!(pair.determined[1] && single.determined[0]);
             assert!(single.held_out > 0.5 * single.gain && single.rivals.is_empty());
+            // Each by itself gains as much as it does beside the other: their columns have little in common.
+            let alone_gain = gains(&runs(seed, &[(5, 1.0), (6, 0.6)]), &possible());
+            assert!(alone_gain[0] < 0.1 * alone_gain[2] && alone_gain[2] < 1.5 * single.gain);
+            let one = alone(&runs(seed, &[(6, 0.6)]), &possible(), 2);
+            assert!((one.values[0] - 0.6).abs() < 5.0 * one.covariance[(0, 0)].sqrt());
         }
     }
 

@@ -25,6 +25,77 @@ impl Triangle {
         }
     }
 
+    /// The triangle of `n` parameters whose entries, from [`Triangle::entries`], were kept elsewhere, and from how many rows they
+    /// came, those of zeros left out.
+    /// Fails when there are not `(n + 1)(n + 2) / 2` entries or one is not finite.
+    pub fn from_entries(n: usize, rows: usize, entries: &[f64]) -> Result<Self, LeastSquaresError> {
+        let width = n + 1;
+        if entries.len() != width * (width + 1) / 2 {
+            return Err(LeastSquaresError::Shape {
+                regressor: entries.len(),
+                measured: width,
+                columns: n,
+            });
+        }
+        if let Some(at) = entries.iter().position(|x| !x.is_finite()) {
+            return Err(LeastSquaresError::NotFinite {
+                row: at,
+                column: None,
+            });
+        }
+        let mut whole = vec![0.0; width * width];
+        let mut next = entries.iter();
+        for i in 0..width {
+            for (x, entry) in whole[i * width + i..(i + 1) * width]
+                .iter_mut()
+                .zip(next.by_ref())
+            {
+                *x = *entry;
+            }
+        }
+        Ok(Self {
+            n,
+            rows: RowCount {
+                shown: rows,
+                telling: rows,
+            },
+            entries: whole,
+        })
+    }
+
+    /// The entries of the triangle `[R, Q'y; 0, +-|residual|]` by rows, without the zeros below its diagonal.
+    pub fn entries(&self) -> Vec<f64> {
+        let width = self.n + 1;
+        (0..width)
+            .flat_map(|i| &self.entries[i * width + i..(i + 1) * width])
+            .copied()
+            .collect()
+    }
+
+    /// The triangle of the rows of both. Fails when the numbers of parameters differ.
+    pub fn merged(&self, other: &Self) -> Result<Self, LeastSquaresError> {
+        if self.n != other.n {
+            return Err(LeastSquaresError::NominalLength {
+                have: other.n,
+                expected: self.n,
+            });
+        }
+        let mut regression = LeastSquares::new(self.n);
+        for row in [self, other]
+            .iter()
+            .flat_map(|one| one.entries.chunks_exact(self.n + 1))
+        {
+            regression.add_rows(&row[..self.n], &row[self.n..])?;
+        }
+        Ok(Self {
+            rows: RowCount {
+                shown: self.rows.shown + other.rows.shown,
+                telling: self.rows.telling + other.rows.telling,
+            },
+            ..Self::new(&regression)
+        })
+    }
+
     /// Number of parameters.
     pub fn n_parameters(&self) -> usize {
         self.n
@@ -98,5 +169,42 @@ impl Triangle {
             rows: self.rows,
             ..Self::new(&regression)
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_noise::Noise;
+
+    #[test]
+    fn triangles_that_were_kept_add_to_that_of_all_rows() {
+        let mut noise = Noise::new(8);
+        let (n, rows) = (4, 90);
+        let w: Vec<f64> = (0..n * rows).map(|_| noise.normal()).collect();
+        let y: Vec<f64> = (0..rows).map(|_| noise.normal()).collect();
+        let of = |from: usize, to: usize| {
+            let mut regression = LeastSquares::new(n);
+            regression
+                .add_rows(&w[from * n..to * n], &y[from..to])
+                .unwrap();
+            let triangle = Triangle::new(&regression);
+            Triangle::from_entries(n, triangle.rows(), &triangle.entries()).unwrap()
+        };
+        let [a, b, c] = [of(0, 20), of(20, 50), of(50, rows)];
+        let all = of(0, rows).solve_near(&[0.0; 4]).unwrap();
+        for merged in [
+            a.merged(&b).unwrap().merged(&c).unwrap(),
+            c.merged(&a).unwrap().merged(&b).unwrap(),
+        ] {
+            assert_eq!(merged.rows(), rows);
+            let solved = merged.solve_near(&[0.0; 4]).unwrap();
+            for k in 0..n {
+                assert!((solved.values[k] - all.values[k]).abs() < 1e-12);
+                assert!((solved.classical_std[k] - all.classical_std[k]).abs() < 1e-12);
+            }
+        }
+        assert!(Triangle::from_entries(3, rows, &a.entries()).is_err());
+        assert!(a.merged(&Triangle::new(&LeastSquares::new(3))).is_err());
     }
 }

@@ -57,6 +57,10 @@ pub struct Preparation {
     /// Whether cut-off, smoothing and decimation were chosen by what they leave of the forces rather than asked for.
     #[serde(skip)]
     pub chosen: bool,
+    /// Whether states are prepared without a look at whether the motion repeats itself: for thousands of recordings that are
+    /// prepared alike.
+    #[serde(skip)]
+    pub unexamined: bool,
 }
 
 impl Default for Preparation {
@@ -70,6 +74,7 @@ impl Default for Preparation {
             smoothing: Smoothing::Automatic,
             band_hz: None,
             chosen: false,
+            unexamined: false,
         }
     }
 }

@@ -245,7 +245,9 @@ impl Recording {
             prepared,
             notes,
         };
-        self.note_repeats(&columns, drives, &mut run);
+        if !preparation.unexamined {
+            self.note_repeats(&columns, drives, &mut run);
+        }
         for [q, qd, qdd] in states {
             run.q.push(q);
             run.qd.push(qd);

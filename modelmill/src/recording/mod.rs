@@ -138,7 +138,8 @@ fn prepare(model: &Model, recording: &Raw, args: &Reading, delay: f64) -> Outcom
             .watched(&format!("preparing {}", recording.file()), 0, |_| {
                 free::runs(model, recording, preparation)
             })??;
-    if let Some(first) = runs.first_mut() {
+    let is_examined = !preparation.unexamined;
+    if let Some(first) = runs.first_mut().filter(|_| is_examined) {
         let mut motions = model.motions();
         // Twists are no derivatives of the coordinates whose names they have.
         let free: Vec<&str> = free::free_bodies(&model.derivation.mechanism)
@@ -158,13 +159,19 @@ fn prepare(model: &Model, recording: &Raw, args: &Reading, delay: f64) -> Outcom
         .collect();
     let maps_from_degrees = maps.join(" ");
     for run in &mut runs {
-        let idle = run.suspicious_forces(&model.drives(), &model.undriven());
-        run.notes.extend(idle);
+        if is_examined {
+            let idle = run.suspicious_forces(&model.drives(), &model.undriven());
+            run.notes.extend(idle);
+        }
         pair(run, delay)?;
     }
-    let faults: Vec<Disturbance> = (recording.position_faults(&model.active()).into_iter())
-        .map(|fault| position_fault(model, recording.file(), &fault))
-        .collect();
+    let faults: Vec<Disturbance> = if is_examined {
+        (recording.position_faults(&model.active()).into_iter())
+            .map(|fault| position_fault(model, recording.file(), &fault))
+            .collect()
+    } else {
+        Vec::new()
+    };
     let with_variance = runs.into_iter().map(|run| {
         let variance = variances::recorded(recording, &run, &model.drives())?;
         Ok(Stretch {
@@ -328,6 +335,13 @@ impl Model {
 impl Recording {
     fn new(model: &Model, raw: Raw, reading: &Reading) -> Outcome<Self> {
         let raw = Arc::new(raw);
+        if reading.preparation.unexamined {
+            return Ok(Self {
+                stretches: prepared(model, &raw, reading)?,
+                raw,
+                reading: reading.clone(),
+            });
+        }
         let (reading, note) = settled(model, &raw, reading)?;
         let mut stretches = prepared(model, &raw, &reading)?;
         if let (Some(note), Some(first)) = (note, stretches.first_mut()) {
@@ -344,6 +358,12 @@ impl Recording {
     /// What messages call its file.
     pub fn file(&self) -> &str {
         self.raw.file()
+    }
+
+    /// The readings of a column by our name, one for each sample, as they were before anything was filtered; `None` where there
+    /// is none that holds numbers alone.
+    pub fn raw_column(&self, name: &str) -> Option<&[f64]> {
+        self.raw.column(name).ok()
     }
 
     /// Remarks on all stretches.

@@ -23,7 +23,8 @@ pub use atlas::{Pictured, atlas};
 pub use curves::section as curves;
 pub use modelmill_draw::page::{begin as begin_page, end as end_page};
 pub use page::{STYLE, page, scripts};
-pub use runs::runs_page;
+pub use runs::{over_runs, runs_page};
+pub use tables::{Cell, table};
 
 /// The ladder of a diagnosis as a picture: errors of fit and check step by step, beside the noise.
 pub fn ladder(findings: &Findings) -> String {

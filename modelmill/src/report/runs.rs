@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use modelmill_draw::page as pages;
+use modelmill_identify::ParameterInfo;
 
 use super::draw::{Axis, LEFT, Picture, RIGHT, WIDTH, range, with_room};
 use super::page::end;
@@ -226,39 +227,50 @@ fn told(fitted: Fitted) -> Option<[f64; 2]> {
 
 /// One base parameter over the runs.
 fn picture(compared: &Compared, k: usize) -> String {
-    let info = &compared.parameters[k];
     let runs = &compared.runs;
     let known: Vec<(usize, [f64; 2])> = (runs.iter().enumerate())
         .filter_map(|(at, run)| Some((at, told(run.alone[k])?)))
         .collect();
+    let steps = compared.points.iter().flat_map(|point| {
+        let own = point.steps.iter().filter(|step| step.parameter == k);
+        own.map(move |step| (point.run, [step.before.value, step.now.value]))
+    });
+    let steps: Vec<(usize, [f64; 2])> = steps.collect();
+    over_runs(&compared.parameters[k], "run", runs.len(), &known, &steps)
+}
+
+/// A base parameter over `n` runs or days as a picture: values that are known, by place and with their deviations, and levels
+/// before and since each change, by the place from which on it is there.
+pub fn over_runs(
+    info: &ParameterInfo,
+    what: &str,
+    n: usize,
+    known: &[(usize, [f64; 2])],
+    steps: &[(usize, [f64; 2])],
+) -> String {
     let ends: Vec<f64> = (known.iter())
         .flat_map(|(_, [x, d])| [x - BARS * d, x + BARS * d])
         .collect();
-    let x = Axis::new([0.5, runs.len() as f64 + 0.5], [LEFT, WIDTH - RIGHT]);
+    let x = Axis::new([0.5, n as f64 + 0.5], [LEFT, WIDTH - RIGHT]);
     let y = Axis::new(with_room(range(&ends), 0.05), [HEIGHT - 40.0, 8.0]);
     let mut picture = Picture::new(WIDTH, HEIGHT);
-    picture.frame(&x, &y, "run", [runs.len().min(12), 4]);
-    for (at, [value, deviation]) in &known {
+    picture.frame(&x, &y, what, [n.min(12), 4]);
+    for (at, [value, deviation]) in known {
         let across = x.at(*at as f64 + 1.0);
         let [low, high] = [-BARS, BARS].map(|b| y.at(value + b * deviation));
         picture.path("curve c-fit", &format!("M{across:.1} {low:.1}V{high:.1}"));
         picture.dot("dot c-before", [across, y.at(*value)], 2.4);
     }
-    let steps = compared.points.iter().flat_map(|point| {
-        let own = point.steps.iter().filter(|step| step.parameter == k);
-        own.map(move |step| (point.run, step))
-    });
-    let steps: Vec<_> = steps.collect();
-    for (i, (run, step)) in steps.iter().enumerate() {
+    for (i, (run, [before, now])) in steps.iter().enumerate() {
         let start = if i == 0 { 0 } else { steps[i - 1].0 };
-        let end = steps.get(i + 1).map_or(runs.len(), |next| next.0);
+        let end = steps.get(i + 1).map_or(n, |next| next.0);
         let at = |run: usize| x.at(run as f64 + 0.5);
         if i == 0 {
-            let level = y.at(step.before.value);
+            let level = y.at(*before);
             let d = format!("M{:.1} {level:.1}H{:.1}", at(start), at(*run));
             picture.path("curve c-after", &d);
         }
-        let level = y.at(step.now.value);
+        let level = y.at(*now);
         picture.path(
             "curve c-after",
             &format!("M{:.1} {level:.1}H{:.1}", at(*run), at(end)),
@@ -268,7 +280,7 @@ fn picture(compared: &Compared, k: usize) -> String {
             &format!("M{:.1} {:.1}V{:.1}", at(*run), y.start, y.end),
         );
     }
-    let says = format!("{} over {} runs", info.name, runs.len());
+    let says = format!("{} over {n} {what}s", info.name);
     format!(
         "<figure class=\"still\"><figcaption><b>{}</b> {} <code class=\"expression\">{}</code></figcaption>\n{}</figure>\n",
         escape(&info.name),

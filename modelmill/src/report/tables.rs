@@ -16,24 +16,27 @@ use crate::text::table::{percent, significant};
 const FIRST: usize = 20;
 
 /// A cell: its text, and the number by which it is sorted.
-pub(crate) struct Cell(String, Option<f64>);
+pub struct Cell(String, Option<f64>);
 
 impl Cell {
-    pub(crate) fn text(text: &str) -> Self {
+    /// A text.
+    pub fn text(text: &str) -> Self {
         Self(escape(text), None)
     }
 
-    pub(crate) fn number(text: &str, value: f64) -> Self {
+    /// A number as it is shown, and its value.
+    pub fn number(text: &str, value: f64) -> Self {
         Self(escape(text), Some(value))
     }
 
-    pub(crate) fn html(html: String) -> Self {
+    /// Finished HTML.
+    pub fn html(html: String) -> Self {
         Self(html, None)
     }
 }
 
 /// A table; columns that begin with `#` hold numbers.
-pub(crate) fn table(class: &str, head: &[&str], rows: &[Vec<Cell>]) -> String {
+pub fn table(class: &str, head: &[&str], rows: &[Vec<Cell>]) -> String {
     let mut html = format!("<div class=\"wide\"><table class=\"{class}\">\n<thead><tr>");
     for name in head {
         let (class, name) = match name.strip_prefix('#') {

@@ -159,7 +159,7 @@ pub struct Changed {
 
 /// Kinds of change, each with the drive or frame that it belongs to.
 #[derive(Clone, Debug)]
-enum Kind {
+pub(crate) enum Kind {
     Payload(String),
     Friction(usize),
     Offset(usize),
@@ -171,7 +171,7 @@ enum Kind {
 /// A change that is possible.
 #[derive(Clone, Debug)]
 pub(crate) struct Possible {
-    kind: Kind,
+    pub(crate) kind: Kind,
     /// What the search knows of it.
     pub(crate) candidate: Candidate,
 }
@@ -381,7 +381,7 @@ pub(crate) fn centre(found: &Values) -> [Option<Estimate>; 3] {
 }
 
 /// What a kind of change is called.
-fn name(model: &Model, kind: &Kind) -> String {
+pub(crate) fn name(model: &Model, kind: &Kind) -> String {
     let drive = |d: &usize| model.drives()[*d].clone();
     match kind {
         Kind::Payload(frame) => format!("a load on {frame}"),

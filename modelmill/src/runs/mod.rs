@@ -12,6 +12,7 @@ pub(crate) mod payload;
 mod per_run;
 mod points;
 mod rows;
+mod sums;
 
 use std::borrow::Borrow;
 
@@ -33,6 +34,7 @@ use payload::Payloads;
 pub use per_run::{KnownLoad, PerRun, SharedFit, Valued};
 pub use points::{ChangePoint, Step};
 use rows::{Rows, Sizes, White};
+pub use sums::{CommonGround, RunSums};
 
 /// A difference of a base parameter counts as moved from this many standard deviations on.
 const MOVED: f64 = 4.0;
@@ -179,6 +181,15 @@ impl Model {
                     return Err(alone(&before.file, &unread));
                 }
                 let base: Vec<usize> = (0..layout.base).collect();
+                let alone: Vec<&[Fitted]> = all.iter().map(|run| &run.alone[..]).collect();
+                let points = points::found(
+                    &bench,
+                    &alone,
+                    &wholes,
+                    &withins,
+                    &before.sizes,
+                    &before.values,
+                );
                 let mut together = Moments::new(layout.base);
                 for whole in &wholes {
                     together.merge(&whole.of(&base));
@@ -187,7 +198,7 @@ impl Model {
                     model: self.name.clone(),
                     parameters: self.infos(),
                     together: fitted(self, &together),
-                    points: points::found(&bench, &all, &wholes, &withins, &before),
+                    points,
                     runs: all,
                     unread,
                     shared: shared.answer()?,
@@ -226,7 +237,7 @@ pub(crate) struct Bench<'a> {
 pub(crate) struct LookedAt {
     file: String,
     samples: usize,
-    events: Vec<Changed>,
+    pub(crate) events: Vec<Changed>,
     /// Base parameters of the first run.
     values: DVector<f64>,
     white: White,
@@ -450,6 +461,14 @@ pub(crate) fn differences(model: &Model, recordings: &[&Recording]) -> Outcome<V
 fn fitted(model: &Model, moments: &Moments) -> Vec<Fitted> {
     let solved = moments.solve();
     let noise = (solved.rest / (moments.rows as f64 - solved.rank as f64).max(1.0)).max(1.0);
+    beside_known(model, |i| Fitted {
+        value: solved.values[i],
+        deviation: solved.determined[i].then(|| (noise * solved.covariance[(i, i)]).sqrt()),
+    })
+}
+
+/// All base parameters, of which those that are no numbers of the file are asked for by their place among themselves.
+fn beside_known(model: &Model, unknown: impl Fn(usize) -> Fitted) -> Vec<Fitted> {
     let mut next = 0;
     let of = |k: usize| {
         if model.is_known(k) {
@@ -460,10 +479,7 @@ fn fitted(model: &Model, moments: &Moments) -> Vec<Fitted> {
         }
         let i = next;
         next += 1;
-        Fitted {
-            value: solved.values[i],
-            deviation: solved.determined[i].then(|| (noise * solved.covariance[(i, i)]).sqrt()),
-        }
+        unknown(i)
     };
     (0..model.base.len()).map(of).collect()
 }

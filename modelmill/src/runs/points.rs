@@ -2,7 +2,10 @@
 
 use modelmill_identify::changes::{Moments, Runs, Told, mean, segments};
 
-use crate::runs::{Bench, Changed, Fitted, LookedAt, OneRun};
+use nalgebra::DVector;
+
+use crate::runs::rows::Sizes;
+use crate::runs::{Bench, Changed, Fitted};
 
 /// A change of one parameter from one stretch of runs to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,27 +35,28 @@ pub struct ChangePoint {
     pub changes: Vec<Changed>,
 }
 
-/// Change points over the runs; `wholes` are their sums and `within` by what parts of each differ among themselves.
+/// Change points over the runs; `runs` are the base parameters of each, fitted alone, `wholes` their sums and `within` by what
+/// parts of each differ among themselves. `sizes` and `values` are those of a run that the others are held against.
 pub(crate) fn found(
     bench: &Bench<'_>,
-    runs: &[OneRun],
+    runs: &[&[Fitted]],
     wholes: &[Moments],
     within: &[f64],
-    first: &LookedAt,
+    sizes: &Sizes,
+    values: &DVector<f64>,
 ) -> Vec<ChangePoint> {
     let parameters: Vec<usize> = (0..bench.model.base.len())
         .filter(|k| !bench.model.is_known(*k))
         .collect();
     let mut steps: Vec<(usize, Step)> = Vec::new();
     for parameter in &parameters {
-        let values: Vec<Option<Told>> =
-            runs.iter().map(|run| told(run.alone[*parameter])).collect();
-        let mut bounds = segments(&values, parameters.len());
+        let told: Vec<Option<Told>> = runs.iter().map(|run| told(run[*parameter])).collect();
+        let mut bounds = segments(&told, parameters.len());
         bounds.insert(0, 0);
         bounds.push(runs.len());
         for three in bounds.windows(3) {
             let [before, now] = [three[0]..three[1], three[1]..three[2]].map(|some| {
-                let (value, deviation) = mean(&values[some])?;
+                let (value, deviation) = mean(&told[some])?;
                 let deviation = Some(deviation);
                 Some(Fitted { value, deviation })
             });
@@ -84,7 +88,7 @@ pub(crate) fn found(
         ChangePoint {
             run: at,
             steps: own,
-            changes: bench.told(&bench.large(&both, &first.sizes), &first.values),
+            changes: bench.told(&bench.large(&both, sizes), values),
         }
     };
     bounds.windows(3).map(point).collect()

@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use modelmill_identify::LeastSquares;
 use modelmill_identify::changes::{Coloured, Moments};
 use nalgebra::DVector;
 
@@ -42,6 +43,8 @@ pub(crate) struct White {
     pub(crate) blocks: Vec<Moments>,
     /// Drive by drive, the whole run.
     pub(crate) drives: Vec<Moments>,
+    /// The base columns alone, all drives together: a triangle keeps the digits that sums of products lose.
+    pub(crate) base: LeastSquares,
 }
 
 impl White {
@@ -137,7 +140,8 @@ impl<'a> Rows<'a> {
 
     /// The rows with the memory of each drive's noise taken out, as sums.
     pub(crate) fn white(&self) -> Outcome<White> {
-        let columns = Layout::new(self.model, self.payloads).total();
+        let layout = Layout::new(self.model, self.payloads);
+        let columns = layout.total();
         let values = weighed(&self.sums)?;
         let mut rests: Vec<Vec<Vec<f64>>> = vec![Vec::new(); self.sums.len()];
         self.visit(|laid| {
@@ -162,18 +166,32 @@ impl<'a> Rows<'a> {
         let mut white = White {
             blocks: vec![Moments::new(columns); BLOCKS],
             drives: vec![Moments::new(columns); self.sums.len()],
+            base: LeastSquares::with_channels(layout.base, layout.drives),
         };
         let mut before = 0;
+        let zeros = [0.0; TOGETHER];
         self.visit(|laid| {
             for (drive, noise) in noise.iter().enumerate().filter(|(_, n)| n.deviation > 0.0) {
                 for some in laid.pieces(drive) {
                     let start = before + some.start;
-                    whiten(laid, drive, some, noise, columns, |i, sums| {
+                    whiten(laid, drive, some, noise, columns, |i, z, y| {
+                        let mut sums = Moments::new(columns);
+                        sums.add_rows(z, y);
                         // Neighbouring blocks, each of the same part of the run.
                         let block = BLOCKS * (start + i) / length.max(1);
-                        white.blocks[block.min(BLOCKS - 1)].merge(sums);
-                        white.drives[drive].merge(sums);
-                    });
+                        white.blocks[block.min(BLOCKS - 1)].merge(&sums);
+                        white.drives[drive].merge(&sums);
+                        let z = z[..layout.base].iter();
+                        let z: Vec<&[f64]> = z
+                            .map(|column| column.unwrap_or(&zeros[..y.len()]))
+                            .collect();
+                        white.base.add_columns(drive, &z, y).map_err(|error| {
+                            Error::input(format!(
+                                "the rows of {}: {error}",
+                                drive_name(self.model, drive)
+                            ))
+                        })
+                    })?;
                 }
             }
             before += laid.samples();
@@ -184,9 +202,25 @@ impl<'a> Rows<'a> {
 }
 
 /// Sums over the rows of each drive as they were measured.
-pub(crate) struct Sizes(Vec<Moments>);
+#[derive(Clone)]
+pub(crate) struct Sizes(pub(crate) Vec<Moments>);
 
 impl Sizes {
+    /// What the best base parameters leave of the force of each drive, as a part of it: with `base` columns at the front.
+    pub(crate) fn left(&self, base: usize) -> Outcome<Vec<f64>> {
+        let base: Vec<usize> = (0..base).collect();
+        let sums: Vec<Moments> = self.0.iter().map(|one| one.of(&base)).collect();
+        let values = weighed(&sums)?;
+        let part = |one: &Moments| {
+            if one.total > 0.0 {
+                (one.rest(&values) / one.total).sqrt()
+            } else {
+                0.0
+            }
+        };
+        Ok(sums.iter().map(part).collect())
+    }
+
     /// How large the force of some columns is on the drive where it is largest, as a part of what that drive does.
     pub(crate) fn part(&self, columns: &[usize], values: &DVector<f64>) -> f64 {
         let of_drive = |sums: &Moments| {
@@ -201,16 +235,22 @@ impl Sizes {
     }
 }
 
-/// Shows sums over white rows of a stretch of samples, some hundreds at a time, with the place of the first.
+fn drive_name(model: &Model, drive: usize) -> String {
+    model.drives()[drive].clone()
+}
+
+/// Rows that are shown at once.
+const TOGETHER: usize = 256;
+
+/// Shows white rows of a stretch of samples by their columns, some hundreds at a time, with the place of the first.
 fn whiten(
     laid: &Laid,
     drive: usize,
     some: Range<usize>,
     noise: &Coloured,
     columns: usize,
-    mut show: impl FnMut(usize, &Moments),
-) {
-    const TOGETHER: usize = 256;
+    mut show: impl FnMut(usize, &[Option<&[f64]>], &[f64]) -> Outcome,
+) -> Outcome {
     let white = |values: &[f64]| noise.whitened(&values[some.clone()]);
     let y = white(&laid.forces[drive]);
     let z: Vec<Option<Vec<f64>>> = (0..columns)
@@ -222,10 +262,9 @@ fn whiten(
             .iter()
             .map(|column| column.as_ref().map(|column| &column[rows.clone()]))
             .collect();
-        let mut sums = Moments::new(columns);
-        sums.add_rows(&z, &y[rows]);
-        show(start, &sums);
+        show(start, &z, &y[rows])?;
     }
+    Ok(())
 }
 
 /// Adds the rows of a stretch to sums of each drive.

@@ -10,6 +10,7 @@ physical effect that a model lacks.
 Units are SI (m, rad, kg, s, N, N m). Arrays of states have shape ``(dof,)`` for one state or ``(n, dof)`` for many.
 """
 
+from . import fleet
 from ._errors import ModelmillError, ModelmillWarning
 from ._model import BaseParameter, BaseParameters, Equations, Model, Recording, kinds, load, recordings
 from ._results import (
@@ -54,6 +55,7 @@ __all__ = [
     "Result",
     "Runs",
     "Simulation",
+    "fleet",
     "kinds",
     "load",
     "recordings",

@@ -1,0 +1,162 @@
+//! Folders of recordings: which robot and which day a file belongs to, by its path.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use modelmill::recording::has_ending_of_a_recording;
+
+use crate::Fault;
+
+/// A recording that is a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct File {
+    /// Its path below the folder, with `/`; what messages call it.
+    pub name: String,
+    /// Where it is.
+    pub path: PathBuf,
+    /// Its day.
+    pub day: String,
+    /// Name, size and time of change: a file that was written anew is another recording.
+    pub key: String,
+}
+
+/// Recordings below a folder by robot, each in the order of day and name.
+///
+/// Fails where the folder cannot be read, or holds no recording whose robot is known.
+pub fn robots(folder: &Path) -> Result<BTreeMap<String, Vec<File>>, Fault> {
+    let mut found = Vec::new();
+    walk(folder, &mut found)?;
+    let mut robots: BTreeMap<String, Vec<File>> = BTreeMap::new();
+    for path in found {
+        let below = path.strip_prefix(folder).unwrap_or(&path);
+        let parts: Vec<String> = below
+            .iter()
+            .map(|part| part.to_string_lossy().into_owned())
+            .collect();
+        let name = parts.join("/");
+        let Some((robot, day)) = place(&parts) else {
+            return Err(Fault::new(format!(
+                "{}: the path of {name} names no robot; put recordings below folders such as `robot=R1/day=2026-03-01`, or \
+                 `R1/2026-03-01`",
+                folder.display()
+            )));
+        };
+        let about = fs::metadata(&path).map_err(|error| unread(&path, &error))?;
+        let changed = about.modified().ok();
+        let changed = changed.and_then(|at| at.duration_since(std::time::UNIX_EPOCH).ok());
+        let key = format!(
+            "{name} {} {}",
+            about.len(),
+            changed.map_or(0, |at| at.as_nanos())
+        );
+        robots.entry(robot).or_default().push(File {
+            name,
+            path,
+            day,
+            key,
+        });
+    }
+    if robots.is_empty() {
+        return Err(Fault::new(format!(
+            "{} holds no recordings (Parquet, CSV, MATLAB, HDF5, MCAP); give the folder above those of the robots",
+            folder.display()
+        )));
+    }
+    for files in robots.values_mut() {
+        files.sort_by(|a, b| (&a.day, &a.name).cmp(&(&b.day, &b.name)));
+    }
+    Ok(robots)
+}
+
+fn unread(path: &Path, error: &std::io::Error) -> Fault {
+    Fault::new(format!(
+        "{} cannot be read: {error}; check the path and who may read it",
+        path.display()
+    ))
+}
+
+fn walk(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), Fault> {
+    let entries = fs::read_dir(folder).map_err(|error| unread(folder, &error))?;
+    let mut entries: Vec<PathBuf> = entries
+        .map(|entry| entry.map(|entry| entry.path()))
+        .collect::<Result<_, _>>()
+        .map_err(|error| unread(folder, &error))?;
+    entries.sort();
+    for path in entries {
+        if path.is_dir() {
+            walk(&path, found)?;
+        } else if has_ending_of_a_recording(&path) {
+            found.push(path);
+        }
+    }
+    Ok(())
+}
+
+/// Robot and day of a path: by `robot=` and `day=`, else by the first folder and the second, or what the name begins with.
+fn place(parts: &[String]) -> Option<(String, String)> {
+    let named = |key: &str| {
+        parts
+            .iter()
+            .find_map(|part| part.strip_prefix(key).map(str::to_owned))
+    };
+    if let (Some(robot), Some(day)) = (named("robot="), named("day=")) {
+        return Some((robot, day));
+    }
+    let (file, folders) = parts.split_last()?;
+    let robot = folders.first()?.clone();
+    let day = folders.get(1).cloned().unwrap_or_else(|| {
+        let digits: String = file
+            .chars()
+            .take_while(|c| c.is_ascii_digit() || "-_".contains(*c))
+            .take(10)
+            .collect();
+        let digits = digits.trim_matches(['-', '_']);
+        if digits.is_empty() {
+            Path::new(file)
+                .file_stem()
+                .map_or_else(|| file.clone(), |stem| stem.to_string_lossy().into_owned())
+        } else {
+            digits.to_owned()
+        }
+    });
+    Some((robot, day))
+}
+
+/// Writes a file as a whole or not at all. Fails where the place cannot be written to.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Fault> {
+    let beside = path.with_extension("part");
+    let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, path));
+    written.map_err(|error| {
+        Fault::new(format!(
+            "{} cannot be written: {error}; choose another place, or make room",
+            path.display()
+        ))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::place;
+
+    #[track_caller]
+    fn check(path: &str, expected: Option<(&str, &str)>) {
+        let parts: Vec<String> = path.split('/').map(str::to_owned).collect();
+        let expected = expected.map(|(robot, day)| (robot.to_owned(), day.to_owned()));
+        assert_eq!(place(&parts), expected);
+    }
+
+    #[test]
+    fn a_path_names_robot_and_day() {
+        check(
+            "robot=R1/day=2026-03-01/recording=0/data.parquet",
+            Some(("R1", "2026-03-01")),
+        );
+        check("site/robot=R1/day=3/x.csv", Some(("R1", "3")));
+        check("R1/2026-03-01/a.csv", Some(("R1", "2026-03-01")));
+        check("R1/2026-03-01_0815.csv", Some(("R1", "2026-03-01")));
+        check("R1/20260301-early.parquet", Some(("R1", "20260301")));
+        check("R1/monday.csv", Some(("R1", "monday")));
+        check("a.csv", None);
+    }
+}

@@ -1,0 +1,277 @@
+//! A plan with its model derived: recordings to summaries, summaries to parameters.
+
+use std::path::Path;
+
+use modelmill::recording::Recording;
+use modelmill::runs::{CommonGround, Fitted};
+use modelmill_identify::ParameterInfo;
+use serde_json::{Value, json};
+
+use crate::sensors::{self, SensorFault};
+use crate::summary::{Bad, Summary};
+use crate::{Fault, Plan};
+
+/// A plan with its model derived. It may be shared by threads.
+#[derive(Clone)]
+pub struct Ground {
+    plan: Plan,
+    mark: u64,
+    pub(crate) common: CommonGround,
+    still: Vec<(String, bool, f64)>,
+}
+
+/// What summaries say of the parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fit {
+    /// Base parameters in the order of the model.
+    pub parameters: Vec<Fitted>,
+    /// For each drive what the recordings' own parameters leave of its force, as a part of it.
+    pub left: Vec<f64>,
+    /// Recordings that gave an answer.
+    pub recordings: u64,
+    /// Recordings that gave none.
+    pub bad: usize,
+}
+
+impl Ground {
+    pub(crate) fn new(plan: Plan, common: CommonGround) -> Self {
+        let drives = common.model().drives();
+        let usual = plan.reference.still.iter();
+        let still = usual.map(|(name, still)| (name.clone(), drives.contains(name), *still));
+        Self {
+            mark: plan.mark(),
+            still: still.collect(),
+            plan,
+            common,
+        }
+    }
+
+    /// The plan.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// [`Plan::mark`] of the plan.
+    pub fn mark(&self) -> u64 {
+        self.mark
+    }
+
+    /// The base parameters, in the order in which fits have them.
+    pub fn parameters(&self) -> Vec<ParameterInfo> {
+        self.common.model().infos()
+    }
+
+    /// Names of the columns that a recording must have: time, coordinates, then drives.
+    pub fn columns(&self) -> Vec<String> {
+        let model = self.common.model();
+        let time = std::iter::once("t".to_owned());
+        time.chain(model.active()).chain(model.drives()).collect()
+    }
+
+    /// Names of the drives.
+    pub fn drives(&self) -> Vec<String> {
+        self.common.model().drives()
+    }
+
+    /// The summary of no recordings.
+    pub fn empty(&self) -> Summary {
+        Summary::empty(self.mark, self.common.n_columns(), self.drives().len())
+    }
+
+    /// Summarises one recording whose columns are in memory, in SI units, with their names; the rows may be in any order, which
+    /// is that of column `t`. What is wrong with it stands in the summary.
+    pub fn summarise(&self, name: &str, columns: Vec<(String, Vec<f64>)>) -> Summary {
+        let read = in_order(columns).and_then(|columns| {
+            let model = self.common.model();
+            Ok(model.recording_of_table(name, columns, &self.plan.reading())?)
+        });
+        self.summed(name, read)
+    }
+
+    /// Summarises one recording that is a file, under a name that may be another than its path's.
+    pub fn summarise_file(&self, name: &str, path: &Path) -> Summary {
+        let model = self.common.model();
+        let read = model.recording(path, &self.plan.reading());
+        self.summed(name, read.map_err(Fault::from))
+    }
+
+    fn summed(&self, name: &str, recording: Result<Recording, Fault>) -> Summary {
+        recording
+            .and_then(|recording| self.sums(name, recording))
+            .unwrap_or_else(|fault| Summary {
+                bad: vec![Bad {
+                    recording: name.to_owned(),
+                    says: fault.to_string(),
+                }],
+                ..self.empty()
+            })
+    }
+
+    fn sums(&self, name: &str, mut recording: Recording) -> Result<Summary, Fault> {
+        let time = recording.raw_column("t").unwrap_or_default();
+        let columns: Vec<(&str, bool, &[f64], f64)> = self
+            .still
+            .iter()
+            .filter_map(|(of, is_force, usual)| {
+                Some((of.as_str(), *is_force, recording.raw_column(of)?, *usual))
+            })
+            .collect();
+        let sensors = sensors::faults(name, time, &columns);
+        let samples = time.len() as u64;
+        let seconds = match time {
+            [first, .., last] => last - first,
+            _ => 0.0,
+        };
+        let drives = self.drives();
+        if let Some(encoder) = sensors.iter().find(|one| !one.is_force) {
+            // States that are made of it are wrong; nothing is summed, but the fault is told.
+            let says = format!(
+                "the reading of {} stands still for {:.0} % of the recording while others move",
+                encoder.of,
+                100.0 * encoder.still
+            );
+            return Ok(Summary {
+                bad: vec![Bad {
+                    recording: name.to_owned(),
+                    says,
+                }],
+                sensors,
+                ..self.empty()
+            });
+        }
+        leave_out(&mut recording, &drives, &sensors);
+        let sums = self.common.sums(&recording)?;
+        let is_dead = |drive: &String| sensors.iter().any(|one| one.of == *drive);
+        let left = drives.iter().zip(&sums.left).map(|(drive, left)| {
+            if is_dead(drive) {
+                0.0
+            } else {
+                left * left * samples as f64
+            }
+        });
+        Ok(Summary {
+            mark: self.mark,
+            recordings: 1,
+            samples,
+            seconds,
+            base: Some(sums.base),
+            whole: sums.whole,
+            within: sums.within,
+            left: left.collect(),
+            remarks: (sums.events.iter())
+                .map(|event| (name.to_owned(), event.says.clone()))
+                .collect(),
+            sensors,
+            bad: Vec::new(),
+        })
+    }
+
+    /// Base parameters with deviations; parameters that the recordings do not determine have none.
+    ///
+    /// Fails where the summary is of another plan, or of no recordings.
+    pub fn solve(&self, summary: &Summary) -> Result<Fit, Fault> {
+        self.check(summary)?;
+        let Some(base) = &summary.base else {
+            let why = match summary.bad.as_slice() {
+                [] => "it is of none".to_owned(),
+                [first, ..] => format!(
+                    "{} gave no answer, {} for one: {}",
+                    summary.bad.len(),
+                    first.recording,
+                    first.says
+                ),
+            };
+            return Err(Fault::new(format!(
+                "this summary holds no recording that could be used: {why}"
+            )));
+        };
+        Ok(Fit {
+            parameters: self.common.fitted(base)?,
+            left: (0..summary.left.len()).map(|d| summary.left(d)).collect(),
+            recordings: summary.recordings,
+            bad: summary.bad.len(),
+        })
+    }
+
+    /// Fails where a summary is of another plan.
+    pub fn check(&self, summary: &Summary) -> Result<(), Fault> {
+        if summary.mark == self.mark {
+            Ok(())
+        } else {
+            Err(Fault::new(
+                "this summary was made with another plan; summarise its recordings with this one, or take the other plan",
+            ))
+        }
+    }
+
+    /// A fit as JSON: `parameters` with `name`, `expression`, `value`, `std` (null where not determined) and `unit`.
+    pub fn json(&self, fit: &Fit) -> Value {
+        let parameters = self.parameters();
+        let parameters = parameters
+            .iter()
+            .zip(&fit.parameters)
+            .map(|(info, fitted)| {
+                json!({
+                    "name": info.name,
+                    "expression": info.expression,
+                    "value": fitted.value,
+                    "std": fitted.deviation,
+                    "unit": info.unit,
+                })
+            });
+        json!({
+            "parameters": parameters.collect::<Vec<_>>(),
+            "left": self.drives().into_iter().zip(fit.left.iter().map(|x| json!(x))).collect::<serde_json::Map<_, _>>(),
+            "recordings": fit.recordings,
+            "bad": fit.bad,
+        })
+    }
+}
+
+/// The forces of sensors that died count in no equation.
+fn leave_out(recording: &mut Recording, drives: &[String], sensors: &[SensorFault]) {
+    let is_dead: Vec<bool> = (drives.iter())
+        .map(|drive| sensors.iter().any(|one| one.is_force && one.of == *drive))
+        .collect();
+    if !is_dead.contains(&true) {
+        return;
+    }
+    for stretch in &mut recording.stretches {
+        let run = &mut stretch.run;
+        if run.left_out.is_empty() {
+            run.left_out = vec![vec![false; run.time.len()]; drives.len()];
+        }
+        for (out, _) in run
+            .left_out
+            .iter_mut()
+            .zip(&is_dead)
+            .filter(|(_, dead)| **dead)
+        {
+            out.fill(true);
+        }
+    }
+}
+
+/// Columns in the order of time. Rows of equal time stay as they are, and are refused later.
+fn in_order(mut columns: Vec<(String, Vec<f64>)>) -> Result<Vec<(String, Vec<f64>)>, Fault> {
+    let Some((_, time)) = columns.iter().find(|(name, _)| name == "t") else {
+        // The reader of recordings says what is missing, and knows what the plan maps onto time.
+        return Ok(columns);
+    };
+    if time.windows(2).all(|two| two[0] <= two[1]) {
+        return Ok(columns);
+    }
+    let n = time.len();
+    if let Some((name, other)) = columns.iter().find(|(_, values)| values.len() != n) {
+        return Err(Fault::new(format!(
+            "column `t` has {n} numbers and column `{name}` has {}; all columns need one for each sample",
+            other.len()
+        )));
+    }
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|a, b| time[*a].total_cmp(&time[*b]));
+    for (_, values) in &mut columns {
+        *values = order.iter().map(|i| values[*i]).collect();
+    }
+    Ok(columns)
+}

@@ -1,0 +1,292 @@
+//! The days of one robot: parameters over time, when something changed and stayed changed, and which sensors died.
+
+use modelmill::runs::{Changed, Fitted, Step};
+use modelmill_identify::changes::{Moments, Told, mean};
+use serde_json::{Value, json};
+
+use crate::onset::onset;
+use crate::sensors::SensorFault;
+use crate::{Bad, Fault, Fit, Ground, Summary};
+
+/// A parameter is told to have moved from so many deviations on.
+const MOVED: f64 = 4.0;
+
+/// A day of a robot.
+#[derive(Clone, Debug)]
+pub struct Day {
+    /// What it is called.
+    pub name: String,
+    /// What its recordings say; `None` where none gave an answer.
+    pub fit: Option<Fit>,
+    /// Sensors that died in one of its recordings.
+    pub sensors: Vec<SensorFault>,
+    /// Recordings that gave no answer.
+    pub bad: Vec<Bad>,
+}
+
+/// A day from which on something was different and stayed so.
+#[derive(Clone, Debug)]
+pub struct Since {
+    /// The day, by place.
+    pub day: usize,
+    /// Base parameters that changed, by place, the clearest first: value before and since, with deviations.
+    pub steps: Vec<Step>,
+    /// By how much the parameter that told it grows each day, in its unit, where it grows rather than stepped.
+    pub per_day: Option<f64>,
+    /// What it is in physics, the clearest first.
+    pub changes: Vec<Changed>,
+}
+
+/// A sensor that died, and from which day on.
+#[derive(Clone, Debug)]
+pub struct Dead {
+    /// The coordinate or drive.
+    pub of: String,
+    /// The first day.
+    pub day: usize,
+    /// On how many of the days since then.
+    pub days: usize,
+    /// Its first fault.
+    pub first: SensorFault,
+}
+
+/// A robot over its days.
+#[derive(Clone, Debug)]
+pub struct Robot {
+    /// What it is called.
+    pub name: String,
+    /// Its days in order.
+    pub days: Vec<Day>,
+    /// When something changed.
+    pub since: Vec<Since>,
+    /// Sensors that died.
+    pub dead: Vec<Dead>,
+    /// The recordings before the first change: what it is held against others by.
+    pub before: Summary,
+    /// Samples of all its recordings.
+    pub samples: u64,
+}
+
+/// Looks at the days of a robot, which are in order of time, each with the summary of its recordings.
+///
+/// Fails where summaries are of another plan.
+pub fn robot(ground: &Ground, name: &str, days: Vec<(String, Summary)>) -> Result<Robot, Fault> {
+    for (_, summary) in &days {
+        ground.check(summary)?;
+    }
+    let looked_at: Vec<Day> = days
+        .iter()
+        .map(|(name, summary)| Day {
+            name: name.clone(),
+            fit: ground.solve(summary).ok(),
+            sensors: summary.sensors.clone(),
+            bad: summary.bad.clone(),
+        })
+        .collect();
+    // Days without an answer have no place among the runs.
+    let known: Vec<usize> = (0..days.len())
+        .filter(|k| looked_at[*k].fit.is_some())
+        .collect();
+    let runs: Vec<Run> = known
+        .iter()
+        .filter_map(|k| {
+            let fit = looked_at[*k].fit.as_ref()?;
+            let summary = &days[*k].1;
+            Some((
+                fit.parameters.clone(),
+                summary.whole.clone(),
+                summary.within,
+            ))
+        })
+        .collect();
+    let since = sinces(ground, &runs, &known);
+    let end = since.first().map_or(days.len(), |one| one.day);
+    let mut before = ground.empty();
+    for (_, summary) in &days[..end] {
+        before.merge(summary)?;
+    }
+    Ok(Robot {
+        name: name.to_owned(),
+        dead: dead(&looked_at),
+        samples: days.iter().map(|(_, summary)| summary.samples).sum(),
+        days: looked_at,
+        since,
+        before,
+    })
+}
+
+/// A day as a run: base parameters, sums, and by what its parts differ.
+type Run = (Vec<Fitted>, Moments, f64);
+
+/// When something began, over the days that gave an answer; what is found splits them, and both sides are looked at again. What
+/// physics has no name for is no change of the machine, and stands in the values of the days alone.
+fn sinces(ground: &Ground, runs: &[Run], known: &[usize]) -> Vec<Since> {
+    let mut within: Vec<f64> = runs.iter().map(|run| run.2).collect();
+    within.sort_by(f64::total_cmp);
+    let Some(within) = within.get(within.len() / 2) else {
+        return Vec::new();
+    };
+    let mut all = Vec::new();
+    let mut open = vec![0..runs.len()];
+    while let Some(window) = open.pop() {
+        let Some(since) = clearest(ground, &runs[window.clone()], *within) else {
+            continue;
+        };
+        let at = window.start + since.day;
+        open.push(window.start..at);
+        // Growth goes on to the end of its window.
+        if since.per_day.is_none() {
+            open.push(at..window.end);
+        }
+        all.push(Since {
+            day: known[at],
+            ..since
+        });
+    }
+    all.sort_by_key(|since| since.day);
+    all
+}
+
+/// The clearest onset of any parameter, if physics has a name for what began there.
+fn clearest(ground: &Ground, runs: &[Run], within: f64) -> Option<Since> {
+    let series = |k: usize| -> Vec<Option<Told>> {
+        let told = runs.iter().map(|run| {
+            let fitted = run.0[k];
+            Some((fitted.value, fitted.deviation.filter(|d| *d > 0.0)?))
+        });
+        told.collect()
+    };
+    let parameters = runs.first()?.0.len();
+    let onsets = (0..parameters).filter_map(|k| Some((k, onset(&series(k))?)));
+    let (_, found) = onsets.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain))?;
+    let sums = |some: &[Run]| -> Vec<Moments> { some.iter().map(|run| run.1.clone()).collect() };
+    let (before, later) = runs.split_at(found.day);
+    let changes = ground.common.changes(&sums(before), &sums(later), within);
+    if changes.is_empty() {
+        return None;
+    }
+    let mut steps: Vec<Step> = (0..parameters)
+        .filter_map(|parameter| {
+            let told = series(parameter);
+            let [before, now] = [&told[..found.day], &told[found.day..]].map(|some| {
+                let (value, deviation) = mean(some)?;
+                Some(Fitted {
+                    value,
+                    deviation: Some(deviation),
+                })
+            });
+            let step = Step {
+                parameter,
+                before: before?,
+                now: now?,
+            };
+            (apart(&step) > MOVED).then_some(step)
+        })
+        .collect();
+    steps.sort_by(|a, b| apart(b).total_cmp(&apart(a)));
+    Some(Since {
+        day: found.day,
+        steps,
+        per_day: found.per_day,
+        changes,
+    })
+}
+
+fn apart(step: &Step) -> f64 {
+    (step.now.value - step.before.value).abs() / step.before.beside(step.now)
+}
+
+/// Sensors that died, each with its first day.
+fn dead(days: &[Day]) -> Vec<Dead> {
+    let mut all: Vec<Dead> = Vec::new();
+    for (k, day) in days.iter().enumerate() {
+        let mut seen: Vec<&str> = Vec::new();
+        for fault in &day.sensors {
+            if seen.contains(&fault.of.as_str()) {
+                continue;
+            }
+            seen.push(&fault.of);
+            match all.iter_mut().find(|one| one.of == fault.of) {
+                Some(one) => one.days += 1,
+                None => all.push(Dead {
+                    of: fault.of.clone(),
+                    day: k,
+                    days: 1,
+                    first: fault.clone(),
+                }),
+            }
+        }
+    }
+    all
+}
+
+impl Robot {
+    /// Whether nothing is told of it.
+    pub fn is_quiet(&self) -> bool {
+        self.since.is_empty() && self.dead.is_empty()
+    }
+
+    /// All that was found as one JSON object: `values` and `std` of each day are in the order of the parameters.
+    pub fn json(&self, ground: &Ground) -> Value {
+        let infos = ground.parameters();
+        let days = self.days.iter().map(|day| {
+            json!({
+                "day": day.name,
+                "recordings": day.fit.as_ref().map_or(0, |fit| fit.recordings),
+                "values": day.fit.as_ref().map(|fit| fit.parameters.iter().map(|one| one.value).collect::<Vec<_>>()),
+                "std": day.fit.as_ref().map(|fit| fit.parameters.iter().map(|one| one.deviation).collect::<Vec<_>>()),
+                "left": day.fit.as_ref().map(|fit| fit.left.clone()),
+                "bad": day.bad.iter().map(|one| json!({ "recording": one.recording, "says": one.says })).collect::<Vec<_>>(),
+            })
+        });
+        let since = self.since.iter().map(|one| {
+            let steps = one.steps.iter().map(|step| {
+                json!({
+                    "parameter": infos[step.parameter].name,
+                    "before": step.before.value,
+                    "now": step.now.value,
+                    "std": step.before.beside(step.now),
+                    "unit": infos[step.parameter].unit,
+                })
+            });
+            json!({
+                "day": self.days[one.day].name,
+                "per_day": one.per_day,
+                "parameters": steps.collect::<Vec<_>>(),
+                "changes": one.changes.iter().map(change_json).collect::<Vec<_>>(),
+            })
+        });
+        let dead = self.dead.iter().map(|one| {
+            json!({
+                "sensor": one.of,
+                "is_force": one.first.is_force,
+                "day": self.days[one.day].name,
+                "days": one.days,
+                "recording": one.first.recording,
+                "still": one.first.still,
+                "since": one.first.since,
+            })
+        });
+        json!({
+            "robot": self.name,
+            "days": days.collect::<Vec<_>>(),
+            "since": since.collect::<Vec<_>>(),
+            "dead_sensors": dead.collect::<Vec<_>>(),
+        })
+    }
+}
+
+/// A change in physics as JSON, named as `runs` names it.
+pub(crate) fn change_json(change: &Changed) -> Value {
+    let (kind, at, values) = change.what.parts(change.unit);
+    let values = values.into_iter().map(|(name, estimate, unit)| {
+        json!({ "name": name, "value": estimate.value, "std": estimate.deviation, "unit": unit })
+    });
+    json!({
+        "kind": kind,
+        "at": at,
+        "values": values.collect::<Vec<_>>(),
+        "says": change.says,
+        "not_told_from": change.rivals,
+    })
+}

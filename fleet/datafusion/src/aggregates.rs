@@ -1,0 +1,248 @@
+//! The aggregates.
+
+use std::fmt;
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+
+use datafusion::arrow::array::{
+    Array, ArrayRef, BinaryArray, Float64Array, StructArray, UInt64Array,
+};
+use datafusion::arrow::compute::cast;
+use datafusion::arrow::datatypes::{DataType, Field, FieldRef, Fields};
+use datafusion::common::{Result, ScalarValue, exec_err};
+use datafusion::logical_expr::function::{AccumulatorArgs, StateFieldsArgs};
+use datafusion::logical_expr::{
+    Accumulator, AggregateUDFImpl, Signature, TypeSignature, Volatility,
+};
+use modelmill_fleet::{Ground, Summary};
+
+use crate::samples::{Samples, external};
+
+/// What an aggregate gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Answer {
+    /// `modelmill_summarise`: of samples the summary, as bytes.
+    Summary,
+    /// `modelmill_merge`: of summaries their sum, as bytes.
+    Merged,
+    /// `modelmill_identify`: of either the parameters.
+    Parameters,
+}
+
+impl Answer {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Summary => "modelmill_summarise",
+            Self::Merged => "modelmill_merge",
+            Self::Parameters => "modelmill_identify",
+        }
+    }
+}
+
+/// An aggregate over a plan.
+#[derive(Clone)]
+pub struct Fleet {
+    ground: Arc<Ground>,
+    answer: Answer,
+    signature: Signature,
+    columns: Vec<String>,
+}
+
+impl Fleet {
+    /// The aggregate that gives such an answer.
+    pub fn new(ground: Arc<Ground>, answer: Answer) -> Self {
+        let columns = ground.columns();
+        let numbers = vec![DataType::Float64; columns.len()];
+        let samples = TypeSignature::Exact([vec![DataType::Utf8], numbers].concat());
+        let summaries = TypeSignature::Exact(vec![DataType::Binary]);
+        let signature = match answer {
+            Answer::Summary => samples,
+            Answer::Merged => summaries,
+            Answer::Parameters => TypeSignature::OneOf(vec![summaries, samples]),
+        };
+        Self {
+            ground,
+            answer,
+            signature: Signature::new(signature, Volatility::Immutable),
+            columns,
+        }
+    }
+
+    /// Fields of the answer: `recordings`, `bad`, then for each parameter its value and `_std`, which is null where the recordings
+    /// do not determine it.
+    fn fields(&self) -> Fields {
+        let counts = ["recordings", "bad"].map(|name| Field::new(name, DataType::UInt64, true));
+        let parameters = self.ground.parameters();
+        let parameters = parameters.iter().flat_map(|info| {
+            [info.name.clone(), format!("{}_std", info.name)]
+                .map(|name| Field::new(name, DataType::Float64, true))
+        });
+        counts.into_iter().chain(parameters).collect()
+    }
+}
+
+impl fmt::Debug for Fleet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.answer.name())
+    }
+}
+
+impl PartialEq for Fleet {
+    fn eq(&self, other: &Self) -> bool {
+        self.answer == other.answer && self.ground.mark() == other.ground.mark()
+    }
+}
+
+impl Eq for Fleet {}
+
+impl Hash for Fleet {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.answer.hash(state);
+        self.ground.mark().hash(state);
+    }
+}
+
+impl AggregateUDFImpl for Fleet {
+    fn name(&self) -> &str {
+        self.answer.name()
+    }
+
+    fn signature(&self) -> &Signature {
+        &self.signature
+    }
+
+    fn return_type(&self, _: &[DataType]) -> Result<DataType> {
+        Ok(match self.answer {
+            Answer::Summary | Answer::Merged => DataType::Binary,
+            Answer::Parameters => DataType::Struct(self.fields()),
+        })
+    }
+
+    fn accumulator(&self, args: AccumulatorArgs<'_>) -> Result<Box<dyn Accumulator>> {
+        if args.is_distinct {
+            return exec_err!(
+                "{}(DISTINCT ...) has no meaning: samples that are alike count as often as they are there",
+                self.name()
+            );
+        }
+        Ok(Box::new(Summing {
+            fleet: self.clone(),
+            samples: Samples::default(),
+            sum: None,
+            of_samples: args.expr_fields.len() > 1,
+        }))
+    }
+
+    fn state_fields(&self, args: StateFieldsArgs<'_>) -> Result<Vec<FieldRef>> {
+        Ok(vec![Arc::new(Field::new(
+            format!("{}[state]", args.name),
+            DataType::Binary,
+            true,
+        ))])
+    }
+}
+
+/// A group on the way.
+#[derive(Debug)]
+struct Summing {
+    fleet: Fleet,
+    samples: Samples,
+    sum: Option<Summary>,
+    of_samples: bool,
+}
+
+impl Summing {
+    fn add(&mut self, bytes: &[u8]) -> Result<()> {
+        let one = Summary::of_bytes(bytes).map_err(external)?;
+        self.fleet.ground.check(&one).map_err(external)?;
+        match &mut self.sum {
+            None => self.sum = Some(one),
+            Some(sum) => sum.merge(&one).map_err(external)?,
+        }
+        Ok(())
+    }
+
+    fn each(values: &[ArrayRef], mut look: impl FnMut(&[u8]) -> Result<()>) -> Result<()> {
+        let Some(column) = values.first() else {
+            return exec_err!("a summary is missing; give a column of summaries");
+        };
+        let column = cast(column, &DataType::Binary)?;
+        let Some(column) = column.as_any().downcast_ref::<BinaryArray>() else {
+            return exec_err!("summaries are bytes; give what `modelmill_summarise` made");
+        };
+        column.iter().flatten().try_for_each(|bytes| look(bytes))
+    }
+
+    fn summed(&mut self) -> Result<Option<Summary>> {
+        if self.of_samples {
+            let fleet = self.fleet.clone();
+            return self
+                .samples
+                .summary(&fleet.ground, &fleet.columns)
+                .map(Some);
+        }
+        Ok(self.sum.take())
+    }
+}
+
+impl Accumulator for Summing {
+    fn update_batch(&mut self, values: &[ArrayRef]) -> Result<()> {
+        if self.of_samples {
+            self.samples.add(values)
+        } else {
+            Self::each(values, |bytes| self.add(bytes))
+        }
+    }
+
+    fn merge_batch(&mut self, states: &[ArrayRef]) -> Result<()> {
+        Self::each(states, |bytes| {
+            if self.of_samples {
+                self.samples.add_bytes(bytes)
+            } else {
+                self.add(bytes)
+            }
+        })
+    }
+
+    fn state(&mut self) -> Result<Vec<ScalarValue>> {
+        let bytes = if self.of_samples {
+            Some(self.samples.bytes())
+        } else {
+            self.sum.take().map(|sum| sum.bytes())
+        };
+        Ok(vec![ScalarValue::Binary(bytes)])
+    }
+
+    fn evaluate(&mut self) -> Result<ScalarValue> {
+        let sum = self.summed()?;
+        match self.fleet.answer {
+            Answer::Summary | Answer::Merged => Ok(ScalarValue::Binary(sum.map(|sum| sum.bytes()))),
+            Answer::Parameters => {
+                let sum = sum.unwrap_or_else(|| self.fleet.ground.empty());
+                // A group without a usable recording has counts and no parameters.
+                let fit = self.fleet.ground.solve(&sum).ok();
+                let n = self.fleet.ground.parameters().len();
+                let mut columns: Vec<ArrayRef> = vec![
+                    Arc::new(UInt64Array::from(vec![sum.recordings])),
+                    Arc::new(UInt64Array::from(vec![sum.bad.len() as u64])),
+                ];
+                for k in 0..n {
+                    let fitted = fit.as_ref().map(|fit| fit.parameters[k]);
+                    columns.push(Arc::new(Float64Array::from(vec![
+                        fitted.map(|fitted| fitted.value),
+                    ])));
+                    columns.push(Arc::new(Float64Array::from(vec![
+                        fitted.and_then(|fitted| fitted.deviation),
+                    ])));
+                }
+                let answer = StructArray::try_new(self.fleet.fields(), columns, None)?;
+                Ok(ScalarValue::Struct(Arc::new(answer)))
+            }
+        }
+    }
+
+    fn size(&self) -> usize {
+        let sum = self.sum.as_ref().map_or(0, |sum| 8 * sum.whole.gram.len());
+        size_of_val(self) + self.samples.size() + sum
+    }
+}

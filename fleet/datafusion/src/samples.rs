@@ -1,0 +1,161 @@
+//! Samples of recordings as they come in, in any order, and as bytes between partitions.
+
+use std::collections::BTreeMap;
+
+use datafusion::arrow::array::{Array, ArrayRef, Float64Array, StringArray};
+use datafusion::arrow::compute::cast;
+use datafusion::arrow::datatypes::DataType;
+use datafusion::common::{DataFusionError, Result, exec_err};
+use modelmill_fleet::{Ground, Summary};
+
+/// Samples by recording: column by column, in the order in which they came.
+#[derive(Debug, Default)]
+pub(crate) struct Samples {
+    recordings: BTreeMap<String, Vec<Vec<f64>>>,
+}
+
+impl Samples {
+    /// Takes rows: names of recordings, then numbers; what is missing becomes NaN, which the reader of recordings refuses or leaves
+    /// out as the plan says.
+    pub(crate) fn add(&mut self, values: &[ArrayRef]) -> Result<()> {
+        let Some((names, columns)) = values.split_first() else {
+            return exec_err!(
+                "samples have no columns; give the recording's name, time, coordinates and forces"
+            );
+        };
+        let names = cast(names, &DataType::Utf8)?;
+        let Some(names) = names.as_any().downcast_ref::<StringArray>() else {
+            return exec_err!(
+                "the names of recordings are no texts; cast the first column to text"
+            );
+        };
+        let columns: Vec<Float64Array> = columns
+            .iter()
+            .map(|column| {
+                let column = cast(column, &DataType::Float64)?;
+                let column = column.as_any().downcast_ref::<Float64Array>().cloned();
+                column.ok_or_else(|| {
+                    DataFusionError::Execution(
+                        "a column of samples holds no numbers; cast it to double".to_owned(),
+                    )
+                })
+            })
+            .collect::<Result<_>>()?;
+        let name = |row: usize| {
+            if names.is_null(row) {
+                ""
+            } else {
+                names.value(row)
+            }
+        };
+        let mut from = 0;
+        while from < names.len() {
+            // Rows of one recording mostly come together.
+            let this = name(from);
+            let to = (from..names.len())
+                .find(|row| name(*row) != this)
+                .unwrap_or(names.len());
+            if !self.recordings.contains_key(this) {
+                self.recordings
+                    .insert(this.to_owned(), vec![Vec::new(); columns.len()]);
+            }
+            if let Some(kept) = self.recordings.get_mut(this) {
+                for (kept, column) in kept.iter_mut().zip(&columns) {
+                    if column.null_count() == 0 {
+                        kept.extend_from_slice(&column.values()[from..to]);
+                    } else {
+                        let value = |row: usize| {
+                            if column.is_null(row) {
+                                f64::NAN
+                            } else {
+                                column.value(row)
+                            }
+                        };
+                        kept.extend((from..to).map(value));
+                    }
+                }
+            }
+            from = to;
+        }
+        Ok(())
+    }
+
+    /// The summary of all recordings.
+    pub(crate) fn summary(&mut self, ground: &Ground, names: &[String]) -> Result<Summary> {
+        let mut sum = ground.empty();
+        for (recording, columns) in std::mem::take(&mut self.recordings) {
+            let columns = names.iter().cloned().zip(columns).collect();
+            sum.merge(&ground.summarise(&recording, columns))
+                .map_err(external)?;
+        }
+        Ok(sum)
+    }
+
+    /// Bytes that are held.
+    pub(crate) fn size(&self) -> usize {
+        let columns = self.recordings.iter().map(|(name, columns)| {
+            name.capacity() + columns.iter().map(|one| 8 * one.capacity()).sum::<usize>()
+        });
+        columns.sum()
+    }
+
+    /// All samples as bytes.
+    pub(crate) fn bytes(&mut self) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(self.size() + 64);
+        for (name, columns) in std::mem::take(&mut self.recordings) {
+            let rows = columns.first().map_or(0, Vec::len);
+            for number in [name.len(), columns.len(), rows] {
+                bytes.extend_from_slice(&(number as u64).to_le_bytes());
+            }
+            bytes.extend_from_slice(name.as_bytes());
+            for column in columns {
+                for value in column {
+                    bytes.extend_from_slice(&value.to_le_bytes());
+                }
+            }
+        }
+        bytes
+    }
+
+    /// Takes what [`Samples::bytes`] gave.
+    pub(crate) fn add_bytes(&mut self, bytes: &[u8]) -> Result<()> {
+        let mut left = bytes;
+        while !left.is_empty() {
+            self.add_one(&mut left).ok_or_else(|| {
+                DataFusionError::Execution(
+                    "samples from another partition are cut off; run the query again".to_owned(),
+                )
+            })?;
+        }
+        Ok(())
+    }
+
+    fn add_one(&mut self, left: &mut &[u8]) -> Option<()> {
+        let mut number =
+            || usize::try_from(u64::from_le_bytes(take(left, 8)?.try_into().ok()?)).ok();
+        let [length, columns, rows] = [number()?, number()?, number()?];
+        let name = std::str::from_utf8(take(left, length)?).ok()?.to_owned();
+        let all = take(left, columns.checked_mul(rows)?.checked_mul(8)?)?;
+        let kept = self
+            .recordings
+            .entry(name)
+            .or_insert_with(|| vec![Vec::new(); columns]);
+        for (kept, column) in kept.iter_mut().zip(all.chunks_exact((8 * rows).max(1))) {
+            let values = column
+                .chunks_exact(8)
+                .filter_map(|eight| Some(f64::from_le_bytes(eight.try_into().ok()?)));
+            kept.extend(values);
+        }
+        Some(())
+    }
+}
+
+fn take<'a>(left: &mut &'a [u8], n: usize) -> Option<&'a [u8]> {
+    let (taken, rest) = left.split_at_checked(n)?;
+    *left = rest;
+    Some(taken)
+}
+
+pub(crate) fn external(fault: modelmill_fleet::Fault) -> DataFusionError {
+    DataFusionError::Execution(fault.to_string())
+}

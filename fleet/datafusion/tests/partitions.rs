@@ -1,0 +1,144 @@
+//! The same query gives the same numbers however the samples are spread, and the same as the summaries of the files.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use datafusion::arrow::array::{Array, AsArray};
+use datafusion::arrow::datatypes::{Float64Type, UInt64Type};
+use datafusion::prelude::{SessionConfig, SessionContext};
+use modelmill::recording::Reading;
+use modelmill_fleet::folder::robots;
+use modelmill_fleet::{Ground, Plan};
+use modelmill_fleet_datafusion::register;
+use modelmill_fleet_program::generate::{Size, generate};
+
+/// Values by robot and day.
+type Answer = BTreeMap<(String, String), Vec<Option<f64>>>;
+
+async fn answer(session: &SessionContext, sql: &str) -> Answer {
+    let batches = session.sql(sql).await.unwrap().collect().await.unwrap();
+    let mut all = BTreeMap::new();
+    for batch in batches {
+        let [robot, day] = [0, 1].map(|k| {
+            datafusion::arrow::compute::cast(
+                batch.column(k),
+                &datafusion::arrow::datatypes::DataType::Utf8,
+            )
+            .unwrap()
+        });
+        let fits = batch.column(2).as_struct();
+        for row in 0..batch.num_rows() {
+            let key = [&robot, &day].map(|column| column.as_string::<i32>().value(row).to_owned());
+            let counts = fits.columns()[..2]
+                .iter()
+                .map(|one| Some(one.as_primitive::<UInt64Type>().value(row) as f64));
+            let values = fits.columns()[2..].iter().map(|one| {
+                let one = one.as_primitive::<Float64Type>();
+                one.is_valid(row).then(|| one.value(row))
+            });
+            all.insert(key.into(), counts.chain(values).collect());
+        }
+    }
+    all
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn partitions_change_nothing() {
+    let folder = std::env::temp_dir().join(format!("modelmill-partitions-{}", std::process::id()));
+    let size = Size {
+        robots: 3,
+        days: 6,
+        per_day: 2,
+        seconds: 12.0,
+        rate: 100.0,
+        seed: 9,
+        bad: 0,
+    };
+    generate(&folder, &size).unwrap();
+    let data = folder.join("recordings");
+    let first = data.join("robot=R00000/day=2026-03-01/recording=0/data.parquet");
+    let plan = Plan::make(&folder.join("model.toml"), &Reading::default(), &[&first]).unwrap();
+    let ground: Arc<Ground> = Arc::new(plan.ground().unwrap());
+    let mut expected = Answer::new();
+    for (robot, files) in robots(&data).unwrap() {
+        for day in files.chunk_by(|a, b| a.day == b.day) {
+            let mut sum = ground.empty();
+            for file in day {
+                sum.merge(&ground.summarise_file(&file.name, &file.path))
+                    .unwrap();
+            }
+            let fit = ground.solve(&sum).unwrap();
+            let values = fit
+                .parameters
+                .iter()
+                .flat_map(|one| [Some(one.value), one.deviation]);
+            let counts = [sum.recordings as f64, sum.bad.len() as f64].map(Some);
+            expected.insert(
+                (robot.clone(), day[0].day.clone()),
+                counts.into_iter().chain(values).collect(),
+            );
+        }
+    }
+    assert_eq!(expected.len(), 18);
+    let samples = "recording, t, q1, q3, motor_left, motor_right";
+    let queries = [
+        format!(
+            "SELECT robot, day, modelmill_identify({samples}) FROM samples GROUP BY robot, day"
+        ),
+        format!(
+            "SELECT robot, day, modelmill_identify(s) FROM (SELECT robot, day, modelmill_summarise({samples}) AS s FROM samples \
+             GROUP BY robot, day, recording) GROUP BY robot, day"
+        ),
+        // Samples backwards, and of all robots among each other.
+        format!(
+            "SELECT robot, day, modelmill_identify({samples}) FROM (SELECT * FROM samples ORDER BY q1) GROUP BY robot, day"
+        ),
+        format!(
+            "SELECT robot, day, modelmill_identify(modelmill_merge) FROM (SELECT robot, day, modelmill_merge(summary) AS modelmill_merge \
+             FROM modelmill_recordings('{}') GROUP BY robot, day) GROUP BY robot, day",
+            data.display()
+        ),
+    ];
+    for partitions in [1, 2, 7] {
+        for batch in [100, 8192] {
+            let config = SessionConfig::new()
+                .with_target_partitions(partitions)
+                .with_batch_size(batch);
+            let session = SessionContext::new_with_config(config);
+            register(&session, &ground);
+            let table = format!(
+                "CREATE EXTERNAL TABLE samples STORED AS PARQUET PARTITIONED BY (robot, day, recording) LOCATION '{}/'",
+                data.display()
+            );
+            session.sql(&table).await.unwrap().collect().await.unwrap();
+            for query in &queries {
+                let found = answer(&session, query).await;
+                assert!(found.keys().eq(expected.keys()), "{query}");
+                for (key, values) in &found {
+                    for (a, b) in values.iter().zip(&expected[key]) {
+                        let is_same = match (a, b) {
+                            (Some(a), Some(b)) => (a - b).abs() <= 1e-9 * b.abs().max(1e-3),
+                            (a, b) => a == b,
+                        };
+                        assert!(is_same, "{query}: {key:?} {a:?} {b:?}");
+                    }
+                }
+            }
+        }
+    }
+    let session = SessionContext::new();
+    register(&session, &ground);
+    let wrong = session
+        .sql("SELECT modelmill_identify(arrow_cast('no summary', 'Binary'))")
+        .await
+        .unwrap()
+        .collect()
+        .await;
+    assert!(
+        wrong
+            .unwrap_err()
+            .to_string()
+            .contains("no summary of recordings")
+    );
+    std::fs::remove_dir_all(&folder).unwrap();
+}

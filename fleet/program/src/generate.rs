@@ -1,0 +1,627 @@
+//! A fleet with a truth: robots of one kind that differ a little, some of which wear, carry another load from a day on, or lose a
+//! sensor.
+//!
+//! The five-bar stands in as a rig, so that nothing of its mechanics is the mill's: the rig goes along each motion once, and
+//! says what each mass, first moment and inertia of a body adds to the forces, which are linear in them. A robot is a set of
+//! these numbers, with friction; a recording is one of the motions from some moment on, through the rig's sensors.
+
+use std::fs;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use modelmill_fleet::Fault;
+use modelmill_rig::{Body, Channel, Noise, State, Tracker, forces};
+use nalgebra::{Matrix3, Vector3};
+use parquet::basic::{Compression, Repetition, Type as Physical};
+use parquet::data_type::{DoubleType, FloatType};
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::Type;
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+/// The machine as a rig.
+const RIG: &str = include_str!("../five_bar.rig.toml");
+/// The bundled model, and what the fleet's model has besides.
+const MODEL: &str = include_str!("../../../model-spec/models/five_bar.toml");
+const FRICTION: &str = r#"# The bundled five-bar with friction of both motors.
+schema = 1
+name = "five_bar_friction"
+extends = "five_bar.toml"
+
+[[effect]]
+name = "dry_left"
+kind = "coulomb_friction"
+at = ["motor_left"]
+parameters = { Fc = { name = "Fc_left", nominal = 0.8 } }
+
+[[effect]]
+name = "dry_right"
+kind = "coulomb_friction"
+at = ["motor_right"]
+parameters = { Fc = { name = "Fc_right", nominal = 0.7 } }
+
+[[effect]]
+name = "viscous_left"
+kind = "viscous_friction"
+at = ["motor_left"]
+parameters = { Fv = { name = "Fv_left", nominal = 0.5 } }
+
+[[effect]]
+name = "viscous_right"
+kind = "viscous_friction"
+at = ["motor_right"]
+parameters = { Fv = { name = "Fv_right", nominal = 0.6 } }
+"#;
+
+/// ZZ, MX, MY and M of each link about its joint, as the bundled model has them.
+const LINKS: [[f64; 4]; 4] = [
+    [0.14, 0.45, 0.01, 2.0],
+    [0.13, 0.33, 0.005, 1.1],
+    [0.15, 0.47, -0.01, 2.1],
+    [0.14, 0.36, 0.004, 1.2],
+];
+/// Dry friction, N m, and viscous friction, N m s/rad, of the motors.
+const DRY: [f64; 2] = [0.8, 0.7];
+const VISCOUS: [f64; 2] = [0.5, 0.6];
+/// From the elbow to the tip, m.
+const TO_TIP: f64 = 0.6;
+/// Each motion repeats itself after so long, s.
+const PERIOD: f64 = 6.0;
+const HARMONICS: usize = 6;
+const MOTIONS: usize = 4;
+/// About which angles motors move, and how far at most, rad.
+const MIDDLE: [f64; 2] = [1.95, 1.19];
+const REACH: f64 = 0.3;
+/// Robots differ by this part in each number, deviations.
+const ROBOTS: f64 = 0.01;
+const FRICTIONS: f64 = 0.05;
+/// Friction of one robot differs from recording to recording by this part.
+const DAILY: f64 = 0.005;
+/// Encoders: 17 bits; noise in rad. Torques: noise in N m.
+const ENCODER: Channel = Channel {
+    noise: 2e-5,
+    resolution: std::f64::consts::TAU / 131_072.0,
+    delay: 0.0,
+};
+const TORQUE: Channel = Channel {
+    noise: 0.05,
+    resolution: 1.0 / 1024.0,
+    delay: 0.0,
+};
+
+/// How large a fleet, and from which seed.
+#[derive(Clone, Debug)]
+pub struct Size {
+    /// How many robots.
+    pub robots: usize,
+    /// On how many days, six or more.
+    pub days: usize,
+    /// Recordings of a robot on a day.
+    pub per_day: usize,
+    /// How long each is, s.
+    pub seconds: f64,
+    /// Samples a second.
+    pub rate: f64,
+    /// Another seed makes another fleet.
+    pub seed: u64,
+    /// How many recordings are cut off.
+    pub bad: usize,
+}
+
+/// What a robot has beyond small differences.
+#[derive(Clone, Debug)]
+enum Planted {
+    Nothing,
+    /// Friction of a motor grows by so large a part of its own each day, from a day on.
+    Wear {
+        drive: usize,
+        day: usize,
+        per_day: f64,
+    },
+    /// A mass at the tip, kg, from a day on.
+    Load {
+        day: usize,
+        mass: f64,
+    },
+    /// The torque sensor of a motor stands still from a day on.
+    Dead {
+        drive: usize,
+        day: usize,
+    },
+    /// A mass at the tip, kg, from the first day on: it differs from the others.
+    Odd {
+        mass: f64,
+    },
+}
+
+impl Planted {
+    fn json(&self, days: &[String]) -> Value {
+        let motor = |drive: &usize| ["motor_left", "motor_right"][*drive];
+        match self {
+            Self::Nothing => json!({ "kind": "none" }),
+            Self::Wear {
+                drive,
+                day,
+                per_day,
+            } => {
+                json!({ "kind": "wear", "at": motor(drive), "day": days[*day], "place": day, "per_day": per_day })
+            }
+            Self::Load { day, mass } => {
+                json!({ "kind": "payload", "at": "link2", "day": days[*day], "place": day, "mass": mass })
+            }
+            Self::Dead { drive, day } => {
+                json!({ "kind": "dead_sensor", "at": motor(drive), "day": days[*day], "place": day })
+            }
+            Self::Odd { mass } => json!({ "kind": "odd", "at": "link2", "mass": mass }),
+        }
+    }
+}
+
+/// One period of a motion: positions and rates of the motors, and what each number of each link adds to their torques.
+struct Motion {
+    q: [Vec<f64>; 2],
+    qd: [Vec<f64>; 2],
+    /// `[link][number][drive][sample]`.
+    columns: Vec<[[Vec<f64>; 2]; 4]>,
+}
+
+/// Makes a fleet in a folder: a model file, Parquet by robot, day and recording, and the truth, which comes back too.
+///
+/// Fails where the size makes no fleet, or the folder cannot be written to.
+pub fn generate(folder: &Path, size: &Size) -> Result<Value, Fault> {
+    if size.robots == 0
+        || size.days < 6
+        || size.per_day == 0
+        || !(size.seconds >= 5.0)
+        || !(size.rate >= 20.0)
+    {
+        return Err(Fault::new(
+            "a fleet has one robot or more, six days or more, one recording a day or more, each of 5 s or more at 20 Hz or more",
+        ));
+    }
+    write(&folder.join("five_bar.toml"), MODEL)?;
+    write(&folder.join("model.toml"), FRICTION)?;
+    let data = folder.join("recordings");
+    let motions: Vec<Motion> = (0..MOTIONS)
+        .into_par_iter()
+        .map(|k| motion(size, k))
+        .collect::<Result<_, _>>()?;
+    let days: Vec<String> = (0..size.days).map(date).collect();
+    let robots: Vec<(String, Planted)> = (0..size.robots)
+        .map(|r| (format!("R{r:05}"), planted(size, r)))
+        .collect();
+    let bad = bad_recordings(size);
+    robots
+        .par_iter()
+        .enumerate()
+        .try_for_each(|(r, (name, planted))| {
+            let robot = robot(size, r);
+            for day in 0..size.days {
+                for k in 0..size.per_day {
+                    let path = data
+                        .join(format!("robot={name}"))
+                        .join(format!("day={}", days[day]))
+                        .join(format!("recording={k}"));
+                    fs::create_dir_all(&path).map_err(|error| unwritten(&path, &error))?;
+                    let path = path.join("data.parquet");
+                    record(&path, size, &motions, &robot, planted, (r, day, k))?;
+                    if bad.contains(&(r, day, k)) {
+                        spoil(&path)?;
+                    }
+                }
+            }
+            Ok::<_, Fault>(())
+        })?;
+    let bad = bad.iter().map(|(r, day, k)| {
+        format!(
+            "robot={}/day={}/recording={k}/data.parquet",
+            robots[*r].0, days[*day]
+        )
+    });
+    let truth = json!({
+        "seed": size.seed,
+        "robots": robots.iter().map(|(name, planted)| json!({ "robot": name, "planted": planted.json(&days) })).collect::<Vec<_>>(),
+        "days": days,
+        "per_day": size.per_day,
+        "samples": samples(size),
+        "bad": bad.collect::<Vec<_>>(),
+    });
+    write(&folder.join("truth.json"), &format!("{truth:#}\n"))?;
+    Ok(truth)
+}
+
+fn samples(size: &Size) -> usize {
+    (size.seconds * size.rate).round() as usize
+}
+
+/// Days from the first of March 2026 on.
+fn date(day: usize) -> String {
+    let lengths = [31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
+    let (mut month, mut left) = (3, day);
+    for length in lengths {
+        if left < length {
+            break;
+        }
+        left -= length;
+        month += 1;
+    }
+    format!("2026-{month:02}-{:02}", left + 1)
+}
+
+fn write(path: &Path, text: &str) -> Result<(), Fault> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(|error| unwritten(folder, &error))?;
+    }
+    fs::write(path, text).map_err(|error| unwritten(path, &error))
+}
+
+fn unwritten(path: &Path, error: &dyn std::fmt::Display) -> Fault {
+    Fault::new(format!(
+        "{} cannot be written: {error}; choose another folder, or make room",
+        path.display()
+    ))
+}
+
+/// A motion, and the forces of the rig along it.
+fn motion(size: &Size, k: usize) -> Result<Motion, Fault> {
+    let files = modelmill::files::Memory::default();
+    let mut rig = modelmill_rig::load("five_bar.rig.toml", RIG, &files)
+        .map_err(|failure| Fault::new(failure.render(false)))?
+        .rig;
+    let mut noise = Noise::new(size.seed, 1_000 + k as u64);
+    let mut waves = [[[0.0; 2]; HARMONICS]; 2];
+    for waves in &mut waves {
+        let mut largest = 0.0;
+        for (h, wave) in waves.iter_mut().enumerate() {
+            *wave = [0, 1].map(|_| noise.normal() / (1.0 + h as f64).sqrt());
+            largest += wave[0].hypot(wave[1]);
+        }
+        for x in waves.iter_mut().flatten() {
+            *x *= REACH / largest;
+        }
+    }
+    let state = |t: f64| {
+        let mut state = State {
+            q: MIDDLE.to_vec(),
+            qd: vec![0.0; 2],
+            qdd: vec![0.0; 2],
+        };
+        for (j, waves) in waves.iter().enumerate() {
+            for (h, [a, b]) in waves.iter().enumerate() {
+                let w = std::f64::consts::TAU * (h + 1) as f64 / PERIOD;
+                let (s, c) = (libm::sin(w * t), libm::cos(w * t));
+                state.q[j] += a * s + b * c;
+                state.qd[j] += w * (a * c - b * s);
+                state.qdd[j] -= w * w * (a * s + b * c);
+            }
+        }
+        state
+    };
+    let n = (PERIOD * size.rate).round() as usize;
+    // The motions of all bodies once; then forces for one number after the other.
+    let tracked = rig.clone();
+    let mut tracker = Tracker::new(&tracked).map_err(Fault::new)?;
+    let mut one = Motion {
+        q: [Vec::with_capacity(n), Vec::with_capacity(n)],
+        qd: [Vec::with_capacity(n), Vec::with_capacity(n)],
+        columns: (0..LINKS.len())
+            .map(|_| std::array::from_fn(|_| [Vec::new(), Vec::new()]))
+            .collect(),
+    };
+    for body in &mut rig.bodies {
+        set(body, [0.0; 4]);
+    }
+    for i in 0..n {
+        let state = state(i as f64 / size.rate);
+        let moved = tracker.follow(&state).map_err(Fault::new)?;
+        for j in 0..2 {
+            one.q[j].push(state.q[j]);
+            one.qd[j].push(state.qd[j]);
+        }
+        for link in 0..LINKS.len() {
+            let mut of = |numbers: [f64; 4]| {
+                set(&mut rig.bodies[link], numbers);
+                let found = forces(&rig, &moved).map_err(Fault::new);
+                set(&mut rig.bodies[link], [0.0; 4]);
+                found
+            };
+            // ZZ, MX, MY, M.
+            let zz = of([1.0, 0.0, 0.0, 0.0])?;
+            let m = of([0.0, 0.0, 0.0, 1.0])?;
+            let with_x = of([1.0, 1.0, 0.0, 1.0])?;
+            let with_y = of([1.0, 0.0, 1.0, 1.0])?;
+            for d in 0..2 {
+                let base = zz[d] + m[d];
+                for (number, force) in [zz[d], with_x[d] - base, with_y[d] - base, m[d]]
+                    .into_iter()
+                    .enumerate()
+                {
+                    one.columns[link][number][d].push(force);
+                }
+            }
+        }
+    }
+    Ok(one)
+}
+
+/// Gives a body of the rig the numbers ZZ, MX, MY and M about its joint.
+fn set(body: &mut Body, [zz, mx, my, m]: [f64; 4]) {
+    body.mass = m;
+    body.centre = if m == 0.0 {
+        Vector3::zeros()
+    } else {
+        Vector3::new(mx / m, my / m, 0.0)
+    };
+    let about_centre = zz - m * body.centre.norm_squared();
+    body.inertia = Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, about_centre));
+}
+
+/// Numbers of a robot.
+struct Robot {
+    links: [[f64; 4]; 4],
+    dry: [f64; 2],
+    viscous: [f64; 2],
+}
+
+fn robot(size: &Size, r: usize) -> Robot {
+    let mut noise = Noise::new(size.seed, 10_000 + r as u64);
+    let mut links = LINKS;
+    for link in &mut links {
+        let heavier = 1.0 + ROBOTS * noise.normal();
+        for number in link {
+            *number *= heavier * (1.0 + 0.3 * ROBOTS * noise.normal());
+        }
+    }
+    let mut friction = |of: [f64; 2]| of.map(|f| f * (1.0 + FRICTIONS * noise.normal()));
+    Robot {
+        links,
+        dry: friction(DRY),
+        viscous: friction(VISCOUS),
+    }
+}
+
+/// Of a hundred robots three wear, three get a load, two lose a sensor and one is odd.
+fn planted(size: &Size, r: usize) -> Planted {
+    let mut noise = Noise::new(size.seed, 5_000_000 + r as u64);
+    let drive = usize::from(noise.uniform() < 0.5);
+    // Two days before and three after, so that there is something to tell.
+    let span = (size.days - 4) as f64;
+    let day = 2 + ((noise.uniform() * span) as usize).min(size.days - 5);
+    let much = noise.uniform();
+    // Small fleets have one of each as well.
+    match r % 100 {
+        7 | 38 | 71 => Planted::Wear {
+            drive,
+            day,
+            per_day: 0.08 + 0.10 * much,
+        },
+        3 | 45 | 82 => Planted::Load {
+            day,
+            mass: 0.15 + 0.25 * much,
+        },
+        5 | 60 => Planted::Dead { drive, day },
+        9 => Planted::Odd {
+            mass: 0.25 + 0.2 * much,
+        },
+        _ => Planted::Nothing,
+    }
+}
+
+/// Which recordings are cut off, as by a full disk.
+fn bad_recordings(size: &Size) -> Vec<(usize, usize, usize)> {
+    let mut noise = Noise::new(size.seed, 9_000_000);
+    let mut place = |n: usize| ((noise.uniform() * n as f64) as usize).min(n - 1);
+    let mut all: Vec<_> = (0..size.bad)
+        .map(|_| (place(size.robots), place(size.days), place(size.per_day)))
+        .collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// Cuts a file off.
+fn spoil(path: &Path) -> Result<(), Fault> {
+    let file = fs::OpenOptions::new().write(true).open(path);
+    let cut = file.and_then(|file| file.set_len(file.metadata()?.len() * 2 / 3));
+    cut.map_err(|error| unwritten(path, &error))
+}
+
+/// Writes one recording.
+fn record(
+    path: &PathBuf,
+    size: &Size,
+    motions: &[Motion],
+    robot: &Robot,
+    planted: &Planted,
+    (r, day, k): (usize, usize, usize),
+) -> Result<(), Fault> {
+    let seed = size.seed
+        ^ ((r as u64) << 24 | (day as u64) << 8 | k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let mut noise = Noise::new(seed, 3);
+    let motion = &motions[((noise.uniform() * MOTIONS as f64) as usize).min(MOTIONS - 1)];
+    let n = motion.q[0].len();
+    let start = ((noise.uniform() * n as f64) as usize).min(n - 1);
+    let mut links = robot.links;
+    let daily = 1.0 + DAILY * noise.normal();
+    let [mut dry, mut viscous] = [robot.dry, robot.viscous].map(|f| f.map(|f| f * daily));
+    let mut dead = None;
+    let mut load = 0.0;
+    match planted {
+        Planted::Wear {
+            drive,
+            day: from,
+            per_day,
+        } if day >= *from => {
+            let grown = 1.0 + per_day * (day - from + 1) as f64;
+            dry[*drive] *= grown;
+            viscous[*drive] *= grown;
+        }
+        Planted::Load { day: from, mass } if day >= *from => load = *mass,
+        Planted::Dead { drive, day: from } if day >= *from => dead = Some(*drive),
+        Planted::Odd { mass } => load = *mass,
+        _ => {}
+    }
+    links[1][0] += load * TO_TIP * TO_TIP;
+    links[1][1] += load * TO_TIP;
+    links[1][3] += load;
+    // One period without noise.
+    let torque: Vec<Vec<f64>> = (0..2)
+        .map(|d| {
+            let mut sum: Vec<f64> = (motion.qd[d].iter())
+                .map(|rate| dry[d] * sign(*rate) + viscous[d] * rate)
+                .collect();
+            for (numbers, columns) in links.iter().zip(&motion.columns) {
+                for (number, column) in numbers.iter().zip(columns) {
+                    for (sum, x) in sum.iter_mut().zip(&column[d]) {
+                        *sum += number * x;
+                    }
+                }
+            }
+            sum
+        })
+        .collect();
+    let all = samples(size);
+    let time: Vec<f64> = (0..all).map(|i| i as f64 / size.rate).collect();
+    let mut positions = [Vec::with_capacity(all), Vec::with_capacity(all)];
+    let mut torques = [Vec::with_capacity(all), Vec::with_capacity(all)];
+    for i in 0..all {
+        let at = (start + i) % n;
+        for j in 0..2 {
+            positions[j].push(ENCODER.read(motion.q[j][at], &mut noise));
+            torques[j].push(TORQUE.read(torque[j][at], &mut noise) as f32);
+        }
+    }
+    if let Some(drive) = dead {
+        // It dies a tenth into the first recording of its day, and keeps its last reading.
+        let from = match planted {
+            Planted::Dead { day: first, .. } if day == *first && k == 0 => all / 10,
+            _ => 0,
+        };
+        let last = torques[drive][from];
+        torques[drive][from..].fill(last);
+    }
+    store(path, &time, &positions, &torques)
+}
+
+fn sign(x: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x.signum() }
+}
+
+/// The columns as Parquet.
+fn store(
+    path: &Path,
+    time: &[f64],
+    positions: &[Vec<f64>; 2],
+    torques: &[Vec<f32>; 2],
+) -> Result<(), Fault> {
+    let fault = |error: &dyn std::fmt::Display| unwritten(path, error);
+    let column = |name: &str, kind: Physical| {
+        Type::primitive_type_builder(name, kind)
+            .with_repetition(Repetition::REQUIRED)
+            .build()
+            .map(Arc::new)
+    };
+    let fields: Result<Vec<_>, _> = [
+        ("t", Physical::DOUBLE),
+        ("q1", Physical::DOUBLE),
+        ("q3", Physical::DOUBLE),
+        ("motor_left", Physical::FLOAT),
+        ("motor_right", Physical::FLOAT),
+    ]
+    .into_iter()
+    .map(|(name, kind)| column(name, kind))
+    .collect();
+    let schema = fields.and_then(|fields| {
+        Type::group_type_builder("recording")
+            .with_fields(fields)
+            .build()
+    });
+    let schema = Arc::new(schema.map_err(|error| fault(&error))?);
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::UNCOMPRESSED)
+        .set_dictionary_enabled(false)
+        .build();
+    let file = fs::File::create(path).map_err(|error| fault(&error))?;
+    let written = (|| {
+        let mut writer =
+            SerializedFileWriter::new(BufWriter::new(file), schema, Arc::new(properties))?;
+        let mut group = writer.next_row_group()?;
+        for values in [time, &positions[0], &positions[1]] {
+            if let Some(mut column) = group.next_column()? {
+                column
+                    .typed::<DoubleType>()
+                    .write_batch(values, None, None)?;
+                column.close()?;
+            }
+        }
+        for values in torques {
+            if let Some(mut column) = group.next_column()? {
+                column
+                    .typed::<FloatType>()
+                    .write_batch(values, None, None)?;
+                column.close()?;
+            }
+        }
+        group.close()?;
+        writer.close().map(|_| ())
+    })();
+    written.map_err(|error: parquet::errors::ParquetError| fault(&error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The rig's columns add up to the rig's forces with all links as they are.
+    #[test]
+    fn columns_of_the_rig_add_up_to_its_forces() {
+        let size = Size {
+            robots: 1,
+            days: 6,
+            per_day: 1,
+            seconds: 6.0,
+            rate: 25.0,
+            seed: 4,
+            bad: 0,
+        };
+        let motion = motion(&size, 1).expect("a motion");
+        let files = modelmill::files::Memory::default();
+        let mut rig = modelmill_rig::load("rig", RIG, &files).expect("a rig").rig;
+        for (body, numbers) in rig.bodies.iter_mut().zip(LINKS) {
+            set(body, numbers);
+        }
+        // Positions and rates of a sample; accelerations from their neighbours.
+        let i = 40;
+        let qdd = (0..2).map(|j| (motion.qd[j][i + 1] - motion.qd[j][i - 1]) * size.rate / 2.0);
+        let state = State {
+            q: vec![motion.q[0][i], motion.q[1][i]],
+            qd: vec![motion.qd[0][i], motion.qd[1][i]],
+            qdd: qdd.collect(),
+        };
+        let moved = Tracker::new(&rig).unwrap().follow(&state).unwrap();
+        let expected = forces(&rig, &moved).unwrap();
+        for d in 0..2 {
+            let sum: f64 = LINKS
+                .iter()
+                .zip(&motion.columns)
+                .flat_map(|(numbers, columns)| numbers.iter().zip(columns))
+                .map(|(number, column)| number * column[d][i])
+                .sum();
+            assert!(
+                (sum - expected[d]).abs() < 0.02 * expected[d].abs().max(1.0),
+                "{sum} is not {}",
+                expected[d]
+            );
+        }
+    }
+
+    #[test]
+    fn days_follow_each_other() {
+        assert_eq!(
+            [date(0), date(30), date(31), date(61)],
+            ["2026-03-01", "2026-03-31", "2026-04-01", "2026-05-01"]
+        );
+    }
+}

@@ -1,0 +1,177 @@
+//! What was found beside what was planted.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use modelmill_fleet::Fault;
+use serde_json::Value;
+
+fn read(path: &Path) -> Result<Value, Fault> {
+    let text = fs::read_to_string(path).map_err(|error| {
+        Fault::new(format!(
+            "{} cannot be read: {error}; name what `identify` or `make` wrote",
+            path.display()
+        ))
+    })?;
+    serde_json::from_str(&text).map_err(|error| Fault::new(format!("{}: {error}", path.display())))
+}
+
+/// How many of a kind there are, how many were found, and with their day within a day.
+#[derive(Default)]
+struct Tally {
+    planted: usize,
+    found: usize,
+    in_time: usize,
+    named: usize,
+    missed: Vec<String>,
+}
+
+/// Holds results, in a folder that [`crate::identify`] wrote, against a truth.
+///
+/// Fails where either cannot be read, or they are of two fleets.
+pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
+    let results = read(&found.join("results.json"))?;
+    let truth = read(truth)?;
+    let list = |value: &Value| value.as_array().cloned().unwrap_or_default();
+    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    let days: Vec<String> = list(&truth["days"]).iter().map(text).collect();
+    let place = |day: &Value| {
+        days.iter()
+            .position(|one| Some(one.as_str()) == day.as_str())
+    };
+    let robots: BTreeMap<String, Value> = list(&results["robots"])
+        .into_iter()
+        .map(|robot| (text(&robot["robot"]), robot))
+        .collect();
+    let differ: BTreeMap<String, Value> = list(&results["fleet"]["differ"])
+        .into_iter()
+        .map(|one| (text(&one["robot"]), one))
+        .collect();
+    let mut tallies: BTreeMap<String, Tally> = BTreeMap::new();
+    let (mut sound, mut alarms) = (0, Vec::new());
+    for one in list(&truth["robots"]) {
+        let (name, planted) = (text(&one["robot"]), &one["planted"]);
+        let Some(robot) = robots.get(&name) else {
+            return Err(Fault::new(format!(
+                "{} has no robot {name}; the truth is of another fleet",
+                found.display()
+            )));
+        };
+        let (since, dead) = (list(&robot["since"]), list(&robot["dead_sensors"]));
+        let kind = text(&planted["kind"]);
+        let tally = tallies.entry(kind.clone()).or_default();
+        let at = planted["place"]
+            .as_u64()
+            .and_then(|day| usize::try_from(day).ok());
+        let is_near = |day: &Value| {
+            place(day)
+                .zip(at)
+                .is_some_and(|(found, planted)| found.abs_diff(planted) <= 1)
+        };
+        let names = |changes: &Value, kind: &str, at: Option<&str>| {
+            list(changes).iter().any(|change| {
+                let is_there = at.is_none_or(|at| {
+                    list(&change["at"])
+                        .iter()
+                        .any(|one| one.as_str() == Some(at))
+                });
+                change["kind"].as_str() == Some(kind) && is_there
+            })
+        };
+        let (is_found, in_time, is_named) = match kind.as_str() {
+            "none" => {
+                sound += 1;
+                if !since.is_empty() || !dead.is_empty() || differ.contains_key(&name) {
+                    let changes = since
+                        .first()
+                        .map(|one| &one["changes"])
+                        .or(differ.get(&name).map(|one| &one["changes"]));
+                    alarms.push(format!(
+                        "{name}: {} {}",
+                        since
+                            .first()
+                            .map(|one| text(&one["day"]))
+                            .unwrap_or_default(),
+                        changes
+                            .and_then(|changes| changes[0]["says"].as_str())
+                            .unwrap_or("a parameter changed")
+                    ));
+                }
+                continue;
+            }
+            "dead_sensor" => {
+                let own: Vec<&Value> = dead
+                    .iter()
+                    .filter(|one| one["sensor"] == planted["at"])
+                    .collect();
+                let near = own.iter().any(|one| is_near(&one["day"]));
+                (!own.is_empty(), near, !own.is_empty())
+            }
+            "odd" => {
+                let own = differ.get(&name);
+                let is_named = own.is_some_and(|one| names(&one["changes"], "payload", None));
+                (own.is_some(), own.is_some() && since.is_empty(), is_named)
+            }
+            _ => {
+                let near = since.iter().any(|one| is_near(&one["day"]));
+                let is_named = since.iter().any(|one| match kind.as_str() {
+                    "wear" => names(&one["changes"], "friction", planted["at"].as_str()),
+                    _ => names(&one["changes"], "payload", None),
+                });
+                (!since.is_empty(), near, is_named)
+            }
+        };
+        tally.planted += 1;
+        tally.found += usize::from(is_found);
+        tally.in_time += usize::from(is_found && in_time);
+        tally.named += usize::from(is_named);
+        if !(is_found && in_time && is_named) {
+            let days: Vec<String> = since.iter().map(|one| text(&one["day"])).collect();
+            let says = since
+                .iter()
+                .flat_map(|one| list(&one["changes"]))
+                .map(|one| text(&one["says"]))
+                .collect::<Vec<_>>();
+            tally
+                .missed
+                .push(format!("{name} planted {planted}, found {days:?} {says:?}"));
+        }
+    }
+    let mut says = String::new();
+    for (kind, tally) in tallies.iter().filter(|(_, tally)| tally.planted > 0) {
+        let _ = writeln!(
+            says,
+            "{kind}: {} planted, {} found, {} with their day within a day, {} with the right name",
+            tally.planted, tally.found, tally.in_time, tally.named
+        );
+        for missed in &tally.missed {
+            let _ = writeln!(says, "  {missed}");
+        }
+    }
+    let _ = writeln!(
+        says,
+        "sound: {sound}, of which {} raised an alarm ({:.2} %)",
+        alarms.len(),
+        100.0 * alarms.len() as f64 / f64::from(u32::try_from(sound.max(1)).unwrap_or(u32::MAX))
+    );
+    for alarm in &alarms {
+        let _ = writeln!(says, "  {alarm}");
+    }
+    let mut bad: Vec<String> = list(&results["bad"])
+        .iter()
+        .map(|one| text(&one["recording"]))
+        .collect();
+    let mut planted: Vec<String> = list(&truth["bad"]).iter().map(text).collect();
+    bad.sort();
+    planted.sort();
+    let missed = planted.iter().filter(|one| !bad.contains(one)).count();
+    let further = bad.iter().filter(|one| !planted.contains(one)).count();
+    let _ = writeln!(
+        says,
+        "bad recordings: {} planted, {missed} not named, {further} named that are sound",
+        planted.len()
+    );
+    Ok(says)
+}

@@ -1,0 +1,105 @@
+//! What is done, kept beside the results: a file for each robot, to which every recording's summary is added as soon as it is
+//! made. A job that is killed leaves at most a tail, which is cut off.
+
+use std::collections::HashMap;
+use std::fs::{self, File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+use modelmill_fleet::{Fault, Summary};
+
+/// The summaries of a robot that are kept.
+pub(crate) struct State {
+    path: PathBuf,
+    file: Mutex<File>,
+}
+
+impl State {
+    /// Opens the file of a robot, with the summaries that it holds by the keys of their recordings; those of another plan do not
+    /// count.
+    pub(crate) fn open(
+        folder: &Path,
+        robot: &str,
+        mark: u64,
+    ) -> Result<(Self, HashMap<String, Summary>), Fault> {
+        let name: String = robot
+            .chars()
+            .map(|c| {
+                if c.is_alphanumeric() || "-_.".contains(c) {
+                    c
+                } else {
+                    '_'
+                }
+            })
+            .collect();
+        // Two names may become one; their numbers tell them apart.
+        let number = robot
+            .bytes()
+            .fold(0_u32, |n, b| n.wrapping_mul(31).wrapping_add(u32::from(b)));
+        let path = folder.join(format!("{name}-{number:08x}.sums"));
+        let fault = |error: std::io::Error| {
+            Fault::new(format!(
+                "{} cannot be kept: {error}; choose another folder, or make room",
+                path.display()
+            ))
+        };
+        let bytes = match fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
+            Err(error) => return Err(fault(error)),
+        };
+        let mut kept = HashMap::new();
+        let mut sound = 0;
+        while let Some((key, summary, end)) = entry(&bytes, sound) {
+            if summary.mark == mark {
+                kept.insert(key, summary);
+            }
+            sound = end;
+        }
+        let file = OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(&path)
+            .map_err(fault)?;
+        if sound < bytes.len() {
+            file.set_len(sound as u64).map_err(fault)?;
+        }
+        let file = Mutex::new(file);
+        Ok((Self { path, file }, kept))
+    }
+
+    /// Keeps the summary of a recording.
+    pub(crate) fn keep(&self, key: &str, summary: &Summary) -> Result<(), Fault> {
+        let bytes = summary.bytes();
+        let mut entry = Vec::with_capacity(key.len() + bytes.len() + 16);
+        for part in [key.as_bytes(), &bytes] {
+            entry.extend_from_slice(&(part.len() as u64).to_le_bytes());
+            entry.extend_from_slice(part);
+        }
+        let mut file = self
+            .file
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        file.write_all(&entry).map_err(|error| {
+            Fault::new(format!(
+                "{} cannot be kept: {error}; make room and start again: it goes on",
+                self.path.display()
+            ))
+        })
+    }
+}
+
+/// The entry at a place, and where it ends; `None` where there is none, or it is cut off.
+fn entry(bytes: &[u8], at: usize) -> Option<(String, Summary, usize)> {
+    let part = |at: usize| -> Option<(&[u8], usize)> {
+        let length = bytes.get(at..at.checked_add(8)?)?;
+        let length = usize::try_from(u64::from_le_bytes(length.try_into().ok()?)).ok()?;
+        let end = (at + 8).checked_add(length)?;
+        Some((bytes.get(at + 8..end)?, end))
+    };
+    let (key, end) = part(at)?;
+    let (summary, end) = part(end)?;
+    let key = String::from_utf8(key.to_vec()).ok()?;
+    Some((key, Summary::of_bytes(summary).ok()?, end))
+}

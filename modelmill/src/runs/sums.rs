@@ -1,0 +1,208 @@
+//! Runs of many machines of one kind as sums over the same columns, so that they add: those of a day, of a machine, of a fleet.
+//!
+//! What a column means must not depend on the run: those of scales, clocks and encoders' zeros are built on parameters that
+//! are the same for all, from reference runs ([`CommonGround`]). Rows are made white by each run's own noise, and count
+//! independent numbers of variance 1 whichever run they came from.
+
+use std::sync::Arc;
+
+use modelmill_identify::changes::{Moments, Runs, alone, gains};
+use modelmill_identify::{LeastSquaresError, Triangle};
+use nalgebra::DVector;
+
+use crate::error::{Error, Outcome};
+use crate::model::Model;
+use crate::recording::Recording;
+use crate::runs::layout::Layout;
+use crate::runs::payload::Payloads;
+use crate::runs::rows::{Rows, Sizes};
+use crate::runs::{Bench, Changed, Fitted, beside_known, changes};
+
+/// What all runs of a fleet are summed up and held against.
+#[derive(Clone)]
+pub struct CommonGround {
+    model: Model,
+    payloads: Arc<Payloads>,
+    values: DVector<f64>,
+    sizes: Sizes,
+}
+
+/// One run as sums over its rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunSums {
+    /// Samples that were used, after decimation.
+    pub samples: usize,
+    /// Sums over rows of variance 1: base columns that are no known numbers, then those of every possible change.
+    pub whole: Moments,
+    /// The triangle of the base columns alone, over the same rows.
+    pub base: Triangle,
+    /// By what the parts of the run differ among themselves.
+    pub within: f64,
+    /// What the run's own parameters leave of the force of each drive, as a part of it.
+    pub left: Vec<f64>,
+    /// Contacts and pushes, whose forces are left out.
+    pub events: Vec<Changed>,
+}
+
+impl CommonGround {
+    /// The ground that reference runs make: their parameters, fitted to all of them at once, and the size of their forces.
+    ///
+    /// Fails without runs, and where a run cannot be fitted.
+    pub fn of(model: &Model, reference: &[&Recording]) -> Outcome<Self> {
+        let stretches: Vec<_> = (reference.iter())
+            .flat_map(|one| one.stretches.iter().cloned())
+            .collect();
+        if stretches.is_empty() {
+            return Err(Error::options(
+                "there is no reference run; give one or more recordings of sound machines",
+            ));
+        }
+        let payloads = Payloads::new(model)?;
+        let rows = Rows::new(model, &stretches, &payloads, None)?;
+        let values = rows.values.clone();
+        let sizes = rows.sizes();
+        Ok(Self {
+            model: model.clone(),
+            payloads: Arc::new(payloads),
+            values,
+            sizes,
+        })
+    }
+
+    /// The same ground from what was kept of it: [`CommonGround::values`] and [`CommonGround::sizes`].
+    ///
+    /// Fails where they are of another model.
+    pub fn kept(model: &Model, values: &[f64], sizes: Vec<Moments>) -> Outcome<Self> {
+        let payloads = Payloads::new(model)?;
+        let layout = Layout::new(model, &payloads);
+        let fits = |one: &Moments| one.rhs.len() == layout.total();
+        if values.len() != layout.base || sizes.len() != layout.drives || !sizes.iter().all(fits) {
+            return Err(Error::input(format!(
+                "the reference has {} parameters and sums of {} drives where {} has {} and {}; make it anew with this model",
+                values.len(),
+                sizes.len(),
+                model.name,
+                layout.base,
+                layout.drives
+            )));
+        }
+        Ok(Self {
+            model: model.clone(),
+            payloads: Arc::new(payloads),
+            values: DVector::from_column_slice(values),
+            sizes: Sizes(sizes),
+        })
+    }
+
+    /// The model.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Base parameters of the reference runs that are no known numbers.
+    pub fn values(&self) -> &[f64] {
+        self.values.as_slice()
+    }
+
+    /// Sums over the rows of each drive of the reference runs, as they were measured.
+    pub fn sizes(&self) -> &[Moments] {
+        &self.sizes.0
+    }
+
+    /// Number of columns of [`RunSums::whole`].
+    pub fn n_columns(&self) -> usize {
+        Layout::new(&self.model, &self.payloads).total()
+    }
+
+    /// Number of base columns, which stand first.
+    pub fn n_base(&self) -> usize {
+        self.values.len()
+    }
+
+    fn bench(&self) -> Bench<'_> {
+        Bench::new(&self.model, &self.payloads)
+    }
+
+    /// A recording as sums.
+    ///
+    /// Fails where a force was not measured, or the recording cannot be evaluated.
+    pub fn sums(&self, recording: &Recording) -> Outcome<RunSums> {
+        let run = self.bench().looked_at(recording, Some(&self.values))?;
+        Ok(RunSums {
+            samples: run.samples,
+            whole: run.white.whole(),
+            base: Triangle::new(&run.white.base),
+            within: run.within,
+            left: run.sizes.left(self.n_base())?,
+            events: run.events,
+        })
+    }
+
+    /// The base parameters that a triangle gives, with those of the file that are known numbers. Deviations take the rows to be
+    /// independent and of variance 1, or more where they scatter more.
+    ///
+    /// Fails where the triangle is of another model or holds no rows.
+    pub fn fitted(&self, base: &Triangle) -> Outcome<Vec<Fitted>> {
+        let of = |error: LeastSquaresError| Error::input(error.to_string());
+        if base.rows() == 0 {
+            return Err(of(LeastSquaresError::NoRows));
+        }
+        if base.n_parameters() != self.n_base() {
+            return Err(of(LeastSquaresError::NominalLength {
+                have: base.n_parameters(),
+                expected: self.n_base(),
+            }));
+        }
+        let solved = base.solve_near(self.values()).map_err(of)?;
+        let noise = Some(solved.residual_variance()).filter(|x| x.is_finite());
+        let noise = noise.unwrap_or(1.0).max(1.0);
+        let covariance = solved.unit_covariance();
+        Ok(beside_known(&self.model, |i| Fitted {
+            value: solved.values[i],
+            deviation: solved.determined[i].then(|| (noise * covariance[(i, i)]).sqrt()),
+        }))
+    }
+
+    /// What later runs do not share with those before, the largest first; `within` is by what parts of one run, or runs that are
+    /// taken to be alike, differ among themselves.
+    pub fn changes(&self, before: &[Moments], later: &[Moments], within: f64) -> Vec<Changed> {
+        let bench = self.bench();
+        let runs = Runs {
+            reference: before.to_vec(),
+            later: later.to_vec(),
+            within,
+        };
+        bench.told(&bench.large(&runs, &self.sizes), &self.values)
+    }
+
+    /// By how much every possible change, each with no other beside it, explains what a later run does not share with those
+    /// before: sums of squares over the variance of what is left. The order is always the same.
+    pub fn gains(&self, before: &[Moments], later: &Moments) -> Vec<f64> {
+        gains(&pair(before, later), &self.bench().search)
+    }
+
+    /// One of these changes, by its place among them, whatever it explains.
+    pub fn alone(&self, before: &[Moments], later: &Moments, which: usize) -> Changed {
+        let bench = self.bench();
+        let found = alone(&pair(before, later), &bench.search, which);
+        changes::told(&self.model, &bench.possible, &found, &self.values)
+    }
+
+    /// What one of these changes is called.
+    pub fn name_of_change(&self, which: usize) -> String {
+        self.bench()
+            .possible
+            .get(which)
+            .map_or_else(String::new, |possible| {
+                changes::name(&self.model, &possible.kind)
+            })
+    }
+}
+
+fn pair(before: &[Moments], later: &Moments) -> Runs {
+    Runs {
+        reference: before.to_vec(),
+        later: vec![later.clone()],
+        within: 0.0,
+    }
+}

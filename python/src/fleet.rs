@@ -1,0 +1,135 @@
+//! Summaries of recordings for engines that run Python: they take bytes, and give bytes.
+
+use std::path::{Path, PathBuf};
+
+use modelmill::recording::{Preparation, Reading};
+use modelmill_fleet::{Fault, Ground, Plan, Summary};
+use numpy::PyReadonlyArray1;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::errors::refused;
+
+/// A plan with its model derived.
+#[pyclass(frozen)]
+pub(crate) struct FleetGround {
+    ground: Ground,
+}
+
+fn of_fleet(py: Python<'_>, fault: &Fault) -> PyErr {
+    refused(py, &fault.to_string())
+}
+
+/// The plan that reference recordings make, as JSON.
+#[pyfunction]
+#[pyo3(signature = (model, reference, columns, cutoff_hz, decimate, skip_bad_samples))]
+pub(crate) fn fleet_plan(
+    py: Python<'_>,
+    model: PathBuf,
+    reference: Vec<PathBuf>,
+    columns: Vec<(String, String)>,
+    cutoff_hz: Option<f64>,
+    decimate: usize,
+    skip_bad_samples: bool,
+) -> PyResult<String> {
+    let reading = Reading {
+        columns,
+        preparation: Preparation {
+            cutoff_hz,
+            decimate: decimate.max(1),
+            ..Preparation::default()
+        },
+        skip_bad_samples,
+        ..Reading::default()
+    };
+    let made = py.detach(|| {
+        let reference: Vec<&Path> = reference.iter().map(PathBuf::as_path).collect();
+        Plan::make(&model, &reading, &reference).map(|plan| plan.json())
+    });
+    made.map_err(|fault| of_fleet(py, &fault))
+}
+
+/// Adds summaries; `None` without any.
+#[pyfunction]
+pub(crate) fn fleet_merge<'py>(
+    py: Python<'py>,
+    summaries: Vec<Vec<u8>>,
+) -> PyResult<Option<Bound<'py, PyBytes>>> {
+    let merged = py.detach(|| {
+        let mut sum: Option<Summary> = None;
+        for bytes in &summaries {
+            let one = Summary::of_bytes(bytes)?;
+            match &mut sum {
+                None => sum = Some(one),
+                Some(sum) => sum.merge(&one)?,
+            }
+        }
+        Ok(sum.map(|sum| sum.bytes()))
+    });
+    let merged = merged.map_err(|fault| of_fleet(py, &fault))?;
+    Ok(merged.map(|bytes| PyBytes::new(py, &bytes)))
+}
+
+#[pymethods]
+impl FleetGround {
+    #[new]
+    fn new(py: Python<'_>, plan: &str) -> PyResult<Self> {
+        let made = py.detach(|| Plan::parse("the plan", plan).and_then(|plan| plan.ground()));
+        let ground = made.map_err(|fault| of_fleet(py, &fault))?;
+        Ok(Self { ground })
+    }
+
+    /// Names of the columns that a recording needs.
+    #[getter]
+    fn columns(&self) -> Vec<String> {
+        self.ground.columns()
+    }
+
+    fn summarise<'py>(
+        &self,
+        py: Python<'py>,
+        recording: &str,
+        columns: Vec<(String, PyReadonlyArray1<'py, f64>)>,
+    ) -> Bound<'py, PyBytes> {
+        let columns = columns.into_iter().map(|(name, values)| {
+            let values = values.as_array().iter().copied().collect();
+            (name, values)
+        });
+        let columns = columns.collect();
+        let bytes = py.detach(|| self.ground.summarise(recording, columns).bytes());
+        PyBytes::new(py, &bytes)
+    }
+
+    fn summarise_file<'py>(
+        &self,
+        py: Python<'py>,
+        recording: &str,
+        path: PathBuf,
+    ) -> Bound<'py, PyBytes> {
+        let bytes = py.detach(|| self.ground.summarise_file(recording, &path).bytes());
+        PyBytes::new(py, &bytes)
+    }
+
+    /// Parameters with deviations, as JSON, with what was wrong.
+    fn solve(&self, py: Python<'_>, summary: &[u8]) -> PyResult<String> {
+        let solved = py.detach(|| {
+            let summary = Summary::of_bytes(summary)?;
+            let fit = self.ground.solve(&summary)?;
+            Ok(self.ground.json(&fit).to_string())
+        });
+        solved.map_err(|fault: Fault| of_fleet(py, &fault))
+    }
+
+    /// The days of a robot in order, each with its summary, as JSON.
+    fn robot(&self, py: Python<'_>, name: &str, days: Vec<(String, Vec<u8>)>) -> PyResult<String> {
+        let found = py.detach(|| {
+            let days = days
+                .iter()
+                .map(|(day, bytes)| Ok((day.clone(), Summary::of_bytes(bytes)?)));
+            let days = days.collect::<Result<Vec<_>, Fault>>()?;
+            let robot = modelmill_fleet::robot::robot(&self.ground, name, days)?;
+            Ok(robot.json(&self.ground).to_string())
+        });
+        found.map_err(|fault: Fault| of_fleet(py, &fault))
+    }
+}
