@@ -51,10 +51,10 @@ pub(crate) fn fleet_plan(
 
 /// Adds summaries; `None` without any.
 #[pyfunction]
-pub(crate) fn fleet_merge<'py>(
-    py: Python<'py>,
+pub(crate) fn fleet_merge(
+    py: Python<'_>,
     summaries: Vec<Vec<u8>>,
-) -> PyResult<Option<Bound<'py, PyBytes>>> {
+) -> PyResult<Option<Bound<'_, PyBytes>>> {
     let merged = py.detach(|| {
         let mut sum: Option<Summary> = None;
         for bytes in &summaries {
