@@ -1,6 +1,6 @@
 //! Sensitivity: the size at which half of the effects of a kind are found, beside an oracle that knows the shape of each.
 //!
-//! `cargo bench -p modelmill-cli --bench sensitivity -- [--seeds 6] [--calm 60] [--figure FILE.svg] [--only KIND]
+//! `cargo bench -p modelmill-cli --bench sensitivity -- [--seeds 6] [--calm 200] [--figure FILE.svg] [--only KIND]
 //! [--program PATH]`. An effect is as large as the square root of the squares that it adds to both recordings, beside base
 //! parameters, in units of the white noise: d'; of a kind that holds a simpler one, what it adds beside that. A matched filter (W. Peterson, T. Birdsall, W. Fox 1954) at the false-alarm
 //! rate of `diagnose` on `--calm` recordings without anything finds half of the effects whose d' is the two-sided
@@ -64,7 +64,7 @@ fn main() -> ExitCode {
 fn run() -> Result<(), String> {
     let options = Options::read(&[
         ("seeds", "6"),
-        ("calm", "60"),
+        ("calm", "200"),
         ("figure", ""),
         ("only", ""),
         ("program", ""),
