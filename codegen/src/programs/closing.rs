@@ -237,7 +237,7 @@ impl Closing {
         let mut total = [c, s];
         for (piece, n) in parts.solved {
             let turned = times(graph, self.solved[piece], n.into());
-            total = turn(graph, turned, total);
+            total = turn(graph, total, turned);
         }
         total
     }
