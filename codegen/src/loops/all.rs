@@ -33,7 +33,7 @@ impl Loops {
         let mut closures = closures(graph, mechanism, tree)?;
         let couplings = coupling::couplings(graph, mechanism)?;
         closures.extend(couplings.closures);
-        parallelogram::find(graph, mechanism, &mut closures);
+        parallelogram::find(graph, mechanism, &mut closures, &couplings.divided);
         let residual: Vec<ExprId> = closures
             .iter()
             .flat_map(|c| c.residual.iter().copied())

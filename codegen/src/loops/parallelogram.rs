@@ -6,16 +6,19 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modelmill_algebra::field::{Element, Stream};
+use modelmill_algebra::field::{Element, MODULUS, Stream};
 use modelmill_spec::Mechanism;
 use nalgebra::{DMatrix, DVector};
 
 use crate::expr::{
     AngleSum, Atom, ExprId, F64, FieldPoint, Graph, Node, Tape, coordinates_of, nominal_of,
 };
+use crate::loops::all::Loops;
 use crate::loops::closure::Closure;
+use crate::loops::field_poses::FieldPoses;
 use crate::loops::magnitude;
 use crate::loops::numeric_poses::{NumericLoops, symmetric};
+use crate::loops::plan::{Unknowns, plan};
 use crate::loops::relation::AngleRelation;
 
 /// How far known coordinates are moved from the nominal pose, in rad or relative to the size of the loop, and how exact
@@ -27,12 +30,17 @@ const TOLERANCE: f64 = 1e-8;
 ///
 /// Loops are looked at one after the other, as soon as all but as many of their coordinates are known as they have
 /// equations: a loop may be driven by another one.
-pub(crate) fn find(graph: &mut Graph, mechanism: &Mechanism, closures: &mut [Closure]) {
+pub(crate) fn find(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    closures: &mut [Closure],
+    divided: &[(usize, i64)],
+) {
     let mut known: BTreeSet<usize> = (0..mechanism.coordinates.len())
         .filter(|c| !mechanism.coordinates[*c].passive)
         .collect();
     let mut related: Vec<AngleRelation> = Vec::new();
-    let mut solved: Vec<ExprId> = Vec::new();
+    let mut solved: Vec<usize> = Vec::new();
     let mut todo: Vec<usize> = (0..closures.len()).collect();
     let unknown_of = |closure: &Closure, known: &BTreeSet<usize>| -> Vec<usize> {
         let coordinates = closure.coordinates.iter().copied();
@@ -42,71 +50,118 @@ pub(crate) fn find(graph: &mut Graph, mechanism: &Mechanism, closures: &mut [Clo
         let closure = &closures[*i];
         unknown_of(closure, &known).len() == closure.residual.len()
     }) {
-        let closure = &mut closures[todo.remove(position)];
+        let index = todo.remove(position);
+        let closure = &closures[index];
         let unknown = unknown_of(closure, &known);
+        let turning: Vec<usize> = (known.iter().copied())
+            .filter(|c| related.iter().all(|r| r.coordinate != *c))
+            .collect();
         known.extend(&unknown);
-        if !closure.given().is_empty() {
-            related.extend(closure.relations.iter().cloned());
-            solved.extend(&closure.residual);
-            continue;
+        if closure.given().is_empty() {
+            // What is known of other loops' angles may be what makes this one a parallelogram.
+            let residual = put_in(graph, &related, &closure.residual);
+            let relations = relations_of(graph, mechanism, &residual, &unknown).or_else(|| {
+                let before = solved.iter().map(|i| &closures[*i]);
+                let motion = Motion::new(mechanism, before, divided)?;
+                relations_along(graph, mechanism, &motion, &turning, &residual, &unknown)
+            });
+            if let Some(relations) = relations {
+                let closure = &mut closures[index];
+                closure.residual = relations.iter().map(|r| r.residual(graph)).collect();
+                closure.coordinates = coordinates_of(graph, &closure.residual);
+                closure.chain = None;
+                closure.relations = relations;
+            }
         }
-        // What is known of other loops' angles may be what makes this one a parallelogram.
-        let residual = put_in(graph, &related, &closure.residual);
-        let mut relations = relations_of(graph, mechanism, &residual, &unknown);
-        if relations.is_none() && mechanism.is_at_values {
-            let of_relations = |c: &usize| related.iter().any(|r| r.coordinate == *c);
-            let motion = Motion {
-                residual: solved.iter().chain(&residual).copied().collect(),
-                unknown: (known.iter().copied())
-                    .filter(|c| mechanism.coordinates[*c].passive)
-                    .collect(),
-                turning: (known.iter().copied())
-                    .filter(|c| !unknown.contains(c) && !of_relations(c))
-                    .collect(),
-            };
-            relations = relations_along(graph, mechanism, &motion, &residual, &unknown);
-        }
-        if let Some(relations) = relations {
-            closure.residual = relations.iter().map(|r| r.residual(graph)).collect();
-            closure.coordinates = coordinates_of(graph, &closure.residual);
-            closure.chain = None;
-            related.extend(relations.iter().cloned());
-            closure.relations = relations;
-        }
-        solved.extend(&closure.residual);
+        related.extend(closures[index].relations.iter().cloned());
+        solved.push(index);
     }
 }
 
-/// Loops that are closed together, with the coordinates that they settle, and those by which others may turn.
-struct Motion {
-    residual: Vec<ExprId>,
-    unknown: Vec<usize>,
-    turning: Vec<usize>,
+/// Loops that were solved before, by whose motion others may turn.
+struct Motion(Loops);
+
+impl Motion {
+    /// `None` if there are no loops.
+    fn new<'a>(
+        mechanism: &Mechanism,
+        solved: impl Iterator<Item = &'a Closure>,
+        divided: &[(usize, i64)],
+    ) -> Option<Self> {
+        let closures: Vec<Closure> = solved
+            .cloned()
+            .map(|mut closure| {
+                closure.n_independent = closure.residual.len();
+                closure
+            })
+            .collect();
+        let settled: BTreeSet<usize> = (closures.iter().flat_map(|c| &c.coordinates).copied())
+            .filter(|c| mechanism.coordinates[*c].passive)
+            .collect();
+        (!closures.is_empty()).then(|| {
+            let (passive, active) =
+                (0..mechanism.coordinates.len()).partition(|c| settled.contains(c));
+            Self(Loops {
+                active,
+                passive,
+                residual: closures.iter().flat_map(|c| c.residual.clone()).collect(),
+                closures,
+                divided: divided.to_vec(),
+            })
+        })
+    }
+
+    /// Whether expressions vanish wherever these loops close: shown at random points of the field.
+    fn makes_vanish(&self, graph: &mut Graph, mechanism: &Mechanism, closed: &[ExprId]) -> bool {
+        /// Points, and how many draws may fail to be one.
+        const POINTS: usize = 8;
+        const DRAWS: usize = 400;
+        let Some(plan) = plan(graph, mechanism, &self.0, Unknowns::Any) else {
+            return false;
+        };
+        let poses = FieldPoses::new(graph, mechanism, plan, closed);
+        let tape = Tape::new(graph, closed);
+        let mut stream = Stream::new(4);
+        let Ok(constants) = poses.constants::<MODULUS>(&mut stream) else {
+            return false;
+        };
+        let points = (0..DRAWS).filter_map(|_| {
+            let open: FieldPoint<Element> = poses.open(&constants, &mut stream);
+            tape.evaluate(&poses.close(open)?)
+        });
+        let seen: Vec<_> = points.take(POINTS).collect();
+        seen.len() == POINTS && seen.iter().flatten().all(|left| *left == Element::ZERO)
+    }
 }
 
 /// Relations that hold along the motion of other loops and not without it, as those of a parallelogram of which one side is
-/// the side of a five-bar; seen in numbers, to the last digits of the file, and so only of its values.
+/// the side of a five-bar, or of a kite whose halves share a slide. They are seen in numbers, and then shown exactly; of a
+/// mechanism for its file's values alone, to the last digits of these.
 fn relations_along(
     graph: &mut Graph,
     mechanism: &Mechanism,
     motion: &Motion,
+    turning: &[usize],
     residual: &[ExprId],
     unknown: &[usize],
 ) -> Option<Vec<AngleRelation>> {
+    let all: Vec<ExprId> = (motion.0.residual.iter().chain(residual).copied()).collect();
+    let following: Vec<usize> = (motion.0.passive.iter().chain(unknown).copied()).collect();
     let given: Vec<usize> = (0..mechanism.coordinates.len())
-        .filter(|c| !motion.unknown.contains(c))
+        .filter(|c| !following.contains(c))
         .collect();
-    let poses = poses(graph, mechanism, &motion.residual, &motion.unknown, &given)?;
+    let poses = poses(graph, mechanism, &all, &following, &given)?;
     let fixed = fixed_angles(graph, residual);
     let candidates: Vec<Vec<AngleRelation>> = unknown
         .iter()
-        .map(|p| relations(mechanism, &poses, &motion.turning, &fixed, *p))
+        .map(|p| relations(mechanism, &poses, turning, &fixed, *p))
         .collect();
     let size = magnitude::at_nominal(graph, mechanism, residual);
     combinations(&candidates).find(|relations| {
         let closed = put_in(graph, relations, residual);
         let tape = Tape::new(graph, &closed);
         poses.iter().all(|q| closes_at(mechanism, &tape, q, size))
+            && (mechanism.is_at_values || motion.makes_vanish(graph, mechanism, &closed))
     })
 }
 

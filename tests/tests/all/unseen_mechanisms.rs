@@ -3,6 +3,7 @@
 //! once, moves its bodies in floating point, and writes the model file as a user would, from the format's description.
 
 use modelmill_codegen::Method;
+use modelmill_codegen::review::{Format, page};
 use modelmill_spec::Mechanism;
 use modelmill_tests::fixtures::{derive, fixtures};
 use modelmill_tests::laws::{ACCURACY, Case};
@@ -98,6 +99,16 @@ fn numeric_reductions_have_the_rank_of_the_judge() {
         // No doubt is left about the number.
         assert!(least_kept > 1e-6 && most_dropped < 1e-100, "{name}");
         assert!(residual < 1e-12, "{name}: {residual:.1e}");
+    }
+}
+
+/// Equal angles of two loops that share a slide are relations: no root, and the same motion beyond the fold.
+#[test]
+fn halves_of_a_kite_are_mirrored_by_relations() {
+    let derivation = derive(&judged("kite_sprung"));
+    let page = page(&derivation, Format::Text, None);
+    for relation in ["c = -a", "d_ = -b"] {
+        assert!(page.contains(relation), "{page}");
     }
 }
 
