@@ -124,17 +124,21 @@ impl DelayAudit<'_> {
         }
     }
 
-    /// The forces at times later by the shift of each channel, and rows that count.
-    fn shifted(&self, shifts: &[f64]) -> (DVector<f64>, Vec<bool>) {
+    /// The forces of some channels at times later by a shift of each, and rows that count; the forces of others are zero.
+    fn shifted(&self, shifts: impl Iterator<Item = (usize, f64)>) -> (DVector<f64>, Vec<bool>) {
         let channels = self.forces.len();
         let mut forces = DVector::zeros(self.counts.len());
         let mut counts = self.counts.clone();
         let last = self.recorded.len() - 1;
-        for (c, shift) in shifts.iter().enumerate() {
+        for (c, shift) in shifts {
+            let mut above = 1;
             for (k, time) in self.time.iter().enumerate() {
                 let row = k * channels + c;
                 let at = time + shift;
-                let above = self.recorded.partition_point(|t| *t < at).clamp(1, last);
+                above += self.recorded[above..last]
+                    .iter()
+                    .take_while(|t| **t < at)
+                    .count();
                 let [t, next] = [self.recorded[above - 1], self.recorded[above]];
                 let part = (at - t) / (next - t);
                 let is_in = (-1e-6..=1.0 + 1e-6).contains(&part);
@@ -152,6 +156,11 @@ impl DelayAudit<'_> {
             }
         }
         (forces, counts)
+    }
+
+    /// The forces at times later by the shift of each channel, and rows that count.
+    fn all_shifted(&self, shifts: &[f64]) -> (DVector<f64>, Vec<bool>) {
+        self.shifted(shifts.iter().copied().enumerate())
     }
 
     /// The shift by whole steps that leaves least of some channels, each divided by what is left without a shift.
@@ -177,7 +186,7 @@ impl DelayAudit<'_> {
         }
         let normal = normal.cholesky()?;
         let error = |steps: f64| {
-            let (forces, _) = self.shifted(&vec![steps * step; n]);
+            let (forces, _) = self.shifted(channels.iter().map(|c| (*c, steps * step)));
             let of_row = rows.iter().map(|row| forces[*row] * weights[row % n]);
             let forces = DVector::from_iterator(rows.len(), of_row);
             let right = &transposed * &forces;
@@ -218,7 +227,7 @@ impl DelayAudit<'_> {
             let mean = shifts.iter().sum::<f64>() / channels as f64;
             shifts = vec![(mean / step).round() * step; channels];
         }
-        let (mut forces, mut counts) = self.shifted(&shifts);
+        let (mut forces, mut counts) = self.all_shifted(&shifts);
         let mut fit = robust_fit(&self.regressor, &forces, &counts)?;
         let width = self.regressor.columns();
         if delays == 0 {
@@ -245,7 +254,7 @@ impl DelayAudit<'_> {
                 let steps = (further / step).clamp(-FARTHEST, FARTHEST).round();
                 *shift = (*shift + steps * step).clamp(-self.longest, self.longest);
             }
-            (forces, counts) = self.shifted(&shifts);
+            (forces, counts) = self.all_shifted(&shifts);
         }
         None
     }

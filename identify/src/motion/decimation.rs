@@ -2,8 +2,10 @@
 
 use crate::signal::{FilterError, LowPass};
 
-/// Columns that are filtered side by side.
-const LANES: usize = 8;
+/// Columns that are filtered side by side: as many vectors of numbers as the filter's recursion has time for, or, of few
+/// columns, fewer.
+const LANES: usize = 16;
+const FEW: usize = 4;
 
 /// The parallel filter passes this part of the sampling rate that is left.
 pub const PASSED_BY_DECIMATION: f64 = 0.4;
@@ -54,21 +56,37 @@ pub fn decimate_columns(columns: &[&[f64]], factor: usize) -> Result<Vec<Vec<f64
     }
     let mut short = Vec::with_capacity(columns.len());
     for group in columns.chunks(LANES) {
-        let samples = group.iter().map(|column| column.len()).min().unwrap_or(0);
-        let mut lanes = vec![[0.0; LANES]; samples];
-        for (k, column) in group.iter().enumerate() {
-            for (lane, value) in lanes.iter_mut().zip(*column) {
-                lane[k] = *value;
-            }
-        }
-        let kept = decimate_lanes(&lanes, factor)?;
-        short.extend((0..group.len()).map(|k| kept.iter().map(|lane| lane[k]).collect()));
+        short.extend(if group.len() <= FEW {
+            decimate_group::<FEW>(group, factor)?
+        } else {
+            decimate_group::<LANES>(group, factor)?
+        });
     }
     Ok(short)
 }
 
+/// [`decimate_columns`] of at most so many columns.
+fn decimate_group<const N: usize>(
+    group: &[&[f64]],
+    factor: usize,
+) -> Result<Vec<Vec<f64>>, FilterError> {
+    let samples = group.iter().map(|column| column.len()).min().unwrap_or(0);
+    let mut lanes = vec![[0.0; N]; samples];
+    for (k, column) in group.iter().enumerate() {
+        for (lane, value) in lanes.iter_mut().zip(*column) {
+            lane[k] = *value;
+        }
+    }
+    let kept = decimate_lanes(&lanes, factor)?;
+    let column = |k: usize| kept.iter().map(|lane| lane[k]).collect();
+    Ok((0..group.len()).map(column).collect())
+}
+
 /// Every `factor`-th sample of columns that stand side by side.
-fn decimate_lanes(lanes: &[[f64; LANES]], factor: usize) -> Result<Vec<[f64; LANES]>, FilterError> {
+fn decimate_lanes<const N: usize>(
+    lanes: &[[f64; N]],
+    factor: usize,
+) -> Result<Vec<[f64; N]>, FilterError> {
     if factor >= lanes.len() {
         return Err(FilterError::FactorOutOfRange { factor });
     }

@@ -118,6 +118,26 @@ impl Section {
         let second = self.b[2] - self.a[1] * y;
         [self.b[1] - self.a[0] * y + second, second]
     }
+
+    /// Filters samples in their order, from a state to the next.
+    #[inline(always)]
+    fn pass<'a, const N: usize>(
+        &self,
+        state: &mut [[f64; N]; 2],
+        samples: impl Iterator<Item = &'a mut [f64; N]>,
+    ) {
+        let ([b0, b1, b2], [a1, a2]) = (self.b, self.a);
+        let [mut z1, mut z2] = *state;
+        for x in samples {
+            for k in 0..N {
+                let y = b0 * x[k] + z1[k];
+                z1[k] = b1 * x[k] - a1 * y + z2[k];
+                z2[k] = b2 * x[k] - a2 * y;
+                x[k] = y;
+            }
+        }
+        *state = [z1, z2];
+    }
 }
 
 impl LowPass {
@@ -249,12 +269,12 @@ impl LowPass {
         extended.extend_from_slice(signal);
         extended.extend((1..=pad).map(|i| mirrored(n - 1, n - 1 - i)));
         let arch = Arch::new();
-        for _ in 0..2 {
+        for is_backward in [false, true] {
             arch.dispatch(FromSteadyState {
                 sections: &self.sections,
                 signal: &mut extended,
+                is_backward,
             });
-            extended.reverse();
         }
         extended.truncate(pad + n);
         extended.drain(..pad);
@@ -262,10 +282,11 @@ impl LowPass {
     }
 }
 
-/// Sections one after the other, from the steady state of the first sample on.
+/// Sections one after the other, from the steady state of the first sample on, or back from that of the last one.
 struct FromSteadyState<'a, const N: usize> {
     sections: &'a [Section],
     signal: &'a mut [[f64; N]],
+    is_backward: bool,
 }
 
 impl<const N: usize> WithSimd for FromSteadyState<'_, N> {
@@ -275,7 +296,14 @@ impl<const N: usize> WithSimd for FromSteadyState<'_, N> {
     fn with_simd<S: Simd>(self, _simd: S) {
         /// Samples that stay in the nearest cache while all sections pass over them.
         const CHUNK: usize = 64;
-        let mut level = self.signal[0];
+        let first = if self.is_backward {
+            self.signal.last()
+        } else {
+            self.signal.first()
+        };
+        let Some(mut level) = first.copied() else {
+            return;
+        };
         let mut states: Vec<[[f64; N]; 2]> = Vec::with_capacity(self.sections.len());
         for section in self.sections {
             states.push(
@@ -285,19 +313,17 @@ impl<const N: usize> WithSimd for FromSteadyState<'_, N> {
             );
             level = level.map(|level| level * section.dc_gain());
         }
-        for chunk in self.signal.chunks_mut(CHUNK) {
-            for (section, state) in self.sections.iter().zip(&mut states) {
-                let ([b0, b1, b2], [a1, a2]) = (section.b, section.a);
-                let [mut z1, mut z2] = *state;
-                for x in chunk.iter_mut() {
-                    for k in 0..N {
-                        let y = b0 * x[k] + z1[k];
-                        z1[k] = b1 * x[k] - a1 * y + z2[k];
-                        z2[k] = b2 * x[k] - a2 * y;
-                        x[k] = y;
-                    }
+        if self.is_backward {
+            for chunk in self.signal.rchunks_mut(CHUNK) {
+                for (section, state) in self.sections.iter().zip(&mut states) {
+                    section.pass(state, chunk.iter_mut().rev());
                 }
-                *state = [z1, z2];
+            }
+        } else {
+            for chunk in self.signal.chunks_mut(CHUNK) {
+                for (section, state) in self.sections.iter().zip(&mut states) {
+                    section.pass(state, chunk.iter_mut());
+                }
             }
         }
     }

@@ -45,15 +45,21 @@ impl Rows {
             .resize_horizontally(width + MORE * n, 0.0);
         let mut accelerations = vec![Vec::with_capacity(samples.len()); n];
         let mut slope = DMatrix::zeros(regressor.nrows(), regressor.ncols());
+        let span = |i: usize| time[after[i]] - time[before[i]];
+        for k in 0..width {
+            let later = w_after.regressor.column(k);
+            let earlier = w_before.regressor.column(k);
+            let changes = later.iter().zip(&earlier).enumerate();
+            let slopes = changes.map(|(row, (later, earlier))| (later - earlier) / span(row / n));
+            for (to, slope) in slope.column_mut(k).iter_mut().zip(slopes) {
+                *to = slope;
+            }
+        }
         for (i, sample) in samples.iter().enumerate() {
             let [t_before, t, t_after] = [before[i], *sample, after[i]].map(|k| time[k]);
             let step = t_after - t_before;
             for d in 0..n {
                 let row = i * n + d;
-                for k in 0..width {
-                    let change = w_after.regressor[(row, k)] - w_before.regressor[(row, k)];
-                    slope[(row, k)] = change / step;
-                }
                 let [v_before, v, v_after] =
                     [&w_before, &w, &w_after].map(|values| values.rates[d][i]);
                 let acceleration = (v_after - v_before) / step;

@@ -246,8 +246,9 @@ impl Search<'_> {
     fn runs(&self, smoother: Smoother) -> Option<Vec<Run>> {
         let mut preparation = self.reading.preparation.clone();
         smoother.goes_into(&mut preparation);
-        // What the band is was found already, and costs spectra of all positions.
+        // Band and period were found already, and cost a look at all positions.
         preparation.band_hz = Some(self.open.band_hz);
+        preparation.unexamined = true;
         let mut runs = free::runs(self.model, self.raw, &preparation).ok()?;
         let delay = self.model.derivation.mechanism.force_delay;
         if delay != 0.0 {

@@ -263,7 +263,7 @@ impl Ground {
         let k = self.basis.ncols();
         Part {
             site,
-            basis: DMatrix::from_fn(rows.len(), k, |i, j| self.basis[(rows[i], j)]),
+            basis: DMatrix::from_fn(k, rows.len(), |i, j| self.basis[(rows[j], i)]),
             rest: DVector::from_iterator(rows.len(), rows.iter().map(|i| self.rest[*i])),
         }
     }
@@ -272,6 +272,7 @@ impl Ground {
 /// Rows of the ground on the channels that feel a place.
 pub(crate) struct Part {
     site: usize,
+    /// Transposed, as products with many columns need it.
     basis: DMatrix<f64>,
     rest: DVector<f64>,
 }
@@ -331,7 +332,7 @@ impl Part {
     fn scores(&self, columns: &[Vec<f64>], counts: &[usize]) -> Vec<f64> {
         let rows = self.rest.len();
         let matrix = DMatrix::from_iterator(rows, columns.len(), columns.iter().flatten().copied());
-        let taken = self.basis.tr_mul(&matrix);
+        let taken = &self.basis * &matrix;
         let with_rest = matrix.tr_mul(&self.rest);
         let product = |i: usize, j: usize| {
             matrix.column(i).dot(&matrix.column(j)) - taken.column(i).dot(&taken.column(j))

@@ -85,6 +85,8 @@ const SUSPICIOUS: f64 = 4.0;
 /// What a law must take off of that which comes again, and of all that is left where nothing else says that it does.
 const LEAST_PART: f64 = 0.5;
 const LEAST_ALONE: f64 = 0.6;
+/// The part of it that a term must take off with constants that are only tried, to be worth a search for better ones.
+const HOPEFUL: f64 = 0.2;
 /// How many independent columns the grammar may have, and how likely it may be that one of them does as well by chance.
 const FORMS_THERE_ARE: f64 = 1e5;
 const CHANCE: f64 = 1e-3;
@@ -220,11 +222,27 @@ pub(crate) fn propose(
         open.retain(|d| *d != channel);
         let is_felt = |site: &usize| few.channels(*site).contains(&channel);
         let felt: Vec<usize> = (0..sites.len()).filter(is_felt).collect();
+        let squares = |samples: &Samples<'_>, site: usize, of: &dyn Fn(usize) -> f64| {
+            samples.picked.len() as f64 * left.squares(&samples.channels(site), &deviations, of)
+        };
+        // What a law must take off of all that is left there.
+        let least = |site: usize| {
+            let channels = many.channels(site);
+            if channels.iter().any(|d| left.unexplained.contains(d)) {
+                let again = squares(&many, site, &|d| left.again[d]);
+                LEAST_PART * again / squares(&many, site, &|_| 1.0)
+            } else {
+                LEAST_ALONE
+            }
+        };
+        let is_hopeful = |one: &Scored| {
+            one.score >= HOPEFUL * least(one.site) * squares(&few, one.site, &|_| 1.0)
+        };
         let without = bases[0].held_out.judge(&many, 0, &[]);
         let mut tried = Vec::new();
         for (k, base) in bases.iter().enumerate() {
             let beside: usize = base.picks.iter().map(|pick| 2 * bench.freedoms(pick)).sum();
-            for (site, terms) in forms(&base.ground, &few, &felt) {
+            for (site, terms) in forms(&base.ground, &few, &felt, &is_hopeful) {
                 tried.push(Tried {
                     judged: base.held_out.judge(&many, site, &terms),
                     size: beside + terms.iter().map(|term| 1 + term.size()).sum::<usize>(),
@@ -234,13 +252,10 @@ pub(crate) fn propose(
                 });
             }
         }
-        let squares = |site: usize, of: &dyn Fn(usize) -> f64| {
-            many.picked.len() as f64 * left.squares(&many.channels(site), &deviations, of)
-        };
         let left_there = |one: &Tried| bases[one.base].held_out.left_there(&many, one);
         // Where the base, freed by a law, fits other drives better as well, that is not gained on its own drives.
         let gain = |one: &Tried| {
-            let all = squares(one.site, &|_| 1.0).max(f64::MIN_POSITIVE);
+            let all = squares(&many, one.site, &|_| 1.0).max(f64::MIN_POSITIVE);
             let off = without.total() - one.judged.total();
             (off / all).min(1.0 - left_there(one).0 / all)
         };
@@ -251,18 +266,11 @@ pub(crate) fn propose(
         let is_one = |one: &Tried| {
             let channels = many.channels(one.site);
             let gain = gain(one);
-            let all = squares(one.site, &|_| 1.0);
-            let is_proven = channels.iter().any(|d| left.unexplained.contains(d));
-            let least = if is_proven {
-                LEAST_PART * squares(one.site, &|d| left.again[d]) / all
-            } else {
-                LEAST_ALONE
-            };
             // The best of many columns that have nothing to do with what is left explains so much of so few samples.
             let worth = bench.worth(left.rest, &channels);
             let by_chance = FORMS_THERE_ARE * (1.0 - gain).max(0.0).powf(0.5 * worth);
             let (off, deviation) = without.worse_than(&one.judged);
-            gain >= least && off > deviation && by_chance < CHANCE
+            gain >= least(one.site) && off > deviation && by_chance < CHANCE
         };
         let Some((chosen, near_ties)) = best(tried, &without, &many, &is_one, &scatter) else {
             continue;
@@ -328,8 +336,14 @@ fn terms(one: &Tried) -> Vec<Term> {
     one.terms.iter().map(term).collect()
 }
 
-/// The best laws of each form with their constants, those of one term and then those of two.
-fn forms(ground: &Ground, samples: &Samples<'_>, sites: &[usize]) -> Vec<(usize, Vec<Product>)> {
+/// The best laws of each form with their constants, those of one term and then those of two, as far as their first term
+/// is hopeful.
+fn forms(
+    ground: &Ground,
+    samples: &Samples<'_>,
+    sites: &[usize],
+    is_hopeful: &dyn Fn(&Scored) -> bool,
+) -> Vec<(usize, Vec<Product>)> {
     let parts: BTreeMap<usize, Part> = (sites.iter())
         .map(|site| (*site, ground.at(samples, *site)))
         .collect();
@@ -337,6 +351,7 @@ fn forms(ground: &Ground, samples: &Samples<'_>, sites: &[usize]) -> Vec<(usize,
         .values()
         .flat_map(|part| part.screen(samples, &|_| true));
     let mut single: Vec<Scored> = (best_of_forms(screened, FORMS).into_iter())
+        .filter(is_hopeful)
         .map(|one| refined(&parts[&one.site], samples, one))
         .collect();
     single.sort_by(|a, b| b.score.total_cmp(&a.score));
