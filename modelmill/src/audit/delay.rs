@@ -66,7 +66,7 @@ impl Late {
         }
         let delays = Delays::of(&DelayAudit {
             regressor: rows.regressor,
-            slope: rows.slope,
+            slope: Rows::slope(model, data, &samples)?,
             time: rows.time,
             counts,
             recorded: &run.time,

@@ -20,8 +20,6 @@ pub(super) struct Rows {
     pub(super) time: Vec<f64>,
     /// The regressor and the further columns.
     pub(super) regressor: ByChannel,
-    /// Their slope in time, per s.
-    pub(super) slope: ByChannel,
     /// Positions, rates and accelerations of the drives, `[order][drive][sample]`.
     pub(super) motion: [Vec<Vec<f64>>; 3],
 }
@@ -29,77 +27,129 @@ pub(super) struct Rows {
 impl Rows {
     /// `None` where the mechanism has no answer at one of the samples.
     pub(super) fn new(model: &Model, data: &Stretch, samples: &[usize]) -> Option<Self> {
-        let last = data.samples().checked_sub(1)?;
-        let reach = reach(data);
-        let before: Vec<usize> = samples.iter().map(|k| k.saturating_sub(reach)).collect();
-        let after: Vec<usize> = samples.iter().map(|k| (k + reach).min(last)).collect();
-        let [w_before, w, w_after] =
-            [&before, samples, &after].map(|samples| Values::new(model, data, samples));
-        let (w_before, w, w_after) = (w_before?, w?, w_after?);
-        let time = &data.run.time;
-        let n = w.rates.len();
-        let width = w.regressor.ncols();
-        let mut regressor = w
-            .regressor
-            .clone()
-            .resize_horizontally(width + MORE * n, 0.0);
+        let around = Around::new(model, data, samples)?;
+        let mut rows = regressor(model, data, samples)?;
+        around.add_further(&mut rows, |further| further.values);
+        let n = around.rates[1].len();
         let mut accelerations = vec![Vec::with_capacity(samples.len()); n];
-        let mut slope = DMatrix::zeros(regressor.nrows(), regressor.ncols());
-        let span = |i: usize| time[after[i]] - time[before[i]];
-        for k in 0..width {
-            let later = w_after.regressor.column(k);
-            let earlier = w_before.regressor.column(k);
-            let changes = later.iter().zip(&earlier).enumerate();
-            let slopes = changes.map(|(row, (later, earlier))| (later - earlier) / span(row / n));
-            for (to, slope) in slope.column_mut(k).iter_mut().zip(slopes) {
-                *to = slope;
+        for (d, accelerations) in accelerations.iter_mut().enumerate() {
+            accelerations.extend((0..samples.len()).map(|i| around.further(d, i).values[2]));
+        }
+        let [_, rates, _] = around.rates;
+        let [_, time, _] = around.times;
+        rows.iter().all(|x| x.is_finite()).then(|| Self {
+            time,
+            regressor: ByChannel::new(&rows, n),
+            motion: [around.positions, rates, accelerations],
+        })
+    }
+
+    /// The slope in time of the regressor and the further columns, per s.
+    pub(super) fn slope(model: &Model, data: &Stretch, samples: &[usize]) -> Option<ByChannel> {
+        let around = Around::new(model, data, samples)?;
+        let n = around.rates[1].len();
+        let [earlier, _, later] = &around.samples;
+        let mut slope = regressor(model, data, later)? - regressor(model, data, earlier)?;
+        for mut column in slope.column_iter_mut() {
+            for (row, change) in column.iter_mut().enumerate() {
+                *change /= around.span(row / n);
             }
         }
-        for (i, sample) in samples.iter().enumerate() {
-            let [t_before, t, t_after] = [before[i], *sample, after[i]].map(|k| time[k]);
-            let step = t_after - t_before;
-            for d in 0..n {
-                let row = i * n + d;
-                let [v_before, v, v_after] =
-                    [&w_before, &w, &w_after].map(|values| values.rates[d][i]);
-                let acceleration = (v_after - v_before) / step;
-                accelerations[d].push(acceleration);
-                let slopes = [(v - v_before, t - t_before), (v_after - v, t_after - t)].map(
-                    |(change, step)| {
-                        if step > 0.0 {
-                            change / step
-                        } else {
-                            acceleration
-                        }
-                    },
-                );
-                let jerk = 2.0 * (slopes[1] - slopes[0]) / step;
-                let sign = if v == 0.0 { 0.0 } else { v.signum() };
-                let values = [v, sign, acceleration, 1.0, v * v.abs(), v.abs()];
-                let changes = [
-                    acceleration,
-                    0.0,
-                    jerk,
-                    0.0,
-                    2.0 * v.abs() * acceleration,
-                    sign * acceleration,
-                ];
-                for k in 0..MORE {
-                    let at = (row, width + MORE * d + k);
-                    regressor[at] = values[k];
-                    slope[at] = changes[k];
+        around.add_further(&mut slope, |further| further.slopes);
+        let is_finite = slope.iter().all(|x| x.is_finite());
+        is_finite.then(|| ByChannel::new(&slope, n))
+    }
+}
+
+/// What the drives do at samples, at those before and at those after them.
+struct Around {
+    samples: [Vec<usize>; 3],
+    times: [Vec<f64>; 3],
+    /// At the samples themselves.
+    positions: Vec<Vec<f64>>,
+    rates: [Vec<Vec<f64>>; 3],
+}
+
+/// Further columns of a drive at a sample, and their slopes in time.
+struct Further {
+    values: [f64; MORE],
+    slopes: [f64; MORE],
+}
+
+impl Around {
+    fn new(model: &Model, data: &Stretch, samples: &[usize]) -> Option<Self> {
+        let last = data.samples().checked_sub(1)?;
+        let reach = reach(data);
+        let before = samples.iter().map(|k| k.saturating_sub(reach)).collect();
+        let after = samples.iter().map(|k| (k + reach).min(last)).collect();
+        let samples = [before, samples.to_vec(), after];
+        let n = model.derivation.mechanism.drives.len();
+        let mut drives = Vec::new();
+        for samples in &samples {
+            let evaluator = Evaluator::new(&model.derivation);
+            let found = Inputs::new(data, samples).with(|states| evaluator.drives(states));
+            // Positions come first, rates behind them, the Jacobian last.
+            let mut positions = found.ok()?;
+            positions.truncate(2 * n);
+            let rates = positions.split_off(n);
+            drives.push((positions, rates));
+        }
+        let [(_, before), (positions, rates), (_, after)] = drives.try_into().ok()?;
+        let of = |samples: &Vec<usize>| samples.iter().map(|k| data.run.time[*k]).collect();
+        Some(Self {
+            times: samples.each_ref().map(of),
+            samples,
+            positions,
+            rates: [before, rates, after],
+        })
+    }
+
+    /// The time from before a sample to after it, s.
+    fn span(&self, i: usize) -> f64 {
+        self.times[2][i] - self.times[0][i]
+    }
+
+    fn further(&self, d: usize, i: usize) -> Further {
+        let [t_before, t, t_after] = self.times.each_ref().map(|times| times[i]);
+        let [v_before, v, v_after] = self.rates.each_ref().map(|rates| rates[d][i]);
+        let step = self.span(i);
+        let acceleration = (v_after - v_before) / step;
+        let slopes =
+            [(v - v_before, t - t_before), (v_after - v, t_after - t)].map(|(change, step)| {
+                if step > 0.0 {
+                    change / step
+                } else {
+                    acceleration
+                }
+            });
+        let jerk = 2.0 * (slopes[1] - slopes[0]) / step;
+        let sign = if v == 0.0 { 0.0 } else { v.signum() };
+        Further {
+            values: [v, sign, acceleration, 1.0, v * v.abs(), v.abs()],
+            slopes: [
+                acceleration,
+                0.0,
+                jerk,
+                0.0,
+                2.0 * v.abs() * acceleration,
+                sign * acceleration,
+            ],
+        }
+    }
+
+    /// Puts what is chosen of the further columns behind those of the model.
+    fn add_further(&self, rows: &mut DMatrix<f64>, chosen: impl Fn(Further) -> [f64; MORE]) {
+        let (n, width) = (self.rates[1].len(), rows.ncols());
+        let owned = std::mem::replace(rows, DMatrix::zeros(0, 0));
+        *rows = owned.resize_horizontally(width + MORE * n, 0.0);
+        for d in 0..n {
+            for i in 0..self.times[1].len() {
+                let values = chosen(self.further(d, i));
+                for (k, value) in values.into_iter().enumerate() {
+                    rows[(i * n + d, width + MORE * d + k)] = value;
                 }
             }
         }
-        let is_finite = [&regressor, &slope]
-            .iter()
-            .all(|m| m.iter().all(|x| x.is_finite()));
-        is_finite.then(|| Self {
-            time: samples.iter().map(|k| time[*k]).collect(),
-            regressor: ByChannel::new(&regressor, n),
-            slope: ByChannel::new(&slope, n),
-            motion: [w.positions, w.rates, accelerations],
-        })
     }
 }
 
@@ -117,36 +167,39 @@ fn reach(data: &Stretch) -> usize {
     reach.clamp(1, time.len().max(2) / 2)
 }
 
-/// The regressor, and positions and rates of the drives, at some samples.
-struct Values {
-    regressor: DMatrix<f64>,
-    positions: Vec<Vec<f64>>,
-    rates: Vec<Vec<f64>>,
+/// The regressor at some samples, rows interleaved.
+fn regressor(model: &Model, data: &Stretch, samples: &[usize]) -> Option<DMatrix<f64>> {
+    let evaluator = Evaluator::new(&model.derivation);
+    let found = Inputs::new(data, samples).with(|states| evaluator.regressor(states));
+    found.ok()
 }
 
-impl Values {
-    fn new(model: &Model, data: &Stretch, samples: &[usize]) -> Option<Self> {
-        let states = [&data.run.q, &data.run.qd, &data.run.qdd].map(|all| picked(all, samples));
-        let load = picked(data.run.force.as_deref().unwrap_or(&[]), samples);
-        let states = States {
-            q: states[0].iter().map(Vec::as_slice).collect(),
-            qd: states[1].iter().map(Vec::as_slice).collect(),
-            qdd: states[2].iter().map(Vec::as_slice).collect(),
-            load: load.iter().map(Vec::as_slice).collect(),
-        };
-        let evaluator = Evaluator::new(&model.derivation);
-        let regressor = evaluator.regressor(&states).ok()?;
-        let n = model.derivation.mechanism.drives.len();
-        // Positions come first, rates behind them, the Jacobian last.
-        let mut positions = evaluator.drives(&states).ok()?;
-        positions.truncate(2 * n);
-        let rates = positions.split_off(n);
-        Some(Self {
-            regressor,
-            positions,
-            rates,
+/// States at some samples.
+struct Inputs {
+    motion: [Vec<Vec<f64>>; 3],
+    load: Vec<Vec<f64>>,
+}
+
+impl Inputs {
+    fn new(data: &Stretch, samples: &[usize]) -> Self {
+        Self {
+            motion: [&data.run.q, &data.run.qd, &data.run.qdd].map(|all| picked(all, samples)),
+            load: picked(data.run.force.as_deref().unwrap_or(&[]), samples),
+        }
+    }
+
+    fn with<R>(&self, evaluate: impl FnOnce(&States<'_>) -> R) -> R {
+        evaluate(&States {
+            q: slices(&self.motion[0]),
+            qd: slices(&self.motion[1]),
+            qdd: slices(&self.motion[2]),
+            load: slices(&self.load),
         })
     }
+}
+
+fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
+    columns.iter().map(Vec::as_slice).collect()
 }
 
 /// Columns at some samples.

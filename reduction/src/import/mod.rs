@@ -92,8 +92,13 @@ pub fn import(text: &str, options: &Options) -> Result<Imported, ImportError> {
         ));
     }
     let document = Document::parse(text).map_err(|error| {
+        let expected = if text.trim_start().starts_with('<') {
+            "XML with macros (xacro) expanded"
+        } else {
+            "XML; of a robot with a `robot.yaml` the URDF is given, and the file beside it is found"
+        };
         ImportError(format!(
-            "this is no URDF, MJCF or SDF that can be read ({error}); expected XML with macros (xacro) expanded"
+            "this is no URDF, MJCF or SDF that can be read ({error}); expected {expected}"
         ))
     })?;
     let read = match document.root_element().tag_name().name() {
