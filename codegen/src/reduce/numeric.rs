@@ -464,8 +464,6 @@ mod tests {
         for (name, rank) in [
             ("bricard_trihedral", 22),
             ("bricard_regular", 19),
-            ("peaucellier", 14),
-            ("peaucellier_tied", 8),
             ("sarrus", 5),
         ] {
             let found = crate::derive(&judged(name, &[])).expect("a derivation");

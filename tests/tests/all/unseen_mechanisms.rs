@@ -48,7 +48,8 @@ ranks! {
         "palletizer" => 25;
     planar_bodies_wherever_gravity_points:
         "four_bar_tilted" => 8, "four_bar_in_a_horizontal_plane" => 4, "four_bar_isosceles" => 8,
-        "antiparallelogram" => 8, "deltoid" => 8, "kites_in_a_row" => 8, "kite_sprung" => 7;
+        "antiparallelogram" => 8, "deltoid" => 8, "kites_in_a_row" => 8, "kite_sprung" => 7,
+        "peaucellier" => 14, "peaucellier_tied" => 8;
     planar_platforms:
         "three_prr" => 13, "three_prr_tied_by_drives" => 7, "three_rpr_tied" => 9,
         "three_rpr_by_drives" => 19, "three_rrr_by_drives" => 19, "five_bar_prismatic" => 7;
@@ -82,8 +83,6 @@ fn numeric_reductions_have_the_rank_of_the_judge() {
         ("sarrus", 5),
         ("bricard_trihedral", 22),
         ("bricard_regular", 19),
-        ("peaucellier", 14),
-        ("peaucellier_tied", 8),
     ] {
         let reduction = derive(&judged(name)).reduction;
         assert_eq!(reduction.retained.len(), rank, "{name}");
