@@ -257,10 +257,7 @@ fn steps(program: &Program, computed: &[bool], slots: &[usize], spare: usize) ->
             Op::Div(a, b) => Step::Div(to, slot(a), slot(b)),
             Op::Atan2(a, b) => Step::Atan2(to, slot(a), slot(b)),
             Op::Neg(a) => Step::Neg(to, slot(a)),
-            Op::Unary(Unary::Sin, a) => Step::SinCos(to, spare, slot(a)),
-            Op::Unary(Unary::Cos, a) => Step::SinCos(spare, to, slot(a)),
-            Op::Unary(function, a) => Step::Unary(to, *function, slot(a)),
-            Op::Cos(a) => Step::SinCos(spare, to, slot(a)),
+            Op::Cos(a) | Op::Unary(Unary::Cos, a) => Step::SinCos(spare, to, slot(a)),
             // The cosine of the same angle stands right before the sine if both are needed; the angle is still there.
             Op::Sin(a) if i > 0 && computed[i - 1] && program.ops[i - 1] == Op::Cos(*a) => {
                 steps.pop();
@@ -271,7 +268,8 @@ fn steps(program: &Program, computed: &[bool], slots: &[usize], spare: usize) ->
                 };
                 Step::SinCos(to, cos, slot(a))
             }
-            Op::Sin(a) => Step::SinCos(to, spare, slot(a)),
+            Op::Sin(a) | Op::Unary(Unary::Sin, a) => Step::SinCos(to, spare, slot(a)),
+            Op::Unary(function, a) => Step::Unary(to, *function, slot(a)),
             Op::Number(_) => unreachable!("numbers are fixed"),
         };
         steps.push(step);

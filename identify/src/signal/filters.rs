@@ -118,26 +118,6 @@ impl Section {
         let second = self.b[2] - self.a[1] * y;
         [self.b[1] - self.a[0] * y + second, second]
     }
-
-    /// Filters samples in their order, from a state to the next.
-    #[inline(always)]
-    fn pass<'a, const N: usize>(
-        &self,
-        state: &mut [[f64; N]; 2],
-        samples: impl Iterator<Item = &'a mut [f64; N]>,
-    ) {
-        let ([b0, b1, b2], [a1, a2]) = (self.b, self.a);
-        let [mut z1, mut z2] = *state;
-        for x in samples {
-            for k in 0..N {
-                let y = b0 * x[k] + z1[k];
-                z1[k] = b1 * x[k] - a1 * y + z2[k];
-                z2[k] = b2 * x[k] - a2 * y;
-                x[k] = y;
-            }
-        }
-        *state = [z1, z2];
-    }
 }
 
 impl LowPass {
@@ -313,19 +293,56 @@ impl<const N: usize> WithSimd for FromSteadyState<'_, N> {
             );
             level = level.map(|level| level * section.dc_gain());
         }
-        if self.is_backward {
-            for chunk in self.signal.rchunks_mut(CHUNK) {
-                for (section, state) in self.sections.iter().zip(&mut states) {
-                    section.pass(state, chunk.iter_mut().rev());
+        let mut pass = |chunk: &mut [[f64; N]]| {
+            for (sections, states) in self.sections.chunks(2).zip(states.chunks_mut(2)) {
+                match (sections, states) {
+                    ([a, b], [of_a, of_b]) => {
+                        through([a, b], [of_a, of_b], chunk, self.is_backward);
+                    }
+                    ([one], [state]) => through([one], [state], chunk, self.is_backward),
+                    _ => {}
                 }
             }
+        };
+        if self.is_backward {
+            self.signal.rchunks_mut(CHUNK).for_each(&mut pass);
         } else {
-            for chunk in self.signal.chunks_mut(CHUNK) {
-                for (section, state) in self.sections.iter().zip(&mut states) {
-                    section.pass(state, chunk.iter_mut());
-                }
+            self.signal.chunks_mut(CHUNK).for_each(&mut pass);
+        }
+    }
+}
+
+/// Samples through some sections: while one waits for its last result, another works on the sample before.
+#[allow(
+    clippy::inline_always,
+    reason = "a function of its own would be compiled for the narrowest vectors"
+)]
+#[inline(always)]
+fn through<const M: usize, const N: usize>(
+    sections: [&Section; M],
+    states: [&mut [[f64; N]; 2]; M],
+    samples: &mut [[f64; N]],
+    is_backward: bool,
+) {
+    let mut z = states.each_ref().map(|state| **state);
+    let mut step = |x: &mut [f64; N]| {
+        for (section, [z1, z2]) in sections.iter().zip(&mut z) {
+            let ([b0, b1, b2], [a1, a2]) = (section.b, section.a);
+            for k in 0..N {
+                let y = b0 * x[k] + z1[k];
+                z1[k] = b1 * x[k] - a1 * y + z2[k];
+                z2[k] = b2 * x[k] - a2 * y;
+                x[k] = y;
             }
         }
+    };
+    if is_backward {
+        samples.iter_mut().rev().for_each(&mut step);
+    } else {
+        samples.iter_mut().for_each(&mut step);
+    }
+    for (state, z) in states.into_iter().zip(z) {
+        *state = z;
     }
 }
 

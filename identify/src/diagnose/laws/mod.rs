@@ -239,19 +239,7 @@ pub(crate) fn propose(
             one.score >= HOPEFUL * least(one.site) * squares(&few, one.site, &|_| 1.0)
         };
         let without = bases[0].held_out.judge(&many, 0, &[]);
-        let mut tried = Vec::new();
-        for (k, base) in bases.iter().enumerate() {
-            let beside: usize = base.picks.iter().map(|pick| 2 * bench.freedoms(pick)).sum();
-            for (site, terms) in forms(&base.ground, &few, &felt, &is_hopeful) {
-                tried.push(Tried {
-                    judged: base.held_out.judge(&many, site, &terms),
-                    size: beside + terms.iter().map(|term| 1 + term.size()).sum::<usize>(),
-                    base: k,
-                    site,
-                    terms,
-                });
-            }
-        }
+        let tried = tried(bench, &bases, [&few, &many], &felt, &is_hopeful);
         let left_there = |one: &Tried| bases[one.base].held_out.left_there(&many, one);
         // Where the base, freed by a law, fits other drives better as well, that is not gained on its own drives.
         let gain = |one: &Tried| {
@@ -298,6 +286,30 @@ pub(crate) fn propose(
         open.retain(|d| !many.channels(chosen.site).contains(d));
     }
     (sites.into_iter().map(bare).collect(), proposals)
+}
+
+/// Laws beside each of the bases, formed on few samples and judged on many.
+fn tried(
+    bench: &Bench<'_>,
+    bases: &[Base],
+    [few, many]: [&Samples<'_>; 2],
+    sites: &[usize],
+    is_hopeful: &dyn Fn(&Scored) -> bool,
+) -> Vec<Tried> {
+    let mut tried = Vec::new();
+    for (k, base) in bases.iter().enumerate() {
+        let beside: usize = base.picks.iter().map(|pick| 2 * bench.freedoms(pick)).sum();
+        for (site, terms) in forms(&base.ground, few, sites, is_hopeful) {
+            tried.push(Tried {
+                judged: base.held_out.judge(many, site, &terms),
+                size: beside + terms.iter().map(|term| 1 + term.size()).sum::<usize>(),
+                base: k,
+                site,
+                terms,
+            });
+        }
+    }
+    tried
 }
 
 /// A site whose motions have done their part.
