@@ -192,7 +192,7 @@ impl Functions {
         Ok(out)
     }
 
-    /// A function as C for eight states at once ([`vectors_c`]), for callers with a C compiler; base parameters are its arguments,
+    /// A function as C for many states ([`vectors_c`]), for callers with a C compiler; base parameters are its arguments,
     /// other values those of the model.
     ///
     /// Fails for forward dynamics, which is no straight-line program, and where each state starts from the one before.

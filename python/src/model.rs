@@ -341,7 +341,7 @@ impl CoreModel {
         Ok((PyArray1::from_vec(py, found), shape))
     }
 
-    /// A function as C for eight states at once, and its shape.
+    /// A function as C for many states, and its shape.
     fn vectors_c(&self, py: Python<'_>, function: &str) -> PyResult<(String, [usize; 2])> {
         let function = named(py, function)?;
         self.work(py, None, || {

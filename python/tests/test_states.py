@@ -178,3 +178,33 @@ def test_compiled_functions_are_the_evaluators(name: str) -> None:
         far[700, 0] = np.nan
         with pytest.raises(ModelmillError, match="sample 700"):
             fast.inverse_dynamics(far, qd, qdd)
+
+
+@pytest.mark.filterwarnings("ignore::modelmill.ModelmillWarning")
+@pytest.mark.parametrize("narrower", ["", "-mno-avx512f", "-mno-avx"])
+def test_compiled_functions_take_any_number_of_states(narrower: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In vectors of 512, 256 and 128 bits, with lines that are full and such that are not."""
+    import platform
+    import shutil
+
+    compiler = next((one for one in ("cc", "gcc", "clang") if shutil.which(one)), None)
+    if compiler is None:
+        pytest.skip("there is no C compiler")
+    if narrower and platform.machine() not in ("x86_64", "AMD64"):
+        pytest.skip(f"{narrower} is for another processor")
+    monkeypatch.setenv("CC", f"{compiler} {narrower}")
+    for name in ("panda", "two_link", "emps"):
+        plain, fast = loaded(name), loaded(name)
+        fast.compile("inverse_dynamics", "regressor")
+        for n in (0, 1, 3, 4, 7, 8, 9, 63, 64, 65, 300):
+            given = states(plain, n, seed=n)
+            for form in (np.ascontiguousarray, np.asfortranarray):
+                arrays = [form(a) for a in given]
+                for call in ("inverse_dynamics", "regressor"):
+                    expected, found = (getattr(m, call)(*arrays) for m in (plain, fast))
+                    assert found.shape == expected.shape
+                    assert np.allclose(found, expected, rtol=1e-11, atol=1e-12 * np.abs(expected).max(initial=0.0))
+        late = states(plain, 65)
+        late[2][64, -1] = np.nan
+        with pytest.raises(ModelmillError, match="sample 64"):
+            fast.inverse_dynamics(*late)

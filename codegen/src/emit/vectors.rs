@@ -4,10 +4,12 @@
 //! irregular (a pose without an answer, a number that is none, an angle of many turns) it says so and leaves the rest to the
 //! evaluator.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use modelmill_spec::Mechanism;
 
+use super::tree::in_order;
 use crate::expr::{Atom, Unary};
 use crate::lower::{Guard, Op, Program, SINGULAR, Stage};
 use crate::{Derivation, ValueId};
@@ -16,93 +18,114 @@ use crate::{Derivation, ValueId};
 const SUPPORT: &str = include_str!("vectors.c");
 
 /// The source of `int run(n, arrays, by_state, by_column, base, out)`. `arrays` are positions, rates, accelerations and loads,
-/// whose numbers are so many doubles apart from state to state and from column to column; `base` are the base parameters; `out`
-/// gets `width` numbers for each state, one state after the other. It returns 0, or 1 where a state is irregular; there must be
-/// at least 8 states.
+/// whose numbers are so many doubles apart from state to state and from column to column; those that are not given are null.
+/// `base` are the base parameters; `out` gets `width` numbers for each state, one state after the other. It returns 0, or 1 where
+/// a state is irregular or something that is read is not given.
+///
+/// Some states at once are turned into columns in the cache, where the program reads them, and its results are turned back into
+/// rows; its statements stand in the order in which the emitted Rust has them.
 ///
 /// The program is one of the derivation's; passive coordinates must have a closed form.
 pub fn vectors_c(derivation: &Derivation, program: &Program, width: usize) -> String {
     let mechanism = &derivation.mechanism;
     let active = &derivation.equations.projection.loops.active;
-    let column = |coordinate: usize| {
+    let n_active = active.len();
+    let place = |coordinate: usize| {
         let place = active.iter().position(|a| *a == coordinate);
         place.expect("passive coordinates are put in place")
     };
+    // Where a line of an input stands, and of which array it is.
+    let input = |atom: Atom| match atom {
+        Atom::Coordinate(c) => Some((0, place(c))),
+        Atom::Rate(c) => Some((1, n_active + place(c))),
+        Atom::Acceleration(c) => Some((2, 2 * n_active + place(c))),
+        Atom::Load(d) => Some((3, 3 * n_active + d)),
+        _ => None,
+    };
     let is_fixed = |value: ValueId| program.stages[value.index()] == Stage::Fixed;
+    let read = program.ops.iter().filter_map(|op| match op {
+        Op::Input(atom) => input(*atom),
+        _ => None,
+    });
+    let (parts, places): (BTreeSet<usize>, Vec<usize>) = read.unzip();
+    let loads = places.iter().map(|k| (k + 1).saturating_sub(3 * n_active));
+    let widths = [n_active, n_active, n_active, loads.max().unwrap_or(0)];
+
     let (mut fixed, mut of_state) = (String::new(), String::new());
-    for (i, (op, stage)) in program.ops.iter().zip(&program.stages).enumerate() {
-        match stage {
-            Stage::Fixed => {
-                let _ = writeln!(fixed, "    const double x{i} = {};", scalar(op, mechanism));
-            }
+    let n = program.ops.len();
+    for i in in_order(program, &vec![false; n], &vec![false; n], &vec![0; n]) {
+        let op = &program.ops[i];
+        let _ = match program.stages[i] {
+            Stage::Fixed => writeln!(fixed, "    const double x{i} = {};", scalar(op, mechanism)),
             Stage::State => {
-                let _ = writeln!(of_state, "        {}", vector(i, op, &column, &is_fixed));
+                let statement = vector(i, op, &|atom| input(atom).map(|(_, k)| k), &is_fixed);
+                writeln!(of_state, "            {statement}")
             }
-        }
+        };
     }
     for guard in &program.guards {
         let value = wide(guard.value(), &is_fixed);
-        let fails = match guard {
-            Guard::Reachable(_) => format!("~({value} >= 0.0)"),
+        let _ = match guard {
+            Guard::Reachable(_) => writeln!(of_state, "            bad |= ~({value} >= 0.0);"),
             Guard::Regular(_, size) => {
                 let size = wide(*size, &is_fixed);
-                format!("~(absolute({value}) > {SINGULAR:e} * {size})")
+                let holds = format!("absolute({value}) > {SINGULAR:e} * {size}");
+                writeln!(of_state, "            bad |= ~({holds});")
             }
-            Guard::Finite(_) => format!("irregular({value})"),
+            Guard::Finite(_) => writeln!(of_state, "            look_at({value}, &none);"),
         };
-        let _ = writeln!(of_state, "        bad |= {fails};");
     }
     for (k, output) in program.outputs.iter().take(width).enumerate() {
         let value = wide(*output, &is_fixed);
-        let _ = writeln!(
-            of_state,
-            "        {{ const V y = {value}; bad |= irregular(y); \
-             for (int k = 0; k < LANES; k++) out[(at + k) * {width} + {k}] = y[k]; }}"
-        );
+        let _ = writeln!(of_state, "            found[{k} * LINES] = {value};");
     }
-    // A number that is none is a fault also where the program does not read it.
-    let mut unread = String::new();
-    for (k, coordinate) in active.iter().enumerate() {
-        let atoms = [
-            Atom::Coordinate(*coordinate),
-            Atom::Rate(*coordinate),
-            Atom::Acceleration(*coordinate),
-        ];
-        for (part, atom) in atoms.into_iter().enumerate() {
-            let is_read = |op: &Op| matches!(op, Op::Input(input) if *input == atom);
-            if !program.ops.iter().any(is_read) {
-                let column = read_column(part, k);
-                let _ = writeln!(
-                    unread,
-                    "        if (arrays[{part}]) bad |= irregular({column});"
-                );
-            }
+    let [mut given, mut reads, mut fetches] = [const { String::new() }; 3];
+    for part in 0..widths.len() {
+        if parts.contains(&part) {
+            let _ = writeln!(given, "    if (!arrays[{part}]) return 1;");
+        }
+        // A number that is none is a fault also where the program does not read it; loads are looked at where they are read.
+        if part < 3 || parts.contains(&part) {
+            let _ = writeln!(
+                reads,
+                "        read(arrays[{part}], i, by_state[{part}], by_column[{part}], {}, m, lines + {} * LINES, &none);",
+                widths[part],
+                part * n_active
+            );
+            let _ = writeln!(
+                fetches,
+                "                fetch(arrays[{part}], ahead, by_state[{part}], by_column[{part}], {}, 0);",
+                widths[part]
+            );
         }
     }
     format!(
-        "{SUPPORT}
+        "#define READ {}
+#define WIDTH {width}
+{SUPPORT}
 int run(long n, const double *const *arrays, const long *by_state, const long *by_column, const double *base, double *out)
 {{
     (void)base;
-{fixed}
+{given}{fixed}
+    V lines[READ * LINES], results[WIDTH * LINES];
+    V none = {{0}};
     W bad = {{0}};
-    for (long i = 0; i < n; i += LANES) {{
-        /* The last states are computed together with some before them. */
-        const long at = i + LANES > n ? n - LANES : i;
-{unread}{of_state}    }}
-    long long any = 0;
-    for (int k = 0; k < LANES; k++)
-        any |= bad[k];
-    return any != 0;
+    for (long i = 0; i < n; i += LINES * LANES) {{
+        const long m = n - i < LINES * LANES ? n - i : LINES * LANES;
+{reads}        for (long line = 0; line * LANES < m; line++) {{
+            const V *const in = lines + line;
+            V *const found = results + line;
+            if (line * LANES % CACHE_LINE == 0) {{
+                const long ahead = i + line * LANES + AHEAD;
+                fetch(out, ahead, WIDTH, 1, WIDTH, 1);
+{fetches}            }}
+{of_state}        }}
+        write(results, m, out + i * WIDTH, &none);
+    }}
+    return is_irregular(none, bad);
 }}
-"
-    )
-}
-
-/// Eight numbers of a column of an array.
-fn read_column(part: usize, k: usize) -> String {
-    format!(
-        "read_column(arrays[{part}] + at * by_state[{part}] + {k} * by_column[{part}], by_state[{part}])"
+",
+        widths.iter().sum::<usize>()
     )
 }
 
@@ -162,26 +185,23 @@ fn scalar(op: &Op, mechanism: &Mechanism) -> String {
     }
 }
 
-/// The statement of an operation on eight states.
+/// The statement of an operation on the states of a line.
 fn vector(
     i: usize,
     op: &Op,
-    column: &dyn Fn(usize) -> usize,
+    line: &dyn Fn(Atom) -> Option<usize>,
     is_fixed: &dyn Fn(ValueId) -> bool,
 ) -> String {
     if let Some((a, sign, b)) = binary(op) {
         return format!("const V x{i} = x{a} {sign} x{b};");
     }
     let wide = |value: &ValueId| self::wide(*value, is_fixed);
-    let input = |part: usize, k: usize| {
-        let column = read_column(part, k);
-        format!("const V x{i} = {column}; bad |= irregular(x{i});")
-    };
+    if let Op::Input(atom) = op
+        && let Some(k) = line(*atom)
+    {
+        return format!("const V x{i} = in[{k} * LINES];");
+    }
     match op {
-        Op::Input(Atom::Coordinate(c)) => input(0, column(*c)),
-        Op::Input(Atom::Rate(c)) => input(1, column(*c)),
-        Op::Input(Atom::Acceleration(c)) => input(2, column(*c)),
-        Op::Input(Atom::Load(d)) => input(3, *d),
         Op::Neg(a) => format!("const V x{i} = -x{};", a.index()),
         Op::Sin(a) => format!("const V x{i} = sine({}, &bad);", wide(a)),
         Op::Cos(a) => format!("const V x{i} = cosine({}, &bad);", wide(a)),

@@ -328,9 +328,6 @@ class Recording:
         return f"recording {self.name}: {len(self.t)} samples{remarks}"
 
 
-#: How many of positions, rates, accelerations and forces the compiled form of a function must be given.
-_READ = {"inverse_dynamics": 3, "regressor": 3, "mass_matrix": 1, "bias": 2, "reactions": 3}
-
 #: What a method takes as one recording: a path, a tuple of paths of one run, a table, or what `Model.recording` returned.
 Source = Any
 
@@ -515,7 +512,7 @@ class Model:
         assert positions is not None
         compiled = self._compiled.get(function)
         flat: Floats | None = None
-        if compiled is not None and all(array is not None for array in arrays[: _READ[function]]):
+        if compiled is not None:
             shape = list(compiled.shape)
             flat = compiled(arrays, np.asarray(values))
         if flat is None:

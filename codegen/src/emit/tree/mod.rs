@@ -16,6 +16,7 @@ mod sections;
 
 pub(in crate::emit) use expression::{Binding, Expression};
 pub(in crate::emit) use once::Once;
+pub(in crate::emit) use order::order as in_order;
 pub(in crate::emit) use pose::Pose;
 pub(in crate::emit) use scope::Scope;
 

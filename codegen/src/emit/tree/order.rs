@@ -37,7 +37,7 @@ struct Statement {
 /// The operations of a program in another order: those that are fixed as they were, then those of a state, with the ones
 /// in `first` before all others. `fused` says which ones are written inside others, `sections` where each stands; what
 /// stands in an earlier section comes first.
-pub(super) fn order(
+pub(in crate::emit) fn order(
     program: &Program,
     fused: &[bool],
     first: &[bool],
