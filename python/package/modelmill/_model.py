@@ -20,6 +20,7 @@ from ._compiled import Compiled
 from ._errors import ModelmillError, ModelmillWarning
 from ._progress import Told, told
 from ._results import (
+    AnswerT,
     Check,
     Comparison,
     Diagnosis,
@@ -149,6 +150,14 @@ def _warn(notes: Remarks, level: int = 3) -> None:
     for severity, says in notes:
         if severity == "warning":
             warnings.warn(says, ModelmillWarning, stacklevel=level)
+
+
+def _answered(progress: Progress, verb: Callable[[_core._Progress], AnswerT]) -> AnswerT:
+    """What a verb that tells its progress finds, once its warnings are given."""
+    with told(progress) as hears:
+        found = verb(hears)
+    _warn(found.notes, 4)
+    return found
 
 
 def _wrong_shape(name: str, shape: tuple[int, ...], names: list[str]) -> str:
@@ -400,8 +409,7 @@ class Model:
 
     def check(self) -> Check:
         """What the model consists of, and its numeric rank beside the exact one."""
-        found = self._core.check()
-        return Check(found.json, found.text, found.notes)
+        return Check(self._core.check())
 
     def picture(self, at: Mapping[str, float] | None = None, view: tuple[float, float] | None = None) -> Picture:
         """The mechanism at a pose.
@@ -702,10 +710,7 @@ class Model:
         """
         values, name = self._values(parameters)
         read = self._recordings(data, reading, progress, "data")
-        with told(progress) as hears:
-            found = self._core.compare(read, values, name, hears)
-        _warn(found.notes)
-        return Comparison(found.json, found.text, found.notes)
+        return Comparison(_answered(progress, lambda hears: self._core.compare(read, values, name, hears)))
 
     def identify(
         self,
@@ -756,9 +761,7 @@ class Model:
             "essential": essential,
             "standstill": standstill,
         }
-        with told(progress) as hears:
-            found = self._core.identify(read, checked, options, recorded, instrument_period, hears)
-        _warn(found.notes)
+        found = _answered(progress, lambda hears: self._core.identify(read, checked, options, recorded, instrument_period, hears))
         return Identification(found, self)
 
     def diagnose(
@@ -788,9 +791,7 @@ class Model:
         """
         model = self if parameters is None else self.with_fit(parameters)
         read, checked = (model._recordings(all, reading, progress, name) for all, name in ((data, "data"), (check, "check")))
-        with told(progress) as hears:
-            found = model._core.diagnose(read, checked, held, hears)
-        _warn(found.notes)
+        found = _answered(progress, lambda hears: model._core.diagnose(read, checked, held, hears))
         return Diagnosis(found, None if found.model is None else Model(found.model))
 
     def report(self, data: Source, **options: Any) -> Page:
@@ -830,10 +831,7 @@ class Model:
                 if k == 0:
                     raise
                 unread.append((k, os.fspath(source) if isinstance(source, (str, os.PathLike)) else f"run {k + 1}", str(error)))
-        with told(progress) as hears:
-            found = self._core.runs(read, unread, list(per_run), list(loads), hears)
-        _warn(found.notes)
-        return Runs(found)
+        return Runs(_answered(progress, lambda hears: self._core.runs(read, unread, list(per_run), list(loads), hears)))
 
     def excite(
         self,
@@ -898,10 +896,7 @@ class Model:
             "noise": noise,
         }
         read = model._recordings(data, {"columns": columns} if columns else {}, progress, "data")
-        with told(progress) as hears:
-            found = model._core.excite(options, read, hears)
-        _warn(found.notes)
-        return Excitation(found, self.coordinates)
+        return Excitation(_answered(progress, lambda hears: model._core.excite(options, read, hears)), self.coordinates)
 
     # Other models of the same mechanism.
 
@@ -955,7 +950,7 @@ class Model:
             raise ModelmillError(f"unknown={unknown!r}: pass a list of names, as in unknown=[{unknown!r}]")
         found = self._core.interpret(*_fit(fit), list(unknown))
         _warn(found.notes)
-        return Interpretation(found.json, found.text, found.notes)
+        return Interpretation(found)
 
     def diff(
         self, variant: Model, data: Source = None, *, progress: Progress = None, **reading: Unpack[ReadingOptions]
@@ -973,10 +968,7 @@ class Model:
         """
         sources = [] if data is None else data if isinstance(data, list) else [data]
         read, again = (model._recordings(sources, reading, progress, "data") for model in (self, variant))
-        with told(progress) as hears:
-            found = self._core.diff(variant._core, read, again, hears)
-        _warn(found.notes)
-        return Difference(found.json, found.text, found.notes)
+        return Difference(_answered(progress, lambda hears: self._core.diff(variant._core, read, again, hears)))
 
     def export(self, format: str = "urdf", *, parameters: Identification | PathText | None = None) -> str:
         """The model as a robot description of other programs; what the format cannot say is warned of.
@@ -1084,8 +1076,7 @@ def load(
 
 def recordings(path: PathText) -> Result:
     """What a log holds, table by table or topic by topic, before a model reads it."""
-    found = _core.contents(path)
-    return Result(found.json, found.text, found.notes)
+    return Result(_core.contents(path))
 
 
 def kinds(libraries: Sequence[PathText] = ()) -> list[dict[str, Any]]:

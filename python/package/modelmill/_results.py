@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,11 @@ if TYPE_CHECKING:
     from . import _core
     from ._model import Model
 
+    #: What the compiled part answers: JSON, text and remarks.
+    Answer = Union[_core.Found, _core.Excited, _core.Simulated]
+
 Remarks = list[tuple[str, str]]
+AnswerT = TypeVar("AnswerT", bound="Answer")
 
 
 def frame(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
@@ -60,10 +64,10 @@ class Result:
         Remarks: severity (``"info"`` or ``"warning"``) and text.
     """
 
-    def __init__(self, told: str, text: str, notes: Remarks) -> None:
-        self._object: dict[str, Any] = json.loads(told)
-        self._text = text
-        self.notes = notes
+    def __init__(self, found: Answer) -> None:
+        self._object: dict[str, Any] = json.loads(found.json)
+        self._text = found.text
+        self.notes = found.notes
 
     def to_dict(self) -> dict[str, Any]:
         """The same as ``modelmill ... --json`` prints it."""
@@ -188,7 +192,7 @@ class Identification(Result):
     """
 
     def __init__(self, found: _core.Found, model: Model) -> None:
-        super().__init__(found.json, found.text, found.notes)
+        super().__init__(found)
         self.values: NDArray[np.float64] = found.values
         self._model = model
 
@@ -269,7 +273,7 @@ class Diagnosis(Result):
     """Which physical effect a model lacks, and what speaks for it."""
 
     def __init__(self, found: _core.Found, better: Model | None) -> None:
-        super().__init__(found.json, found.text, found.notes)
+        super().__init__(found)
         self._page = found.page or ""
         self._better = better
 
@@ -376,7 +380,7 @@ class Runs(Result):
     """What changed between recordings of one machine."""
 
     def __init__(self, found: _core.Found) -> None:
-        super().__init__(found.json, found.text, found.notes)
+        super().__init__(found)
         self._page = found.page or ""
 
     @property
@@ -426,7 +430,7 @@ class Excitation(Result):
     """
 
     def __init__(self, found: _core.Excited, coordinates: list[str]) -> None:
-        super().__init__(found.json, found.text, found.notes)
+        super().__init__(found)
         self.t, *motion = found.motion()
         self.q, self.qd, self.qdd = (np.stack(part, axis=1) for part in motion)
         self.picture = found.picture

@@ -31,7 +31,7 @@ class Simulation(Result):
     """
 
     def __init__(self, made: _core.Simulated) -> None:
-        super().__init__(made.json, made.text, made.notes)
+        super().__init__(made)
         self.columns: dict[str, Floats] = dict(made.columns())
         self._csv = made.csv
 
@@ -57,7 +57,7 @@ class Reduction(Result):
     """
 
     def __init__(self, found: _core.Found, text: str) -> None:
-        super().__init__(found.json, found.text, found.notes)
+        super().__init__(found)
         self.text = text
 
     @property
