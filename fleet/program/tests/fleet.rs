@@ -57,6 +57,7 @@ impl Fleet {
         let first = self.at("recordings/robot=R00000/day=2026-03-01/recording=0/data.parquet");
         let plan =
             Plan::make(&self.at("model.toml"), &Reading::default(), &[&first]).expect("a plan");
+        assert_eq!(Plan::parse("the plan", &plan.json()).expect("a plan"), plan);
         plan.ground().expect("a ground")
     }
 }
