@@ -8,6 +8,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use modelmill::Model;
+use modelmill::diagnose::{Question, Verdict};
 use modelmill::identify::Estimation;
 use modelmill::recording::Reading;
 use modelmill::variants::Variants;
@@ -218,9 +219,18 @@ impl Plant<'_> {
 /// Noise of the forces beside their amplitude.
 const NOISE: f64 = 1e-3;
 
+/// How a recording is made.
+struct Made {
+    push: f64,
+    seed: u64,
+    /// What an encoder counts in, rad or m; exact without one.
+    step: Option<f64>,
+}
+
 /// Simulates by Runge and Kutta and writes poses and the drives' forces; every other quaternion has the other sign.
-fn recording(model: &Model, name: &str, push: f64) -> PathBuf {
+fn recording(model: &Model, name: &str, made: &Made) -> PathBuf {
     const SAMPLES: usize = 4000;
+    let push = made.push;
     const STEP: f64 = 0.001;
     let mechanism = &model.derivation.mechanism;
     let body = free_body(model);
@@ -230,7 +240,7 @@ fn recording(model: &Model, name: &str, push: f64) -> PathBuf {
         dynamics: model.derivation.dynamics().expect("an equation of motion"),
         body,
     };
-    let mut draws = Draws(17);
+    let mut draws = Draws(made.seed);
     let waves: Vec<Vec<[f64; 3]>> = mechanism
         .drives
         .iter()
@@ -273,7 +283,10 @@ fn recording(model: &Model, name: &str, push: f64) -> PathBuf {
         let _ = write!(text, "\n{t}");
         for (i, value) in q.iter().enumerate() {
             let turned = k % 2 == 1 && mechanism.coordinates[i].motion.is_quaternion();
-            let _ = write!(text, ",{}", if turned { -value } else { *value });
+            let read = made
+                .step
+                .map_or(*value, |step| (value / step).round() * step);
+            let _ = write!(text, ",{}", if turned { -read } else { read });
         }
         let forces = |t: f64| -> Vec<f64> { (0..waves.len()).map(|d| force(d, t)).collect() };
         for d in &driven {
@@ -312,7 +325,12 @@ fn recording(model: &Model, name: &str, push: f64) -> PathBuf {
 #[track_caller]
 fn check(name: &str, text: &str, push: f64, accuracy: f64) {
     let model = Model::from_text(name, text).expect("the model");
-    let file = recording(&model, name, push);
+    let made = Made {
+        push,
+        seed: 17,
+        step: None,
+    };
+    let file = recording(&model, name, &made);
     let recording = model
         .recording(&file, &Reading::default())
         .expect("a recording");
@@ -371,6 +389,62 @@ fn an_arm_on_a_free_body_is_identified_in_any_axes() {
     ] {
         check(name, &free_arm(order, coordinates, twist), 1.0, 2e-2);
     }
+}
+
+/// What a diagnosis says of recordings by encoders, of a machine that is that of the model but for an effect.
+#[track_caller]
+fn told(name: &str, text: &str, effect: &str, push: f64) -> Vec<(String, Vec<String>)> {
+    let model = Model::from_text(name, text).expect("the model");
+    let machine = Model::from_text(name, &format!("{text}{effect}")).expect("the machine");
+    let run = |seed: u64| {
+        let made = Made {
+            push,
+            seed,
+            step: Some(1e-4),
+        };
+        let file = recording(&machine, &format!("{name}-{}-{seed}", effect.len()), &made);
+        (model.recording(&file, &Reading::default())).expect("a recording")
+    };
+    let (fit, check) = (run(17), run(29));
+    let found = (model.diagnose(&[&fit], &[&check], &Question::default())).expect("a diagnosis");
+    let diagnosis = found.diagnosis;
+    let error = diagnosis.ladder[0].check;
+    assert!(!effect.is_empty() || error < 0.15, "{name}: {error}");
+    let expected = if effect.is_empty() {
+        Verdict::Adequate
+    } else {
+        Verdict::MissingEffect
+    };
+    assert_eq!(diagnosis.verdict, expected, "{name}");
+    let effects = diagnosis.effects.into_iter();
+    let named = effects.map(|found| (found.effect.kind, found.effect.at));
+    named.collect()
+}
+
+/// Of a joint that nothing drives no force is read: zeros say nothing of a gain, and do not count more than all else.
+#[test]
+fn nothing_is_missing_where_a_joint_has_no_drive() {
+    for (name, text, push) in [
+        ("pendubot-told", PENDUBOT, 1.0),
+        ("cart_pole-told", CART_POLE, 3.0),
+    ] {
+        assert_eq!(told(name, text, "", push), []);
+    }
+}
+
+#[test]
+fn friction_is_found_beside_a_joint_without_a_drive() {
+    let friction = r#"
+[[effect]]
+kind = "coulomb_friction"
+at = ["motor"]
+parameters = { Fc = { name = "Fc", nominal = 1.5 } }
+"#;
+    let found = told("cart_pole-rubs", CART_POLE, friction, 3.0);
+    assert_eq!(
+        found,
+        [("coulomb_friction".to_owned(), vec!["motor".to_owned()])]
+    );
 }
 
 const CABLES: &str = r#"

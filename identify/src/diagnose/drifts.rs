@@ -29,6 +29,9 @@ pub fn drifts(problem: &Problem, units: &[String]) -> Vec<Candidate> {
             let mut parameters = Vec::new();
             let mut columns = Vec::new();
             let has_level = kind == "offset_drift";
+            if has_level && problem.is_idle(d) {
+                continue;
+            }
             for ([level, ramp], name) in ramps.iter().zip(&recordings) {
                 let changes = shapes.iter().map(|shape| ("change of ", ramp, shape));
                 let levels = shapes.iter().map(|shape| ("", level, shape));

@@ -26,6 +26,7 @@ mod estimates;
 mod evidence;
 mod factored;
 mod following;
+mod idle;
 mod laws;
 mod noise;
 mod pool;
@@ -166,6 +167,7 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
     problem.removed.resize(problem.layout.channels.len(), 0.0);
     let mut disturbances = problem.disturbances.clone();
     problem.find_jumps();
+    problem.find_noise_of_idle();
     disturbances.extend(cleaning::clean(problem));
     let problem = &*problem;
     let mut bench = Bench::new(problem, supply);

@@ -240,8 +240,10 @@ pub struct Problem {
     pub candidates: Vec<Candidate>,
     /// Variables on which forces may depend, by name: positions, rates, accelerations, loads; one number per sample.
     pub variables: Vec<(String, Vec<f64>)>,
-    /// White noise of each channel's force.
+    /// White noise of each channel's force; that of idle channels is found by a diagnosis.
     pub noise: Vec<f64>,
+    /// Channels of which no force is read, since nothing drives there; empty where all are read.
+    pub idle: Vec<bool>,
     /// Samples that say nothing of the model, as those of a push, `[channel][sample]`; empty where all count.
     pub left_out: Vec<Vec<bool>>,
     /// Samples next to reversals, which do not decide but count in figures, `[channel][sample]`; a diagnosis finds them.

@@ -6,7 +6,7 @@ use super::bench::{Bench, Pick, Trial};
 use super::column::Column;
 use super::pool::On;
 use super::problem::{
-    Candidate, Effect, EffectParameter, Fault, Layout, Nature, Reading, Sign, Source,
+    Candidate, Effect, EffectParameter, Fault, Nature, Problem, Reading, Sign, Source,
 };
 
 /// Below this part of a sample a derivative says what a delay does.
@@ -26,11 +26,15 @@ impl Fault {
 
 /// What may be wrong with the reading of each force by itself, and of all by a low-pass alike. A delay of all forces is an
 /// effect of the library, and another scale of all would be other parameters.
-pub fn readings(layout: &Layout) -> Vec<Candidate> {
-    let channels = layout.channels.len();
-    let each = (0..channels).flat_map(|d| {
-        let late = (channels > 1).then_some((Fault::Late, Some(d)));
-        let lagging = (channels > 1).then_some((Fault::Lagging, Some(d)));
+pub fn readings(problem: &Problem) -> Vec<Candidate> {
+    let layout = &problem.layout;
+    let read: Vec<usize> = (0..layout.channels.len())
+        .filter(|d| !problem.is_idle(*d))
+        .collect();
+    let has_others = read.len() > 1;
+    let each = read.into_iter().flat_map(|d| {
+        let late = has_others.then_some((Fault::Late, Some(d)));
+        let lagging = has_others.then_some((Fault::Lagging, Some(d)));
         [late, lagging, Some((Fault::Scaled, Some(d)))]
     });
     let all = [Some((Fault::Lagging, None))];

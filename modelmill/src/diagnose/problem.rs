@@ -95,7 +95,7 @@ pub(crate) fn find(
     let units: Vec<String> = (0..model.drives().len())
         .map(|d| model.force_unit(d).to_owned())
         .collect();
-    let mut further = readings(&problem.layout);
+    let mut further = readings(&problem);
     further.extend(drifts(&problem, &units));
     further.extend(memories(model, &all)?);
     let values = encoders::values(model, &problem, held);
@@ -235,9 +235,19 @@ fn problem(
         }
     }
     let mut made = columns::columns(candidates, model, all)?;
+    let undriven = model
+        .derivation
+        .mechanism
+        .drives
+        .iter()
+        .map(|drive| !drive.is_driven);
+    let idle = undriven
+        .zip(&measured)
+        .map(|(undriven, force)| undriven && force.iter().all(|f| *f == 0.0));
     let problem = Problem {
         layout: layout(model, all),
         noise: noises(&measured, all)?,
+        idle: idle.collect(),
         measured: Column::new(measured),
         base: regressor(all, &Evaluator::new(&model.derivation), model)?,
         candidates: std::mem::take(&mut made.candidates),
