@@ -19,6 +19,10 @@ const BESIDE: usize = 5;
 const ABOVE_OTHERS: f64 = 8.0;
 /// Jumps of a position at most, as a part of its samples: what happens often is how the sensor is.
 const RARE: f64 = 0.002;
+/// Rates before and behind a step of so many usual ones are no neighbours: the motion has gone on meanwhile.
+const GAP: f64 = 3.5;
+/// Neighbours to either side of a rate at least, where a gap cuts them off.
+const FEWEST: usize = 2;
 
 impl Recording {
     /// Puts in place what stands for values that were not measured, where `is_lacking_allowed`, and for those of sensors that
@@ -199,7 +203,9 @@ fn spikes(force: &[f64], is_made: &dyn Fn(usize) -> bool) -> Option<(Vec<bool>, 
     sorted.sort_unstable_by(f64::total_cmp);
     let range = sorted[n - 1 - n / 100] - sorted[n / 100];
     let bound = (ABOVE_NOISE * noise.max(white_noise(force))).max(OF_RANGE * range);
-    let mut spikes: Vec<bool> = off.iter().map(|x| x.abs() > bound && bound > 0.0).collect();
+    let mut spikes: Vec<bool> = (0..n)
+        .map(|i| bound > 0.0 && off[i].abs() > bound && beyond(force, i) > bound)
+        .collect();
     let mut i = 0;
     while i < n {
         let end = (i..n).find(|k| !spikes[*k]).unwrap_or(n);
@@ -236,6 +242,29 @@ fn beside(values: &[f64], i: usize) -> f64 {
     median(around.map(|k| values[k]).collect())
 }
 
+/// How far a sample lies beyond what the samples before and those behind reach: where a force steps, as where friction reverses,
+/// it is near those of one side.
+fn beyond(values: &[f64], i: usize) -> f64 {
+    let before = &values[i.saturating_sub(BESIDE)..i];
+    let behind = &values[i + 1..(i + 1 + BESIDE).min(values.len())];
+    let sides = [before, behind].into_iter().filter(|side| !side.is_empty());
+    let off = sides.map(|side| (values[i] - median(side.to_vec())).abs());
+    off.fold(f64::INFINITY, f64::min)
+}
+
+/// The neighbours of one of `n` rates, of which some are steps over gaps in time: from where to where. Beside a gap there are as
+/// many before as behind, since rates on one side alone say what an acceleration adds; `None` where these are too few.
+fn around_within(gaps: &[usize], k: usize, n: usize) -> Option<(usize, usize)> {
+    let next = gaps.partition_point(|gap| *gap < k);
+    if gaps.get(next) == Some(&k) {
+        return None;
+    }
+    let before = next.checked_sub(1).map_or(BESIDE, |at| k - gaps[at] - 1);
+    let behind = gaps.get(next).map_or(BESIDE, |gap| gap - k - 1);
+    let reach = before.min(behind).min(BESIDE);
+    (reach >= FEWEST).then(|| (k.saturating_sub(reach), (k + reach + 1).min(n)))
+}
+
 /// Steps of a position that no neighbour makes likely, `(first sample behind, size)`.
 fn jumps(time: &[f64], q: &[f64]) -> Vec<(usize, f64)> {
     let n = q.len();
@@ -247,8 +276,18 @@ fn jumps(time: &[f64], q: &[f64]) -> Vec<(usize, f64)> {
         .map(|i| (q[i] - q[i - 1]) / (time[i] - time[i - 1]))
         .collect();
     let is_short = |i: usize| time[i] - time[i - 1] < 1.5 * usual;
-    let off: Vec<f64> = (1..n)
-        .map(|i| (rates[i - 1] - beside(&rates, i - 1)) * (time[i] - time[i - 1]))
+    let cuts: Vec<usize> = (1..n)
+        .filter(|i| time[*i] - time[i - 1] > GAP * usual)
+        .map(|i| i - 1)
+        .collect();
+    let off: Vec<f64> = (0..n - 1)
+        .map(|k| {
+            let around = around_within(&cuts, k, n - 1);
+            around.map_or(0.0, |(start, end)| {
+                let others = rates[start..k].iter().chain(&rates[k + 1..end]);
+                (rates[k] - median(others.copied().collect())) * (time[k + 1] - time[k])
+            })
+        })
         .collect();
     let mut sizes: Vec<f64> = off.iter().map(|x| x.abs()).collect();
     sizes.sort_unstable_by(f64::total_cmp);
@@ -350,6 +389,35 @@ mod tests {
         // A coarse encoder makes steps all the time.
         let coarse = recording(|i| (q(i) * 200.0).round() / 200.0, |i| force(i).to_string());
         assert_eq!(coarse.notes(), []);
+    }
+
+    /// A joint that carries friction alone: all of its force turns over where it reverses.
+    #[test]
+    fn friction_that_reverses_makes_no_spikes() {
+        let steps = recording(q, |i| {
+            let rate = (3.0 * f64::from(i) * 0.002).cos();
+            (0.25 * rate.signum() + 0.01 * rate).to_string()
+        });
+        assert_eq!(steps.notes(), []);
+        assert_eq!(steps.lost("motor"), None);
+    }
+
+    /// A slow motion that goes on while nothing is recorded: fine encoders make steps beside which the rates behind the gap are
+    /// far off those before it.
+    #[test]
+    fn lost_samples_are_no_jumps() {
+        let mut text = "t,q,motor\n".to_owned();
+        for i in (0..400).chain(900..1400).chain(1403..2000) {
+            let t = f64::from(i) * 0.002;
+            let _ = writeln!(text, "{t},{},{}", (3.0 * t).sin(), (7.0 * t).cos());
+        }
+        let read = Recording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default());
+        let mut recording = read.unwrap();
+        let before = recording.column("q").unwrap().to_vec();
+        let (coordinates, drives) = (["q".to_owned()], ["motor".to_owned()]);
+        recording.repair(&coordinates, &drives, true, &|_, _| false);
+        assert_eq!(recording.column("q").unwrap(), before);
+        assert_eq!(recording.with_faults(), None);
     }
 
     #[test]
