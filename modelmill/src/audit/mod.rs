@@ -22,9 +22,15 @@ const FEWEST_LOOKED_AT: usize = 300;
 /// Fewest samples of which anything is said.
 const FEWEST: usize = 100;
 /// Relative errors below this one raise no suspicion of exchanged columns.
-const BEARABLE: f64 = 0.3;
+const BEARABLE: f64 = 0.05;
+/// Where a mechanism cannot reach the poses as they are, others must explain forces to this relative error.
+const CONVINCING: f64 = 0.3;
 /// An exchange must lower the error to this part.
 const BETTER: f64 = 0.5;
+/// Errors that are the same but for this part cannot tell one change from another.
+const ALIKE: f64 = 0.05;
+/// Multiplications that trying all changes of the motion may take: some ten seconds of one core at most.
+const AFFORDABLE: f64 = 2e10;
 
 /// Looks at every recording that has forces, and adds what it finds to their notes; the forces of contacts and pushes count no
 /// more where `leave_out_events`.
@@ -48,18 +54,11 @@ fn findings(model: &Model, data: &Stretch) -> Vec<Note> {
     let n_drives = forces.len();
     let wanted = (ROWS_LOOKED_AT / n_drives.max(1)).clamp(FEWEST_LOOKED_AT, LOOKED_AT);
     let samples: Vec<usize> = (0..n).step_by((n / wanted).max(1)).collect();
-    let explained = |change: &Change<'_>| {
-        let regressor = regressor(model, data, &samples, change)?;
-        ForceAudit::new(ByChannel::new(&regressor, n_drives))
-    };
     // Poses without answer are reported with their place when the whole recording is evaluated.
-    let Some(as_it_is) = explained(&|_| {}) else {
-        return suspects_of_motion(model, data, &samples, None, &explained);
+    let Some(as_it_is) = explained(model, data, &samples, &|_| {}) else {
+        return suspects_of_motion(model, data, &samples);
     };
-    let rows = samples
-        .iter()
-        .flat_map(|k| forces.iter().map(move |force| force[*k]));
-    let measured = DVector::from_iterator(samples.len() * n_drives, rows);
+    let measured = interleaved(forces, &samples);
     let Some(error) = as_it_is.error(&measured) else {
         return Vec::new();
     };
@@ -99,7 +98,7 @@ fn findings(model: &Model, data: &Stretch) -> Vec<Note> {
             )));
         }
         if notes.is_empty() {
-            notes = suspects_of_motion(model, data, &samples, Some((error, &measured)), &explained);
+            notes = suspects_of_motion(model, data, &samples);
         }
     }
     if notes.is_empty() {
@@ -137,80 +136,139 @@ fn beside_nominal(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<Note>
 type Motion = [Vec<Vec<f64>>; 3];
 /// What could be done to a recording's motion to make sense of it.
 type Change<'a> = dyn Fn(&mut Motion) + 'a;
-/// How well the model explains the forces once the motion is changed.
-type Explain<'a> = dyn Fn(&Change<'_>) -> Option<ForceAudit> + 'a;
-
-/// Coordinates that are exchanged, or angles in degrees; `now` is the error as the columns are, if there is one.
-fn suspects_of_motion(
-    model: &Model,
-    data: &Stretch,
-    samples: &[usize],
-    now: Option<(f64, &DVector<f64>)>,
-    explained: &Explain<'_>,
-) -> Vec<Note> {
-    let Some(forces) = data.run.force.as_deref() else {
-        return Vec::new();
-    };
+/// Forces at some samples, those of all drives one after the other.
+fn interleaved(forces: &[Vec<f64>], samples: &[usize]) -> DVector<f64> {
     let rows = samples
         .iter()
         .flat_map(|k| forces.iter().map(move |force| force[*k]));
-    let measured = DVector::from_iterator(samples.len() * forces.len(), rows);
+    DVector::from_iterator(samples.len() * forces.len(), rows)
+}
+
+/// How well the model explains the forces once the motion is changed.
+fn explained(
+    model: &Model,
+    data: &Stretch,
+    samples: &[usize],
+    change: &Change<'_>,
+) -> Option<ForceAudit> {
+    let regressor = regressor(model, data, samples, change)?;
+    ForceAudit::new(ByChannel::new(&regressor, model.drives().len()))
+}
+
+/// Coordinates that are exchanged or turned round, or angles in degrees.
+fn suspects_of_motion(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<Note> {
+    let Some(forces) = data.run.force.as_deref() else {
+        return Vec::new();
+    };
     let file = &data.run.file;
-    let motions = model.motions();
-    let mut hypotheses: Vec<(String, Box<Change<'static>>)> = Vec::new();
-    let angles: Vec<usize> = (0..motions.len()).filter(|i| motions[*i].1).collect();
-    if !angles.is_empty() {
-        let angles = angles.clone();
-        hypotheses.push((
-            format!(
-                "The angles in {file} seem to be in degrees; they must be in rad: say {}",
-                data.maps_from_degrees
-            ),
-            Box::new(move |states| {
-                for order in states.iter_mut() {
-                    for i in &angles {
-                        for value in &mut order[*i] {
-                            *value = value.to_radians();
-                        }
-                    }
-                }
-            }),
-        ));
-    }
-    for a in 0..motions.len() {
-        for b in a + 1..motions.len() {
-            if motions[a].1 == motions[b].1 {
-                hypotheses.push((
-                    format!(
-                        "The coordinates `{}` and `{}` in {file} seem to be exchanged: check which column is which (option `columns`)",
-                        motions[a].0, motions[b].0
-                    ),
-                    Box::new(move |states| {
-                        for order in states.iter_mut() {
-                            order.swap(a, b);
-                        }
-                    }),
-                ));
-            }
-        }
-    }
-    let limit = now.map_or(BEARABLE, |(error, _)| BETTER * error);
-    let best = hypotheses
+    let hypotheses = hypotheses(model, &data.maps_from_degrees, file);
+    let squares = (model.base.len() * model.base.len()) as f64;
+    let cost = squares * (samples.len() * forces.len() * hypotheses.len()) as f64;
+    let thinned = (cost / AFFORDABLE).ceil().max(1.0) as usize;
+    let samples: Vec<usize> = samples.iter().copied().step_by(thinned).collect();
+    let measured = interleaved(forces, &samples);
+    let now = explained(model, data, &samples, &|_| {}).and_then(|audit| audit.error(&measured));
+    let limit = now.map_or(CONVINCING, |error| BETTER * error);
+    let mut tried: Vec<(&Hypothesis, f64)> = hypotheses
         .iter()
-        .filter_map(|(says, change)| Some((says, explained(change.as_ref())?.error(&measured)?)))
+        .filter_map(|one| {
+            let audit = explained(model, data, &samples, one.change.as_ref())?;
+            Some((one, audit.error(&measured)?))
+        })
         .filter(|(_, error)| *error < limit)
-        .min_by(|a, b| a.1.total_cmp(&b.1));
+        .collect();
+    tried.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let best = tried.first().map(|(first, error)| {
+        let alike = tried.iter().filter(|(one, other)| {
+            one.turns.is_some() && *other <= (1.0 + ALIKE) * error
+        });
+        let turned: Vec<String> = alike
+            .filter_map(|(one, _)| Some(format!("`{}`", one.turns.as_deref()?)))
+            .collect();
+        let says = if first.turns.is_some() && turned.len() > 1 {
+            format!(
+                "One of the coordinates {} in {file} seems to have the wrong sign: check which way each counts (option `columns`)",
+                turned.join(", ")
+            )
+        } else {
+            first.says.clone()
+        };
+        (says, *error)
+    });
     let Some((says, error)) = best else {
         return Vec::new();
     };
     let as_it_is = match now {
-        Some((now, _)) => format!("is off by {}", percent(Some(now))),
+        Some(now) => format!("is off by {}", percent(Some(now))),
         None => "does not exist, for the mechanism cannot reach such poses".to_owned(),
     };
     vec![Note::warning(format!(
         "{says}. The best fit of the model {as_it_is} as the columns are, and would be off by {} then.",
         percent(Some(error))
     ))]
+}
+
+/// What may have happened to the columns of a motion.
+struct Hypothesis {
+    says: String,
+    /// The coordinate that it turns round, if that is all.
+    turns: Option<String>,
+    change: Box<Change<'static>>,
+}
+
+/// Angles in degrees, coordinates with the wrong sign, and pairs that are exchanged.
+fn hypotheses(model: &Model, maps_from_degrees: &str, file: &str) -> Vec<Hypothesis> {
+    let motions = model.motions();
+    let mut hypotheses = Vec::new();
+    let scaled = |coordinates: Vec<usize>, factor: f64| -> Box<Change<'static>> {
+        Box::new(move |states| {
+            for order in states.iter_mut() {
+                for i in &coordinates {
+                    for value in &mut order[*i] {
+                        *value *= factor;
+                    }
+                }
+            }
+        })
+    };
+    let angles: Vec<usize> = (0..motions.len()).filter(|i| motions[*i].1).collect();
+    if !angles.is_empty() {
+        hypotheses.push(Hypothesis {
+            says: format!(
+                "The angles in {file} seem to be in degrees; they must be in rad: say {maps_from_degrees}"
+            ),
+            turns: None,
+            change: scaled(angles, 1.0_f64.to_radians()),
+        });
+    }
+    for (a, (name, _)) in motions.iter().enumerate() {
+        hypotheses.push(Hypothesis {
+            says: format!(
+                "The coordinate `{name}` in {file} seems to have the wrong sign: check which way it counts (option `columns`)"
+            ),
+            turns: Some(name.clone()),
+            change: scaled(vec![a], -1.0),
+        });
+    }
+    for a in 0..motions.len() {
+        for b in a + 1..motions.len() {
+            if motions[a].1 == motions[b].1 {
+                hypotheses.push(Hypothesis {
+                    says: format!(
+                        "The coordinates `{}` and `{}` in {file} seem to be exchanged: check which column is which (option `columns`)",
+                        motions[a].0, motions[b].0
+                    ),
+                    turns: None,
+                    change: Box::new(move |states| {
+                        for order in states.iter_mut() {
+                            order.swap(a, b);
+                        }
+                    }),
+                });
+            }
+        }
+    }
+    hypotheses
 }
 
 /// The regressor at some samples, with the states changed.
