@@ -45,7 +45,7 @@ async fn answer(session: &SessionContext, sql: &str) -> Answer {
     all
 }
 
-/// All files of a fleet as objects of a store, below `site/recordings`, and one that is no recording.
+/// All files of a fleet as objects of a store, below `site/recordings`, and one elsewhere that is no recording.
 async fn stored(files: &BTreeMap<String, Vec<File>>) -> Arc<dyn ObjectStore> {
     let store = InMemory::new();
     for file in files.values().flatten() {
@@ -53,7 +53,7 @@ async fn stored(files: &BTreeMap<String, Vec<File>>) -> Arc<dyn ObjectStore> {
         let bytes = std::fs::read(&file.path).unwrap();
         store.put(&place, bytes.into()).await.unwrap();
     }
-    let note = "site/recordings/notes.md".into();
+    let note = "site/elsewhere/notes.md".into();
     store.put(&note, "not a recording".into()).await.unwrap();
     Arc::new(store)
 }
@@ -165,7 +165,7 @@ async fn partitions_change_nothing() {
             "no summary of recordings",
         ),
         (
-            "SELECT * FROM modelmill_recordings('s3://fleet/elsewhere')",
+            "SELECT * FROM modelmill_recordings('s3://fleet/site/elsewhere')",
             "holds no recordings",
         ),
         (
