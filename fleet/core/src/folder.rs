@@ -25,42 +25,66 @@ pub struct File {
 ///
 /// Fails where the folder cannot be read, or holds no recording whose robot is known.
 pub fn robots(folder: &Path) -> Result<BTreeMap<String, Vec<File>>, Fault> {
+    let mut paths = Vec::new();
+    walk(folder, &mut paths)?;
     let mut found = Vec::new();
-    walk(folder, &mut found)?;
-    let mut robots: BTreeMap<String, Vec<File>> = BTreeMap::new();
-    for path in found {
+    for path in paths {
         let below = path.strip_prefix(folder).unwrap_or(&path);
-        let parts: Vec<String> = below
-            .iter()
-            .map(|part| part.to_string_lossy().into_owned())
-            .collect();
-        let name = parts.join("/");
-        let Some((robot, day)) = place(&parts) else {
-            return Err(Fault::new(format!(
-                "{}: the path of {name} names no robot; put recordings below folders such as `robot=R1/day=2026-03-01`, or \
-                 `R1/2026-03-01`",
-                folder.display()
-            )));
-        };
+        let parts: Vec<_> = below.iter().map(|part| part.to_string_lossy()).collect();
         let about = fs::metadata(&path).map_err(|error| unread(&path, &error))?;
         let changed = about.modified().ok();
         let changed = changed.and_then(|at| at.duration_since(std::time::UNIX_EPOCH).ok());
-        let key = format!(
-            "{name} {} {}",
-            about.len(),
-            changed.map_or(0, |at| at.as_nanos())
-        );
-        robots.entry(robot).or_default().push(File {
-            name,
+        found.push(Found {
+            name: parts.join("/"),
+            version: format!("{} {}", about.len(), changed.map_or(0, |at| at.as_nanos())),
             path,
+        });
+    }
+    by_robot(&folder.display(), found)
+}
+
+/// A file or object that was found below a folder.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// Its path below the folder, with `/`.
+    pub name: String,
+    /// Where it is.
+    pub path: PathBuf,
+    /// What changes when it is written anew, such as its size and time.
+    pub version: String,
+}
+
+/// What was found by robot, each in the order of day and name; `folder` is what messages call the place. Of what is no recording, by
+/// the endings of names, nothing is said.
+///
+/// Fails where there is no recording, or the path of one names no robot.
+pub fn by_robot(
+    folder: &dyn std::fmt::Display,
+    found: impl IntoIterator<Item = Found>,
+) -> Result<BTreeMap<String, Vec<File>>, Fault> {
+    let mut robots: BTreeMap<String, Vec<File>> = BTreeMap::new();
+    for one in found {
+        if !has_ending_of_a_recording(&one.path) {
+            continue;
+        }
+        let parts: Vec<String> = one.name.split('/').map(str::to_owned).collect();
+        let Some((robot, day)) = place(&parts) else {
+            return Err(Fault::new(format!(
+                "{folder}: the path of {} names no robot; put recordings below folders such as `robot=R1/day=2026-03-01`, or \
+                 `R1/2026-03-01`",
+                one.name
+            )));
+        };
+        robots.entry(robot).or_default().push(File {
+            key: format!("{} {}", one.name, one.version),
+            name: one.name,
+            path: one.path,
             day,
-            key,
         });
     }
     if robots.is_empty() {
         return Err(Fault::new(format!(
-            "{} holds no recordings (Parquet, CSV, MATLAB, HDF5, MCAP); give the folder above those of the robots",
-            folder.display()
+            "{folder} holds no recordings (Parquet, CSV, MATLAB, HDF5, MCAP); give the folder above those of the robots"
         )));
     }
     for files in robots.values_mut() {
@@ -86,7 +110,7 @@ fn walk(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), Fault> {
     for path in entries {
         if path.is_dir() {
             walk(&path, found)?;
-        } else if has_ending_of_a_recording(&path) {
+        } else {
             found.push(path);
         }
     }

@@ -95,6 +95,14 @@ impl Ground {
         self.summed(name, read.map_err(Fault::from))
     }
 
+    /// As [`Ground::summarise_file`], of a file that is in memory, such as an object of a store; the ending of its name says what it
+    /// is.
+    pub fn summarise_bytes(&self, name: &str, bytes: Vec<u8>) -> Summary {
+        let model = self.common.model();
+        let read = model.recording_of_bytes(name, bytes, &self.plan.reading());
+        self.summed(name, read.map_err(Fault::from))
+    }
+
     fn summed(&self, name: &str, recording: Result<Recording, Fault>) -> Summary {
         recording
             .and_then(|recording| self.sums(name, recording))

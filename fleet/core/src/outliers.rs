@@ -14,7 +14,7 @@ const ALIKE: f64 = 3.5;
 /// What a change explains of a robot must lie, as a root, so many median distances above the median over the robots: a change of
 /// one value of robots that are distributed normally does so once in a million.
 const BEYOND: f64 = 12.0;
-/// A change that stands for less than this part of the clearest one is told with it, and not by itself.
+/// Changes that stand for this part of the clearest one are told together, by the name of the one that explains most.
 const BESIDE: f64 = 0.5;
 
 /// A robot as it is held against others.
@@ -111,14 +111,18 @@ pub fn outliers(ground: &Ground, robots: &[One]) -> Result<Outliers, Fault> {
             .collect();
         for (which, roots) in known.iter().zip(&roots) {
             let beyond = |g: usize| (roots[g] - bounds[g].0) / bounds[g].1;
-            let clearest = (0..possible).max_by(|a, b| beyond(*a).total_cmp(&beyond(*b)));
-            if let Some(g) = clearest.filter(|g| beyond(*g) > BEYOND) {
+            let clearest = (0..possible).map(beyond).fold(0.0, f64::max);
+            // What robots hardly differ in, such as the zero of a sensor, stands clear of them even where it explains little of a load:
+            // the name is that of the change that explains most.
+            let clear = |g: &usize| beyond(*g) > BEYOND && beyond(*g) > BESIDE * clearest;
+            let named = (0..possible)
+                .filter(clear)
+                .max_by(|a, b| roots[*a].total_cmp(&roots[*b]));
+            if let Some(g) = named {
                 let mut change = ground
                     .common
                     .alone(&parts, &robots[*which].summary.whole, g);
-                let rivals = (0..possible).filter(|other| {
-                    *other != g && beyond(*other) > BEYOND && beyond(*other) > BESIDE * beyond(g)
-                });
+                let rivals = (0..possible).filter(|other| *other != g && clear(other));
                 let rivals = rivals.map(|other| ground.common.name_of_change(other));
                 change.rivals = rivals.collect();
                 found.push(Outlier {

@@ -1,24 +1,30 @@
-//! A folder of recordings as a table of summaries: one file is in memory for each partition.
+//! A folder of recordings as a table of summaries, on disk or in an object store that the session knows: one file is in memory for
+//! each partition.
 
-use std::path::Path;
+use std::path::PathBuf;
 use std::sync::Arc;
 
+use async_trait::async_trait;
 use datafusion::arrow::array::{ArrayRef, BinaryArray, RecordBatch, StringArray};
 use datafusion::arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use datafusion::catalog::streaming::StreamingTable;
-use datafusion::catalog::{TableFunctionImpl, TableProvider};
+use datafusion::catalog::{Session, TableFunctionArgs, TableFunctionImpl, TableProvider};
 use datafusion::common::{DataFusionError, Result, ScalarValue, plan_err};
+use datafusion::datasource::listing::ListingTableUrl;
 use datafusion::execution::{SendableRecordBatchStream, TaskContext};
-use datafusion::logical_expr::Expr;
+use datafusion::logical_expr::{Expr, TableType};
+use datafusion::object_store::{ObjectMeta, ObjectStore, ObjectStoreExt, path::Path as Place};
+use datafusion::physical_plan::ExecutionPlan;
 use datafusion::physical_plan::stream::RecordBatchStreamAdapter;
 use datafusion::physical_plan::streaming::PartitionStream;
-use futures::StreamExt;
-use modelmill_fleet::Ground;
-use modelmill_fleet::folder::{File, robots};
+use futures::{StreamExt, TryStreamExt};
+use modelmill_fleet::folder::{File, Found, by_robot, robots};
+use modelmill_fleet::{Ground, Summary};
 
 use crate::samples::external;
 
-/// `modelmill_recordings('folder')`: `robot`, `day`, `recording`, `summary`, and `bad` with the reason where it gave no answer.
+/// `modelmill_recordings('folder')`: `robot`, `day`, `recording`, `summary`, and `bad` with the reason where it gave no answer. The
+/// folder is a path or the URL of one, such as `s3://bucket/folder`, in a store that the session knows.
 #[derive(Clone)]
 pub struct Recordings {
     ground: Arc<Ground>,
@@ -38,31 +44,144 @@ impl std::fmt::Debug for Recordings {
 }
 
 impl TableFunctionImpl for Recordings {
-    fn call(&self, arguments: &[Expr]) -> Result<Arc<dyn TableProvider>> {
-        let [Expr::Literal(ScalarValue::Utf8(Some(folder)), _)] = arguments else {
+    fn call_with_args(&self, args: TableFunctionArgs<'_, '_>) -> Result<Arc<dyn TableProvider>> {
+        let [
+            Expr::Literal(ScalarValue::Utf8(Some(folder)) | ScalarValue::Utf8View(Some(folder)), _),
+        ] = args.exprs()
+        else {
             return plan_err!(
                 "modelmill_recordings takes one text, the folder above those of the robots"
             );
         };
-        let files: Vec<(String, File)> = robots(Path::new(folder))
-            .map_err(external)?
+        let folder = if folder.contains("://") {
+            Folder::Stored(ListingTableUrl::parse(folder)?)
+        } else {
+            Folder::Path(folder.into())
+        };
+        Ok(Arc::new(Table {
+            ground: self.ground.clone(),
+            folder,
+            schema: schema(),
+        }))
+    }
+}
+
+/// Where the recordings lie.
+enum Folder {
+    Path(PathBuf),
+    Stored(ListingTableUrl),
+}
+
+impl Folder {
+    /// All recordings, and what they are read from.
+    async fn files(&self, session: &dyn Session) -> Result<(Source, Vec<(String, File)>)> {
+        let (source, robots) = match self {
+            Self::Path(folder) => (Source::Disk, robots(folder).map_err(external)?),
+            Self::Stored(url) => {
+                let store = session.runtime_env().object_store(url)?;
+                let above = url.prefix();
+                let found: Vec<ObjectMeta> = store.list(Some(above)).try_collect().await?;
+                let found = found.into_iter().map(|object| {
+                    let below = object.location.prefix_match(above);
+                    let parts: Vec<_> = below
+                        .into_iter()
+                        .flatten()
+                        .map(|part| part.as_ref().to_owned())
+                        .collect();
+                    Found {
+                        name: parts.join("/"),
+                        path: object.location.as_ref().into(),
+                        version: format!(
+                            "{} {}",
+                            object.size,
+                            object.last_modified.timestamp_micros()
+                        ),
+                    }
+                });
+                let robots = by_robot(url, found).map_err(external)?;
+                (Source::Store(store), robots)
+            }
+        };
+        let files = robots
             .into_iter()
-            .flat_map(|(robot, files)| files.into_iter().map(move |file| (robot.clone(), file)))
-            .collect();
+            .flat_map(|(robot, files)| files.into_iter().map(move |file| (robot.clone(), file)));
+        Ok((source, files.collect()))
+    }
+}
+
+/// What files are read from.
+#[derive(Clone)]
+enum Source {
+    Disk,
+    Store(Arc<dyn ObjectStore>),
+}
+
+impl Source {
+    /// The summary of a file. What is wrong with a recording stands in it; a store that does not answer is a fault.
+    async fn summary(&self, ground: Arc<Ground>, file: File) -> Result<Summary> {
+        let bytes = match self {
+            Self::Disk => None,
+            Self::Store(store) => {
+                let place = Place::parse(file.path.to_string_lossy())?;
+                Some(store.get(&place).await?.bytes().await?)
+            }
+        };
+        let summed = tokio::task::spawn_blocking(move || match bytes {
+            None => ground.summarise_file(&file.name, &file.path),
+            Some(bytes) => ground.summarise_bytes(&file.name, bytes.into()),
+        });
+        summed
+            .await
+            .map_err(|error| DataFusionError::External(Box::new(error)))
+    }
+}
+
+/// The table. Files are listed when it is scanned, since only then a store may be asked.
+struct Table {
+    ground: Arc<Ground>,
+    folder: Folder,
+    schema: SchemaRef,
+}
+
+impl std::fmt::Debug for Table {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match &self.folder {
+            Folder::Path(folder) => write!(f, "recordings below {}", folder.display()),
+            Folder::Stored(url) => write!(f, "recordings below {url}"),
+        }
+    }
+}
+
+#[async_trait]
+impl TableProvider for Table {
+    fn schema(&self) -> SchemaRef {
+        self.schema.clone()
+    }
+
+    fn table_type(&self) -> TableType {
+        TableType::View
+    }
+
+    async fn scan(
+        &self,
+        session: &dyn Session,
+        projection: Option<&Vec<usize>>,
+        filters: &[Expr],
+        limit: Option<usize>,
+    ) -> Result<Arc<dyn ExecutionPlan>> {
+        let (source, files) = self.folder.files(session).await?;
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let each = files.len().div_ceil(cores).max(1);
-        let schema = schema();
         let partitions = files.chunks(each).map(|files| {
             Arc::new(Part {
                 ground: self.ground.clone(),
-                schema: schema.clone(),
+                schema: self.schema.clone(),
+                source: source.clone(),
                 files: files.to_vec(),
             }) as Arc<dyn PartitionStream>
         });
-        Ok(Arc::new(StreamingTable::try_new(
-            schema.clone(),
-            partitions.collect(),
-        )?))
+        let streamed = StreamingTable::try_new(self.schema.clone(), partitions.collect())?;
+        streamed.scan(session, projection, filters, limit).await
     }
 }
 
@@ -81,6 +200,7 @@ fn schema() -> SchemaRef {
 struct Part {
     ground: Arc<Ground>,
     schema: SchemaRef,
+    source: Source,
     files: Vec<(String, File)>,
 }
 
@@ -96,21 +216,23 @@ impl PartitionStream for Part {
     }
 
     fn execute(&self, _: Arc<TaskContext>) -> SendableRecordBatchStream {
-        let (ground, schema) = (self.ground.clone(), self.schema.clone());
+        let (ground, schema, source) = (
+            self.ground.clone(),
+            self.schema.clone(),
+            self.source.clone(),
+        );
         let batches = futures::stream::iter(self.files.clone()).then(move |(robot, file)| {
-            let (ground, schema) = (ground.clone(), schema.clone());
+            let (ground, schema, source) = (ground.clone(), schema.clone(), source.clone());
             async move {
-                let read = tokio::task::spawn_blocking(move || one(&ground, schema, &robot, &file));
-                read.await
-                    .map_err(|error| DataFusionError::External(Box::new(error)))?
+                let summary = source.summary(ground, file.clone()).await?;
+                row(schema, &robot, &file, &summary)
             }
         });
         Box::pin(RecordBatchStreamAdapter::new(self.schema.clone(), batches))
     }
 }
 
-fn one(ground: &Ground, schema: SchemaRef, robot: &str, file: &File) -> Result<RecordBatch> {
-    let summary = ground.summarise_file(&file.name, &file.path);
+fn row(schema: SchemaRef, robot: &str, file: &File, summary: &Summary) -> Result<RecordBatch> {
     let text = |text: &str| Arc::new(StringArray::from(vec![text])) as ArrayRef;
     let bad = summary.bad.first().map(|bad| bad.says.as_str());
     let columns: Vec<ArrayRef> = vec![

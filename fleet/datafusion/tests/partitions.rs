@@ -1,13 +1,16 @@
-//! The same query gives the same numbers however the samples are spread, and the same as the summaries of the files.
+//! The same query gives the same numbers however the samples are spread and wherever they lie, and the same as the summaries of the
+//! files.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use datafusion::arrow::array::{Array, AsArray};
 use datafusion::arrow::datatypes::{Float64Type, UInt64Type};
+use datafusion::object_store::memory::InMemory;
+use datafusion::object_store::{ObjectStore, ObjectStoreExt};
 use datafusion::prelude::{SessionConfig, SessionContext};
 use modelmill::recording::Reading;
-use modelmill_fleet::folder::robots;
+use modelmill_fleet::folder::{File, robots};
 use modelmill_fleet::{Ground, Plan};
 use modelmill_fleet_datafusion::register;
 use modelmill_fleet_program::generate::{Size, generate};
@@ -42,6 +45,19 @@ async fn answer(session: &SessionContext, sql: &str) -> Answer {
     all
 }
 
+/// All files of a fleet as objects of a store, below `site/recordings`, and one elsewhere that is no recording.
+async fn stored(files: &BTreeMap<String, Vec<File>>) -> Arc<dyn ObjectStore> {
+    let store = InMemory::new();
+    for file in files.values().flatten() {
+        let place = format!("site/recordings/{}", file.name).into();
+        let bytes = std::fs::read(&file.path).unwrap();
+        store.put(&place, bytes.into()).await.unwrap();
+    }
+    let note = "site/elsewhere/notes.md".into();
+    store.put(&note, "not a recording".into()).await.unwrap();
+    Arc::new(store)
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn partitions_change_nothing() {
     let folder = std::env::temp_dir().join(format!("modelmill-partitions-{}", std::process::id()));
@@ -53,6 +69,7 @@ async fn partitions_change_nothing() {
         rate: 100.0,
         seed: 9,
         bad: 0,
+        changes: 1.0,
     };
     generate(&folder, &size).unwrap();
     let data = folder.join("recordings");
@@ -60,7 +77,9 @@ async fn partitions_change_nothing() {
     let plan = Plan::make(&folder.join("model.toml"), &Reading::default(), &[&first]).unwrap();
     let ground: Arc<Ground> = Arc::new(plan.ground().unwrap());
     let mut expected = Answer::new();
-    for (robot, files) in robots(&data).unwrap() {
+    let files = robots(&data).unwrap();
+    let store = stored(&files).await;
+    for (robot, files) in &files {
         for day in files.chunk_by(|a, b| a.day == b.day) {
             let mut sum = ground.empty();
             for file in day {
@@ -98,6 +117,11 @@ async fn partitions_change_nothing() {
              FROM modelmill_recordings('{}') GROUP BY robot, day) GROUP BY robot, day",
             data.display()
         ),
+        "SELECT robot, day, modelmill_identify(summary) FROM modelmill_recordings('s3://fleet/site/recordings') GROUP BY robot, day"
+            .to_owned(),
+        format!(
+            "SELECT robot, day, modelmill_identify({samples}) FROM stored_samples GROUP BY robot, day"
+        ),
     ];
     for partitions in [1, 2, 7] {
         for batch in [100, 8192] {
@@ -106,11 +130,17 @@ async fn partitions_change_nothing() {
                 .with_batch_size(batch);
             let session = SessionContext::new_with_config(config);
             register(&session, &ground);
-            let table = format!(
-                "CREATE EXTERNAL TABLE samples STORED AS PARQUET PARTITIONED BY (robot, day, recording) LOCATION '{}/'",
-                data.display()
-            );
-            session.sql(&table).await.unwrap().collect().await.unwrap();
+            session.register_object_store(&"s3://fleet".parse().unwrap(), store.clone());
+            let places = [
+                ("samples", data.display().to_string()),
+                ("stored_samples", "s3://fleet/site/recordings".to_owned()),
+            ];
+            for (name, place) in places {
+                let table = format!(
+                    "CREATE EXTERNAL TABLE {name} STORED AS PARQUET PARTITIONED BY (robot, day, recording) LOCATION '{place}/'"
+                );
+                session.sql(&table).await.unwrap().collect().await.unwrap();
+            }
             for query in &queries {
                 let found = answer(&session, query).await;
                 assert!(found.keys().eq(expected.keys()), "{query}");
@@ -128,17 +158,25 @@ async fn partitions_change_nothing() {
     }
     let session = SessionContext::new();
     register(&session, &ground);
-    let wrong = session
-        .sql("SELECT modelmill_identify(arrow_cast('no summary', 'Binary'))")
-        .await
-        .unwrap()
-        .collect()
-        .await;
-    assert!(
-        wrong
-            .unwrap_err()
-            .to_string()
-            .contains("no summary of recordings")
-    );
+    session.register_object_store(&"s3://fleet".parse().unwrap(), store);
+    let faults = [
+        (
+            "SELECT modelmill_identify(arrow_cast('no summary', 'Binary'))",
+            "no summary of recordings",
+        ),
+        (
+            "SELECT * FROM modelmill_recordings('s3://fleet/site/elsewhere')",
+            "holds no recordings",
+        ),
+        (
+            "SELECT * FROM modelmill_recordings('s3://unknown/recordings')",
+            "s3://unknown",
+        ),
+    ];
+    for (query, says) in faults {
+        let frame = session.sql(query).await.unwrap();
+        let fault = frame.collect().await.unwrap_err().to_string();
+        assert!(fault.contains(says), "{query}: {fault}");
+    }
     std::fs::remove_dir_all(&folder).unwrap();
 }

@@ -108,6 +108,8 @@ pub struct Size {
     pub seed: u64,
     /// How many recordings are cut off.
     pub bad: usize,
+    /// How large changes of friction and load are: 1 as in the guide, less for smaller ones.
+    pub changes: f64,
 }
 
 /// What a robot has beyond small differences.
@@ -176,9 +178,10 @@ pub fn generate(folder: &Path, size: &Size) -> Result<Value, Fault> {
         || size.per_day == 0
         || !(size.seconds >= 5.0)
         || !(size.rate >= 20.0)
+        || !(size.changes >= 0.0)
     {
         return Err(Fault::new(
-            "a fleet has one robot or more, six days or more, one recording a day or more, each of 5 s or more at 20 Hz or more",
+            "a fleet has one robot or more, six days or more, one recording a day or more, each of 5 s or more at 20 Hz or more, and no changes of less than nothing",
         ));
     }
     write(&folder.join("five_bar.toml"), MODEL)?;
@@ -222,6 +225,7 @@ pub fn generate(folder: &Path, size: &Size) -> Result<Value, Fault> {
     });
     let truth = json!({
         "seed": size.seed,
+        "changes": size.changes,
         "robots": robots.iter().map(|(name, planted)| json!({ "robot": name, "planted": planted.json(&days) })).collect::<Vec<_>>(),
         "days": days,
         "per_day": size.per_day,
@@ -395,15 +399,15 @@ fn planted(size: &Size, r: usize) -> Planted {
         7 | 38 | 71 => Planted::Wear {
             drive,
             day,
-            per_day: 0.08 + 0.10 * much,
+            per_day: size.changes * (0.08 + 0.10 * much),
         },
         3 | 45 | 82 => Planted::Load {
             day,
-            mass: 0.15 + 0.25 * much,
+            mass: size.changes * (0.15 + 0.25 * much),
         },
         5 | 60 => Planted::Dead { drive, day },
         9 => Planted::Odd {
-            mass: 0.25 + 0.2 * much,
+            mass: size.changes * (0.25 + 0.2 * much),
         },
         _ => Planted::Nothing,
     }
@@ -585,6 +589,7 @@ mod tests {
             rate: 25.0,
             seed: 4,
             bad: 0,
+            changes: 1.0,
         };
         let motion = motion(&size, 1).expect("a motion");
         let files = modelmill::files::Memory::default();

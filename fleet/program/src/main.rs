@@ -61,6 +61,9 @@ struct Make {
     /// How many recordings are cut off.
     #[arg(long, default_value_t = 2)]
     bad: usize,
+    /// How large the changes of friction and load are; 1 as in the guide, 0.5 for half of that.
+    #[arg(long, default_value_t = 1.0)]
+    changes: f64,
 }
 
 /// How recordings are read, where no plan says it.
@@ -168,6 +171,7 @@ fn run(command: Command) -> Result<String, Fault> {
                 rate: args.rate,
                 seed: args.seed,
                 bad: args.bad,
+                changes: args.changes,
             };
             generate::generate(&args.folder, &size)?;
             Ok(format!(

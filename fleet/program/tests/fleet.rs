@@ -25,6 +25,7 @@ impl Fleet {
             rate: 100.0,
             seed: 5,
             bad,
+            changes: 1.0,
         };
         generate(&folder, &size).expect("a fleet");
         Self(folder)

@@ -12,6 +12,7 @@ mod smoother;
 use std::path::Path;
 use std::sync::Arc;
 
+use modelmill_boundary::files::Memory;
 use modelmill_identify::diagnose::{Disturbance, Quantity};
 use modelmill_identify::{Note, PositionFault, Recording as Raw, RecordingFiles};
 
@@ -328,6 +329,22 @@ impl Model {
         reading: &Reading,
     ) -> Outcome<Recording> {
         let raw = read_raw(self, &RecordingFiles::of_table(name, columns)?, reading)?;
+        Recording::new(self, raw, reading)
+    }
+
+    /// As [`Model::recording`], of a file that is in memory, such as an object of a store. `name` is what messages call it, and its
+    /// ending says what it is.
+    ///
+    /// Fails as [`Model::recording`] does.
+    pub fn recording_of_bytes(
+        &self,
+        name: &str,
+        bytes: Vec<u8>,
+        reading: &Reading,
+    ) -> Outcome<Recording> {
+        let files = Memory::default().with(name, bytes);
+        let file = RecordingFiles::open(&files, &[Path::new(name)])?;
+        let raw = read_raw(self, &file, reading)?;
         Recording::new(self, raw, reading)
     }
 }

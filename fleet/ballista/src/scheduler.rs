@@ -1,0 +1,202 @@
+//! The scheduler. Where an executor is lost, it ends the jobs that run, and clients put their queries again.
+//!
+//! Ballista 55 would go on with such a job, and its answer may be wrong: a stage that is done anew, since it lost its input, leaves
+//! what it had handed on, so that groups are there twice. (Its adaptive planner does not go on at all: it "does not cover executor
+//! failure".) So no stage is ever done anew here. A job ends as soon as results cannot be fetched, and before Ballista hears of an
+//! executor that is taken for dead, or says that it stops.
+
+use std::collections::{HashMap, HashSet};
+use std::net::SocketAddr;
+use std::sync::Arc;
+
+use async_trait::async_trait;
+use ballista_core::JobId;
+use ballista_core::config::TaskSchedulingPolicy;
+use ballista_core::error::Result;
+use ballista_core::extension::SessionConfigExt;
+use ballista_core::serde::protobuf::job_status::Status;
+use ballista_core::serde::protobuf::scheduler_grpc_client::SchedulerGrpcClient;
+use ballista_core::serde::protobuf::{CancelJobParams, ExecutorHeartbeat};
+use ballista_core::serde::scheduler::{ExecutorData, ExecutorMetadata};
+use ballista_core::utils::{default_config_producer, default_session_builder};
+use ballista_scheduler::cluster::memory::{InMemoryClusterState, InMemoryJobState};
+use ballista_scheduler::cluster::{
+    BallistaCluster, BoundTask, ClusterState, ClusterStateEventStream, ExecutorSlot, JobState,
+};
+use ballista_scheduler::config::{SchedulerConfig, TaskDistributionPolicy};
+use ballista_scheduler::scheduler_process::start_server;
+use ballista_scheduler::state::task_manager::JobInfoCache;
+use datafusion::execution::SessionStateBuilder;
+use datafusion::prelude::SessionConfig;
+use modelmill_fleet::{Fault, Ground};
+use modelmill_fleet_datafusion::aggregates;
+
+use crate::{LONGEST_MESSAGE, stores};
+
+/// Serves until the process ends. Executors that are not heard of for `timeout` seconds are taken for dead.
+///
+/// Fails where it cannot listen at the address.
+pub(crate) async fn serve(
+    ground: &Arc<Ground>,
+    host: &str,
+    port: u16,
+    timeout: u64,
+) -> std::result::Result<(), Fault> {
+    let functions = ground.clone();
+    let session = move |config: SessionConfig| {
+        let state = default_session_builder(config.with_ballista_adaptive_query_planner(false))?;
+        let known = state.aggregate_functions().values().cloned();
+        let all = known.chain(aggregates(&functions)).collect();
+        Ok(SessionStateBuilder::new_from_existing(state)
+            .with_aggregate_functions(all)
+            .with_runtime_env(stores::runtime(None)?)
+            .build())
+    };
+    let config = SchedulerConfig {
+        bind_host: host.to_owned(),
+        external_host: host.to_owned(),
+        bind_port: port,
+        // Executors ask for work, and whoever asks is alive.
+        scheduling_policy: TaskSchedulingPolicy::PullStaged,
+        executor_timeout_seconds: timeout,
+        expire_dead_executor_interval_seconds: (timeout / 4).max(1),
+        grpc_server_max_decoding_message_size: LONGEST_MESSAGE,
+        grpc_server_max_encoding_message_size: LONGEST_MESSAGE,
+        grpc_client_max_message_size: LONGEST_MESSAGE,
+        // Results that cannot be fetched end the job.
+        stage_max_failures: 1,
+        override_session_builder: Some(Arc::new(session)),
+        ..SchedulerConfig::default()
+    };
+    let address = format!("{host}:{port}").parse().map_err(|error| {
+        Fault::new(format!(
+            "`{host}:{port}` is no address: {error}; give a number such as 127.0.0.1"
+        ))
+    })?;
+    let session = config.override_session_builder.clone();
+    let jobs = Arc::new(InMemoryJobState::new(
+        config.scheduler_id.clone(),
+        session.unwrap_or_else(|| Arc::new(default_session_builder)),
+        Arc::new(default_config_producer),
+    ));
+    let cluster = Cluster {
+        known: InMemoryClusterState::default(),
+        jobs: jobs.clone(),
+        address,
+    };
+    start_server(
+        BallistaCluster::new(Arc::new(cluster), jobs),
+        address,
+        Arc::new(config),
+    )
+    .await
+    .map_err(Fault::new)
+}
+
+/// Ballista's picture of the executors, with one that is lost ending what runs.
+struct Cluster {
+    known: InMemoryClusterState,
+    jobs: Arc<dyn JobState>,
+    /// Of the scheduler itself.
+    address: SocketAddr,
+}
+
+impl Cluster {
+    /// Ends all jobs that run; the scheduler has taken note of it when this returns.
+    async fn end_jobs(&self) -> std::result::Result<usize, Fault> {
+        let mut running = Vec::new();
+        for job in self.jobs.get_all_jobs().await.map_err(Fault::new)? {
+            let told = self.jobs.get_job_status(&job).await.map_err(Fault::new)?;
+            if matches!(told.and_then(|told| told.status), Some(Status::Running(_))) {
+                running.push(job);
+            }
+        }
+        if running.is_empty() {
+            return Ok(0);
+        }
+        let mut scheduler = SchedulerGrpcClient::connect(format!("http://{}", self.address))
+            .await
+            .map_err(Fault::new)?;
+        for job in &running {
+            let ended = CancelJobParams {
+                job_id: job.to_string(),
+            };
+            scheduler.cancel_job(ended).await.map_err(Fault::new)?;
+        }
+        Ok(running.len())
+    }
+}
+
+#[async_trait]
+impl ClusterState for Cluster {
+    async fn remove_executor(&self, executor_id: &str) -> Result<()> {
+        match self.end_jobs().await {
+            Ok(ended) => {
+                log::warn!("executor {executor_id} is lost; {ended} jobs end, to be put again")
+            }
+            // No answer is better than one that may be wrong.
+            Err(fault) => {
+                log::error!(
+                    "executor {executor_id} is lost, and jobs cannot be ended: {fault}; the scheduler ends"
+                );
+                std::process::exit(1);
+            }
+        }
+        self.known.remove_executor(executor_id).await
+    }
+
+    async fn init(&self) -> Result<()> {
+        self.known.init().await
+    }
+
+    async fn bind_schedulable_tasks(
+        &self,
+        distribution: TaskDistributionPolicy,
+        active_jobs: Arc<HashMap<JobId, JobInfoCache>>,
+        executors: Option<HashSet<String>>,
+    ) -> Result<Vec<BoundTask>> {
+        self.known
+            .bind_schedulable_tasks(distribution, active_jobs, executors)
+            .await
+    }
+
+    async fn unbind_tasks(&self, executor_slots: Vec<ExecutorSlot>) -> Result<()> {
+        self.known.unbind_tasks(executor_slots).await
+    }
+
+    async fn register_executor(
+        &self,
+        metadata: ExecutorMetadata,
+        spec: ExecutorData,
+    ) -> Result<()> {
+        self.known.register_executor(metadata, spec).await
+    }
+
+    async fn save_executor_metadata(&self, metadata: ExecutorMetadata) -> Result<()> {
+        self.known.save_executor_metadata(metadata).await
+    }
+
+    async fn get_executor_metadata(&self, executor_id: &str) -> Result<ExecutorMetadata> {
+        self.known.get_executor_metadata(executor_id).await
+    }
+
+    async fn registered_executor_metadata(&self) -> Vec<ExecutorMetadata> {
+        self.known.registered_executor_metadata().await
+    }
+
+    async fn save_executor_heartbeat(&self, heartbeat: ExecutorHeartbeat) -> Result<()> {
+        self.known.save_executor_heartbeat(heartbeat).await
+    }
+
+    fn executor_heartbeats(&self) -> HashMap<String, ExecutorHeartbeat> {
+        self.known.executor_heartbeats()
+    }
+
+    fn get_executor_heartbeat(&self, executor_id: &str) -> Option<ExecutorHeartbeat> {
+        self.known.get_executor_heartbeat(executor_id)
+    }
+
+    async fn cluster_state_events(&self) -> Result<ClusterStateEventStream> {
+        self.known.cluster_state_events().await
+    }
+}

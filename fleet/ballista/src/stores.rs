@@ -1,0 +1,57 @@
+//! Where samples lie: paths of this computer, and buckets of S3 or what speaks as it does, by their URL.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use datafusion::error::{DataFusionError, Result};
+use datafusion::execution::object_store::{DefaultObjectStoreRegistry, ObjectStoreRegistry};
+use datafusion::execution::runtime_env::{RuntimeEnv, RuntimeEnvBuilder};
+use object_store::ObjectStore;
+use object_store::aws::AmazonS3Builder;
+use url::Url;
+
+/// What a process runs on: stores by URL, and a folder for what does not fit into memory, that of the system where none is given.
+pub(crate) fn runtime(spilled: Option<&Path>) -> Result<Arc<RuntimeEnv>> {
+    let runtime = RuntimeEnvBuilder::new().with_object_store_registry(Arc::new(Stores::default()));
+    match spilled {
+        Some(folder) => runtime.with_temp_file_path(folder).build_arc(),
+        None => runtime.build_arc(),
+    }
+}
+
+/// Stores that were registered, and a bucket where it is first asked for: `AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY`,
+/// `AWS_REGION`, `AWS_ENDPOINT`, `AWS_ALLOW_HTTP` and their like say who asks and where it is.
+#[derive(Debug, Default)]
+struct Stores {
+    known: DefaultObjectStoreRegistry,
+}
+
+impl ObjectStoreRegistry for Stores {
+    fn register_store(
+        &self,
+        url: &Url,
+        store: Arc<dyn ObjectStore>,
+    ) -> Option<Arc<dyn ObjectStore>> {
+        self.known.register_store(url, store)
+    }
+
+    fn deregister_store(&self, url: &Url) -> Result<Arc<dyn ObjectStore>> {
+        self.known.deregister_store(url)
+    }
+
+    fn get_store(&self, url: &Url) -> Result<Arc<dyn ObjectStore>> {
+        let known = self.known.get_store(url);
+        if known.is_ok() || url.scheme() != "s3" {
+            return known;
+        }
+        let Some(bucket) = url.host_str() else {
+            return Err(DataFusionError::Configuration(format!(
+                "{url} names no bucket; write it as s3://BUCKET/FOLDER/"
+            )));
+        };
+        let bucket = AmazonS3Builder::from_env().with_bucket_name(bucket);
+        let store: Arc<dyn ObjectStore> = Arc::new(bucket.build()?);
+        self.known.register_store(url, store.clone());
+        Ok(store)
+    }
+}
