@@ -15,6 +15,8 @@ use crate::values::Vector;
 
 /// Most coordinates of a mechanism.
 const MOST_COORDINATES: usize = 100;
+/// Further ones that are looked at although the file has too many.
+const DECLARED_AT_MOST: usize = 1000;
 
 /// What the names of a file stand for.
 pub(crate) struct Symbols {
@@ -364,10 +366,12 @@ fn declare_coordinates(
     if let Some((key, _)) = entries.get(MOST_COORDINATES) {
         log.push(
             Diagnostic::error(key.span, "there are too many coordinates")
-                .label(format!("at most {MOST_COORDINATES}")),
+                .label(format!("at most {MOST_COORDINATES}"))
+                .help("fix joints that the recordings do not move, such as those of fingers: a frame without a joint stands still"),
         );
     }
-    for (key, entry) in entries.iter().take(MOST_COORDINATES) {
+    // Those above are known as well, so that no other place of the file has a fault by them.
+    for (key, entry) in entries.iter().take(DECLARED_AT_MOST) {
         let turns = angles.iter().find_map(|ast| find(ast, &key.name));
         let slides = lengths.iter().find_map(|ast| find(ast, &key.name));
         let of_quaternion = quaternions
