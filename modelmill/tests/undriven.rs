@@ -436,14 +436,14 @@ fn nothing_is_missing_where_a_joint_has_no_drive() {
 fn friction_is_found_beside_a_joint_without_a_drive() {
     let friction = r#"
 [[effect]]
-kind = "coulomb_friction"
+kind = "viscous_friction"
 at = ["motor"]
-parameters = { Fc = { name = "Fc", nominal = 1.5 } }
+parameters = { Fv = { name = "Fv", nominal = 1.5 } }
 "#;
     let found = told("cart_pole-rubs", CART_POLE, friction, 3.0);
     assert_eq!(
         found,
-        [("coulomb_friction".to_owned(), vec!["motor".to_owned()])]
+        [("viscous_friction".to_owned(), vec!["motor".to_owned()])]
     );
 }
 

@@ -182,6 +182,15 @@ fn lagging(values: &[f64], constant: f64) -> Vec<f64> {
     values.iter().map(follow).collect()
 }
 
+/// The cubic through four samples, between the second and the third of them (J. L. Lagrange).
+fn cubic(values: &[f64], share: f64) -> f64 {
+    let [before, first, second, behind] = [values[0], values[1], values[2], values[3]];
+    let (x, y) = (share, 1.0 - share);
+    let inner = y * first + x * second;
+    let outer = (1.0 + y) * before + (1.0 + x) * behind;
+    (1.0 + x) * (1.0 + y) * inner / 2.0 - x * y * outer / 6.0
+}
+
 /// A force at a place between its samples. Where the drive turns round between two of them friction jumps: up to there the force
 /// goes on as before, and from there on as after.
 fn between(values: &[f64], rates: Option<&[f64]>, at: f64) -> f64 {
@@ -194,7 +203,15 @@ fn between(values: &[f64], rates: Option<&[f64]>, at: f64) -> f64 {
     )]
     let k = at.floor() as usize;
     let share = at - at.floor();
-    let turns = rates.filter(|rates| k < last && rates[k] * rates[k + 1] < 0.0);
+    let turns_within = |rates: &[f64], i: usize| rates[i] * rates[i + 1] < 0.0;
+    let is_smooth = rates.is_none_or(|rates| {
+        let near = k.saturating_sub(1)..(k + 2).min(last);
+        near.into_iter().all(|i| !turns_within(rates, i))
+    });
+    if is_smooth && k > 0 && k + 2 <= last {
+        return cubic(&values[k - 1..k + 3], share);
+    }
+    let turns = rates.filter(|rates| k < last && turns_within(rates, k));
     match turns.map(|rates| rates[k] / (rates[k] - rates[k + 1])) {
         Some(turn) if share < turn => values[k] + share * (values[k] - values[k.saturating_sub(1)]),
         Some(_) => values[k + 1] - (1.0 - share) * (values[(k + 2).min(last)] - values[k + 1]),
@@ -217,6 +234,17 @@ mod tests {
             let t = 0.1 * f64::from(i) + 0.05;
             let said = between(&values, Some(&rates), t);
             assert!((said - force(t)).abs() < 1e-9, "{t}: {said}");
+        }
+    }
+
+    /// Six samples of a wave are enough to say what it is between them.
+    #[test]
+    fn a_smooth_force_is_followed_between_its_samples() {
+        let values: Vec<f64> = (0..40).map(|i| f64::from(i).sin()).collect();
+        for i in 10..380 {
+            let t = 0.1 * f64::from(i);
+            let said = between(&values, None, t);
+            assert!((said - t.sin()).abs() < 0.025, "{t}: {said}");
         }
     }
 
