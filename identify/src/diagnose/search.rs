@@ -272,7 +272,7 @@ impl Bench<'_> {
                 }
             }
         }
-        let pairs = self.pairs(accepted, &table, &score);
+        let pairs = self.pairs(accepted, &table, worth);
         trials.extend(
             (pairs.into_iter())
                 .filter(|pair| beam.iter().all(|set| !same(set, &pair.picks)))
@@ -305,9 +305,15 @@ impl Bench<'_> {
             let mut best = trials[k].clone();
             loop {
                 let mut better: Option<Trial> = None;
+                let mut bound = score(&best) - 1e-9;
                 for i in 0..best.picks.len() {
+                    let mut others = best.picks.clone();
+                    others.remove(i);
+                    let beyond = self.beyond(&table, &others);
                     for pick in self.present.iter().flatten() {
-                        if best.picks.iter().any(|p| p.candidate == pick.candidate) {
+                        if best.picks.iter().any(|p| p.candidate == pick.candidate)
+                            || self.least_criterion(&beyond, &[pick], worth) > bound
+                        {
                             continue;
                         }
                         let mut picks = best.picks.clone();
@@ -317,8 +323,9 @@ impl Bench<'_> {
                         }
                         picks[i] = pick;
                         let trial = self.try_in(&table, picks);
-                        let bound = better.as_ref().map_or(score(&best) - 1e-9, &score);
-                        if score(&trial) < bound {
+                        let own = score(&trial);
+                        if own < bound {
+                            bound = own;
                             better = Some(trial);
                         }
                     }
@@ -342,7 +349,7 @@ impl Bench<'_> {
 
     /// The best of all pairs of further effects beside the accepted ones, and in place of any of these: a pair may explain all
     /// where neither does much alone, and where what is shared by two places comes first.
-    fn pairs(&self, accepted: &[Pick], table: &Table, score: &dyn Fn(&Trial) -> f64) -> Vec<Trial> {
+    fn pairs(&self, accepted: &[Pick], table: &Table, worth: f64) -> Vec<Trial> {
         let is_new = |pick: &&Pick| accepted.iter().all(|p| p.candidate != pick.candidate);
         let alone = |pick: &Pick| {
             let mut set = accepted.to_vec();
@@ -362,12 +369,19 @@ impl Bench<'_> {
         }));
         let mut best: Vec<(f64, Trial)> = Vec::new();
         for set in kept {
+            let beyond = self.beyond(table, &set);
             for (i, (_, one)) in further.iter().enumerate() {
                 for (_, two) in &further[i + 1..] {
+                    if best.len() == BEST_PAIRS {
+                        let least = self.least_criterion(&beyond, &[one, two], worth);
+                        if best.last().is_some_and(|(last, _)| least > *last) {
+                            continue;
+                        }
+                    }
                     let mut picks = set.clone();
                     picks.extend([(*one).clone(), (*two).clone()]);
                     let trial = self.try_in(table, picks);
-                    let own = score(&trial);
+                    let own = criterion(self.problem, &trial, worth);
                     if best.len() < BEST_PAIRS || best.last().is_some_and(|(last, _)| own < *last) {
                         let at = best.partition_point(|(other, _)| *other < own);
                         best.insert(at, (own, trial));

@@ -101,15 +101,15 @@ impl Bench<'_> {
                 let mut others = picks.clone();
                 others.remove(j);
                 others.remove(i);
-                self.look(&others);
-                let same = self.present.iter().flatten().find(|one| {
+                let wide = self.as_wide_as(&pair);
+                let seen = self.looked_at(&others, &|k| wide.contains(&k));
+                let same = seen.into_iter().flatten().find(|one| {
                     let is_new = picks.iter().all(|p| p.candidate != one.candidate);
                     is_new
                         && one.rank == n_columns(&pair)
-                        && self.candidate(one).searched == 0
                         && pair.iter().all(|p| self.is_within(p, one))
                 });
-                let Some(same) = same.cloned() else { continue };
+                let Some(same) = same else { continue };
                 let mut set = others.clone();
                 set.insert(i, same);
                 let trial = self.trial(set);
@@ -120,6 +120,24 @@ impl Bench<'_> {
             }
         }
         picks
+    }
+
+    /// Candidates without constants of their own that may hold two effects: only these are worth a look.
+    fn as_wide_as(&self, pair: &[Pick]) -> Vec<usize> {
+        let candidates = self.problem.candidates.iter().enumerate();
+        let may_hold = candidates.filter(|(k, candidate)| {
+            let has_room = candidate.searched == 0 && candidate.parameters.len() >= n_columns(pair);
+            // What does not depend on the fit is known already.
+            has_room
+                && match &candidate.source {
+                    Source::Columns(choices) if choices.len() == 1 => {
+                        let one = self.pick(*k, 0);
+                        pair.iter().all(|p| self.is_within(p, &one))
+                    }
+                    _ => true,
+                }
+        });
+        may_hold.map(|(k, _)| k).collect()
     }
 
     /// Exchanges members for others by which the whole set gets better or simpler.
