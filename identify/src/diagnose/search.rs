@@ -138,7 +138,11 @@ impl Bench<'_> {
             let refreshed = self.refresh(polished);
             let settled = self.trial(refreshed);
             let evidence = self.between(accepted, &settled.picks);
-            if settled.is_possible() && evidence.holds() {
+            let channels = self.changed_on(accepted, &settled.picks);
+            if settled.is_possible()
+                && evidence.holds()
+                && !self.costs_more(accepted, &settled.picks, &channels)
+            {
                 return Some(Step {
                     picks: settled.picks,
                     evidence: Some(evidence),
@@ -177,9 +181,14 @@ impl Bench<'_> {
 
     /// Evidence for one set beside another, on the channels on which they differ.
     fn between(&self, before: &[Pick], after: &[Pick]) -> Evidence {
+        self.evidence(before, after, &self.changed_on(before, after))
+    }
+
+    /// Channels on which two sets differ.
+    fn changed_on(&self, before: &[Pick], after: &[Pick]) -> Vec<usize> {
         let mut differ = difference(after, before);
         differ.extend(difference(before, after));
-        self.evidence(before, after, &self.acted_on(&differ))
+        self.acted_on(&differ)
     }
 
     /// Whether evidence speaks for one set beside another that is to take its place. What was found step by step need not prove
@@ -246,8 +255,6 @@ impl Bench<'_> {
         let rest = self.rest(accepted, &factors);
         let channels: Vec<usize> = (0..rest.len()).collect();
         let worth = self.worth(&rest, &channels);
-        let problem = self.problem;
-        let score = |trial: &Trial| criterion(problem, trial, worth);
         let mut trials: Vec<Trial> = Vec::new();
         let mut known: HashSet<Vec<usize>> = HashSet::new();
         for set in beam {
@@ -286,6 +293,7 @@ impl Bench<'_> {
                 let (factors, _) = self.fit(&best.picks, On::All);
                 worth.max(self.worth(&self.rest(&best.picks, &factors), &channels))
             });
+        let problem = self.problem;
         let score = |trial: &Trial| criterion(problem, trial, worth);
         trials.sort_by(|a, b| score(a).total_cmp(&score(b)));
         trials.dedup_by(|a, b| same(&a.picks, &b.picks));
