@@ -165,8 +165,10 @@ impl Bench<'_> {
             set.insert(i, one);
             let set = self.refine_around(set, i);
             let trial = self.trial(set);
+            let for_both = self.evidence(&trial.picks, picks, &channels);
             if trial.is_possible()
-                && !self.evidence(&trial.picks, picks, &channels).holds()
+                && !for_both.holds()
+                && for_both.bic < AS_GOOD
                 && self.evidence(&others, &trial.picks, &channels).holds()
             {
                 return Some(trial.picks);
