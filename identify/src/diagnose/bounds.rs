@@ -119,3 +119,97 @@ impl Beyond<'_> {
         left[n][n] - ROUNDING * self.squares
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::column::Column;
+    use super::super::problem::{
+        Candidate, Choice, Effect, EffectParameter, Layout, Nature, NoSupply, Problem, Stretch,
+    };
+    use super::super::search::criterion;
+    use super::*;
+
+    const SAMPLES: u32 = 200;
+
+    /// Two columns for every third candidate, one for the others; some are nearly the same, and some have a sign.
+    fn candidate(k: u32) -> Candidate {
+        let wave = |rate: f64, phase: f64| -> Option<Vec<f64>> {
+            let at = |i: u32| (rate * f64::from(i) + phase).sin();
+            Some((0..SAMPLES).map(at).collect())
+        };
+        let rate = 0.05 + 0.03 * f64::from(k / 2) + 1e-6 * f64::from(k);
+        let mut columns = vec![Column(vec![wave(rate, 0.3)])];
+        if k.is_multiple_of(3) {
+            columns.push(Column(vec![wave(1.7 * rate, 1.1)]));
+        }
+        let sign = [Sign::Any, Sign::Positive][k as usize % 2];
+        let parameter = |symbol: usize| EffectParameter {
+            symbol: format!("p{symbol}"),
+            unit: String::new(),
+            sign,
+        };
+        Candidate {
+            effect: Effect {
+                kind: format!("kind{k}"),
+                at: vec!["drive".into()],
+            },
+            parameters: (0..columns.len()).map(parameter).collect(),
+            searched: 0,
+            is_part_of_load: false,
+            refines: None,
+            nature: Nature::Effect,
+            is_per_run: false,
+            source: Source::Columns(vec![Choice {
+                constants: Vec::new(),
+                columns,
+            }]),
+        }
+    }
+
+    /// What is passed over is worse than the bound that it is passed over for: the bound is never above the criterion, and near
+    /// it where no sign matters.
+    #[test]
+    fn no_set_is_better_than_its_bound() {
+        let value = |i: u32| (0.09 * f64::from(i)).sin() - 0.4 * (0.31 * f64::from(i)).cos();
+        let measured = (0..SAMPLES).map(value).collect();
+        let problem = Problem {
+            layout: Layout {
+                channels: vec!["drive".into()],
+                stretches: vec![Stretch {
+                    name: String::new(),
+                    samples: SAMPLES as usize,
+                    step: 0.1,
+                    sampled: 0.1,
+                    is_check: false,
+                }],
+                left_out: Vec::new(),
+            },
+            measured: Column(vec![Some(measured)]),
+            noise: vec![1e-3],
+            candidates: (0..12).map(candidate).collect(),
+            ..Problem::default()
+        };
+        let mut bench = Bench::new(&problem, &NoSupply);
+        bench.look(&[]);
+        let present: Vec<Pick> = bench.present.iter().flatten().cloned().collect();
+        let table = bench.table(&[]);
+        let worth = 100.0;
+        let mut near = 0;
+        for n in 0..4 {
+            let set = &present[..n];
+            let beyond = bench.beyond(&table, set);
+            for (i, one) in present.iter().enumerate().skip(n) {
+                for two in &present[i + 1..] {
+                    let least = bench.least_criterion(&beyond, &[one, two], worth);
+                    let mut picks = set.to_vec();
+                    picks.extend([one.clone(), two.clone()]);
+                    let trial = bench.try_in(&table, picks);
+                    let own = criterion(&problem, &trial, worth);
+                    assert!(least <= own, "{n}, {i}: {least} above {own}");
+                    near += usize::from(trial.is_possible() && own - least < 1.0);
+                }
+            }
+        }
+        assert!(near > 20, "{near} bounds are near");
+    }
+}

@@ -138,8 +138,8 @@ impl Bench<'_> {
         trial.is_possible().then_some(trial.picks)
     }
 
-    /// A set with one effect for two members at a place, of which it holds one, if the evidence that speaks for it does not
-    /// speak for the pair beside it.
+    /// A set with one effect for two members at a place, of which it holds one, or is one with other constants, if the evidence
+    /// that speaks for it does not speak for the pair beside it.
     fn as_good_as_both(&mut self, picks: &[Pick], i: usize, j: usize) -> Option<Vec<Pick>> {
         let pair = [picks[i].clone(), picks[j].clone()];
         let [one, two] = pair.each_ref().map(|p| &self.candidate(p).effect);
@@ -148,17 +148,19 @@ impl Bench<'_> {
         }
         let problem = self.problem;
         let place = &one.at;
+        let others = without(picks, &[i, j]);
         let is_curve = |k: usize| {
             let candidate = &problem.candidates[k];
             matches!(candidate.source, Source::Columns(_))
                 && candidate.effect.at == *place
-                && picks.iter().all(|p| p.candidate != k)
+                && (candidate.searched > 0 || pair.iter().all(|p| p.candidate != k))
+                && others.iter().all(|p| p.candidate != k)
         };
-        let others = without(picks, &[i, j]);
         let seen = self.looked_at(&others, &is_curve);
         let channels = self.acted_on(&pair);
         for one in seen.into_iter().flatten() {
-            if !pair.iter().any(|p| self.is_within(p, &one)) {
+            let is_held = |p: &Pick| p.candidate == one.candidate || self.is_within(p, &one);
+            if !pair.iter().any(is_held) {
                 continue;
             }
             let mut set = others.clone();
@@ -170,6 +172,7 @@ impl Bench<'_> {
                 && !for_both.holds()
                 && for_both.bic < AS_GOOD
                 && self.evidence(&others, &trial.picks, &channels).holds()
+                && !self.is_worse(&trial.picks, picks)
             {
                 return Some(trial.picks);
             }
