@@ -97,7 +97,9 @@ impl Bench<'_> {
             let is_bent = candidate.searched > 0 && candidate.parameters.len() > 1;
             is_bent && candidate.effect.at == *place
         };
-        let bent: Vec<usize> = (0..rest.len()).filter(|k| is_bent_there(&rest[*k])).collect();
+        let bent: Vec<usize> = (0..rest.len())
+            .filter(|k| is_bent_there(&rest[*k]))
+            .collect();
         let rest = self.refine_some(rest, bent);
         self.refresh(rest)
     }
@@ -128,9 +130,7 @@ impl Bench<'_> {
         let seen = self.looked_at(&others, &|k| wide.contains(&k));
         let same = seen.into_iter().flatten().find(|one| {
             let is_new = picks.iter().all(|p| p.candidate != one.candidate);
-            is_new
-                && one.rank == n_columns(&pair)
-                && pair.iter().all(|p| self.is_within(p, one))
+            is_new && one.rank == n_columns(&pair) && pair.iter().all(|p| self.is_within(p, one))
         })?;
         let mut set = others;
         set.insert(i, same);
