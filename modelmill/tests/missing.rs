@@ -101,6 +101,18 @@ fn a_gear_that_yields_is_found_with_its_compliance() {
     );
 }
 
+/// No polynomial is like a pull that gives way: it is one effect all the same, with one place.
+#[test]
+fn a_hose_that_gives_way_is_one_effect() {
+    for (seed, way) in [(732, 0.15), (733, 0.2)] {
+        let file = run(ARM, seed, Made::Hose(2, 12.0, way));
+        let findings = diagnosed(&file, Held::All);
+        let drive = findings.channels()[2].clone();
+        only(&findings, "cable_torque", &drive);
+        assert_eq!(findings.diagnosis.verdict, Verdict::MissingEffect);
+    }
+}
+
 /// A fit of one run is known to its own deviations only: a further run in which nothing changed misses it by as much, and a load
 /// stands out against that.
 #[test]

@@ -182,11 +182,30 @@ impl<'a> Bench<'a> {
     /// Chooses the constants of every candidate that suit what a set leaves best, and makes the columns of those that
     /// depend on the fit.
     pub(crate) fn look(&mut self, picks: &[Pick]) {
+        self.present = self.looked_at(picks, &|_| true);
+    }
+
+    /// The same of some candidates only, by their place; the others are not there.
+    pub(crate) fn looked_at(
+        &mut self,
+        picks: &[Pick],
+        is_asked: &dyn Fn(usize) -> bool,
+    ) -> Vec<Option<Pick>> {
         let beside = self.beside(picks);
         let problem = self.problem;
-        let carried = self.carried(picks);
-        let mut present = Vec::with_capacity(problem.candidates.len());
-        for (k, candidate) in problem.candidates.iter().enumerate() {
+        let candidates = problem.candidates.iter().enumerate();
+        let mut asked = candidates.clone().filter(|(k, _)| is_asked(*k));
+        let carried = if asked.any(|(_, candidate)| candidate.source == Source::Carried) {
+            self.carried(picks)
+        } else {
+            HashMap::new()
+        };
+        let mut seen = Vec::with_capacity(problem.candidates.len());
+        for (k, candidate) in candidates {
+            if !is_asked(k) {
+                seen.push(None);
+                continue;
+            }
             let pick = match &candidate.source {
                 Source::Columns(_) => self
                     .best_choice(k, &beside)
@@ -204,12 +223,12 @@ impl<'a> Bench<'a> {
                 }
                 Source::Carried => carried.get(&k).cloned(),
             };
-            present.push(pick.and_then(|mut pick| {
+            seen.push(pick.and_then(|mut pick| {
                 pick.rank = self.rank(&pick.columns, &beside);
                 (pick.rank > 0).then_some(pick)
             }));
         }
-        self.present = present;
+        seen
     }
 
     /// The choice of a candidate that explains most beside a set, and how much; an only one is not asked.
@@ -413,9 +432,10 @@ impl<'a> Bench<'a> {
 
 /// Inner products of the effects' columns and the measured forces once the base is taken off.
 pub(crate) struct Table {
-    left: DMatrix<f64>,
+    /// The measured forces come last.
+    pub(crate) left: DMatrix<f64>,
     /// Where the columns of the pool stand in it.
-    place: Vec<usize>,
+    pub(crate) place: Vec<usize>,
 }
 
 pub(crate) fn n_columns(picks: &[Pick]) -> usize {

@@ -17,6 +17,7 @@ mod aliases;
 mod bench;
 mod beside;
 mod body;
+mod bounds;
 mod cleaning;
 mod column;
 mod constant;
@@ -29,6 +30,7 @@ mod following;
 mod idle;
 mod laws;
 mod noise;
+mod numbered;
 mod pool;
 mod problem;
 mod readings;
@@ -430,15 +432,7 @@ impl Bench<'_> {
     fn errors(&self, picks: &[Pick]) -> [f64; 2] {
         let layout = &self.problem.layout;
         let split = layout.fit_samples();
-        let (factors, _) = self.fit(picks, On::Fit);
-        // What decides nothing counts in figures, but for what is left out altogether.
-        let columns = self.columns(picks);
-        let mut rest = (self.pool).whole_rest(self.measured, &columns, factors.as_slice());
-        for (rest, out) in rest.iter_mut().zip(&self.problem.left_out) {
-            for (r, _) in rest.iter_mut().zip(out).filter(|(_, out)| **out) {
-                *r = 0.0;
-            }
-        }
+        let rest = self.whole(picks);
         let forces: Vec<Vec<f64>> = (0..rest.len()).map(|d| self.problem.force(d)).collect();
         let norm = |part: &[f64]| dot(part, part);
         let size = |range: std::ops::Range<usize>| -> f64 {
@@ -459,6 +453,39 @@ impl Bench<'_> {
             error / size(0..split).max(f64::MIN_POSITIVE)
         };
         [fit, check.sqrt()]
+    }
+
+    /// What a set leaves where it is fitted to the fit. What decides nothing counts, but for what is left out altogether.
+    fn whole(&self, picks: &[Pick]) -> Vec<Vec<f64>> {
+        let (factors, _) = self.fit(picks, On::Fit);
+        let columns = self.columns(picks);
+        let mut rest = (self.pool).whole_rest(self.measured, &columns, factors.as_slice());
+        for (rest, out) in rest.iter_mut().zip(&self.problem.left_out) {
+            for (r, _) in rest.iter_mut().zip(out).filter(|(_, out)| **out) {
+                *r = 0.0;
+            }
+        }
+        rest
+    }
+
+    /// Whether a change makes what is left larger where everything counts, in the fit and in the check: then it explains what
+    /// decides at the cost of what lies next to reversals, where an effect would be seen, too.
+    fn costs_more(&self, before: &[Pick], after: &[Pick], channels: &[usize]) -> bool {
+        if self.problem.jumps.is_empty() {
+            return false;
+        }
+        let layout = &self.problem.layout;
+        let split = layout.fit_samples();
+        let [old, new] = [before, after].map(|picks| self.whole(picks));
+        let rises = |range: std::ops::Range<usize>| {
+            let of = |rest: &[Vec<f64>], d: usize| {
+                let part = &rest[d][range.clone()];
+                self.weights[d] * dot(part, part)
+            };
+            let more = channels.iter().map(|d| of(&new, *d) - of(&old, *d));
+            more.sum::<f64>() > 0.0
+        };
+        rises(0..split) && (!layout.has_check() || rises(split..layout.samples()))
     }
 
     /// What became of every candidate.

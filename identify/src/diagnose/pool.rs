@@ -3,18 +3,18 @@
 
 use std::borrow::Cow;
 use std::cell::RefCell;
-use std::collections::HashMap;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 use pulp::Arch;
 
 use super::column::Column;
+use super::numbered::ByPlace;
 use super::problem::Layout;
 
 /// Inner products of a column with earlier ones by part (0 is the fit, 1 the check) and channel on which both act, the parts one
 /// after the other; or by fold and channel.
-type Products = HashMap<usize, Box<[f64]>>;
+type Products = ByPlace<Box<[f64]>>;
 /// Inner products of fewer numbers are made as they stand.
 const SHORT: usize = 64;
 /// Folds of the cross-validation where there is no check.
@@ -104,8 +104,8 @@ impl<'a> Pool<'a> {
         }
         self.acts.push(acts.into());
         self.columns.push(column);
-        self.products.get_mut().push(HashMap::new());
-        self.of_folds.get_mut().push(HashMap::new());
+        self.products.get_mut().push(Products::default());
+        self.of_folds.get_mut().push(Products::default());
         self.columns.len() - 1
     }
 

@@ -138,7 +138,11 @@ impl Bench<'_> {
             let refreshed = self.refresh(polished);
             let settled = self.trial(refreshed);
             let evidence = self.between(accepted, &settled.picks);
-            if settled.is_possible() && evidence.holds() {
+            let channels = self.changed_on(accepted, &settled.picks);
+            if settled.is_possible()
+                && evidence.holds()
+                && !self.costs_more(accepted, &settled.picks, &channels)
+            {
                 return Some(Step {
                     picks: settled.picks,
                     evidence: Some(evidence),
@@ -177,9 +181,14 @@ impl Bench<'_> {
 
     /// Evidence for one set beside another, on the channels on which they differ.
     fn between(&self, before: &[Pick], after: &[Pick]) -> Evidence {
+        self.evidence(before, after, &self.changed_on(before, after))
+    }
+
+    /// Channels on which two sets differ.
+    fn changed_on(&self, before: &[Pick], after: &[Pick]) -> Vec<usize> {
         let mut differ = difference(after, before);
         differ.extend(difference(before, after));
-        self.evidence(before, after, &self.acted_on(&differ))
+        self.acted_on(&differ)
     }
 
     /// Whether evidence speaks for one set beside another that is to take its place. What was found step by step need not prove
@@ -246,8 +255,6 @@ impl Bench<'_> {
         let rest = self.rest(accepted, &factors);
         let channels: Vec<usize> = (0..rest.len()).collect();
         let worth = self.worth(&rest, &channels);
-        let problem = self.problem;
-        let score = |trial: &Trial| criterion(problem, trial, worth);
         let mut trials: Vec<Trial> = Vec::new();
         let mut known: HashSet<Vec<usize>> = HashSet::new();
         for set in beam {
@@ -272,7 +279,7 @@ impl Bench<'_> {
                 }
             }
         }
-        let pairs = self.pairs(accepted, &table, &score);
+        let pairs = self.pairs(accepted, &table, worth);
         trials.extend(
             (pairs.into_iter())
                 .filter(|pair| beam.iter().all(|set| !same(set, &pair.picks)))
@@ -286,6 +293,7 @@ impl Bench<'_> {
                 let (factors, _) = self.fit(&best.picks, On::All);
                 worth.max(self.worth(&self.rest(&best.picks, &factors), &channels))
             });
+        let problem = self.problem;
         let score = |trial: &Trial| criterion(problem, trial, worth);
         trials.sort_by(|a, b| score(a).total_cmp(&score(b)));
         trials.dedup_by(|a, b| same(&a.picks, &b.picks));
@@ -305,9 +313,15 @@ impl Bench<'_> {
             let mut best = trials[k].clone();
             loop {
                 let mut better: Option<Trial> = None;
+                let mut bound = score(&best) - 1e-9;
                 for i in 0..best.picks.len() {
+                    let mut others = best.picks.clone();
+                    others.remove(i);
+                    let beyond = self.beyond(&table, &others);
                     for pick in self.present.iter().flatten() {
-                        if best.picks.iter().any(|p| p.candidate == pick.candidate) {
+                        if best.picks.iter().any(|p| p.candidate == pick.candidate)
+                            || self.least_criterion(&beyond, &[pick], worth) > bound
+                        {
                             continue;
                         }
                         let mut picks = best.picks.clone();
@@ -317,8 +331,9 @@ impl Bench<'_> {
                         }
                         picks[i] = pick;
                         let trial = self.try_in(&table, picks);
-                        let bound = better.as_ref().map_or(score(&best) - 1e-9, &score);
-                        if score(&trial) < bound {
+                        let own = score(&trial);
+                        if own < bound {
+                            bound = own;
                             better = Some(trial);
                         }
                     }
@@ -342,7 +357,7 @@ impl Bench<'_> {
 
     /// The best of all pairs of further effects beside the accepted ones, and in place of any of these: a pair may explain all
     /// where neither does much alone, and where what is shared by two places comes first.
-    fn pairs(&self, accepted: &[Pick], table: &Table, score: &dyn Fn(&Trial) -> f64) -> Vec<Trial> {
+    fn pairs(&self, accepted: &[Pick], table: &Table, worth: f64) -> Vec<Trial> {
         let is_new = |pick: &&Pick| accepted.iter().all(|p| p.candidate != pick.candidate);
         let alone = |pick: &Pick| {
             let mut set = accepted.to_vec();
@@ -362,12 +377,19 @@ impl Bench<'_> {
         }));
         let mut best: Vec<(f64, Trial)> = Vec::new();
         for set in kept {
+            let beyond = self.beyond(table, &set);
             for (i, (_, one)) in further.iter().enumerate() {
                 for (_, two) in &further[i + 1..] {
+                    if best.len() == BEST_PAIRS {
+                        let least = self.least_criterion(&beyond, &[one, two], worth);
+                        if best.last().is_some_and(|(last, _)| least > *last) {
+                            continue;
+                        }
+                    }
                     let mut picks = set.clone();
                     picks.extend([(*one).clone(), (*two).clone()]);
                     let trial = self.try_in(table, picks);
-                    let own = score(&trial);
+                    let own = criterion(self.problem, &trial, worth);
                     if best.len() < BEST_PAIRS || best.last().is_some_and(|(last, _)| own < *last) {
                         let at = best.partition_point(|(other, _)| *other < own);
                         best.insert(at, (own, trial));

@@ -61,17 +61,13 @@ impl Bench<'_> {
         let whole = picks.clone();
         let mut picks = self.simplify(picks);
         loop {
-            let without = |i: usize| {
-                let mut rest = picks.clone();
-                rest.remove(i);
-                rest
-            };
             let mut tests = Vec::new();
+            let mut fewer = Vec::new();
             for i in 0..picks.len() {
-                // What follows from the fit follows without the member too.
-                let rest = self.refresh(without(i));
+                fewer.push(self.settled_without(&picks, i));
+                let rest = &fewer[i];
                 let channels = self.acted_on(std::slice::from_ref(&picks[i]));
-                tests.push((i, self.evidence(&rest, &picks, &channels)));
+                tests.push((i, self.evidence(rest, &picks, &channels)));
             }
             let mut unsupported: Vec<(usize, f64)> = tests
                 .into_iter()
@@ -80,9 +76,8 @@ impl Bench<'_> {
                 .collect();
             unsupported.sort_by(|a, b| a.1.total_cmp(&b.1));
             let fewer = unsupported.into_iter().find_map(|(i, _)| {
-                let fewer = self.refresh(without(i));
                 // Members that do little one by one may do much together.
-                (!self.is_worse(&fewer, &whole)).then_some(fewer)
+                (!self.is_worse(&fewer[i], &whole)).then(|| fewer[i].clone())
             });
             match fewer {
                 Some(fewer) => picks = self.simplify(fewer),
@@ -92,34 +87,115 @@ impl Bench<'_> {
         self.join(picks)
     }
 
+    /// A set without a member: what follows from the fit follows without it too, and what was bent by a constant beside it at its
+    /// place may be bent otherwise.
+    fn settled_without(&mut self, picks: &[Pick], member: usize) -> Vec<Pick> {
+        let place = &self.candidate(&picks[member]).effect.at;
+        let rest = without(picks, &[member]);
+        let is_bent_there = |pick: &Pick| {
+            let candidate = self.candidate(pick);
+            let is_bent = candidate.searched > 0 && candidate.parameters.len() > 1;
+            is_bent && candidate.effect.at == *place
+        };
+        let bent: Vec<usize> = (0..rest.len())
+            .filter(|k| is_bent_there(&rest[*k]))
+            .collect();
+        let rest = self.refine_some(rest, bent);
+        self.refresh(rest)
+    }
+
     /// Takes one effect for two that it is the same as, such as dry friction that differs by direction for dry friction and
-    /// an offset: one cause is likelier than two.
+    /// an offset: one cause is likelier than two. So does one that holds either of them and says all that both say as far as
+    /// the recordings tell, as a cable that is bent for a spring and a wave at its place.
     fn join(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
         for i in 0..picks.len() {
             for j in i + 1..picks.len() {
-                let pair = [picks[i].clone(), picks[j].clone()];
-                let mut others = picks.clone();
-                others.remove(j);
-                others.remove(i);
-                self.look(&others);
-                let same = self.present.iter().flatten().find(|one| {
-                    let is_new = picks.iter().all(|p| p.candidate != one.candidate);
-                    is_new
-                        && one.rank == n_columns(&pair)
-                        && self.candidate(one).searched == 0
-                        && pair.iter().all(|p| self.is_within(p, one))
-                });
-                let Some(same) = same.cloned() else { continue };
-                let mut set = others.clone();
-                set.insert(i, same);
-                let trial = self.trial(set);
-                if trial.is_possible() {
-                    picks = trial.picks;
+                let joined = self
+                    .same_as_both(&picks, i, j)
+                    .or_else(|| self.as_good_as_both(&picks, i, j));
+                if let Some(joined) = joined {
+                    picks = joined;
                     return self.join(picks);
                 }
             }
         }
         picks
+    }
+
+    /// A set with one effect for two of its members that together are the same.
+    fn same_as_both(&mut self, picks: &[Pick], i: usize, j: usize) -> Option<Vec<Pick>> {
+        let pair = [picks[i].clone(), picks[j].clone()];
+        let others = without(picks, &[i, j]);
+        let wide = self.as_wide_as(&pair);
+        let seen = self.looked_at(&others, &|k| wide.contains(&k));
+        let same = seen.into_iter().flatten().find(|one| {
+            let is_new = picks.iter().all(|p| p.candidate != one.candidate);
+            is_new && one.rank == n_columns(&pair) && pair.iter().all(|p| self.is_within(p, one))
+        })?;
+        let mut set = others;
+        set.insert(i, same);
+        let trial = self.trial(set);
+        trial.is_possible().then_some(trial.picks)
+    }
+
+    /// A set with one effect for two members at a place, of which it holds one, or is one with other constants, if the evidence
+    /// that speaks for it does not speak for the pair beside it.
+    fn as_good_as_both(&mut self, picks: &[Pick], i: usize, j: usize) -> Option<Vec<Pick>> {
+        let pair = [picks[i].clone(), picks[j].clone()];
+        let [one, two] = pair.each_ref().map(|p| &self.candidate(p).effect);
+        if one.at != two.at {
+            return None;
+        }
+        let problem = self.problem;
+        let place = &one.at;
+        let others = without(picks, &[i, j]);
+        let is_curve = |k: usize| {
+            let candidate = &problem.candidates[k];
+            matches!(candidate.source, Source::Columns(_))
+                && candidate.effect.at == *place
+                && (candidate.searched > 0 || pair.iter().all(|p| p.candidate != k))
+                && others.iter().all(|p| p.candidate != k)
+        };
+        let seen = self.looked_at(&others, &is_curve);
+        let channels = self.acted_on(&pair);
+        for one in seen.into_iter().flatten() {
+            let is_held = |p: &Pick| p.candidate == one.candidate || self.is_within(p, &one);
+            if !pair.iter().any(is_held) {
+                continue;
+            }
+            let mut set = others.clone();
+            set.insert(i, one);
+            let set = self.refine_around(set, i);
+            let trial = self.trial(set);
+            let for_both = self.evidence(&trial.picks, picks, &channels);
+            if trial.is_possible()
+                && !for_both.holds()
+                && for_both.bic < AS_GOOD
+                && self.evidence(&others, &trial.picks, &channels).holds()
+                && !self.is_worse(&trial.picks, picks)
+            {
+                return Some(trial.picks);
+            }
+        }
+        None
+    }
+
+    /// Candidates without constants of their own that may hold two effects: only these are worth a look.
+    fn as_wide_as(&self, pair: &[Pick]) -> Vec<usize> {
+        let candidates = self.problem.candidates.iter().enumerate();
+        let may_hold = candidates.filter(|(k, candidate)| {
+            let has_room = candidate.searched == 0 && candidate.parameters.len() >= n_columns(pair);
+            // What does not depend on the fit is known already.
+            has_room
+                && match &candidate.source {
+                    Source::Columns(choices) if choices.len() == 1 => {
+                        let one = self.pick(*k, 0);
+                        pair.iter().all(|p| self.is_within(p, &one))
+                    }
+                    _ => true,
+                }
+        });
+        may_hold.map(|(k, _)| k).collect()
     }
 
     /// Exchanges members for others by which the whole set gets better or simpler.
@@ -168,4 +244,11 @@ impl Bench<'_> {
         }
         picks
     }
+}
+
+/// A set without some of its members.
+fn without(picks: &[Pick], members: &[usize]) -> Vec<Pick> {
+    let kept = picks.iter().enumerate();
+    let kept = kept.filter(|(k, _)| !members.contains(k));
+    kept.map(|(_, pick)| pick.clone()).collect()
 }

@@ -56,7 +56,8 @@ impl Bench<'_> {
         self.refine_some(picks, near)
     }
 
-    fn refine_some(
+    /// The same of some members.
+    pub(crate) fn refine_some(
         &mut self,
         mut picks: Vec<Pick>,
         which: impl IntoIterator<Item = usize>,

@@ -104,17 +104,13 @@ pub(crate) fn fits(mechanism: &Mechanism, kind: &EffectKind, spot: &Spot) -> boo
     }
 }
 
-/// Whether a kind repeats itself along the travel of its place.
+/// Whether a kind repeats itself along the travel of its place, several times at least where it is shortest.
 pub(crate) fn is_wave(kind: &EffectKind) -> bool {
     use modelmill_spec::{Scale, Search};
-    kind.constants.iter().any(|c| {
-        matches!(
-            c.search,
-            Some(Search::Range {
-                of: Scale::Travel,
-                ..
-            })
-        )
+    const SEVERAL: f64 = 0.5;
+    kind.constants.iter().any(|c| match c.search {
+        Some(Search::Range { from, of, .. }) => of == Scale::Travel && from < SEVERAL,
+        _ => false,
     })
 }
 

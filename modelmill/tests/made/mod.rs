@@ -40,6 +40,8 @@ pub(crate) enum Made<'a> {
     Push(&'a Model, f64, usize, usize),
     /// The encoder of a joint sits before a gear that yields by so much for each unit of what its drive carries.
     Yields(usize, f64),
+    /// A hose pulls a joint back by at most so much, beyond so much of its way from the middle hardly more.
+    Hose(usize, f64, f64),
     /// The force of a drive lacks between two samples.
     Lost(usize, usize, usize),
 }
@@ -145,6 +147,13 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
             forces.expect("forces")
         });
         push(&mut forces, &with, &without, times, from..to);
+    }
+    if let Made::Hose(joint, most, way) = made {
+        let positions = &columns[0][joint];
+        let middle = positions.iter().sum::<f64>() / SAMPLES as f64;
+        for (force, position) in forces[joint].iter_mut().zip(positions) {
+            *force += most * ((position - middle) / way).tanh();
+        }
     }
     let carried = forces.clone();
     let motion = evaluator.drives(&states).expect("drives");

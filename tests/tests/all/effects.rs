@@ -186,7 +186,7 @@ fn laws_at_drives() {
         left,
         ("spring", left, &[("k", 300.0), ("rest", 0.9)]),
         &[("c0", -270.0), ("c1", 300.0)],
-        &[],
+        &[("period", 1.0)],
     );
     check(
         "stribeck_load_friction",

@@ -1,0 +1,215 @@
+//! What a set of effects leaves at least, without a fit of its own: of a million sets only those are fitted that may be among
+//! the best.
+
+use nalgebra::DMatrix;
+
+use super::bench::{Bench, Pick, Table};
+use super::factored::Factored;
+use super::problem::{Sign, Source};
+
+/// Columns of what is added to a set that are looked at; with more nothing is said.
+const MOST: usize = 7;
+/// A column of which the others leave a smaller share of squares than this explains nothing. Fits pass over more.
+const NOTHING: f64 = 1e-12;
+/// Squares are known to this share of those that the set leaves.
+const ROUNDING: f64 = 1e-9;
+
+/// A set of which it is asked what further effects would leave.
+pub(crate) struct Beyond<'a> {
+    table: &'a Table,
+    /// What the set explains: for each column of the table a half of its inner products.
+    halves: DMatrix<f64>,
+    /// Squares that the set leaves.
+    squares: f64,
+    /// Numbers that are free in the set at least.
+    freedoms: usize,
+}
+
+impl Bench<'_> {
+    /// A set in a table that holds its columns and those of what may be added.
+    pub(crate) fn beyond<'a>(&self, table: &'a Table, set: &[Pick]) -> Beyond<'a> {
+        let columns = set.iter().flat_map(|pick| &pick.columns);
+        let places: Vec<usize> = columns.map(|k| table.place[*k]).collect();
+        let n = places.len();
+        let own = DMatrix::from_fn(n, n, |i, j| table.left[(places[i], places[j])]);
+        let factor = Factored::new(&own);
+        let with = DMatrix::from_fn(n, table.left.nrows(), |i, j| table.left[(places[i], j)]);
+        let halves = factor.halves(&with);
+        let mut beyond = Beyond {
+            table,
+            halves,
+            squares: 0.0,
+            freedoms: set.iter().map(|pick| self.fewest_freedoms(pick)).sum(),
+        };
+        let measured = beyond.measured();
+        beyond.squares = beyond.product(measured, measured);
+        beyond
+    }
+
+    /// The criterion of a set and further effects is no less than this.
+    pub(crate) fn least_criterion(
+        &self,
+        beyond: &Beyond<'_>,
+        further: &[&Pick],
+        worth: f64,
+    ) -> f64 {
+        let squares = beyond.least_squares(further.iter().flat_map(|pick| &pick.columns));
+        let more: usize = further.iter().map(|pick| self.fewest_freedoms(pick)).sum();
+        let freedoms = (beyond.freedoms + more) as f64;
+        worth * squares.max(f64::MIN_POSITIVE).ln() + freedoms * worth.ln().max(1.0)
+    }
+
+    /// Numbers that are free in an effect at least: those with the wrong sign may be none.
+    fn fewest_freedoms(&self, pick: &Pick) -> usize {
+        let candidate = self.candidate(pick);
+        let has_sign = candidate.parameters.iter().any(|p| p.sign != Sign::Any);
+        let is_body = matches!(candidate.source, Source::Body(_));
+        let may_lose = candidate.refines.is_none() && candidate.searched == 0;
+        if may_lose && (has_sign || is_body) {
+            pick.rank.min(1)
+        } else {
+            self.freedoms(pick)
+        }
+    }
+}
+
+impl Beyond<'_> {
+    fn measured(&self) -> usize {
+        self.table.left.nrows() - 1
+    }
+
+    /// Inner product of two columns of the table once the set is taken off.
+    fn product(&self, a: usize, b: usize) -> f64 {
+        let n = self.halves.nrows();
+        let [one, two] = [a, b].map(|k| &self.halves.as_slice()[k * n..(k + 1) * n]);
+        let known: f64 = one.iter().zip(two).map(|(x, y)| x * y).sum();
+        self.table.left[(a, b)] - known
+    }
+
+    /// Squares that the set leaves at least together with further columns.
+    fn least_squares<'k>(&self, columns: impl Iterator<Item = &'k usize>) -> f64 {
+        let mut places = [self.measured(); MOST + 1];
+        let mut n = 0;
+        for k in columns {
+            if n == MOST {
+                return 0.0;
+            }
+            places[n] = self.table.place[*k];
+            n += 1;
+        }
+        places[n] = self.measured();
+        let mut left = [[0.0; MOST + 1]; MOST + 1];
+        for i in 0..=n {
+            for j in 0..=i {
+                left[i][j] = self.product(places[i], places[j]);
+            }
+        }
+        for i in 0..n {
+            let own = self.table.left[(places[i], places[i])];
+            if left[i][i] <= NOTHING * own {
+                continue;
+            }
+            for j in i + 1..=n {
+                let share = left[j][i] / left[i][i];
+                for k in i + 1..=j {
+                    left[j][k] -= share * left[k][i];
+                }
+            }
+        }
+        left[n][n] - ROUNDING * self.squares
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::column::Column;
+    use super::super::problem::{
+        Candidate, Choice, Effect, EffectParameter, Layout, Nature, NoSupply, Problem, Stretch,
+    };
+    use super::super::search::criterion;
+    use super::*;
+
+    const SAMPLES: u32 = 200;
+
+    /// Two columns for every third candidate, one for the others; some are nearly the same, and some have a sign.
+    fn candidate(k: u32) -> Candidate {
+        let wave = |rate: f64, phase: f64| -> Option<Vec<f64>> {
+            let at = |i: u32| (rate * f64::from(i) + phase).sin();
+            Some((0..SAMPLES).map(at).collect())
+        };
+        let rate = 0.05 + 0.03 * f64::from(k / 2) + 1e-6 * f64::from(k);
+        let mut columns = vec![Column(vec![wave(rate, 0.3)])];
+        if k.is_multiple_of(3) {
+            columns.push(Column(vec![wave(1.7 * rate, 1.1)]));
+        }
+        let sign = [Sign::Any, Sign::Positive][k as usize % 2];
+        let parameter = |symbol: usize| EffectParameter {
+            symbol: format!("p{symbol}"),
+            unit: String::new(),
+            sign,
+        };
+        Candidate {
+            effect: Effect {
+                kind: format!("kind{k}"),
+                at: vec!["drive".into()],
+            },
+            parameters: (0..columns.len()).map(parameter).collect(),
+            searched: 0,
+            is_part_of_load: false,
+            refines: None,
+            nature: Nature::Effect,
+            is_per_run: false,
+            source: Source::Columns(vec![Choice {
+                constants: Vec::new(),
+                columns,
+            }]),
+        }
+    }
+
+    /// What is passed over is worse than the bound that it is passed over for: the bound is never above the criterion, and near
+    /// it where no sign matters.
+    #[test]
+    fn no_set_is_better_than_its_bound() {
+        let value = |i: u32| (0.09 * f64::from(i)).sin() - 0.4 * (0.31 * f64::from(i)).cos();
+        let measured = (0..SAMPLES).map(value).collect();
+        let problem = Problem {
+            layout: Layout {
+                channels: vec!["drive".into()],
+                stretches: vec![Stretch {
+                    name: String::new(),
+                    samples: SAMPLES as usize,
+                    step: 0.1,
+                    sampled: 0.1,
+                    is_check: false,
+                }],
+                left_out: Vec::new(),
+            },
+            measured: Column(vec![Some(measured)]),
+            noise: vec![1e-3],
+            candidates: (0..12).map(candidate).collect(),
+            ..Problem::default()
+        };
+        let mut bench = Bench::new(&problem, &NoSupply);
+        bench.look(&[]);
+        let present: Vec<Pick> = bench.present.iter().flatten().cloned().collect();
+        let table = bench.table(&[]);
+        let worth = 100.0;
+        let mut near = 0;
+        for n in 0..4 {
+            let set = &present[..n];
+            let beyond = bench.beyond(&table, set);
+            for (i, one) in present.iter().enumerate().skip(n) {
+                for two in &present[i + 1..] {
+                    let least = bench.least_criterion(&beyond, &[one, two], worth);
+                    let mut picks = set.to_vec();
+                    picks.extend([one.clone(), two.clone()]);
+                    let trial = bench.try_in(&table, picks);
+                    let own = criterion(&problem, &trial, worth);
+                    assert!(least <= own, "{n}, {i}: {least} above {own}");
+                    near += usize::from(trial.is_possible() && own - least < 1.0);
+                }
+            }
+        }
+        assert!(near > 20, "{near} bounds are near");
+    }
+}
