@@ -92,7 +92,13 @@ pub(crate) fn read(text: &str) -> Result<Closures, String> {
         };
         out.joints.push((name, becomes));
     }
-    const READ: [&str; 5] = ["closed_loop", "type", "name_mot", "joint_name", "joint_type"];
+    const READ: [&str; 5] = [
+        "closed_loop",
+        "type",
+        "name_mot",
+        "joint_name",
+        "joint_type",
+    ];
     for (line, key, _) in &entries {
         if !READ.contains(key) {
             out.remarks.push(format!(

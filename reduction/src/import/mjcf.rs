@@ -99,7 +99,13 @@ pub(crate) fn read(document: &Document) -> Result<Description, String> {
     }
     for node in root.descendants() {
         let tag = node.tag_name().name();
-        if ["include", "attach", "replicate", "composite", "flexcomp"].contains(&tag) {
+        if tag == "include" {
+            return Err(at(
+                &node,
+                "included files are read where the description is read from a file",
+            ));
+        }
+        if ["attach", "replicate", "composite", "flexcomp"].contains(&tag) {
             return Err(at(
                 &node,
                 "this is not expanded here; MuJoCo writes one whole file of it (mj_saveLastXML)",
@@ -497,7 +503,11 @@ impl<'a, 'i> Reader<'a, 'i> {
                  (mj_saveLastXML)",
             ));
         }
-        let kind = self.text(node, class, "type")?.unwrap_or("sphere");
+        let usual = match self.text(node, class, "mesh")? {
+            Some(_) => "mesh",
+            None => "sphere",
+        };
+        let kind = self.text(node, class, "type")?.unwrap_or(usual);
         let mut placed = self.placed(node, class)?;
         let size = match self.text(node, class, "size")? {
             Some(text) => numbers(node, "size", text)?,

@@ -1036,12 +1036,18 @@ impl Build<'_> {
 
 /// Where a link, or one that is fixed to it, is closed to others, in the frame of the link.
 fn tip(description: &Description, index: usize) -> Option<Vector3<f64>> {
-    let ends = description.closures.iter().flat_map(|closure| &closure.ends);
+    let ends = description
+        .closures
+        .iter()
+        .flat_map(|closure| &closure.ends);
     ends.filter_map(|(end, placed)| {
         let (mut link, mut at) = ((*end)?, *placed);
         while link != index {
             let Link {
-                parent, at: own, joints, ..
+                parent,
+                at: own,
+                joints,
+                ..
             } = &description.links[link];
             if !joints.is_empty() {
                 return None;
