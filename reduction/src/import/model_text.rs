@@ -20,8 +20,9 @@ use lines::{Pulled, between};
 
 /// Angles this near to a multiple of a twelfth of pi are taken for it where the option asks for it, rad.
 const SAME_ANGLE: f64 = 1e-4;
-/// Deviations below this are rounding of the format.
-const ROUNDING: f64 = 1e-12;
+/// Deviations below this are rounding: a right angle is often written with eleven digits behind the point, and forces that
+/// differ by that share of theirs are the same. Kept, such deviations would make base parameters of nothing but rounding.
+const ROUNDING: f64 = 2e-11;
 /// Points by which closures hold orientations stand this far from their origins, m.
 const ARM: f64 = 0.1;
 
