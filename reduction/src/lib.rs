@@ -30,7 +30,8 @@ mod write;
 
 pub use export::{ExportError, Exported, Format as ExportFormat, export};
 pub use import::{
-    ImportError, Imported, ImportedJoint, LARGEST_DESCRIPTION, Options as ImportOptions, import,
+    ImportError, Imported, ImportedJoint, LARGEST_DESCRIPTION, Options as ImportOptions,
+    expand_includes, import,
 };
 pub use plan::{Plan, plan, plan_file, plan_file_with};
 pub use plan_for::plan_for;

@@ -1,7 +1,7 @@
 //! Magnitudes of loop residuals, coordinates and determinants: what Newton's method holds residuals and steps against, and
 //! what singular poses are told by, so that neither depends on the unit of length.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use modelmill_spec::Mechanism;
 use num_rational::BigRational;
@@ -23,6 +23,71 @@ pub(crate) fn at_nominal(graph: &mut Graph, mechanism: &Mechanism, roots: &[Expr
     nominal_value(graph, mechanism, total)
         .filter(|size| size.is_normal())
         .unwrap_or(1.0)
+}
+
+/// How large a value is at the nominal pose beside what rounding may change it by, in units of the last digit; `None` where
+/// it has no value.
+///
+/// For a sum that is its share of the magnitudes of its terms. A product has lost as many digits as its factors together
+/// have relative to their own sizes: it is as good as its worst factor, however many there are, while the magnitudes of all
+/// its terms, multiplied out, would count the digits of every factor.
+pub(crate) fn digits_left(graph: &Graph, mechanism: &Mechanism, root: ExprId) -> Option<f64> {
+    let order = operands_first(graph, root);
+    let values = Tape::new(graph, &order).evaluate(&F64(|atom| nominal_of(mechanism, atom)))?;
+    let mut known: HashMap<ExprId, (f64, f64)> = HashMap::new();
+    for (id, value) in order.iter().zip(values) {
+        let of = |id: &ExprId| known[id];
+        let changes = match graph.node(*id) {
+            Node::Sin(_)
+            | Node::Cos(_)
+            | Node::Unary(Unary::Sign | Unary::Tanh | Unary::Sin | Unary::Cos, _) => 1.0,
+            Node::Atom(Atom::Coordinate(i)) if !mechanism.coordinates[*i].motion.is_length() => 1.0,
+            Node::Rational(_) | Node::Atom(_) | Node::Unary(Unary::Exp, _) => value.abs(),
+            Node::Unary(Unary::Abs, inner) => of(inner).1,
+            Node::Unary(Unary::Sqrt, inner) => of(inner).1 / (2.0 * value) + value,
+            Node::Sum(terms) => terms
+                .iter()
+                .map(|(term, factor)| factor.to_f64().abs() * of(term).1)
+                .sum(),
+            Node::Product(factors) => {
+                let shares = factors.iter().map(|(base, n)| {
+                    let (value, changes) = of(base);
+                    f64::from(*n).abs() * changes / value.abs()
+                });
+                value.abs() * shares.sum::<f64>()
+            }
+        };
+        known.insert(*id, (value, changes));
+    }
+    let (value, changes) = known[&root];
+    let left = value.abs() / changes;
+    left.is_finite().then_some(left)
+}
+
+/// Everything that an expression is made of, itself last.
+fn operands_first(graph: &Graph, root: ExprId) -> Vec<ExprId> {
+    let mut order = Vec::new();
+    let mut seen = HashSet::new();
+    let mut waiting = vec![(root, false)];
+    while let Some((id, is_left)) = waiting.pop() {
+        if is_left {
+            order.push(id);
+            continue;
+        }
+        if !seen.insert(id) {
+            continue;
+        }
+        waiting.push((id, true));
+        match graph.node(id) {
+            Node::Sum(terms) => waiting.extend(terms.iter().map(|(term, _)| (*term, false))),
+            Node::Product(factors) => {
+                waiting.extend(factors.iter().map(|(base, _)| (*base, false)));
+            }
+            Node::Unary(_, inner) => waiting.push((*inner, false)),
+            Node::Rational(_) | Node::Atom(_) | Node::Sin(_) | Node::Cos(_) => {}
+        }
+    }
+    order
 }
 
 /// Whether an angle itself, not its sine or cosine, is a term of a sum.
@@ -116,6 +181,35 @@ impl Size {
                 graph.mul(nominal, grown)
             }
             None => nominal,
+        }
+    }
+
+    /// What a determinant is held against: the sum of the magnitudes of its terms, as [`Size::of_terms`] has it. Where the
+    /// nominal pose itself would all but count as singular by that, since the terms cancel in every factor and at every pose,
+    /// it is what rounding says that counts, which grows with the loops. What is below `singular` of its size counts as zero.
+    pub(crate) fn of_determinant(
+        &self,
+        graph: &mut Graph,
+        mechanism: &Mechanism,
+        id: ExprId,
+        singular: f64,
+    ) -> ExprId {
+        /// Determinants become smaller by this from pose to pose before they are singular.
+        const ROOM: f64 = 1e3;
+        let terms = self.of_terms(graph, mechanism, id);
+        let at_nominal = |graph: &Graph, id| nominal_value(graph, mechanism, id).map(f64::abs);
+        let (Some(value), Some(size)) = (at_nominal(graph, id), at_nominal(graph, terms)) else {
+            return terms;
+        };
+        if value > ROOM * singular * size {
+            return terms;
+        }
+        match digits_left(graph, mechanism, id) {
+            Some(left) if left > value / size => {
+                let share = number(graph, value / left / size);
+                graph.mul(share, terms)
+            }
+            _ => terms,
         }
     }
 

@@ -76,10 +76,13 @@ impl Closing {
         };
         for id in &equations.projection.determinants {
             let limit = SINGULAR * magnitude::at_nominal(graph, mechanism, &[*id]);
-            if nominal_value(graph, mechanism, *id).is_some_and(|value| value.abs() <= limit) {
+            let is_small = |value: f64| value.abs() <= limit;
+            if nominal_value(graph, mechanism, *id).is_some_and(is_small)
+                && magnitude::digits_left(graph, mechanism, *id).is_none_or(|left| left <= SINGULAR)
+            {
                 return Err(DeriveError::SingularNominal);
             }
-            let size = closing.size.of_terms(graph, mechanism, *id);
+            let size = closing.size.of_determinant(graph, mechanism, *id, SINGULAR);
             closing.regular.push((*id, size));
         }
         let Some(plan) = closing.plan.clone() else {
@@ -156,7 +159,7 @@ impl Closing {
     pub(crate) fn guard(&mut self, graph: &mut Graph, mechanism: &Mechanism, more: &[ExprId]) {
         for id in more {
             if self.regular.iter().all(|(known, _)| known != id) {
-                let size = self.size.of_terms(graph, mechanism, *id);
+                let size = self.size.of_determinant(graph, mechanism, *id, SINGULAR);
                 self.regular.push((*id, size));
             }
         }

@@ -14,6 +14,7 @@ use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
 
 use super::numeric::{REACH, sample};
+use super::reduction::Reduction;
 use crate::expr::independent::SEED;
 use crate::expr::{ExprId, Graph};
 use crate::loops::numeric_poses::symmetric;
@@ -38,6 +39,18 @@ pub(super) struct Columns<'a> {
     pub(super) units: &'a [String],
 }
 
+/// What must be left of every retained column beside those before it, relative to its size, so that factors found in
+/// floating point mean anything.
+const CERTAIN: f64 = 1e-7;
+
+/// Another choice of retained columns.
+pub(super) struct Exchange {
+    pub(super) retained: Vec<usize>,
+    /// Whether the factors that asked for it are known to some digits. Where retained columns all but depend on each other at
+    /// the file's values, they may be rounding alone, and the true ones of reasonable size.
+    pub(super) is_certain: bool,
+}
+
 /// The retained columns, some exchanged for dependent ones; `None` if all can stay. Columns in `named` stay in any case.
 pub(super) fn exchanged(
     graph: &mut Graph,
@@ -47,7 +60,7 @@ pub(super) fn exchanged(
     retained: &[usize],
     dependent: &[usize],
     named: &[usize],
-) -> Option<Vec<usize>> {
+) -> Option<Exchange> {
     if dependent.is_empty() {
         return None;
     }
@@ -64,7 +77,48 @@ pub(super) fn exchanged(
         factors.exchange(i, j);
         has_changed = true;
     }
-    has_changed.then_some(factors.retained)
+    has_changed.then_some(Exchange {
+        retained: factors.retained,
+        is_certain: factors.least_kept > CERTAIN,
+    })
+}
+
+/// Whether the factors of a reduction are of reasonable size at the file's values. `shown` are its columns' positions.
+pub(super) fn is_moderate(
+    graph: &mut Graph,
+    mechanism: &Mechanism,
+    projection: &Projection,
+    columns: &Columns<'_>,
+    reduction: &Reduction,
+    shown: &[usize],
+) -> bool {
+    let n_rows = columns.values.len() + columns.values.len() / 2;
+    let Ok(w) = sample(graph, mechanism, projection, columns.values, n_rows, REACH) else {
+        return false;
+    };
+    let shares = shares(&w, columns.units);
+    let share = |product: usize| shares[shown[product]];
+    let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
+    let lines = reduction.factors(&constants);
+    reduction.dependencies.iter().zip(lines).all(|(line, by)| {
+        by.into_iter().all(|(k, factor)| {
+            let growth = factor * share(line.product) / share(reduction.retained[k]);
+            growth.abs() <= MOST_GROWTH
+        })
+    })
+}
+
+/// The size of each column beside the longest of a parameter of its unit.
+fn shares(w: &DMatrix<f64>, units: &[String]) -> Vec<f64> {
+    let mut longest: BTreeMap<&str, f64> = BTreeMap::new();
+    for (column, unit) in w.column_iter().zip(units) {
+        let most = longest.entry(unit).or_default();
+        *most = most.max(column.norm());
+    }
+    let columns = w.column_iter().zip(units);
+    columns
+        .map(|(column, unit)| column.norm() / longest[unit.as_str()])
+        .collect()
 }
 
 /// The mechanism with constants a little beside its own.
@@ -92,6 +146,8 @@ struct Factors {
     retained: Vec<usize>,
     dependent: Vec<usize>,
     values: DMatrix<f64>,
+    /// What is left of a retained column beside those before it: the least.
+    least_kept: f64,
 }
 
 impl Factors {
@@ -117,7 +173,9 @@ impl Factors {
         let mut values = others.clone();
         qr.q_tr_mul(&mut values);
         let values = values.rows(0, retained.len()).into_owned();
-        let mut values = qr.unpack_r().solve_upper_triangular(&values)?;
+        let r = qr.unpack_r();
+        let least_kept = r.diagonal().amin();
+        let mut values = r.solve_upper_triangular(&values)?;
         let left = others - basis * &values;
         let is_made_up = left.column_iter().zip(values.column_iter());
         let is_made_up = is_made_up
@@ -127,21 +185,17 @@ impl Factors {
             return None;
         }
         // A column that all but vanishes is written by others with large factors, and others by it.
-        let mut longest: BTreeMap<&str, f64> = BTreeMap::new();
-        for (column, unit) in w.column_iter().zip(units) {
-            let most = longest.entry(unit).or_default();
-            *most = most.max(column.norm());
-        }
-        let share = |k: usize| w.column(k).norm() / longest[units[k].as_str()];
+        let shares = shares(w, units);
         for (j, mut column) in values.column_iter_mut().enumerate() {
             for (factor, k) in column.iter_mut().zip(retained) {
-                *factor *= share(dependent[j]) / share(*k);
+                *factor *= shares[dependent[j]] / shares[*k];
             }
         }
         Some(Self {
             retained: retained.to_vec(),
             dependent: dependent.to_vec(),
             values,
+            least_kept,
         })
     }
 

@@ -129,35 +129,47 @@ fn reduce_exactly(
     let units: Vec<String> = (effective.iter())
         .map(|k| base::unit(mechanism, &candidates[*k]))
         .collect();
+    let written = conditioned::Columns {
+        values: &columns,
+        units: &units,
+    };
+    let names = |k: usize| candidates[effective[k]].clone();
+    let reduced = |dependences: &Dependences, stream: &mut Stream| {
+        let factors = factors::find(
+            dependences,
+            &regressor,
+            &variables,
+            &roots,
+            factors::MOST_OPERATIONS,
+            stream,
+        )?;
+        let reduction = dependences.reduction(mechanism, candidates, &names, factors)?;
+        reduction.confirm(&regressor, &dependences.shown, stream)?;
+        Ok(reduction)
+    };
     let better = conditioned::exchanged(
         graph,
         mechanism,
         projection,
-        &conditioned::Columns {
-            values: &columns,
-            units: &units,
-        },
+        &written,
         &dependences.pivots,
         &dependences.dependent,
         &order[..preference.n_named],
     );
-    if let Some(better) = better {
+    if let Some(exchange) = better {
+        if !exchange.is_certain
+            && let Ok(found) = reduced(&dependences, &mut stream)
+        {
+            let shown = &dependences.shown;
+            if conditioned::is_moderate(graph, mechanism, projection, &written, &found, shown) {
+                return Ok(found);
+            }
+        }
         let (first, rest): (Vec<usize>, Vec<usize>) =
-            order.iter().partition(|k| better.contains(k));
+            order.iter().partition(|k| exchange.retained.contains(k));
         dependences = Dependences::find(&regressor, &[first, rest].concat(), &mut stream)?;
     }
-    let factors = factors::find(
-        &dependences,
-        &regressor,
-        &variables,
-        &roots,
-        factors::MOST_OPERATIONS,
-        &mut stream,
-    )?;
-    let names = |k: usize| candidates[effective[k]].clone();
-    let reduction = dependences.reduction(mechanism, candidates, &names, factors)?;
-    reduction.confirm(&regressor, &dependences.shown, &mut stream)?;
-    Ok(reduction)
+    reduced(&dependences, &mut stream)
 }
 
 /// The products that are wanted and have an effect, all retained.

@@ -1,7 +1,7 @@
 //! Closures beside a URDF: the `robot.yaml` of the collection example-parallel-robots.
 //!
 //! Of YAML it is keys at the start of lines with lists behind them, in brackets or behind dashes, which is what these files
-//! hold; other keys are passed over.
+//! hold; other keys are told.
 
 /// What the file says.
 #[derive(Debug, Default)]
@@ -9,6 +9,19 @@ pub(crate) struct Closures {
     pub(crate) closures: Vec<Pair>,
     /// Joints that are driven; all where there are none.
     pub(crate) drives: Vec<String>,
+    /// Joints with what they are, whatever the URDF has in their place: it knows neither balls nor crosses.
+    pub(crate) joints: Vec<(String, Becomes)>,
+    /// What is not read; one sentence each.
+    pub(crate) remarks: Vec<String>,
+}
+
+/// What a joint of the URDF is in truth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Becomes {
+    Ball,
+    Fixed,
+    /// Two hinges, about axes of its frame one after the other.
+    Cross([char; 2]),
 }
 
 /// Two frames that coincide.
@@ -56,6 +69,43 @@ pub(crate) fn read(text: &str) -> Result<Closures, String> {
         drives: list("name_mot").1,
         ..Closures::default()
     };
+    let (_, names) = list("joint_name");
+    let (line_of_types, types) = list("joint_type");
+    if names.len() != types.len() {
+        return Err(format!(
+            "line {line_of_types} of the file of closures: expected a `joint_type` for each `joint_name`"
+        ));
+    }
+    for (name, kind) in names.into_iter().zip(types) {
+        let becomes = match kind.to_uppercase().as_str() {
+            "SPHERICAL" => Becomes::Ball,
+            "FIXED" => Becomes::Fixed,
+            "UJOINT_XY" => Becomes::Cross(['x', 'y']),
+            "UJOINT_YZ" => Becomes::Cross(['y', 'z']),
+            "UJOINT_ZX" => Becomes::Cross(['z', 'x']),
+            _ => {
+                return Err(format!(
+                    "line {line_of_types} of the file of closures: expected SPHERICAL, FIXED, UJOINT_XY, UJOINT_YZ or UJOINT_ZX \
+                     in `joint_type`, found `{kind}` for `{name}`"
+                ));
+            }
+        };
+        out.joints.push((name, becomes));
+    }
+    const READ: [&str; 5] = [
+        "closed_loop",
+        "type",
+        "name_mot",
+        "joint_name",
+        "joint_type",
+    ];
+    for (line, key, _) in &entries {
+        if !READ.contains(key) {
+            out.remarks.push(format!(
+                "line {line} of the file of closures: `{key}` is not read"
+            ));
+        }
+    }
     for (k, ends) in pairs.iter().enumerate() {
         let is_full = match kinds.get(k).map(|kind| kind.to_lowercase()).as_deref() {
             None | Some("6d") => true,

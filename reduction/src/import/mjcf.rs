@@ -41,6 +41,12 @@ struct Compiler {
     from_geoms: Option<bool>,
     least_mass: f64,
     least_inertia: f64,
+    /// Moments that no body has become their mean.
+    balances_inertia: bool,
+    /// Groups of shapes that weigh something.
+    groups: [f64; 2],
+    /// What all bodies together weigh, if they are made lighter or heavier for that.
+    total_mass: Option<f64>,
 }
 
 pub(super) struct Reader<'a, 'i> {
@@ -93,7 +99,13 @@ pub(crate) fn read(document: &Document) -> Result<Description, String> {
     }
     for node in root.descendants() {
         let tag = node.tag_name().name();
-        if ["include", "attach", "replicate", "composite", "flexcomp"].contains(&tag) {
+        if tag == "include" {
+            return Err(at(
+                &node,
+                "included files are read where the description is read from a file",
+            ));
+        }
+        if ["attach", "replicate", "composite", "flexcomp"].contains(&tag) {
             return Err(at(
                 &node,
                 "this is not expanded here; MuJoCo writes one whole file of it (mj_saveLastXML)",
@@ -107,6 +119,7 @@ pub(crate) fn read(document: &Document) -> Result<Description, String> {
         };
         reader.inside(&body, inside, Placed::identity())?;
     }
+    reader.scale_to_total();
     for equalities in children(&root, "equality") {
         for node in equalities.children().filter(Node::is_element) {
             reader.equality(&node)?;
@@ -136,6 +149,9 @@ fn compiler(root: &Node) -> Result<Compiler, String> {
         from_geoms: None,
         least_mass: 0.0,
         least_inertia: 0.0,
+        balances_inertia: false,
+        groups: [0.0, f64::INFINITY],
+        total_mass: None,
     };
     for node in children(root, "compiler") {
         if let Some(angle) = node.attribute("angle") {
@@ -172,15 +188,15 @@ fn compiler(root: &Node) -> Result<Compiler, String> {
                 "global coordinates left MuJoCo with version 2.3.3; write the file anew with an older one",
             ));
         }
-        for (key, unused) in [("settotalmass", "-1"), ("balanceinertia", "false")] {
-            if node.attribute(key).is_some_and(|value| value != unused) {
-                return Err(at(
-                    &node,
-                    &format!(
-                        "`{key}` is not read; let MuJoCo write the file with masses in place (mj_saveLastXML)"
-                    ),
-                ));
-            }
+        if let Some(balance) = node.attribute("balanceinertia") {
+            out.balances_inertia = balance == "true";
+        }
+        if let Some(text) = node.attribute("inertiagrouprange") {
+            out.groups = exactly(&node, "inertiagrouprange", text)?;
+        }
+        if let Some(text) = node.attribute("settotalmass") {
+            let [total] = exactly(&node, "settotalmass", text)?;
+            out.total_mass = (total > 0.0).then_some(total);
         }
     }
     Ok(out)
@@ -404,17 +420,41 @@ impl<'a, 'i> Reader<'a, 'i> {
             (_, Some(false)) => Inertial::default(),
             _ => self.of_geoms(node, class)?,
         };
-        // MuJoCo takes principal moments here.
         found.mass = found.mass.max(self.compiler.least_mass);
-        if self.compiler.least_inertia > 0.0 {
-            let mut moments = found.inertia.symmetric_eigen();
-            let least = self.compiler.least_inertia;
-            if moments.eigenvalues.min() < least {
-                moments.eigenvalues = moments.eigenvalues.map(|moment| moment.max(least));
-                found.inertia = moments.recompose();
-            }
-        }
+        found.inertia = self.possible(found.inertia);
         Ok(found)
+    }
+
+    /// An inertia with the bounds that the file asks for, on principal moments, as MuJoCo takes them.
+    fn possible(&self, inertia: Matrix3<f64>) -> Matrix3<f64> {
+        let mut moments = inertia.symmetric_eigen();
+        let given = moments.eigenvalues;
+        let least = self.compiler.least_inertia;
+        moments.eigenvalues = given.map(|moment| moment.max(least));
+        let all = moments.eigenvalues;
+        if self.compiler.balances_inertia && 2.0 * all.max() > all.sum() {
+            moments.eigenvalues.fill(all.mean());
+        }
+        if moments.eigenvalues == given {
+            inertia
+        } else {
+            moments.recompose()
+        }
+    }
+
+    /// Makes all bodies lighter or heavier by one factor, where the file says what they weigh together.
+    fn scale_to_total(&mut self) {
+        let masses = self.out.links.iter().map(|link| link.inertial.mass);
+        let (sum, Some(total)) = (masses.sum::<f64>(), self.compiler.total_mass) else {
+            return;
+        };
+        if sum <= 0.0 {
+            return;
+        }
+        for link in &mut self.out.links {
+            link.inertial.mass *= total / sum;
+            link.inertial.inertia *= total / sum;
+        }
     }
 
     /// Mass and inertia of the shapes of a body, also of those in its frames.
@@ -451,7 +491,23 @@ impl<'a, 'i> Reader<'a, 'i> {
         if mass == Some(0.0) || (mass.is_none() && density == 0.0) {
             return Ok(None);
         }
-        let kind = self.text(node, class, "type")?.unwrap_or("sphere");
+        let [group] = self.numbers(node, class, "group")?.unwrap_or([0.0]);
+        let [first, last] = self.compiler.groups;
+        if !(first..=last).contains(&group) {
+            return Ok(None);
+        }
+        if self.text(node, class, "shellinertia")? == Some("true") {
+            return Err(at(
+                node,
+                "mass and inertia of a hollow shape are not worked out here: give the body an <inertial>, as MuJoCo writes it \
+                 (mj_saveLastXML)",
+            ));
+        }
+        let usual = match self.text(node, class, "mesh")? {
+            Some(_) => "mesh",
+            None => "sphere",
+        };
+        let kind = self.text(node, class, "type")?.unwrap_or(usual);
         let mut placed = self.placed(node, class)?;
         let size = match self.text(node, class, "size")? {
             Some(text) => numbers(node, "size", text)?,

@@ -1,4 +1,4 @@
-//! What MJCF ties together: bodies by `connect` and `weld`, joints by `joint`.
+//! What MJCF ties together: bodies by `connect` and `weld`, joints by `joint` and by fixed tendons of constant length.
 
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
@@ -6,7 +6,7 @@ use roxmltree::Node;
 use super::description::{Closure, Coupling, Holds};
 use super::mjcf::Reader;
 use super::placed::{Placed, of_quaternion};
-use super::xml::{at, exactly, line, numbers, vector, word};
+use super::xml::{at, children, exactly, line, number, numbers, vector, word};
 
 impl<'a, 'i> Reader<'a, 'i> {
     fn link(&self, node: &Node, name: &str) -> Result<Option<usize>, String> {
@@ -59,11 +59,12 @@ impl<'a, 'i> Reader<'a, 'i> {
                 });
             }
             "joint" => self.coupling(node)?,
+            "tendon" => self.tied(node)?,
             other => {
                 return Err(at(
                     node,
                     &format!(
-                        "models do not have the equality `{other}`; they have connect, weld and joint"
+                        "models do not have the equality `{other}`; they have connect, weld, joint and tendon"
                     ),
                 ));
             }
@@ -121,19 +122,13 @@ impl<'a, 'i> Reader<'a, 'i> {
             None => vec![0.0, 1.0],
         };
         let coefficient = |k: usize| given.get(k).copied().unwrap_or(0.0);
+        let zero = |name: &str| self.zero(node, name);
         if of.is_some() && (2..5).any(|k| coefficient(k) != 0.0) {
             return Err(at(
                 node,
                 "a coupling by a polynomial of higher degree; models have constant ratios",
             ));
         }
-        let zero = |name: &str| {
-            let mut joints = self.out.links.iter().flat_map(|link| &link.joints);
-            joints
-                .find(|joint| joint.name == name)
-                .map(|joint| joint.zero)
-                .ok_or_else(|| at(node, &format!("no joint is called `{name}`")))
-        };
         let ratio = if of.is_some() { coefficient(1) } else { 0.0 };
         let reference = of.as_deref().map_or(Ok(0.0), zero)?;
         let offset = zero(&joint)? + coefficient(0) - ratio * reference;
@@ -141,6 +136,89 @@ impl<'a, 'i> Reader<'a, 'i> {
             line: line(node),
             joint,
             of,
+            ratio,
+            offset,
+        });
+        Ok(())
+    }
+
+    /// The value of a joint at the pose of the file.
+    fn zero(&self, node: &Node, name: &str) -> Result<f64, String> {
+        let mut joints = self.out.links.iter().flat_map(|link| &link.joints);
+        joints
+            .find(|joint| joint.name == name)
+            .map(|joint| joint.zero)
+            .ok_or_else(|| at(node, &format!("no joint is called `{name}`")))
+    }
+
+    /// Joints with the lengths that a turn or a slide of each adds to a fixed tendon.
+    fn on_tendon(&self, node: &Node<'a, 'i>, name: &str) -> Result<Vec<(String, f64)>, String> {
+        let root = node.document().root_element();
+        let tendon = children(&root, "tendon")
+            .flat_map(|section| section.children().collect::<Vec<_>>())
+            .find(|tendon| tendon.attribute("name") == Some(name))
+            .ok_or_else(|| at(node, &format!("no tendon is called `{name}`")))?;
+        if tendon.tag_name().name() != "fixed" {
+            return Err(at(
+                node,
+                &format!(
+                    "`{name}` runs through space; models keep the length of fixed tendons only"
+                ),
+            ));
+        }
+        let joints = children(&tendon, "joint");
+        joints
+            .map(|joint| Ok((word(&joint, "joint")?, number(&joint, "coef")?)))
+            .collect()
+    }
+
+    /// A fixed tendon of constant length, or two that follow each other: a coupling, if two joints are concerned.
+    fn tied(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
+        let given = match self.text(node, None, "polycoef")? {
+            Some(text) => numbers(node, "polycoef", text)?,
+            None => vec![0.0, 1.0],
+        };
+        let coefficient = |k: usize| given.get(k).copied().unwrap_or(0.0);
+        let mut terms = self.on_tendon(node, &word(node, "tendon1")?)?;
+        if let Some(other) = node.attribute("tendon2") {
+            if (2..5).any(|k| coefficient(k) != 0.0) {
+                return Err(at(
+                    node,
+                    "a coupling by a polynomial of higher degree; models have constant ratios",
+                ));
+            }
+            for (joint, length) in self.on_tendon(node, other)? {
+                terms.push((joint, -coefficient(1) * length));
+            }
+        }
+        let mut sums: Vec<(String, f64)> = Vec::new();
+        for (joint, length) in terms {
+            match sums.iter_mut().find(|(known, _)| *known == joint) {
+                Some((_, sum)) => *sum += length,
+                None => sums.push((joint, length)),
+            }
+        }
+        sums.retain(|(_, length)| *length != 0.0);
+        let (one, of) = match sums.as_slice() {
+            [one] => (one, None),
+            [of, one] => (one, Some(of)),
+            _ => {
+                return Err(at(
+                    node,
+                    &format!(
+                        "it ties {} joints to each other; models have couplings of two",
+                        sums.len()
+                    ),
+                ));
+            }
+        };
+        let ratio = of.map_or(0.0, |(_, length)| -length / one.1);
+        let reference = of.map_or(Ok(0.0), |(of, _)| self.zero(node, of))?;
+        let offset = self.zero(node, &one.0)? + coefficient(0) / one.1 - ratio * reference;
+        self.out.couplings.push(Coupling {
+            line: line(node),
+            joint: one.0.clone(),
+            of: of.map(|(of, _)| of.clone()),
             ratio,
             offset,
         });

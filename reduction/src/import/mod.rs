@@ -15,12 +15,15 @@ mod mjcf;
 mod mjcf_actuators;
 mod mjcf_defaults;
 mod mjcf_equalities;
+mod mjcf_include;
 mod model_text;
 mod placed;
 mod sdf;
 mod urdf;
 mod welds;
 mod xml;
+
+pub use mjcf_include::expand as expand_includes;
 
 use std::fmt;
 

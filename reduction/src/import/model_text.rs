@@ -20,8 +20,9 @@ use lines::{Pulled, between};
 
 /// Angles this near to a multiple of a twelfth of pi are taken for it where the option asks for it, rad.
 const SAME_ANGLE: f64 = 1e-4;
-/// Deviations below this are rounding of the format.
-const ROUNDING: f64 = 1e-12;
+/// Deviations below this are rounding: a right angle is often written with eleven digits behind the point, and forces that
+/// differ by that share of theirs are the same. Kept, such deviations would make base parameters of nothing but rounding.
+const ROUNDING: f64 = 2e-11;
 /// Points by which closures hold orientations stand this far from their origins, m.
 const ARM: f64 = 0.1;
 
@@ -153,15 +154,10 @@ impl Build<'_> {
             } else {
                 format!("{}_{}", link.name, joint.name)
             };
-            let is_tip = description
-                .closures
-                .iter()
-                .flat_map(|closure| &closure.ends)
-                .find(|(end, _)| *end == Some(index))
-                .map(|(_, placed)| placed.p - joint.anchor);
+            let tip = tip(description, index).map(|tip| tip - joint.anchor);
             (frame, here) = match joint.kind {
                 Kind::Free => self.free(joint, &here, &name),
-                Kind::Ball => self.ball(joint, frame, &here, &name, is_tip),
+                Kind::Ball => self.ball(joint, frame, &here, &name, tip),
                 Kind::Turn | Kind::Slide => self.scalar(description, joint, frame, &here, &name)?,
             };
         }
@@ -829,7 +825,7 @@ impl Build<'_> {
         if gravity.norm() == 0.0 {
             self.remarks
                 .push("the description says that there is no gravity".to_owned());
-            text.push_str("\n[constants]\n");
+            text.push_str("gravity = [0, 0, 0]\n\n[constants]\n");
         } else if along_z && gravity.z < 0.0 {
             let _ = write!(
                 text,
@@ -1037,6 +1033,32 @@ impl Build<'_> {
             }
         }
     }
+}
+
+/// Where a link, or one that is fixed to it, is closed to others, in the frame of the link.
+fn tip(description: &Description, index: usize) -> Option<Vector3<f64>> {
+    let ends = description
+        .closures
+        .iter()
+        .flat_map(|closure| &closure.ends);
+    ends.filter_map(|(end, placed)| {
+        let (mut link, mut at) = ((*end)?, *placed);
+        while link != index {
+            let Link {
+                parent,
+                at: own,
+                joints,
+                ..
+            } = &description.links[link];
+            if !joints.is_empty() {
+                return None;
+            }
+            at = own.then(&at);
+            link = (*parent)?;
+        }
+        Some(at.p)
+    })
+    .next()
 }
 
 /// Fifteen significant digits: what follows is rounding of sums.

@@ -2,9 +2,10 @@
 //!
 //! Source of names and defaults: the URDF specification of ROS (wiki.ros.org/urdf/XML).
 
+use nalgebra::Vector3;
 use roxmltree::{Document, Node};
 
-use super::closures_file::{self, Closures};
+use super::closures_file::{self, Becomes, Closures};
 use super::description::{Closure, Coupling, Description, Holds, Inertial, Joint, Kind, Link};
 use super::placed::Placed;
 use super::xml::{at, child, children, line, number, required, symmetric, three, vector, word};
@@ -14,8 +15,8 @@ struct Between {
     parent: String,
     child: String,
     origin: Placed,
-    /// None is fixed.
-    joint: Option<Joint>,
+    /// One after the other; none is fixed.
+    joints: Vec<Joint>,
     name: String,
     line: u32,
 }
@@ -38,6 +39,12 @@ pub(crate) fn read(
     for node in children(&robot, "joint") {
         joints.push(joint(&node, &mut out)?);
     }
+    let closures = closures.map(closures_file::read).transpose()?;
+    if let Some(file) = &closures {
+        out.remarks.extend(file.remarks.iter().cloned());
+        replace(&mut joints, &file.joints)?;
+    }
+    follow_fixed(&mut out, &joints);
     for node in children(&robot, "transmission") {
         for reduction in node.descendants().filter(|node| {
             node.tag_name().name() == "mechanicalReduction"
@@ -80,8 +87,8 @@ pub(crate) fn read(
             let joint = &joints[j];
             link.parent = out.links.iter().position(|link| link.name == joint.parent);
             link.at = joint.origin;
-            link.joints.extend(joint.joint.clone());
-            if joint.joint.as_ref().is_some_and(|j| j.kind == Kind::Free)
+            link.joints.clone_from(&joint.joints);
+            if joint.joints.iter().any(|j| j.kind == Kind::Free)
                 && joint.parent != word(&root, "name")?
             {
                 return Err(format!(
@@ -126,10 +133,69 @@ pub(crate) fn read(
             "it is in a ring of joints that the root does not reach",
         ));
     }
-    if let Some(text) = closures {
-        close(&mut out, &joints, closures_file::read(text)?)?;
+    if let Some(file) = closures {
+        close(&mut out, &joints, file)?;
     }
     Ok(out)
+}
+
+/// Puts in the place of joints what the file of closures says that they are.
+fn replace(joints: &mut [Between], by: &[(String, Becomes)]) -> Result<(), String> {
+    for (name, becomes) in by {
+        let found = joints.iter_mut().find(|joint| &joint.name == name);
+        let Some(Between { joints, line, .. }) = found else {
+            return Err(format!(
+                "the file of closures says what `{name}` is, which is no joint"
+            ));
+        };
+        let old = std::mem::take(joints);
+        let new = |name: String, kind: Kind| {
+            let mut joint = Joint::new(name, kind, *line);
+            (joint.damping, joint.friction) = old
+                .first()
+                .map_or((0.0, 0.0), |old| (old.damping, old.friction));
+            joint
+        };
+        match becomes {
+            Becomes::Fixed => {}
+            Becomes::Ball => joints.push(new(name.clone(), Kind::Ball)),
+            Becomes::Cross(axes) => {
+                for letter in axes {
+                    let own = format!("{name}_{}", letter.to_ascii_uppercase());
+                    let mut joint = new(own, Kind::Turn);
+                    joint.axis = Vector3::zeros();
+                    joint.axis[usize::from(*letter as u8 - b'x')] = 1.0;
+                    joints.push(joint);
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A joint that is fixed follows nothing, and what follows a fixed one is held.
+fn follow_fixed(out: &mut Description, joints: &[Between]) {
+    let is_fixed = |name: &str| {
+        let mut joints = joints.iter();
+        joints.any(|joint| joint.name == name && joint.joints.is_empty())
+    };
+    let remarks = &mut out.remarks;
+    out.couplings.retain_mut(|coupling| {
+        if let Some(of) = coupling.of.take_if(|of| is_fixed(of)) {
+            remarks.push(format!(
+                "line {}: `{}` follows `{of}`, which is fixed: it is held at {}",
+                coupling.line, coupling.joint, coupling.offset
+            ));
+        }
+        let moves = !is_fixed(&coupling.joint);
+        if !moves {
+            remarks.push(format!(
+                "line {}: `{}` is fixed and follows nothing; its <mimic> is left out",
+                coupling.line, coupling.joint
+            ));
+        }
+        moves
+    });
 }
 
 fn check_names(links: &[Node], joints: &[Between]) -> Result<(), String> {
@@ -268,7 +334,7 @@ fn joint(node: &Node, out: &mut Description) -> Result<Between, String> {
         parent: word(&required(node, "parent")?, "link")?,
         child: word(&required(node, "child")?, "link")?,
         origin: origin(node)?,
-        joint: moving,
+        joints: moving.into_iter().collect(),
         name,
         line: line(node),
     })
@@ -316,7 +382,7 @@ fn close(out: &mut Description, joints: &[Between], file: Closures) -> Result<()
     for name in &file.drives {
         if joints
             .iter()
-            .all(|joint| &joint.name != name || joint.joint.is_none())
+            .all(|joint| &joint.name != name || joint.joints.is_empty())
         {
             return Err(format!(
                 "the file of closures drives `{name}`, which is no joint that moves"

@@ -111,3 +111,130 @@ fn tendons_that_bend_are_said() {
     let error = missing.unwrap_err();
     assert!(error.contains("line") && error.contains("`tap`"), "{error}");
 }
+
+/// The nominal values of a body's part, as they stand in a model file.
+fn part<'a>(model: &'a str, body: &str) -> &'a str {
+    let from = model.find(&format!("name = \"{body}_body\"")).unwrap();
+    model[from..]
+        .split("nominal = {")
+        .nth(1)
+        .unwrap()
+        .split('}')
+        .next()
+        .unwrap()
+        .trim()
+}
+
+#[test]
+fn masses_are_as_the_compiler_says() {
+    let model = |compiler: &str| {
+        let text = format!(
+            "<mujoco model=\"two\"><compiler {compiler}/><worldbody>\
+             <body name=\"one\"><joint axis=\"0 1 0\"/><inertial mass=\"1\" pos=\"0 0 0\" diaginertia=\"1 2 4\"/>\
+             <body name=\"two\"><joint axis=\"0 1 0\"/><geom type=\"box\" size=\"0.5 0.5 0.5\" mass=\"2\"/>\
+             <geom type=\"box\" size=\"0.5 0.5 0.5\" mass=\"1\" group=\"3\"/></body></body>\
+             </worldbody></mujoco>"
+        );
+        import(&text, &ImportOptions::default()).unwrap().model
+    };
+    let plain = model("");
+    assert_eq!(part(&plain, "one"), "XX = 1.0, YY = 2.0, ZZ = 4.0, M = 1.0");
+    assert_eq!(part(&plain, "two"), "XX = 0.5, YY = 0.5, ZZ = 0.5, M = 3.0");
+    let outer = model("inertiagrouprange=\"0 2\"");
+    assert!(part(&outer, "two").ends_with("M = 2.0"), "{outer}");
+    let heavy = model("settotalmass=\"8\"");
+    assert_eq!(part(&heavy, "one"), "XX = 2.0, YY = 4.0, ZZ = 8.0, M = 2.0");
+    assert_eq!(part(&heavy, "two"), "XX = 1.0, YY = 1.0, ZZ = 1.0, M = 6.0");
+    let even = model("balanceinertia=\"true\"");
+    let third = "2.33333333333333";
+    assert_eq!(
+        part(&even, "one"),
+        format!("XX = {third}, YY = {third}, ZZ = {third}, M = 1.0")
+    );
+    assert_eq!(part(&even, "two"), part(&plain, "two"));
+    assert!(model("settotalmass=\"-1\"") == plain);
+}
+
+/// Joints on a fixed tendon of constant length follow each other: `2*one - other` stays as it is.
+#[test]
+fn fixed_tendons_of_constant_length_couple_joints() {
+    let bodies = bar(
+        "one",
+        "0 0 0",
+        &bar("other", "0 0 1", &bar("third", "0 0 1", "")),
+    );
+    let text = |joints: &str, equality: &str| {
+        format!(
+            "<mujoco model=\"bars\"><worldbody>{bodies}</worldbody>\
+             <tendon><fixed name=\"rope\">{joints}</fixed><fixed name=\"twin\"><joint joint=\"third_turn\" coef=\"1\"/></fixed></tendon>\
+             <equality><tendon tendon1=\"rope\" {equality}/></equality></mujoco>"
+        )
+    };
+    let of = |joint: &str, coef: &str| format!("<joint joint=\"{joint}_turn\" coef=\"{coef}\"/>");
+    let two = of("one", "2") + &of("other", "-1");
+    let imported = import(&text(&two, ""), &ImportOptions::default()).unwrap();
+    let joint = |name: &str| {
+        imported
+            .joints
+            .iter()
+            .find(|joint| joint.name == name)
+            .unwrap()
+    };
+    let (one, other) = (joint("one_turn"), joint("other_turn"));
+    assert_eq!(one.coordinates, other.coordinates);
+    assert_eq!(
+        [one.ratio, one.offset, other.ratio, other.offset],
+        [1.0, 0.0, 2.0, 0.0]
+    );
+    // A tendon that follows another one has the joints of both.
+    let single = text(&of("one", "2"), "tendon2=\"twin\" polycoef=\"0 4\"");
+    let imported = import(&single, &ImportOptions::default()).unwrap();
+    let third = imported
+        .joints
+        .iter()
+        .find(|joint| joint.name == "third_turn")
+        .unwrap();
+    assert!(
+        third.coordinates[0].starts_with("third") || third.ratio != 1.0,
+        "{third:?}"
+    );
+    let fault = |text: String| {
+        import(&text, &ImportOptions::default())
+            .unwrap_err()
+            .to_string()
+    };
+    let three = fault(text(&(two + &of("third", "1")), ""));
+    assert!(three.contains("ties 3 joints"), "{three}");
+}
+
+#[test]
+fn included_files_stand_in_their_place() {
+    let main = "<mujoco model=\"bars\">\n<include file=\"more/defaults.xml\"/>\n<worldbody>\n<include file=\"bar.xml\"/>\n\
+                <body name=\"odd\"><joint type=\"screw\"/></body></worldbody></mujoco>";
+    let read = |name: &str| match name {
+        "more/defaults.xml" => Ok(
+            "<mujocoinclude>\n<default>\n<joint axis=\"1 0 0\"/></default></mujocoinclude>"
+                .to_owned(),
+        ),
+        "bar.xml" => Ok(format!("<mujoco>\n{}\n</mujoco>", bar("bar", "0 0 0", ""))),
+        other => Err(format!("{other} is not there")),
+    };
+    let whole = modelmill_reduction::expand_includes(main, &read).unwrap();
+    // Places of the main file stay.
+    let fault = import(&whole, &ImportOptions::default())
+        .unwrap_err()
+        .to_string();
+    assert!(fault.starts_with("line 5"), "{fault}");
+    let sound = whole.replace("<joint type=\"screw\"/>", "");
+    let model = import(&sound, &ImportOptions::default()).unwrap().model;
+    assert!(model.contains("name = \"bar\""), "{model}");
+    let lost = main.replace("bar.xml", "bare.xml");
+    let fault = modelmill_reduction::expand_includes(&lost, &read).unwrap_err();
+    assert!(
+        fault.contains("line 4") && fault.contains("bare.xml is not there"),
+        "{fault}"
+    );
+    let twice = main.replace("more/defaults.xml", "bar.xml");
+    let fault = modelmill_reduction::expand_includes(&twice, &read).unwrap_err();
+    assert!(fault.contains("included twice"), "{fault}");
+}

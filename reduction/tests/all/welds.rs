@@ -166,3 +166,111 @@ fn the_pose_says_which_assembly_is_meant() {
     let error = at(&[("tern".to_owned(), 1.0)]).expect_err("no such joint");
     assert!(error.to_string().contains("`tern`"), "{error}");
 }
+
+/// A rod between a crank and a rocker, as a URDF draws it that knows no balls: a hinge at one end, and a frame at the other.
+fn rod_between(joint_of_rod: &str) -> String {
+    let robot = "<link name='ground'/>".to_owned()
+        + &link("crank", 2.0, "0.2 0 0.01")
+        + &link("rocker", 1.0, "0.1 0 0.01")
+        + &link("stick", 0.5, "0 0 0.5")
+        + &joint(
+            "turn",
+            "continuous",
+            ["ground", "crank"],
+            "0 0 0",
+            "0.1 1 0",
+        )
+        + &joint(
+            "swing",
+            "continuous",
+            ["ground", "rocker"],
+            "0 0 1",
+            "0 1 0.2",
+        )
+        + &joint("held", joint_of_rod, ["crank", "stick"], "0.4 0 0", "0 1 0")
+        + &place("top", "stick", "0 0 1")
+        + &place("seat", "rocker", "0.4 0 0");
+    format!("<robot name='rod'>{robot}</robot>")
+}
+
+const SEATED: &str = "closed_loop: [['top', 'seat']]\ntype: ['3d']\nname_mot: ['turn']\n";
+
+fn with(robot: &str, closures: &str) -> Result<Imported, String> {
+    let options = ImportOptions {
+        closures: Some(closures),
+        ..ImportOptions::default()
+    };
+    import(robot, &options).map_err(|error| error.to_string())
+}
+
+#[test]
+fn joints_are_what_the_file_of_closures_says() {
+    let more = |name: &str, kind: &str| {
+        format!("{SEATED}joint_name: ['{name}']\njoint_type: ['{kind}']\n")
+    };
+    let ball = with(&rod_between("revolute"), &more("held", "SPHERICAL")).expect("a model");
+    // A rod turns about itself last, wherever its length leads: that turn is the one that the loop leaves free.
+    assert!(ball.model.contains("axes = \"yxz\""), "{}", ball.model);
+    let passive = |line: &&str| line.contains("passive = true");
+    let passive: Vec<&str> = ball.model.lines().filter(passive).collect();
+    assert_eq!(passive.len(), 3, "{passive:?}");
+    assert!(
+        !passive.iter().any(|line| line.starts_with("held_z")),
+        "{passive:?}"
+    );
+    let spherical = with(&rod_between("spherical"), SEATED).expect("a model");
+    assert_eq!(ball.model, spherical.model);
+    let cross = with(&rod_between("revolute"), &more("held", "UJOINT_XY")).expect("a model");
+    let names: Vec<&str> = cross
+        .joints
+        .iter()
+        .map(|joint| joint.name.as_str())
+        .collect();
+    assert_eq!(names, ["turn", "swing", "held_X", "held_Y"]);
+    let fixed = with(&rod_between("revolute"), &more("swing", "FIXED")).expect("a model");
+    assert!(fixed.joints.iter().all(|joint| joint.name != "swing"));
+    let fault = |text: &str| with(&rod_between("revolute"), text).expect_err("a fault");
+    assert!(fault(&more("hold", "SPHERICAL")).contains("`hold`"));
+    assert!(fault(&more("held", "SPHERE")).contains("found `SPHERE`"));
+    let short = format!("{SEATED}joint_name: ['held']\n");
+    assert!(fault(&short).contains("a `joint_type` for each"));
+    let odd = with(
+        &rod_between("spherical"),
+        &format!("{SEATED}color: ['red']\n"),
+    );
+    let remarks = odd.expect("a model").remarks.join("\n");
+    assert!(remarks.contains("`color` is not read"), "{remarks}");
+}
+
+/// Grippers whose fingers were fixed by hand keep their <mimic>.
+#[test]
+fn fixed_joints_follow_nothing() {
+    let follow = |of: &str| format!("<mimic joint='{of}' multiplier='-1' offset='0.25'/></joint>");
+    let finger = |name: &str, kind: &str, of: &str| {
+        let text = joint(
+            name,
+            kind,
+            ["palm", &format!("{name}_link")],
+            "0 0 0",
+            "0 1 0",
+        );
+        link(&format!("{name}_link"), 0.1, "0.1 0 0") + &text.replace("</joint>", &follow(of))
+    };
+    let robot = "<link name='base'/>".to_owned()
+        + &link("palm", 1.0, "0 0 0.1")
+        + &joint("wrist", "continuous", ["base", "palm"], "0 0 0", "1 0 0")
+        + &finger("one", "fixed", "wrist")
+        + &finger("two", "revolute", "one");
+    let imported = import(
+        &format!("<robot name='hand'>{robot}</robot>"),
+        &ImportOptions::default(),
+    );
+    let imported = imported.expect("a model");
+    assert_eq!(imported.joints.len(), 1);
+    let remarks = imported.remarks.join("\n");
+    assert!(
+        remarks.contains("`one` is fixed and follows nothing"),
+        "{remarks}"
+    );
+    assert!(remarks.contains("it is held at 0.25"), "{remarks}");
+}

@@ -1,0 +1,67 @@
+//! Puts the files that an MJCF includes in the place of its `<include>`.
+//!
+//! Source: MuJoCo's XML reference, "include": the children of the other file's root, each file once, with names relative to
+//! the folder of the main file.
+
+use roxmltree::Document;
+
+use super::xml::{at, word};
+
+/// Files that include each other are followed this far.
+const DEEPEST: usize = 20;
+
+/// The text of an MJCF with all files that it includes, each as one line, so that lines of messages are those of the file
+/// itself. `read` gives the text of a file by its name.
+///
+/// Text that is no XML, or no MJCF, stays as it is: reading it says what is wrong.
+pub fn expand(text: &str, read: &dyn Fn(&str) -> Result<String, String>) -> Result<String, String> {
+    expanded(text, read, &mut Vec::new(), 0)
+}
+
+fn expanded(
+    text: &str,
+    read: &dyn Fn(&str) -> Result<String, String>,
+    seen: &mut Vec<String>,
+    depth: usize,
+) -> Result<String, String> {
+    let Ok(document) = Document::parse(text) else {
+        return Ok(text.to_owned());
+    };
+    let root = document.root_element();
+    if depth == 0 && root.tag_name().name() != "mujoco" {
+        return Ok(text.to_owned());
+    }
+    let mut out = String::new();
+    let mut from = 0;
+    for node in root.descendants() {
+        if node.tag_name().name() != "include" {
+            continue;
+        }
+        let name = word(&node, "file")?;
+        if depth == DEEPEST || seen.contains(&name) {
+            return Err(at(
+                &node,
+                &format!("`{name}` is included twice; MuJoCo takes a file once"),
+            ));
+        }
+        seen.push(name.clone());
+        let other = read(&name).map_err(|fault| at(&node, &fault))?;
+        let whole = expanded(&other, read, seen, depth + 1)
+            .map_err(|fault| at(&node, &format!("in `{name}`: {fault}")))?;
+        let inner = Document::parse(&whole).map_err(|fault| {
+            at(
+                &node,
+                &format!("`{name}` is no XML that can be read ({fault})"),
+            )
+        })?;
+        let children = inner.root_element().children();
+        let range = node.range();
+        out.push_str(&text[from..range.start]);
+        for child in children.filter(|child| child.is_element()) {
+            out.push_str(&whole[child.range()].replace(['\n', '\r'], " "));
+        }
+        from = range.end;
+    }
+    out.push_str(&text[from..]);
+    Ok(out)
+}
