@@ -127,7 +127,7 @@ impl FleetGround {
                 .iter()
                 .map(|(day, bytes)| Ok((day.clone(), Summary::of_bytes(bytes)?)));
             let days = days.collect::<Result<Vec<_>, Fault>>()?;
-            let robot = modelmill_fleet::robot::robot(&self.ground, name, days)?;
+            let robot = modelmill_fleet::robot::robot(&self.ground, name, &days)?;
             Ok(robot.json(&self.ground).to_string())
         });
         found.map_err(|fault: Fault| of_fleet(py, &fault))

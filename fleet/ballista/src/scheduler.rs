@@ -105,7 +105,10 @@ impl Cluster {
     /// Ends all jobs that run; the scheduler has taken note of it when this returns.
     async fn end_jobs(&self) -> std::result::Result<usize, Fault> {
         let mut running = Vec::new();
-        for job in self.jobs.get_all_jobs().await.map_err(Fault::new)? {
+        let all = self.jobs.get_all_jobs().await.map_err(Fault::new)?;
+        let mut all: Vec<JobId> = all.into_iter().collect();
+        all.sort_by_key(JobId::to_string);
+        for job in all {
             let told = self.jobs.get_job_status(&job).await.map_err(Fault::new)?;
             if matches!(told.and_then(|told| told.status), Some(Status::Running(_))) {
                 running.push(job);
@@ -132,7 +135,7 @@ impl ClusterState for Cluster {
     async fn remove_executor(&self, executor_id: &str) -> Result<()> {
         match self.end_jobs().await {
             Ok(ended) => {
-                log::warn!("executor {executor_id} is lost; {ended} jobs end, to be put again")
+                log::warn!("executor {executor_id} is lost; {ended} jobs end, to be put again");
             }
             // No answer is better than one that may be wrong.
             Err(fault) => {

@@ -153,7 +153,7 @@ fn middle(mut values: Vec<f64>) -> Option<Fitted> {
     let median = |values: &mut Vec<f64>| {
         values.sort_by(f64::total_cmp);
         let n = values.len();
-        (values[(n - 1) / 2] + values[n / 2]) / 2.0
+        f64::midpoint(values[(n - 1) / 2], values[n / 2])
     };
     let value = median(&mut values);
     let mut distances: Vec<f64> = values.iter().map(|x| (x - value).abs()).collect();

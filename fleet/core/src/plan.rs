@@ -251,7 +251,7 @@ fn settled(chosen: &Recording, reading: &Reading) -> Result<Preparation, Fault> 
         let cutoff = ABOVE * highest;
         // Beyond a quarter of the rate no filter can be designed; motion is there no more.
         let cutoff = cutoff.min(0.2 * rate);
-        let every = (1..)
+        let every = (1..=1_000_000)
             .take_while(|every| KEPT * cutoff * f64::from(*every) <= rate)
             .last();
         decimate = decimate.max(

@@ -70,8 +70,8 @@ pub struct Robot {
 /// Looks at the days of a robot, which are in order of time, each with the summary of its recordings.
 ///
 /// Fails where summaries are of another plan.
-pub fn robot(ground: &Ground, name: &str, days: Vec<(String, Summary)>) -> Result<Robot, Fault> {
-    for (_, summary) in &days {
+pub fn robot(ground: &Ground, name: &str, days: &[(String, Summary)]) -> Result<Robot, Fault> {
+    for (_, summary) in days {
         ground.check(summary)?;
     }
     let looked_at: Vec<Day> = days
@@ -127,7 +127,7 @@ fn sinces(ground: &Ground, runs: &[Run], known: &[usize]) -> Vec<Since> {
         return Vec::new();
     };
     let mut all = Vec::new();
-    let mut open = vec![0..runs.len()];
+    let mut open: Vec<_> = std::iter::once(0..runs.len()).collect();
     while let Some(window) = open.pop() {
         let Some(since) = clearest(ground, &runs[window.clone()], *within) else {
             continue;

@@ -162,7 +162,7 @@ impl Summing {
         Ok(())
     }
 
-    fn each(values: &[ArrayRef], mut look: impl FnMut(&[u8]) -> Result<()>) -> Result<()> {
+    fn each(values: &[ArrayRef], look: impl FnMut(&[u8]) -> Result<()>) -> Result<()> {
         let Some(column) = values.first() else {
             return exec_err!("a summary is missing; give a column of summaries");
         };
@@ -170,7 +170,7 @@ impl Summing {
         let Some(column) = column.as_any().downcast_ref::<BinaryArray>() else {
             return exec_err!("summaries are bytes; give what `modelmill_summarise` made");
         };
-        column.iter().flatten().try_for_each(|bytes| look(bytes))
+        column.iter().flatten().try_for_each(look)
     }
 
     fn summed(&mut self) -> Result<Option<Summary>> {

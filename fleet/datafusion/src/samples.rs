@@ -157,5 +157,5 @@ fn take<'a>(left: &mut &'a [u8], n: usize) -> Option<&'a [u8]> {
 }
 
 pub(crate) fn external(fault: modelmill_fleet::Fault) -> DataFusionError {
-    DataFusionError::Execution(fault.to_string())
+    DataFusionError::External(Box::new(fault))
 }

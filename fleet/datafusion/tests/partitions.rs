@@ -58,28 +58,10 @@ async fn stored(files: &BTreeMap<String, Vec<File>>) -> Arc<dyn ObjectStore> {
     Arc::new(store)
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn partitions_change_nothing() {
-    let folder = std::env::temp_dir().join(format!("modelmill-partitions-{}", std::process::id()));
-    let size = Size {
-        robots: 3,
-        days: 6,
-        per_day: 2,
-        seconds: 12.0,
-        rate: 100.0,
-        seed: 9,
-        bad: 0,
-        changes: 1.0,
-    };
-    generate(&folder, &size).unwrap();
-    let data = folder.join("recordings");
-    let first = data.join("robot=R00000/day=2026-03-01/recording=0/data.parquet");
-    let plan = Plan::make(&folder.join("model.toml"), &Reading::default(), &[&first]).unwrap();
-    let ground: Arc<Ground> = Arc::new(plan.ground().unwrap());
+/// The answer that files give, one after the other.
+fn of_files(ground: &Ground, files: &BTreeMap<String, Vec<File>>) -> Answer {
     let mut expected = Answer::new();
-    let files = robots(&data).unwrap();
-    let store = stored(&files).await;
-    for (robot, files) in &files {
+    for (robot, files) in files {
         for day in files.chunk_by(|a, b| a.day == b.day) {
             let mut sum = ground.empty();
             for file in day {
@@ -98,6 +80,55 @@ async fn partitions_change_nothing() {
             );
         }
     }
+    expected
+}
+
+async fn faults_are_told(ground: &Arc<Ground>, store: Arc<dyn ObjectStore>) {
+    let session = SessionContext::new();
+    register(&session, ground);
+    session.register_object_store(&"s3://fleet".parse().unwrap(), store);
+    let faults = [
+        (
+            "SELECT modelmill_identify(arrow_cast('no summary', 'Binary'))",
+            "no summary of recordings",
+        ),
+        (
+            "SELECT * FROM modelmill_recordings('s3://fleet/site/elsewhere')",
+            "holds no recordings",
+        ),
+        (
+            "SELECT * FROM modelmill_recordings('s3://unknown/recordings')",
+            "s3://unknown",
+        ),
+    ];
+    for (query, says) in faults {
+        let frame = session.sql(query).await.unwrap();
+        let fault = frame.collect().await.unwrap_err().to_string();
+        assert!(fault.contains(says), "{query}: {fault}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn partitions_change_nothing() {
+    let folder = std::env::temp_dir().join(format!("modelmill-partitions-{}", std::process::id()));
+    let size = Size {
+        robots: 3,
+        days: 6,
+        per_day: 2,
+        seconds: 12.0,
+        rate: 100.0,
+        seed: 9,
+        bad: 0,
+        changes: 1.0,
+    };
+    generate(&folder, &size).unwrap();
+    let data = folder.join("recordings");
+    let first = data.join("robot=R00000/day=2026-03-01/recording=0/data.parquet");
+    let plan = Plan::make(&folder.join("model.toml"), &Reading::default(), &[&first]).unwrap();
+    let ground: Arc<Ground> = Arc::new(plan.ground().unwrap());
+    let files = robots(&data).unwrap();
+    let store = stored(&files).await;
+    let expected = of_files(&ground, &files);
     assert_eq!(expected.len(), 18);
     let samples = "recording, t, q1, q3, motor_left, motor_right";
     let queries = [
@@ -156,27 +187,6 @@ async fn partitions_change_nothing() {
             }
         }
     }
-    let session = SessionContext::new();
-    register(&session, &ground);
-    session.register_object_store(&"s3://fleet".parse().unwrap(), store);
-    let faults = [
-        (
-            "SELECT modelmill_identify(arrow_cast('no summary', 'Binary'))",
-            "no summary of recordings",
-        ),
-        (
-            "SELECT * FROM modelmill_recordings('s3://fleet/site/elsewhere')",
-            "holds no recordings",
-        ),
-        (
-            "SELECT * FROM modelmill_recordings('s3://unknown/recordings')",
-            "s3://unknown",
-        ),
-    ];
-    for (query, says) in faults {
-        let frame = session.sql(query).await.unwrap();
-        let fault = frame.collect().await.unwrap_err().to_string();
-        assert!(fault.contains(says), "{query}: {fault}");
-    }
+    faults_are_told(&ground, store).await;
     std::fs::remove_dir_all(&folder).unwrap();
 }

@@ -7,7 +7,7 @@
 
 use std::fs;
 use std::io::BufWriter;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use modelmill_fleet::Fault;
@@ -173,13 +173,13 @@ struct Motion {
 ///
 /// Fails where the size makes no fleet, or the folder cannot be written to.
 pub fn generate(folder: &Path, size: &Size) -> Result<Value, Fault> {
-    if size.robots == 0
-        || size.days < 6
-        || size.per_day == 0
-        || !(size.seconds >= 5.0)
-        || !(size.rate >= 20.0)
-        || !(size.changes >= 0.0)
-    {
+    let is_large_enough = size.robots > 0
+        && size.days >= 6
+        && size.per_day > 0
+        && size.seconds >= 5.0
+        && size.rate >= 20.0
+        && size.changes >= 0.0;
+    if !is_large_enough {
         return Err(Fault::new(
             "a fleet has one robot or more, six days or more, one recording a day or more, each of 5 s or more at 20 Hz or more, and no changes of less than nothing",
         ));
@@ -236,8 +236,28 @@ pub fn generate(folder: &Path, size: &Size) -> Result<Value, Fault> {
     Ok(truth)
 }
 
+/// The whole number nearest to one that is none or more.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "sizes of a fleet"
+)]
+fn count(x: f64) -> usize {
+    x.round() as usize
+}
+
+/// One of so many places, all alike.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "below n, which is one"
+)]
+fn one_of(noise: &mut Noise, n: usize) -> usize {
+    ((noise.uniform() * n as f64) as usize).min(n - 1)
+}
+
 fn samples(size: &Size) -> usize {
-    (size.seconds * size.rate).round() as usize
+    count(size.seconds * size.rate)
 }
 
 /// Days from the first of March 2026 on.
@@ -303,7 +323,7 @@ fn motion(size: &Size, k: usize) -> Result<Motion, Fault> {
         }
         state
     };
-    let n = (PERIOD * size.rate).round() as usize;
+    let n = count(PERIOD * size.rate);
     // The motions of all bodies once; then forces for one number after the other.
     let tracked = rig.clone();
     let mut tracker = Tracker::new(&tracked).map_err(Fault::new)?;
@@ -391,8 +411,7 @@ fn planted(size: &Size, r: usize) -> Planted {
     let mut noise = Noise::new(size.seed, 5_000_000 + r as u64);
     let drive = usize::from(noise.uniform() < 0.5);
     // Two days before and three after, so that there is something to tell.
-    let span = (size.days - 4) as f64;
-    let day = 2 + ((noise.uniform() * span) as usize).min(size.days - 5);
+    let day = 2 + one_of(&mut noise, size.days - 4);
     let much = noise.uniform();
     // Small fleets have one of each as well.
     match r % 100 {
@@ -416,7 +435,7 @@ fn planted(size: &Size, r: usize) -> Planted {
 /// Which recordings are cut off, as by a full disk.
 fn bad_recordings(size: &Size) -> Vec<(usize, usize, usize)> {
     let mut noise = Noise::new(size.seed, 9_000_000);
-    let mut place = |n: usize| ((noise.uniform() * n as f64) as usize).min(n - 1);
+    let mut place = |n: usize| one_of(&mut noise, n);
     let mut all: Vec<_> = (0..size.bad)
         .map(|_| (place(size.robots), place(size.days), place(size.per_day)))
         .collect();
@@ -434,7 +453,7 @@ fn spoil(path: &Path) -> Result<(), Fault> {
 
 /// Writes one recording.
 fn record(
-    path: &PathBuf,
+    path: &Path,
     size: &Size,
     motions: &[Motion],
     robot: &Robot,
@@ -444,9 +463,9 @@ fn record(
     let seed = size.seed
         ^ ((r as u64) << 24 | (day as u64) << 8 | k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     let mut noise = Noise::new(seed, 3);
-    let motion = &motions[((noise.uniform() * MOTIONS as f64) as usize).min(MOTIONS - 1)];
+    let motion = &motions[one_of(&mut noise, MOTIONS)];
     let n = motion.q[0].len();
-    let start = ((noise.uniform() * n as f64) as usize).min(n - 1);
+    let start = one_of(&mut noise, n);
     let mut links = robot.links;
     let daily = 1.0 + DAILY * noise.normal();
     let [mut dry, mut viscous] = [robot.dry, robot.viscous].map(|f| f.map(|f| f * daily));
@@ -494,6 +513,10 @@ fn record(
         let at = (start + i) % n;
         for j in 0..2 {
             positions[j].push(ENCODER.read(motion.q[j][at], &mut noise));
+            #[allow(
+                clippy::cast_possible_truncation,
+                reason = "torques are stored with fewer digits"
+            )]
             torques[j].push(TORQUE.read(torque[j][at], &mut noise) as f32);
         }
     }

@@ -77,7 +77,7 @@ pub fn identify(asked: &Asked<'_>) -> Result<String, Fault> {
         .par_iter()
         .map(|(name, files)| {
             let days = days(&ground, &states, name, files, &kept_ones)?;
-            let robot = robot(&ground, name, days)?;
+            let robot = robot(&ground, name, &days)?;
             let before = done.fetch_add(files.len(), Ordering::Relaxed);
             let now = before + files.len();
             if now * 20 / total != before * 20 / total {
@@ -110,7 +110,7 @@ pub fn identify(asked: &Asked<'_>) -> Result<String, Fault> {
     )?;
     folder::write(&asked.out.join("fleet.html"), page::page(&found).as_bytes())?;
     let kept = kept_ones.into_inner();
-    let seconds = (summed - planned).as_secs_f64();
+    let seconds = summed.saturating_sub(planned).as_secs_f64();
     let rate = found.samples as f64 * (total - kept) as f64 / total as f64 / seconds.max(1e-9);
     Ok(format!(
         "{}\n{} recordings, {} of which were done before; {:.3e} samples; {seconds:.1} s to sum them up{}; {:.1} s in all; \

@@ -34,8 +34,6 @@ struct Tally {
 pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
     let results = read(&found.join("results.json"))?;
     let truth = read(truth)?;
-    let list = |value: &Value| value.as_array().cloned().unwrap_or_default();
-    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
     let days: Vec<String> = list(&truth["days"]).iter().map(text).collect();
     let place = |day: &Value| {
         days.iter()
@@ -50,7 +48,7 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
         .map(|one| (text(&one["robot"]), one))
         .collect();
     let mut tallies: BTreeMap<String, Tally> = BTreeMap::new();
-    let (mut sound, mut alarms) = (0, Vec::new());
+    let (mut sound, mut alarms) = (0_u32, Vec::new());
     for one in list(&truth["robots"]) {
         let (name, planted) = (text(&one["robot"]), &one["planted"]);
         let Some(robot) = robots.get(&name) else {
@@ -69,16 +67,6 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
             place(day)
                 .zip(at)
                 .is_some_and(|(found, planted)| found.abs_diff(planted) <= 1)
-        };
-        let names = |changes: &Value, kind: &str, at: Option<&str>| {
-            list(changes).iter().any(|change| {
-                let is_there = at.is_none_or(|at| {
-                    list(&change["at"])
-                        .iter()
-                        .any(|one| one.as_str() == Some(at))
-                });
-                change["kind"].as_str() == Some(kind) && is_there
-            })
         };
         let (is_found, in_time, is_named) = match kind.as_str() {
             "none" => {
@@ -139,6 +127,33 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
                 .push(format!("{name} planted {planted}, found {days:?} {says:?}"));
         }
     }
+    let mut says = told(&tallies, sound, &alarms);
+    says.push_str(&of_bad(&results, &truth));
+    Ok(says)
+}
+
+/// Whether one of the changes is of a kind, at a place if one is named.
+fn names(changes: &Value, kind: &str, at: Option<&str>) -> bool {
+    list(changes).iter().any(|change| {
+        let is_there = at.is_none_or(|at| {
+            list(&change["at"])
+                .iter()
+                .any(|one| one.as_str() == Some(at))
+        });
+        change["kind"].as_str() == Some(kind) && is_there
+    })
+}
+
+fn list(value: &Value) -> Vec<Value> {
+    value.as_array().cloned().unwrap_or_default()
+}
+
+fn text(value: &Value) -> String {
+    value.as_str().unwrap_or_default().to_owned()
+}
+
+/// What was found of each kind, and which sound robots raised an alarm.
+fn told(tallies: &BTreeMap<String, Tally>, sound: u32, alarms: &[String]) -> String {
     let mut says = String::new();
     for (kind, tally) in tallies.iter().filter(|(_, tally)| tally.planted > 0) {
         let _ = writeln!(
@@ -154,11 +169,16 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
         says,
         "sound: {sound}, of which {} raised an alarm ({:.2} %)",
         alarms.len(),
-        100.0 * alarms.len() as f64 / f64::from(u32::try_from(sound.max(1)).unwrap_or(u32::MAX))
+        100.0 * alarms.len() as f64 / f64::from(sound.max(1))
     );
-    for alarm in &alarms {
+    for alarm in alarms {
         let _ = writeln!(says, "  {alarm}");
     }
+    says
+}
+
+/// Which recordings were said to give no answer.
+fn of_bad(results: &Value, truth: &Value) -> String {
     let mut bad: Vec<String> = list(&results["bad"])
         .iter()
         .map(|one| text(&one["recording"]))
@@ -168,10 +188,8 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, Fault> {
     planted.sort();
     let missed = planted.iter().filter(|one| !bad.contains(one)).count();
     let further = bad.iter().filter(|one| !planted.contains(one)).count();
-    let _ = writeln!(
-        says,
-        "bad recordings: {} planted, {missed} not named, {further} named that are sound",
+    format!(
+        "bad recordings: {} planted, {missed} not named, {further} named that are sound\n",
         planted.len()
-    );
-    Ok(says)
+    )
 }
