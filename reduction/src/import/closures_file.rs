@@ -33,6 +33,15 @@ pub(crate) struct Pair {
     pub(crate) line: u32,
 }
 
+/// Keys that are read.
+const READ: [&str; 5] = [
+    "closed_loop",
+    "type",
+    "name_mot",
+    "joint_name",
+    "joint_type",
+];
+
 /// Reads the file, or says what is wrong.
 pub(crate) fn read(text: &str) -> Result<Closures, String> {
     let mut entries: Vec<(u32, &str, String)> = Vec::new();
@@ -92,13 +101,6 @@ pub(crate) fn read(text: &str) -> Result<Closures, String> {
         };
         out.joints.push((name, becomes));
     }
-    const READ: [&str; 5] = [
-        "closed_loop",
-        "type",
-        "name_mot",
-        "joint_name",
-        "joint_type",
-    ];
     for (line, key, _) in &entries {
         if !READ.contains(key) {
             out.remarks.push(format!(

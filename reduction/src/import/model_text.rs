@@ -1037,11 +1037,9 @@ impl Build<'_> {
 
 /// Where a link, or one that is fixed to it, is closed to others, in the frame of the link.
 fn tip(description: &Description, index: usize) -> Option<Vector3<f64>> {
-    let ends = description
-        .closures
-        .iter()
-        .flat_map(|closure| &closure.ends);
-    ends.filter_map(|(end, placed)| {
+    let closures = description.closures.iter();
+    let mut ends = closures.flat_map(|closure| &closure.ends);
+    ends.find_map(|(end, placed)| {
         let (mut link, mut at) = ((*end)?, *placed);
         while link != index {
             let Link {
@@ -1058,7 +1056,6 @@ fn tip(description: &Description, index: usize) -> Option<Vector3<f64>> {
         }
         Some(at.p)
     })
-    .next()
 }
 
 /// Fifteen significant digits: what follows is rounding of sums.

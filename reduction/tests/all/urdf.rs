@@ -289,3 +289,31 @@ fn unfinished_descriptions_give_an_answer() {
     }
     assert!(sound > 0);
 }
+
+/// A right angle with eleven digits behind the point is one, and forces are those of the rig all the same; with four it stays.
+#[test]
+fn right_angles_are_read_from_their_digits() {
+    let robot = |angle: &str| {
+        let text = format!(
+            "<robot name='r'><link name='a'/><link name='b'><inertial><mass value='1'/>\
+             <inertia ixx='1' ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/></inertial></link>\
+             <joint name='j' type='continuous'><origin rpy='{angle} 0 0'/><parent link='a'/><child link='b'/></joint></robot>"
+        );
+        import(&text, &ImportOptions::default()).unwrap()
+    };
+    let eleven = robot("1.57079632679");
+    assert!(eleven.model.contains("\"pi/2\""), "{}", eleven.model);
+    assert!(
+        eleven
+            .remarks
+            .iter()
+            .all(|remark| !remark.contains("angle"))
+    );
+    let four = robot("1.5708");
+    assert!(four.model.contains("value = 1.5708"), "{}", four.model);
+    assert!(
+        four.remarks
+            .iter()
+            .any(|remark| remark.contains("stays as it is"))
+    );
+}

@@ -227,7 +227,8 @@ fn joints_are_what_the_file_of_closures_says() {
         .map(|joint| joint.name.as_str())
         .collect();
     assert_eq!(names, ["turn", "swing", "held_X", "held_Y"]);
-    let fixed = with(&rod_between("revolute"), &more("swing", "FIXED")).expect("a model");
+    let open = "name_mot: ['turn']\njoint_name: ['swing']\njoint_type: ['FIXED']\n";
+    let fixed = with(&rod_between("revolute"), open).expect("a model");
     assert!(fixed.joints.iter().all(|joint| joint.name != "swing"));
     let fault = |text: &str| with(&rod_between("revolute"), text).expect_err("a fault");
     assert!(fault(&more("hold", "SPHERICAL")).contains("`hold`"));
