@@ -6,7 +6,7 @@
 /// What the file says.
 #[derive(Debug, Default)]
 pub(crate) struct Closures {
-    pub(crate) closures: Vec<Pair>,
+    pub(crate) pairs: Vec<Pair>,
     /// Joints that are driven; all where there are none.
     pub(crate) drives: Vec<String>,
     /// Joints with what they are, whatever the URDF has in their place: it knows neither balls nor crosses.
@@ -118,7 +118,7 @@ pub(crate) fn read(text: &str) -> Result<Closures, String> {
                 ));
             }
         };
-        out.closures.push(Pair {
+        out.pairs.push(Pair {
             ends: ends.clone(),
             is_full,
             line,

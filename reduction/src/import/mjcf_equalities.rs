@@ -151,27 +151,6 @@ impl<'a, 'i> Reader<'a, 'i> {
             .ok_or_else(|| at(node, &format!("no joint is called `{name}`")))
     }
 
-    /// Joints with the lengths that a turn or a slide of each adds to a fixed tendon.
-    fn on_tendon(&self, node: &Node<'a, 'i>, name: &str) -> Result<Vec<(String, f64)>, String> {
-        let root = node.document().root_element();
-        let tendon = children(&root, "tendon")
-            .flat_map(|section| section.children().collect::<Vec<_>>())
-            .find(|tendon| tendon.attribute("name") == Some(name))
-            .ok_or_else(|| at(node, &format!("no tendon is called `{name}`")))?;
-        if tendon.tag_name().name() != "fixed" {
-            return Err(at(
-                node,
-                &format!(
-                    "`{name}` runs through space; models keep the length of fixed tendons only"
-                ),
-            ));
-        }
-        let joints = children(&tendon, "joint");
-        joints
-            .map(|joint| Ok((word(&joint, "joint")?, number(&joint, "coef")?)))
-            .collect()
-    }
-
     /// A fixed tendon of constant length, or two that follow each other: a coupling, if two joints are concerned.
     fn tied(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
         let given = match self.text(node, None, "polycoef")? {
@@ -179,7 +158,7 @@ impl<'a, 'i> Reader<'a, 'i> {
             None => vec![0.0, 1.0],
         };
         let coefficient = |k: usize| given.get(k).copied().unwrap_or(0.0);
-        let mut terms = self.on_tendon(node, &word(node, "tendon1")?)?;
+        let mut terms = on_tendon(node, &word(node, "tendon1")?)?;
         if let Some(other) = node.attribute("tendon2") {
             if (2..5).any(|k| coefficient(k) != 0.0) {
                 return Err(at(
@@ -187,7 +166,7 @@ impl<'a, 'i> Reader<'a, 'i> {
                     "a coupling by a polynomial of higher degree; models have constant ratios",
                 ));
             }
-            for (joint, length) in self.on_tendon(node, other)? {
+            for (joint, length) in on_tendon(node, other)? {
                 terms.push((joint, -coefficient(1) * length));
             }
         }
@@ -224,4 +203,23 @@ impl<'a, 'i> Reader<'a, 'i> {
         });
         Ok(())
     }
+}
+
+/// Joints with the lengths that a turn or a slide of each adds to a fixed tendon.
+fn on_tendon(node: &Node<'_, '_>, name: &str) -> Result<Vec<(String, f64)>, String> {
+    let root = node.document().root_element();
+    let tendon = children(&root, "tendon")
+        .flat_map(|section| section.children().collect::<Vec<_>>())
+        .find(|tendon| tendon.attribute("name") == Some(name))
+        .ok_or_else(|| at(node, &format!("no tendon is called `{name}`")))?;
+    if tendon.tag_name().name() != "fixed" {
+        return Err(at(
+            node,
+            &format!("`{name}` runs through space; models keep the length of fixed tendons only"),
+        ));
+    }
+    let joints = children(&tendon, "joint");
+    joints
+        .map(|joint| Ok((word(&joint, "joint")?, number(&joint, "coef")?)))
+        .collect()
 }

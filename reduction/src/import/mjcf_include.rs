@@ -57,7 +57,7 @@ fn expanded(
         let children = inner.root_element().children();
         let range = node.range();
         out.push_str(&text[from..range.start]);
-        for child in children.filter(|child| child.is_element()) {
+        for child in children.filter(roxmltree::Node::is_element) {
             out.push_str(&whole[child.range()].replace(['\n', '\r'], " "));
         }
         from = range.end;

@@ -365,7 +365,7 @@ fn close(out: &mut Description, joints: &[Between], file: Closures) -> Result<()
             format!("the file of closures names `{name}`, which is neither a link nor a joint")
         })
     };
-    for closure in file.closures {
+    for closure in file.pairs {
         let [one, other] = &closure.ends;
         let ends = [place(one)?, place(other)?].map(|link| (link, Placed::identity()));
         out.closures.push(Closure {
