@@ -100,6 +100,14 @@ fn bump(force: &mut [f64], height: f64) {
     }
 }
 
+/// Adds a pull that gives way on both sides of the middle.
+fn hose(force: &mut [f64], positions: &[f64], most: f64, way: f64) {
+    let middle = positions.iter().sum::<f64>() / SAMPLES as f64;
+    for (f, position) in force.iter_mut().zip(positions) {
+        *f += most * ((position - middle) / way).tanh();
+    }
+}
+
 /// A recording of a model that is derived already.
 pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBuf {
     let mut draws = Draws(seed);
@@ -149,11 +157,7 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
         push(&mut forces, &with, &without, times, from..to);
     }
     if let Made::Hose(joint, most, way) = made {
-        let positions = &columns[0][joint];
-        let middle = positions.iter().sum::<f64>() / SAMPLES as f64;
-        for (force, position) in forces[joint].iter_mut().zip(positions) {
-            *force += most * ((position - middle) / way).tanh();
-        }
+        hose(&mut forces[joint], &columns[0][joint], most, way);
     }
     let carried = forces.clone();
     let motion = evaluator.drives(&states).expect("drives");
