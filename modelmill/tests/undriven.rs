@@ -230,8 +230,8 @@ struct Made {
 /// Simulates by Runge and Kutta and writes poses and the drives' forces; every other quaternion has the other sign.
 fn recording(model: &Model, name: &str, made: &Made) -> PathBuf {
     const SAMPLES: usize = 4000;
-    let push = made.push;
     const STEP: f64 = 0.001;
+    let push = made.push;
     let mechanism = &model.derivation.mechanism;
     let body = free_body(model);
     let plant = Plant {

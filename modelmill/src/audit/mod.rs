@@ -30,7 +30,7 @@ const BETTER: f64 = 0.5;
 /// Errors that are the same but for this part cannot tell one change from another.
 const ALIKE: f64 = 0.05;
 /// Multiplications that trying all changes of the motion may take: some ten seconds of one core at most.
-const AFFORDABLE: f64 = 2e10;
+const AFFORDABLE: usize = 20_000_000_000;
 
 /// Looks at every recording that has forces, and adds what it finds to their notes; the forces of contacts and pushes count no
 /// more where `leave_out_events`.
@@ -162,9 +162,8 @@ fn suspects_of_motion(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<N
     };
     let file = &data.run.file;
     let hypotheses = hypotheses(model, &data.maps_from_degrees, file);
-    let squares = (model.base.len() * model.base.len()) as f64;
-    let cost = squares * (samples.len() * forces.len() * hypotheses.len()) as f64;
-    let thinned = (cost / AFFORDABLE).ceil().max(1.0) as usize;
+    let each = model.base.len().pow(2) * samples.len() * forces.len();
+    let thinned = (each * hypotheses.len()).div_ceil(AFFORDABLE).max(1);
     let samples: Vec<usize> = samples.iter().copied().step_by(thinned).collect();
     let measured = interleaved(forces, &samples);
     let now = explained(model, data, &samples, &|_| {}).and_then(|audit| audit.error(&measured));
