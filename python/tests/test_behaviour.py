@@ -7,6 +7,7 @@ import signal
 import threading
 import time
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -80,6 +81,15 @@ def test_effects_that_make_no_sense_are_told(m: modelmill.Model) -> None:
     assert any(one["name"] == "coulomb_friction" for one in modelmill.kinds())
 
 
+@pytest.fixture
+def _interrupts() -> Iterator[None]:
+    """Interrupts as a terminal has them: programs that a shell starts in the background begin without."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("_interrupts")
 def test_an_interrupt_stops_work(m: modelmill.Model) -> None:
     arm = modelmill.load(MODELS / "panda.toml")
     limits = {name + end: size for name in arm.coordinates for end, size in (("", (-1.0, 1.0)), ("_d", 2.0), ("_dd", 5.0))}
