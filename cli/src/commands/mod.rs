@@ -101,12 +101,14 @@ pub(crate) fn recordings(
     paths: &[PathBuf],
     reading: &Reading,
 ) -> Outcome<Vec<Recording>> {
-    let read = |path: &PathBuf| {
-        let files = files_of(path);
-        let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
-        Ok(model.recording_of(&files, reading)?)
-    };
-    paths.iter().map(read).collect()
+    let each = paths.iter();
+    each.map(|path| recording(model, path, reading)).collect()
+}
+
+fn recording(model: &Model, path: &Path, reading: &Reading) -> Outcome<Recording> {
+    let files = files_of(path);
+    let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+    Ok(model.recording_of(&files, reading)?)
 }
 
 /// Diagnoses what the command line names.
@@ -115,8 +117,14 @@ pub(crate) fn diagnose(host: &Host, args: &AskArgs, question: Question) -> Outco
         .parameters
         .in_model(host, self::model(host, &args.model)?)?;
     let reading = args.preparation.reading();
-    let fit = recordings(&model, &args.data, &reading)?;
-    let check = recordings(&model, &args.check, &reading)?;
+    let read = |paths: &[PathBuf]| -> Outcome<Vec<Recording>> {
+        let each = paths.iter().map(|path| {
+            let read = recording(&model, path, &reading)?;
+            Ok(read.for_diagnosis(&model)?)
+        });
+        each.collect()
+    };
+    let [fit, check] = [read(&args.data)?, read(&args.check)?];
     let [fit, check] = [&fit, &check].map(|all| all.iter().collect::<Vec<_>>());
     Ok(model.diagnose(&fit, &check, &question)?)
 }

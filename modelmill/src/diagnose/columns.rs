@@ -75,6 +75,8 @@ pub(crate) fn columns(candidates: &Candidates, model: &Model, all: &Runs<'_>) ->
             undefined.push(effect(candidates, entry));
         }
     }
+    // They are in the candidates now.
+    drop(found);
     if let Some((change, derivation)) = &candidates.tilt {
         let tilt = tilt(derivation, model, all)?;
         if !tilt.axes.is_empty() {

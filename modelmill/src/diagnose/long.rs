@@ -14,7 +14,7 @@ use crate::stretch::Stretch;
 /// Shorter stretches stay as they are.
 const LONG: usize = 150_000;
 /// Samples that are kept at most, where that leaves enough of the band in which forces follow the motion.
-const KEPT: usize = 20_000;
+const KEPT: usize = 12_000;
 /// The parallel filter passes this part of the band: what many samples say of it is more than enough.
 const PART_OF_BAND: f64 = 0.25;
 /// Samples that are left for the parallel filter to keep one of.
@@ -38,6 +38,19 @@ pub(crate) fn stretches(
     Ok([fit, check])
 }
 
+impl Recording {
+    /// The recording with long stretches in the fewer samples that a diagnosis looks at: for those who need it for nothing else,
+    /// since it takes less memory so.
+    ///
+    /// Fails when a stretch cannot be filtered.
+    pub fn for_diagnosis(mut self, model: &Model) -> Outcome<Self> {
+        for stretch in &mut self.stretches {
+            *stretch = thinned(model, stretch)?;
+        }
+        Ok(self)
+    }
+}
+
 /// A stretch in fewer samples, if it is long and the parallel filter keeps few of them.
 pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
     let (samples, every) = (stretch.samples(), stretch.decimation());
@@ -51,13 +64,8 @@ pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
     let most = (stretch.run.prepared.band_hz).map_or(every as f64, |band| {
         PASSED_BY_DECIMATION / (PART_OF_BAND * band * step)
     });
-    let more = kept.div_ceil(KEPT);
-    let wanted = if ((every * more) as f64) <= most {
-        every * more
-    } else {
-        every
-    };
-    let factor = wanted / LEFT;
+    let more = kept.div_ceil(KEPT).min((most / every as f64) as usize);
+    let factor = every * more.max(1) / LEFT;
     if samples < LONG || factor < 2 || stretch.weights.is_some() {
         return Ok(stretch.clone());
     }
