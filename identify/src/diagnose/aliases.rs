@@ -31,9 +31,12 @@ impl Bench<'_> {
         let (factors, squares) = self.fit(picks, super::pool::On::All);
         let rest = self.rest(picks, &factors);
         let mut all = Vec::new();
+        let known = self.pool.len();
         for i in 0..picks.len() {
             let mut others = picks.to_vec();
             let pick = others.remove(i);
+            self.present.fill(None);
+            self.forget_since(known, []);
             self.look(&others);
             let beside = self.beside(&others);
             let channels: Vec<usize> = (0..rest.len()).collect();

@@ -75,6 +75,8 @@ pub(crate) struct Bench<'a> {
     pub(crate) alone: Beside,
     /// Pool columns by candidate and choice.
     choices: Vec<Vec<Vec<usize>>>,
+    /// How many columns do not depend on what is found.
+    pub(crate) known: usize,
     /// Which columns lie in the span of others and the base.
     pub(crate) within: RefCell<Within>,
 }
@@ -106,12 +108,14 @@ impl<'a> Bench<'a> {
             weights: vec![1.0; problem.layout.channels.len()],
             present: vec![None; problem.candidates.len()],
             choices,
+            known: 0,
             within: RefCell::default(),
         };
         // Channels of very different forces count alike from the start.
         bench.weigh(&[]);
         bench.weigh(&[]);
         bench.begin();
+        bench.known = bench.pool.len();
         bench
     }
 

@@ -1,7 +1,7 @@
 //! Effects whose columns follow from the fit: a tilted base, late forces, a further body, a wrong number of the model, and
 //! what depends on the load.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use nalgebra::DVector;
 
@@ -199,6 +199,20 @@ impl Bench<'_> {
             if *k >= known {
                 *k = self.pool.add(added[*k - known].clone());
             }
+        }
+    }
+
+    /// Lets go of columns that were made since the pool had a length, but for those of some effects.
+    pub(crate) fn forget_since<'p>(
+        &mut self,
+        known: usize,
+        but: impl IntoIterator<Item = &'p Pick>,
+    ) {
+        let kept: HashSet<usize> = (but.into_iter())
+            .flat_map(|pick| pick.columns.iter().copied())
+            .collect();
+        for k in (known..self.pool.len()).filter(|k| !kept.contains(k)) {
+            self.pool.forget(k);
         }
     }
 }

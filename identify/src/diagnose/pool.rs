@@ -121,6 +121,14 @@ impl<'a> Pool<'a> {
         self.columns.split_off(known)
     }
 
+    /// Lets go of what a column holds; its place is not given to another.
+    pub(crate) fn forget(&mut self, k: usize) {
+        self.acts[k].fill(0);
+        self.columns[k] = Cow::Owned(Column::default());
+        self.products.get_mut()[k] = Products::default();
+        self.of_folds.get_mut()[k] = Products::default();
+    }
+
     pub(crate) fn column(&self, k: usize) -> &Column {
         &self.columns[k]
     }

@@ -74,6 +74,10 @@ impl Bench<'_> {
         let mut beam: Vec<Vec<Pick>> = vec![Vec::new()];
         let mut refused;
         loop {
+            let of_steps = steps.iter().flat_map(|step: &Step| &step.picks);
+            let kept = of_steps.chain(beam.iter().flatten());
+            self.present.fill(None);
+            self.forget_since(self.known, kept);
             self.weigh(&accepted);
             self.look(&accepted);
             let mut trials = self.grow(&accepted, &beam);

@@ -110,6 +110,7 @@ impl Bench<'_> {
     fn join(&mut self, mut picks: Vec<Pick>) -> Vec<Pick> {
         for i in 0..picks.len() {
             for j in i + 1..picks.len() {
+                let known = self.pool.len();
                 let joined = self
                     .same_as_both(&picks, i, j)
                     .or_else(|| self.as_good_as_both(&picks, i, j));
@@ -117,6 +118,7 @@ impl Bench<'_> {
                     picks = joined;
                     return self.join(picks);
                 }
+                self.forget_since(known, []);
             }
         }
         picks
