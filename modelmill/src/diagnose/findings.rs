@@ -167,7 +167,7 @@ impl Model {
         let find = |between: &[Difference]| {
             let asked = Asked {
                 held,
-                with_payloads: true,
+                in_full: true,
                 between,
             };
             problem::find(self, &data[0], &data[1], asked)
@@ -296,7 +296,7 @@ fn with_nominal(findings: &Findings, between: &[Difference]) -> Outcome<WithNomi
     };
     let asked = Asked {
         held: Held::All,
-        with_payloads: false,
+        in_full: false,
         between,
     };
     let answer = problem::find(&version.model, &of(false), &of(true), asked)?;

@@ -62,9 +62,9 @@ impl Answer {
 pub(crate) struct Asked<'a> {
     /// Which parameters keep their nominal values.
     pub held: Held,
-    /// Whether further bodies are looked for where all are held: not while a model file's own values are only held against
-    /// those that were found, where every wrong value of a body would be one.
-    pub with_payloads: bool,
+    /// Whether further bodies, where all are held, and laws are looked for: not while a model file's own values are only held
+    /// against those that were found, where every wrong value of a body would be one.
+    pub in_full: bool,
     /// What the recordings do not share.
     pub between: &'a [Difference],
 }
@@ -103,7 +103,7 @@ pub(crate) fn find(
     further.extend(encoders(model, &all, &problem, &slopes));
     further.extend(gears(model, &all, &values, &slopes)?);
     further.extend(constants(model, &all, &|k| is_held(model, held, k)));
-    if asked.with_payloads && (held == Held::All || problem.base.is_empty()) {
+    if asked.in_full && (held == Held::All || problem.base.is_empty()) {
         further.extend(payloads(model, &all)?);
     }
     problem.candidates.extend(further);
@@ -115,6 +115,7 @@ pub(crate) fn find(
         grids: &made.grids,
         model,
         all: &all,
+        with_laws: asked.in_full,
     };
     let mut diagnosis = model
         .host()
@@ -162,6 +163,7 @@ struct Made<'a> {
     grids: &'a [Vec<f64>],
     model: &'a Model,
     all: &'a Runs<'a>,
+    with_laws: bool,
 }
 
 impl Supply for Made<'_> {
@@ -174,6 +176,9 @@ impl Supply for Made<'_> {
     }
 
     fn sites(&self) -> Vec<Site> {
+        if !self.with_laws {
+            return Vec::new();
+        }
         // Poses without answer were reported when the recordings were evaluated for the first time.
         sites(self.candidates, self.model, self.all).unwrap_or_default()
     }
