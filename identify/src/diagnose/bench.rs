@@ -394,6 +394,7 @@ impl<'a> Bench<'a> {
         columns.extend([self.zero, self.measured]);
         let mut which = self.base.clone();
         which.extend(&columns);
+        self.pool.fill(&which);
         let gram = self.pool.gram(&which, &self.weights, On::All);
         let n = self.base.len();
         let m = columns.len();

@@ -37,6 +37,7 @@ mod readings;
 mod reproducible;
 mod search;
 mod settle;
+mod tile;
 mod tilt;
 mod tuning;
 mod untold;

@@ -1,6 +1,7 @@
 //! Inner products of columns, channel by channel and apart for fit and check, so that any set of columns is fitted in
 //! microseconds.
 
+use std::array;
 use std::borrow::Cow;
 use std::cell::RefCell;
 use std::ops::Range;
@@ -11,20 +12,27 @@ use pulp::Arch;
 use super::column::Column;
 use super::numbered::ByPlace;
 use super::problem::Layout;
+use super::tile;
 
 /// Inner products of a column with earlier ones by part (0 is the fit, 1 the check) and channel on which both act, the parts one
 /// after the other; or by fold and channel.
 type Products = ByPlace<Box<[f64]>>;
 /// Inner products of fewer numbers are made as they stand.
 const SHORT: usize = 64;
+/// Sums that an inner product has at once.
+pub(crate) const LANES: usize = 16;
 /// Folds of the cross-validation where there is no check.
 const FOLDS: usize = 10;
+
+/// Fewer inner products of a tile are made one by one.
+const FEW: usize = 3;
 
 /// Columns with their inner products, each of which is computed when it is asked for first.
 pub(crate) struct Pool<'a> {
     columns: Vec<Cow<'a, Column>>,
     /// Channels on which each column acts, a bit for each.
     acts: Vec<Box<[u64]>>,
+    channels: usize,
     fit: Range<usize>,
     check: Range<usize>,
     products: RefCell<Vec<Products>>,
@@ -45,6 +53,7 @@ impl<'a> Pool<'a> {
         Self {
             columns: Vec::new(),
             acts: Vec::new(),
+            channels: layout.channels.len(),
             fit: 0..fit,
             check: fit..layout.samples(),
             products: RefCell::default(),
@@ -73,11 +82,16 @@ impl<'a> Pool<'a> {
 
     /// Inner product of two columns' values on a channel over some samples, without those that are left out.
     pub(crate) fn inner(&self, channel: usize, a: &[f64], b: &[f64], range: Range<usize>) -> f64 {
+        let less = self.not_counted(channel, a, b, &range);
+        dot(&a[range.clone()], &b[range]) - less
+    }
+
+    /// What samples that are left out would add to an inner product.
+    fn not_counted(&self, channel: usize, a: &[f64], b: &[f64], range: &Range<usize>) -> f64 {
         let out = self.left_out.get(channel).map_or(&[][..], Vec::as_slice);
         let from = out.partition_point(|i| *i < range.start);
         let to = out.partition_point(|i| *i < range.end);
-        let less: f64 = out[from..to].iter().map(|i| a[*i] * b[*i]).sum();
-        dot(&a[range.clone()], &b[range]) - less
+        out[from..to].iter().map(|i| a[*i] * b[*i]).sum()
     }
 
     /// All samples.
@@ -133,6 +147,11 @@ impl<'a> Pool<'a> {
         &self.columns[k]
     }
 
+    /// The values of a column on a channel; `None` where they are zero throughout.
+    fn values(&self, k: usize, channel: usize) -> Option<&[f64]> {
+        self.columns[k].0.get(channel)?.as_deref()
+    }
+
     /// Whether two columns act on a channel both.
     fn meet(&self, a: usize, b: usize) -> bool {
         let mut words = self.acts[a].iter().zip(&*self.acts[b]);
@@ -149,6 +168,74 @@ impl<'a> Pool<'a> {
             common.map(move |(d, a, b)| self.inner(d, a, b, range.clone()))
         };
         parts.flat_map(of_part).collect()
+    }
+
+    /// Computes the inner products of some columns that are not known yet, those of neighbours together.
+    pub(crate) fn fill(&self, which: &[usize]) {
+        let mut which = which.to_vec();
+        // Neighbours act on the same channels.
+        which.sort_unstable_by_key(|k| (&self.acts[*k], *k));
+        which.dedup();
+        let mut products = self.products.borrow_mut();
+        let groups: Vec<&[usize]> = which.chunks(tile::SIDE).collect();
+        for (i, rows) in groups.iter().enumerate() {
+            for columns in &groups[..=i] {
+                let mut unknown = Vec::with_capacity(tile::SIDE * tile::SIDE);
+                for (r, a) in rows.iter().enumerate() {
+                    for (c, b) in columns.iter().enumerate() {
+                        let is_twice = rows == columns && c > r;
+                        let (later, earlier) = (*a.max(b), a.min(b));
+                        if !is_twice && self.meet(*a, *b) && !products[later].contains_key(earlier)
+                        {
+                            unknown.push((r, c));
+                        }
+                    }
+                }
+                if unknown.len() < FEW {
+                    continue; // Single products cost less.
+                }
+                for ((r, c), found) in self.tile(rows, columns, &unknown) {
+                    let (a, b) = (rows[r], columns[c]);
+                    products[a.max(b)].insert(a.min(b), found);
+                }
+            }
+        }
+    }
+
+    /// The same as [`Pool::products_of`] of some pairs of a tile.
+    fn tile(
+        &self,
+        rows: &[usize],
+        columns: &[usize],
+        pairs: &[(usize, usize)],
+    ) -> Vec<((usize, usize), Box<[f64]>)> {
+        let mut found: Vec<Vec<f64>> = vec![Vec::new(); pairs.len()];
+        for part in [&self.fit, &self.check] {
+            for d in 0..self.channels {
+                let r: [_; tile::SIDE] = array::from_fn(|k| self.values(*rows.get(k)?, d));
+                let c: [_; tile::SIDE] = array::from_fn(|k| self.values(*columns.get(k)?, d));
+                let Some(any) = r.iter().flatten().next() else {
+                    continue;
+                };
+                if !pairs
+                    .iter()
+                    .any(|(i, j)| r[*i].is_some() && c[*j].is_some())
+                {
+                    continue;
+                }
+                // Those that do not act here stand in for nothing.
+                let rows = r.map(|one| &one.unwrap_or(any)[part.clone()]);
+                let columns = c.map(|one| &one.unwrap_or(any)[part.clone()]);
+                let sums = tile::products(rows, columns);
+                for (found, (i, j)) in found.iter_mut().zip(pairs) {
+                    if let (Some(a), Some(b)) = (r[*i], c[*j]) {
+                        found.push(sums[*i][*j] - self.not_counted(d, a, b, part));
+                    }
+                }
+            }
+        }
+        let boxed = found.into_iter().map(Vec::into_boxed_slice);
+        pairs.iter().copied().zip(boxed).collect()
     }
 
     /// Weighted inner product of two columns on all samples.
@@ -312,8 +399,8 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 )]
 #[inline(always)]
 fn sums(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 16];
-    let (chunks_a, chunks_b) = (a.chunks_exact(16), b.chunks_exact(16));
+    let mut sums = [0.0; LANES];
+    let (chunks_a, chunks_b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
     let tail: f64 = chunks_a
         .remainder()
         .iter()
