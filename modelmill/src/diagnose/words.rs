@@ -252,3 +252,15 @@ pub fn lines(text: &str, letters: usize) -> Vec<String> {
     }
     lines
 }
+
+/// What a kind of effect does that no library holds, in a sentence.
+pub(crate) fn meaning(kind: &str) -> Option<&'static str> {
+    Some(match kind {
+        "drive_gain" => "The force is read 1 + gain times as large as it is.",
+        "force_lag" => {
+            "The force is read through a low-pass of first order with the time constant tau."
+        }
+        "dahl_friction" => "Dry friction that grows to its size over a length after each reversal.",
+        _ => return None,
+    })
+}

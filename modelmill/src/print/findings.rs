@@ -233,8 +233,13 @@ impl Findings {
                 values.join(", ")
             ));
             let mut kinds = self.answer.candidates.kinds.iter();
-            if let Some(kind) = kinds.find(|kind| kind.name == found.effect.kind) {
-                lines.push(style.dim(&format!("    {}", kind.says)));
+            let kind = kinds.find(|kind| kind.name == found.effect.kind);
+            let meaning = kind.map_or_else(
+                || words::meaning(&found.effect.kind),
+                |kind| Some(kind.says.as_str()),
+            );
+            if let Some(meaning) = meaning {
+                lines.push(style.dim(&format!("    {meaning}")));
             }
             if !found.indistinguishable_from.is_empty() {
                 lines.push(format!(
