@@ -194,7 +194,8 @@ impl<'a> Pool<'a> {
                 if unknown.len() < FEW {
                     continue; // Single products cost less.
                 }
-                for ((r, c), found) in self.tile(rows, columns, &unknown) {
+                let made = self.tile(rows, columns, &unknown);
+                for ((r, c), found) in unknown.into_iter().zip(made) {
                     let (a, b) = (rows[r], columns[c]);
                     products[a.max(b)].insert(a.min(b), found);
                 }
@@ -202,13 +203,8 @@ impl<'a> Pool<'a> {
         }
     }
 
-    /// The same as [`Pool::products_of`] of some pairs of a tile.
-    fn tile(
-        &self,
-        rows: &[usize],
-        columns: &[usize],
-        pairs: &[(usize, usize)],
-    ) -> Vec<((usize, usize), Box<[f64]>)> {
+    /// The same as [`Pool::products_of`] of some pairs of a tile, in their order.
+    fn tile(&self, rows: &[usize], columns: &[usize], pairs: &[(usize, usize)]) -> Vec<Box<[f64]>> {
         let mut found: Vec<Vec<f64>> = vec![Vec::new(); pairs.len()];
         for part in [&self.fit, &self.check] {
             for d in 0..self.channels {
@@ -234,8 +230,7 @@ impl<'a> Pool<'a> {
                 }
             }
         }
-        let boxed = found.into_iter().map(Vec::into_boxed_slice);
-        pairs.iter().copied().zip(boxed).collect()
+        found.into_iter().map(Vec::into_boxed_slice).collect()
     }
 
     /// Weighted inner product of two columns on all samples.

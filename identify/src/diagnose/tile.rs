@@ -34,6 +34,10 @@ struct Tile<'a> {
 impl WithSimd for Tile<'_> {
     type Output = [[[f64; LANES]; SIDE]; SIDE];
 
+    #[allow(
+        clippy::inline_always,
+        reason = "what is inlined has the vectors of its caller"
+    )]
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let [rows, columns] =

@@ -30,7 +30,7 @@ const BETTER: f64 = 0.5;
 /// Errors that are the same but for this part cannot tell one change from another.
 const ALIKE: f64 = 0.05;
 /// Multiplications that trying all changes of the motion may take: some ten seconds of one core at most.
-const AFFORDABLE: f64 = 2e10;
+const AFFORDABLE: u64 = 20_000_000_000;
 
 /// Looks at every recording that has forces, and adds what it finds to their notes; the forces of contacts and pushes count no
 /// more where `leave_out_events`.
@@ -162,11 +162,10 @@ fn suspects_of_motion(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<N
     };
     let file = &data.run.file;
     let hypotheses = hypotheses(model, &data.maps_from_degrees, file);
-    let each = (model.base.len() as f64).powi(2) * (samples.len() * forces.len()) as f64;
     // Beyond what 32 bits hold, where this runs in a browser.
-    let thinned = (each * hypotheses.len() as f64 / AFFORDABLE)
-        .ceil()
-        .max(1.0) as usize;
+    let rows = (samples.len() * forces.len() * hypotheses.len()) as u64;
+    let all = (model.base.len() as u64).pow(2) * rows;
+    let thinned = usize::try_from(all.div_ceil(AFFORDABLE).max(1)).unwrap_or(usize::MAX);
     let samples: Vec<usize> = samples.iter().copied().step_by(thinned).collect();
     let measured = interleaved(forces, &samples);
     let now = explained(model, data, &samples, &|_| {}).and_then(|audit| audit.error(&measured));

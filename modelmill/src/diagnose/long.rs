@@ -64,8 +64,10 @@ pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
     let most = (stretch.run.prepared.band_hz).map_or(every as f64, |band| {
         PASSED_BY_DECIMATION / (PART_OF_BAND * band * step)
     });
-    let more = kept.div_ceil(KEPT).min((most / every as f64) as usize);
-    let factor = every * more.max(1) / LEFT;
+    let more = (2..=kept.div_ceil(KEPT))
+        .rev()
+        .find(|more| (every * more) as f64 <= most);
+    let factor = every * more.unwrap_or(1) / LEFT;
     if samples < LONG || factor < 2 || stretch.weights.is_some() {
         return Ok(stretch.clone());
     }
