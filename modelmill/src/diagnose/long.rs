@@ -125,3 +125,64 @@ pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
     thinned.note(model, Note::info(says));
     Ok(thinned)
 }
+
+#[cfg(test)]
+mod tests {
+    use modelmill_identify::{PreparedAs, Run};
+
+    use super::*;
+    use crate::Host;
+
+    /// A long stretch of a pendulum, of which the parallel filter keeps one in ten samples.
+    fn long(samples: usize, band_hz: f64) -> Stretch {
+        let time: Vec<f64> = (0..samples).map(|i| 1e-3 * i as f64).collect();
+        let of = |f: &dyn Fn(f64) -> f64| vec![time.iter().map(|t| f(*t)).collect::<Vec<f64>>()];
+        Stretch::from(Run {
+            file: "long.csv".to_owned(),
+            q: of(&f64::sin),
+            qd: of(&f64::cos),
+            qdd: of(&|t| -t.sin()),
+            force: Some(of(&|t| 5.0 * t.sin())),
+            missing_force: Vec::new(),
+            left_out: vec![vec![false; samples]],
+            lines: (0..samples as u64).collect(),
+            repeats: None,
+            prepared: PreparedAs {
+                band_hz: Some(band_hz),
+                decimate: 10,
+                ..PreparedAs::default()
+            },
+            notes: Vec::new(),
+            time,
+        })
+    }
+
+    #[test]
+    fn as_few_samples_are_kept_as_the_band_allows() {
+        let path = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../model-spec/models/emps.toml"
+        );
+        let model = Host::default().model(path);
+        let model = model.unwrap_or_else(|error| panic!("{error}"));
+        for (band, kept) in [(100.0, 31_250), (60.0, 12_500), (20.0, 8_929)] {
+            let whole = long(250_000, band);
+            let fewer = thinned(&model, &whole).unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(
+                fewer.samples().div_ceil(fewer.decimation()),
+                kept,
+                "{band} Hz"
+            );
+            let again = thinned(&model, &fewer).unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(again.samples(), fewer.samples());
+            assert_eq!(again.decimation(), fewer.decimation());
+            // States are picked, and forces go with them.
+            for (q, force) in fewer.run.q[0]
+                .iter()
+                .zip(&fewer.run.measured().expect("forces")[0])
+            {
+                assert!((force - 5.0 * q).abs() < 1e-3, "{force} N m at {q}");
+            }
+        }
+    }
+}
