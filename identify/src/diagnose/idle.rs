@@ -20,12 +20,11 @@ impl Problem {
         if !self.idle.contains(&true) {
             return;
         }
-        let shallow = Problem {
-            candidates: Vec::new(),
-            ..self.clone()
-        };
-        let mut bench = Bench::new(&shallow, &NoSupply);
-        for (channel, noise) in bench.noise_of_idle() {
+        // Candidates take no part in it.
+        let candidates = std::mem::take(&mut self.candidates);
+        let found = Bench::new(self, &NoSupply).noise_of_idle();
+        self.candidates = candidates;
+        for (channel, noise) in found {
             self.noise[channel] = noise;
         }
     }

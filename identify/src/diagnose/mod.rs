@@ -219,7 +219,11 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
         }
     }
     unexplained.sort_unstable();
-    let aliases = bench.aliases(&picks);
+    let aliases = if problem.effects_only {
+        vec![Vec::new(); picks.len()]
+    } else {
+        bench.aliases(&picks)
+    };
     bench.weigh(&picks);
     let (budgets, coloured) = bench.budgets(&picks, &rest, &again);
     disturbances.extend(bench.disturbances(&picks));
@@ -250,8 +254,12 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
         (true, true) => Verdict::Adequate,
         (true, false) => Verdict::MissingEffect,
     };
-    let candidates = bench.considered(&picks, &found, &alone);
-    let untold = bench.untold(&picks, &rest);
+    let (candidates, untold) = if problem.effects_only {
+        (Vec::new(), Vec::new())
+    } else {
+        let considered = bench.considered(&picks, &found, &alone);
+        (considered, bench.untold(&picks, &rest))
+    };
     Diagnosis {
         verdict,
         noise_floor: noise_floor(&budgets),
@@ -330,6 +338,9 @@ impl Bench<'_> {
 
     /// Laws for what a set leaves, and where they may act.
     fn laws(&self, picks: &[Pick], left: &Left) -> (Vec<Site>, Vec<Proposal>) {
+        if self.problem.effects_only {
+            return (Vec::new(), Vec::new());
+        }
         let left = laws::Left {
             rest: &left.rest,
             again: &left.again,

@@ -4,6 +4,7 @@
 use std::array;
 use std::borrow::Cow;
 use std::cell::RefCell;
+use std::iter;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
@@ -254,12 +255,11 @@ impl<'a> Pool<'a> {
             .entry(b)
             .or_insert_with(|| self.products_of(a, b));
         let (fit, check) = known.split_at(known.len() / 2);
-        let common = self.columns[a].common(&self.columns[b]);
-        let sums = common
-            .zip(fit.iter().zip(check))
-            .map(|((d, ..), (fit, check))| {
-                weights[d] * if on == On::All { fit + check } else { *fit }
-            });
+        // Which channels these are is told without a look at the columns.
+        let common = (self.acts[a].iter().zip(&*self.acts[b])).map(|(a, b)| a & b);
+        let sums = bits(common).zip(fit.iter().zip(check));
+        let sums = sums
+            .map(|(d, (fit, check))| weights[d] * if on == On::All { fit + check } else { *fit });
         sums.sum()
     }
 
@@ -355,6 +355,17 @@ impl<'a> Pool<'a> {
         }
         rest
     }
+}
+
+/// Numbers of the bits that are set in some words.
+fn bits(words: impl Iterator<Item = u64>) -> impl Iterator<Item = usize> {
+    let of_word = |(k, word): (usize, u64)| {
+        let rest = move |word: &u64| Some(word & (word - 1)).filter(|rest| *rest != 0);
+        let first = Some(word).filter(|word| *word != 0);
+        let each = iter::successors(first, rest);
+        each.map(move |word| 64 * k + word.trailing_zeros() as usize)
+    };
+    words.enumerate().flat_map(of_word)
 }
 
 /// Where something is said, in order.

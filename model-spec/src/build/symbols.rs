@@ -370,7 +370,7 @@ fn declare_coordinates(
                 .help("fix joints that the recordings do not move, such as those of fingers: a frame without a joint stands still"),
         );
     }
-    // Those above are known as well, so that no other place of the file has a fault by them.
+    // Some of those above are known as well, so that few other places of the file have a fault by them.
     for (key, entry) in entries.iter().take(DECLARED_AT_MOST) {
         let turns = angles.iter().find_map(|ast| find(ast, &key.name));
         let slides = lengths.iter().find_map(|ast| find(ast, &key.name));
@@ -402,7 +402,7 @@ fn declare_coordinates(
                 );
                 None
             }
-            (None, None) if let Some(motion) = of_quaternion => Some(motion),
+            (None, None) if of_quaternion.is_some() => of_quaternion,
             (None, Some(_)) => Some(Motion::Prismatic),
             (Some(_), None) => Some(Motion::Revolute),
             (None, None) => {

@@ -29,6 +29,10 @@ const CONVINCING: f64 = 0.3;
 const BETTER: f64 = 0.5;
 /// Errors that are the same but for this part cannot tell one change from another.
 const ALIKE: f64 = 0.05;
+/// Errors as small as this one are rounding.
+const EXACT: f64 = 1e-6;
+/// Rows for each base parameter that a change is judged by at least.
+const ROWS_PER_COLUMN: usize = 4;
 /// Multiplications that trying all changes of the motion may take: some ten seconds of one core at most.
 const AFFORDABLE: u64 = 20_000_000_000;
 
@@ -161,11 +165,20 @@ fn suspects_of_motion(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<N
         return Vec::new();
     };
     let file = &data.run.file;
-    let hypotheses = hypotheses(model, &data.maps_from_degrees, file);
+    let mut hypotheses = hypotheses(model, &data.maps_from_degrees, file);
     // Beyond what 32 bits hold, where this runs in a browser.
-    let rows = (samples.len() * forces.len() * hypotheses.len()) as u64;
-    let all = (model.base.len() as u64).pow(2) * rows;
-    let thinned = usize::try_from(all.div_ceil(AFFORDABLE).max(1)).unwrap_or(usize::MAX);
+    let thinned = |hypotheses: usize| {
+        let rows = (samples.len() * forces.len() * hypotheses) as u64;
+        let all = (model.base.len() as u64).pow(2) * rows;
+        usize::try_from(all.div_ceil(AFFORDABLE).max(1)).unwrap_or(usize::MAX)
+    };
+    let most = samples.len() * forces.len() / (ROWS_PER_COLUMN * model.base.len()).max(1);
+    if thinned(hypotheses.len()) > most {
+        // Exchanges come last, and are many.
+        let turned = hypotheses.iter().rposition(|one| one.turns.is_some());
+        hypotheses.truncate(turned.map_or(0, |last| last + 1));
+    }
+    let thinned = thinned(hypotheses.len()).min(most.max(1));
     let samples: Vec<usize> = samples.iter().copied().step_by(thinned).collect();
     let measured = interleaved(forces, &samples);
     let now = explained(model, data, &samples, &|_| {}).and_then(|audit| audit.error(&measured));
@@ -181,7 +194,7 @@ fn suspects_of_motion(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<N
     tried.sort_by(|a, b| a.1.total_cmp(&b.1));
     let best = tried.first().map(|(first, error)| {
         let alike = tried.iter().filter(|(one, other)| {
-            one.turns.is_some() && *other <= (1.0 + ALIKE) * error
+            one.turns.is_some() && *other <= (1.0 + ALIKE) * error + EXACT
         });
         let turned: Vec<String> = alike
             .filter_map(|(one, _)| Some(format!("`{}`", one.turns.as_deref()?)))

@@ -10,7 +10,7 @@ use crate::along;
 use crate::compare::{self, Places};
 use crate::error::Outcome;
 use crate::model::Model;
-use crate::recording::Recording;
+use crate::recording::{Recording, stretches};
 use crate::runs::Difference;
 use crate::stretch::Stretch;
 
@@ -157,9 +157,15 @@ impl Model {
         check: &[&Recording],
         question: &Question,
     ) -> Outcome<Findings> {
-        let data = long::stretches(self, fit, check)?;
+        let fewer = |all: &[&Recording]| -> Outcome<Vec<Recording>> {
+            all.iter().map(|one| one.for_diagnosis(self)).collect()
+        };
+        let [fewer_fit, fewer_check] = [fewer(fit)?, fewer(check)?];
+        let [of_fit, of_check] =
+            [&fewer_fit, &fewer_check].map(|all| all.iter().collect::<Vec<&Recording>>());
+        let data = stretches(self, &of_fit, &of_check);
         let held = question.held;
-        let recordings: Vec<&Recording> = fit.iter().chain(check).copied().collect();
+        let recordings: Vec<&Recording> = of_fit.into_iter().chain(of_check).collect();
         let between =
             (self.host()).watched("holding the recordings against each other", 0, |_| {
                 faults::between_runs(self, &recordings)

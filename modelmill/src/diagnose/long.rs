@@ -8,7 +8,7 @@ use modelmill_identify::{LowPass, Note, PASSED_BY_DECIMATION, decimate_time};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::{Recording, note_twins};
+use crate::recording::Recording;
 use crate::stretch::Stretch;
 
 /// Shorter stretches stay as they are.
@@ -23,31 +23,14 @@ const LEFT: usize = 4;
 /// would change forces that are held against states as they were.
 const ORDER: usize = 4;
 
-/// The stretches of some recordings, long ones in fewer samples.
-pub(crate) fn stretches(
-    model: &Model,
-    fit: &[&Recording],
-    check: &[&Recording],
-) -> Outcome<[Vec<Stretch>; 2]> {
-    let all = |some: &[&Recording]| -> Outcome<Vec<Stretch>> {
-        let each = some.iter().flat_map(|one| &one.stretches);
-        each.map(|one| thinned(model, one)).collect()
-    };
-    let [mut fit, mut check] = [all(fit)?, all(check)?];
-    note_twins(model, &mut fit, &mut check);
-    Ok([fit, check])
-}
-
 impl Recording {
     /// The recording with long stretches in the fewer samples that a diagnosis looks at: for those who need it for nothing else,
     /// since it takes less memory so.
     ///
     /// Fails when a stretch cannot be filtered.
-    pub fn for_diagnosis(mut self, model: &Model) -> Outcome<Self> {
-        for stretch in &mut self.stretches {
-            *stretch = thinned(model, stretch)?;
-        }
-        Ok(self)
+    pub fn for_diagnosis(&self, model: &Model) -> Outcome<Self> {
+        let stretches = self.stretches.iter().map(|one| thinned(model, one));
+        Ok(self.with(stretches.collect::<Outcome<_>>()?))
     }
 }
 
@@ -64,10 +47,10 @@ pub(crate) fn thinned(model: &Model, stretch: &Stretch) -> Outcome<Stretch> {
     let most = (stretch.run.prepared.band_hz).map_or(every as f64, |band| {
         PASSED_BY_DECIMATION / (PART_OF_BAND * band * step)
     });
-    let more = (2..=kept.div_ceil(KEPT))
+    let wanted = (every + 1..=every * kept.div_ceil(KEPT))
         .rev()
-        .find(|more| (every * more) as f64 <= most);
-    let factor = every * more.unwrap_or(1) / LEFT;
+        .find(|wanted| *wanted as f64 <= most);
+    let factor = wanted.unwrap_or(every) / LEFT;
     if samples < LONG || factor < 2 || stretch.weights.is_some() {
         return Ok(stretch.clone());
     }
@@ -165,8 +148,14 @@ mod tests {
         );
         let model = Host::default().model(path);
         let model = model.unwrap_or_else(|error| panic!("{error}"));
-        for (band, kept) in [(100.0, 31_250), (60.0, 12_500), (20.0, 8_929)] {
-            let whole = long(250_000, band);
+        for (samples, band, kept) in [
+            (250_000, 200.0, 31_250),
+            (250_000, 100.0, 15_625),
+            (250_000, 60.0, 10_417),
+            (250_000, 20.0, 8_929),
+            (650_000, 100.0, 40_625),
+        ] {
+            let whole = long(samples, band);
             let fewer = thinned(&model, &whole).unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(
                 fewer.samples().div_ceil(fewer.decimation()),

@@ -62,8 +62,8 @@ impl Answer {
 pub(crate) struct Asked<'a> {
     /// Which parameters keep their nominal values.
     pub held: Held,
-    /// Whether further bodies, where all are held, and laws are looked for: not while a model file's own values are only held
-    /// against those that were found, where every wrong value of a body would be one.
+    /// Whether all is looked for that may explain something: not while a model file's own values are only held against those that
+    /// were found, where every wrong value of a body would be a further body, and nobody is told of laws and doubles.
     pub in_full: bool,
     /// What the recordings do not share.
     pub between: &'a [Difference],
@@ -91,6 +91,7 @@ pub(crate) fn find(
             })??;
     let mut origins = made.origins;
     hold(&mut problem, model, held);
+    problem.effects_only = !asked.in_full;
     take_off(&mut problem, model, &all, asked.between)?;
     let units: Vec<String> = (0..model.drives().len())
         .map(|d| model.force_unit(d).to_owned())
@@ -115,7 +116,6 @@ pub(crate) fn find(
         grids: &made.grids,
         model,
         all: &all,
-        with_laws: asked.in_full,
     };
     let mut diagnosis = model
         .host()
@@ -163,7 +163,6 @@ struct Made<'a> {
     grids: &'a [Vec<f64>],
     model: &'a Model,
     all: &'a Runs<'a>,
-    with_laws: bool,
 }
 
 impl Supply for Made<'_> {
@@ -176,9 +175,6 @@ impl Supply for Made<'_> {
     }
 
     fn sites(&self) -> Vec<Site> {
-        if !self.with_laws {
-            return Vec::new();
-        }
         // Poses without answer were reported when the recordings were evaluated for the first time.
         sites(self.candidates, self.model, self.all).unwrap_or_default()
     }

@@ -372,6 +372,15 @@ impl Recording {
         })
     }
 
+    /// The same recording with other stretches.
+    pub(crate) fn with(&self, stretches: Vec<Stretch>) -> Self {
+        Self {
+            stretches,
+            raw: self.raw.clone(),
+            reading: self.reading.clone(),
+        }
+    }
+
     /// What messages call its file.
     pub fn file(&self) -> &str {
         self.raw.file()
