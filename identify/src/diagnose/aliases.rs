@@ -27,6 +27,9 @@ pub(crate) struct Alias {
 impl Bench<'_> {
     /// For each effect of a set, what could stand in its place.
     pub(crate) fn aliases(&mut self, picks: &[Pick]) -> Vec<Vec<Alias>> {
+        if self.problem.effects_only {
+            return vec![Vec::new(); picks.len()];
+        }
         self.weigh(picks);
         let (factors, squares) = self.fit(picks, super::pool::On::All);
         let rest = self.rest(picks, &factors);

@@ -219,11 +219,7 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
         }
     }
     unexplained.sort_unstable();
-    let aliases = if problem.effects_only {
-        vec![Vec::new(); picks.len()]
-    } else {
-        bench.aliases(&picks)
-    };
+    let aliases = bench.aliases(&picks);
     bench.weigh(&picks);
     let (budgets, coloured) = bench.budgets(&picks, &rest, &again);
     disturbances.extend(bench.disturbances(&picks));
@@ -254,12 +250,8 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
         (true, true) => Verdict::Adequate,
         (true, false) => Verdict::MissingEffect,
     };
-    let (candidates, untold) = if problem.effects_only {
-        (Vec::new(), Vec::new())
-    } else {
-        let considered = bench.considered(&picks, &found, &alone);
-        (considered, bench.untold(&picks, &rest))
-    };
+    let candidates = bench.considered(&picks, &found, &alone);
+    let untold = bench.untold(&picks, &rest);
     Diagnosis {
         verdict,
         noise_floor: noise_floor(&budgets),
@@ -507,6 +499,9 @@ impl Bench<'_> {
         found: &search::Found,
         alone: &[f64],
     ) -> Vec<Considered> {
+        if self.problem.effects_only {
+            return Vec::new();
+        }
         self.look(picks);
         let has_check = self.problem.layout.has_check();
         let table = self.table(picks);

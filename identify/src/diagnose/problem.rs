@@ -252,7 +252,7 @@ pub struct Problem {
     pub removed: Vec<f64>,
     /// What is known to be wrong with the recordings.
     pub disturbances: Vec<Disturbance>,
-    /// Whether only verdict, steps and effects are asked for: no laws, no doubles, and nothing of what was refused or stays untold.
+    /// Whether only verdict, steps and effects are asked for: no laws, no doubles, and nothing of what was refused.
     pub effects_only: bool,
 }
 
