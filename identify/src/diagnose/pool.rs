@@ -4,7 +4,6 @@
 use std::array;
 use std::borrow::Cow;
 use std::cell::RefCell;
-use std::iter;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
@@ -24,7 +23,6 @@ const SHORT: usize = 64;
 pub(crate) const LANES: usize = 16;
 /// Folds of the cross-validation where there is no check.
 const FOLDS: usize = 10;
-
 /// Fewer inner products of a tile are made one by one.
 const FEW: usize = 3;
 
@@ -33,6 +31,7 @@ pub(crate) struct Pool<'a> {
     columns: Vec<Cow<'a, Column>>,
     /// Channels on which each column acts, a bit for each.
     acts: Vec<Box<[u64]>>,
+    /// How many there are.
     channels: usize,
     fit: Range<usize>,
     check: Range<usize>,
@@ -153,6 +152,11 @@ impl<'a> Pool<'a> {
         self.columns[k].0.get(channel)?.as_deref()
     }
 
+    fn acts_on(&self, k: usize, channel: usize) -> bool {
+        let word = self.acts[k].get(channel / 64);
+        word.is_some_and(|word| word >> (channel % 64) & 1 == 1)
+    }
+
     /// Whether two columns act on a channel both.
     fn meet(&self, a: usize, b: usize) -> bool {
         let mut words = self.acts[a].iter().zip(&*self.acts[b]);
@@ -256,9 +260,9 @@ impl<'a> Pool<'a> {
             .or_insert_with(|| self.products_of(a, b));
         let (fit, check) = known.split_at(known.len() / 2);
         // Which channels these are is told without a look at the columns.
-        let common = (self.acts[a].iter().zip(&*self.acts[b])).map(|(a, b)| a & b);
-        let sums = bits(common).zip(fit.iter().zip(check));
-        let sums = sums
+        let common = (0..self.channels).filter(|d| self.acts_on(a, *d) && self.acts_on(b, *d));
+        let sums = common
+            .zip(fit.iter().zip(check))
             .map(|(d, (fit, check))| weights[d] * if on == On::All { fit + check } else { *fit });
         sums.sum()
     }
@@ -355,17 +359,6 @@ impl<'a> Pool<'a> {
         }
         rest
     }
-}
-
-/// Numbers of the bits that are set in some words.
-fn bits(words: impl Iterator<Item = u64>) -> impl Iterator<Item = usize> {
-    let of_word = |(k, word): (usize, u64)| {
-        let rest = move |word: &u64| Some(word & (word - 1)).filter(|rest| *rest != 0);
-        let first = Some(word).filter(|word| *word != 0);
-        let each = iter::successors(first, rest);
-        each.map(move |word| 64 * k + word.trailing_zeros() as usize)
-    };
-    words.enumerate().flat_map(of_word)
 }
 
 /// Where something is said, in order.

@@ -33,7 +33,7 @@ const ALIKE: f64 = 0.05;
 const EXACT: f64 = 1e-6;
 /// Rows for each base parameter that a change is judged by at least.
 const ROWS_PER_COLUMN: usize = 4;
-/// Multiplications that trying all changes of the motion may take: some ten seconds of one core at most.
+/// Multiplications that trying all changes of the motion may take, some ten seconds of one core: more than 32 bits hold.
 const AFFORDABLE: u64 = 20_000_000_000;
 
 /// Looks at every recording that has forces, and adds what it finds to their notes; the forces of contacts and pushes count no
@@ -166,19 +166,19 @@ fn suspects_of_motion(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<N
     };
     let file = &data.run.file;
     let mut hypotheses = hypotheses(model, &data.maps_from_degrees, file);
-    // Beyond what 32 bits hold, where this runs in a browser.
     let thinned = |hypotheses: usize| {
         let rows = (samples.len() * forces.len() * hypotheses) as u64;
         let all = (model.base.len() as u64).pow(2) * rows;
         usize::try_from(all.div_ceil(AFFORDABLE).max(1)).unwrap_or(usize::MAX)
     };
-    let most = samples.len() * forces.len() / (ROWS_PER_COLUMN * model.base.len()).max(1);
+    let fewest = (ROWS_PER_COLUMN * model.base.len()).max(1);
+    let most = (samples.len() * forces.len() / fewest).max(1);
     if thinned(hypotheses.len()) > most {
         // Exchanges come last, and are many.
         let turned = hypotheses.iter().rposition(|one| one.turns.is_some());
         hypotheses.truncate(turned.map_or(0, |last| last + 1));
     }
-    let thinned = thinned(hypotheses.len()).min(most.max(1));
+    let thinned = thinned(hypotheses.len()).min(most);
     let samples: Vec<usize> = samples.iter().copied().step_by(thinned).collect();
     let measured = interleaved(forces, &samples);
     let now = explained(model, data, &samples, &|_| {}).and_then(|audit| audit.error(&measured));
