@@ -1,16 +1,14 @@
 //! What is taken off the measured forces before anything is looked for, since no least squares bears it: single outliers, and
-//! lines of the spectrum that are periodic in time, as the hum of the mains. Both are told by name.
+//! what is periodic in time (`hum`). Both are told by name.
 //!
 //! Both are looked for in what base parameters and friction leave. An outlier stands above its neighbours' median by many
-//! robust deviations, and not where a drive reverses. A line stands above the spectrum about it, beyond the frequencies of the
-//! motion; its frequency is where least squares of a sine and a cosine explains most.
-
-use std::f64::consts::TAU;
+//! robust deviations, and not where a drive reverses.
 
 use super::disturbance::{Disturbance, Quantity};
+use super::hum;
 use super::pool::{On, Pool, dot, solve};
 use super::problem::Problem;
-use crate::signal::{hann_power, median};
+use crate::signal::median;
 
 /// Samples whose median an outlier stands out from.
 const NEIGHBOURS: usize = 9;
@@ -25,25 +23,35 @@ const REVERSAL: usize = 4;
 /// Samples on either side of a reversal that count no more, and the part of all that they may be.
 const JUMP: usize = 1;
 const MOST_JUMPS: f64 = 0.1;
-/// How many times the middle of the spectrum about it a line must reach.
-const ABOVE: f64 = 60.0;
-/// Half the width of what counts as about it, and of the line itself, in steps of the spectrum.
-const ABOUT: usize = 48;
-const LINE: usize = 6;
-/// Lines below this frequency, Hz, may be those of the motion; so may those of which there are many. Below the second they
-/// must be most of what is left of a channel.
-const LOWEST: f64 = 3.0;
-const LOW: f64 = 8.0;
-const MOST_OF: f64 = 0.6;
-const MOST_LINES: usize = 6;
-/// The part of a channel's squared rest that all of its lines must be.
-const LEAST: f64 = 0.02;
 
 /// Takes outliers and lines off the measured forces and says which there were.
 pub(crate) fn clean(problem: &mut Problem) -> Vec<Disturbance> {
+    counted(problem, |problem| {
+        let mut found = outliers(problem);
+        let left = rest(problem);
+        found.extend(hum::lines(problem, &left));
+        found
+    })
+}
+
+/// Takes off slow lines that only show themselves in what a diagnosis leaves, `[channel][sample]`, and says which there were.
+pub(crate) fn clean_again(
+    problem: &mut Problem,
+    left: &[Vec<f64>],
+    unexplained: &[usize],
+) -> Vec<Disturbance> {
+    counted(problem, |problem| {
+        hum::slow_lines(problem, left, unexplained)
+    })
+}
+
+/// Counts what `clean` takes off among what was removed.
+fn counted(
+    problem: &mut Problem,
+    clean: impl FnOnce(&mut Problem) -> Vec<Disturbance>,
+) -> Vec<Disturbance> {
     let before = problem.measured.clone();
-    let mut found = outliers(problem);
-    found.extend(lines(problem));
+    let found = clean(problem);
     let squares = |(old, new): (&Option<Vec<f64>>, &Option<Vec<f64>>)| {
         let pairs = old.iter().flatten().zip(new.iter().flatten());
         let sum: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();
@@ -168,150 +176,6 @@ fn from_neighbours(problem: &Problem, rest: &[f64]) -> Vec<f64> {
     apart
 }
 
-/// Lines of the spectrum, taken off with a phase of their own in every stretch.
-fn lines(problem: &mut Problem) -> Vec<Disturbance> {
-    let rest = rest(problem);
-    let channels = rest.len();
-    let mut left = rest.clone();
-    let mut frequencies: Vec<f64> = Vec::new();
-    let mut lowest = LOWEST;
-    while frequencies.len() <= MOST_LINES {
-        let Some(frequency) = (0..channels)
-            .filter_map(|d| line(problem, &left[d], lowest))
-            .max_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(_, frequency)| frequency)
-        else {
-            break;
-        };
-        let frequency = finest(problem, &left, frequency);
-        let mut without = left.clone();
-        for left in &mut without {
-            take_off(problem, left, frequency);
-        }
-        let is_most = |(before, after): (&Vec<f64>, &Vec<f64>)| {
-            dot(after, after) < (1.0 - MOST_OF) * dot(before, before)
-        };
-        if frequency < LOW && !left.iter().zip(&without).any(is_most) {
-            lowest = LOW;
-            continue;
-        }
-        left = without;
-        frequencies.push(frequency);
-    }
-    if frequencies.is_empty() || frequencies.len() > MOST_LINES {
-        return Vec::new();
-    }
-    let mut found = Vec::new();
-    for d in 0..channels {
-        let squares = dot(&rest[d], &rest[d]);
-        let taken: Vec<f64> = rest[d].iter().zip(&left[d]).map(|(a, b)| a - b).collect();
-        let own = dot(&taken, &taken);
-        let Some(values) = problem.measured.0[d]
-            .as_mut()
-            .filter(|_| own > LEAST * squares)
-        else {
-            continue;
-        };
-        for (value, taken) in values.iter_mut().zip(&taken) {
-            *value -= taken;
-        }
-        let amplitude = (2.0 * own / taken.len().max(1) as f64).sqrt();
-        let mut estimates = vec![Quantity::new("amplitude", amplitude, "")];
-        let each = frequencies.iter();
-        estimates.extend(each.map(|f| Quantity::new("frequency", *f, "Hz")));
-        found.push(Disturbance {
-            kind: "periodic_in_time".to_owned(),
-            at: vec![problem.layout.channels[d].clone()],
-            estimates,
-            recordings: Vec::new(),
-            interval: None,
-            says: None,
-        });
-    }
-    found
-}
-
-/// The line that stands out most from the spectrum about it: by how much, and its frequency, Hz.
-fn line(problem: &Problem, rest: &[f64], lowest: f64) -> Option<(f64, f64)> {
-    let mut best: Option<(f64, f64)> = None;
-    let mut start = 0;
-    for stretch in &problem.layout.stretches {
-        let power = hann_power(&rest[start..start + stretch.samples]);
-        start += stretch.samples;
-        if power.len() < 4 * ABOUT {
-            continue;
-        }
-        let per_step = 0.5 / stretch.step / (power.len() - 1) as f64;
-        for k in LINE..power.len() {
-            let frequency = k as f64 * per_step;
-            // A line is the highest of its neighbours.
-            let near = &power[k - LINE..(k + LINE + 1).min(power.len())];
-            if frequency < lowest || near.iter().any(|p| *p > power[k]) {
-                continue;
-            }
-            let about = (k.saturating_sub(ABOUT)..(k + ABOUT + 1).min(power.len()))
-                .filter(|i| i.abs_diff(k) > LINE)
-                .map(|i| power[i]);
-            let level = median(about.collect());
-            let above = power[k] / level.max(f64::MIN_POSITIVE);
-            if level > 0.0 && above > ABOVE && best.is_none_or(|(most, _)| above > most) {
-                best = Some((above, frequency));
-            }
-        }
-    }
-    best
-}
-
-/// The frequency about which a sine and a cosine explain most of all channels.
-fn finest(problem: &Problem, rest: &[Vec<f64>], about: f64) -> f64 {
-    let longest = problem.layout.stretches.iter();
-    let longest = longest.map(|s| s.samples as f64 * s.step);
-    let width = 1.0 / longest.fold(f64::MIN_POSITIVE, f64::max);
-    let explained = |frequency: f64| -> f64 {
-        let all = rest.iter().map(|rest| {
-            let mut left = rest.clone();
-            take_off(problem, &mut left, frequency);
-            dot(rest, rest) - dot(&left, &left)
-        });
-        all.sum()
-    };
-    let (mut centre, mut step) = (about, 0.5 * width);
-    for _ in 0..12 {
-        let tried = [centre - step, centre, centre + step].map(|f| (explained(f), f));
-        let best = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
-        centre = best.map_or(centre, |(_, f)| f);
-        step *= 0.6;
-    }
-    centre
-}
-
-/// Takes the best sine and cosine off a series, stretch by stretch.
-fn take_off(problem: &Problem, rest: &mut [f64], frequency: f64) {
-    let mut start = 0;
-    for stretch in &problem.layout.stretches {
-        let part = &mut rest[start..start + stretch.samples];
-        let waves: Vec<(f64, f64)> = (0..part.len())
-            .map(|i| (TAU * frequency * stretch.step * i as f64).sin_cos())
-            .collect();
-        let mut sums = [0.0; 5];
-        for ((s, c), r) in waves.iter().zip(part.iter()) {
-            for (sum, x) in sums.iter_mut().zip([s * s, s * c, c * c, s * r, c * r]) {
-                *sum += x;
-            }
-        }
-        let [ss, sc, cc, sr, cr] = sums;
-        let determinant = ss * cc - sc * sc;
-        if determinant > 1e-9 * ss * cc {
-            let a = (sr * cc - cr * sc) / determinant;
-            let b = (cr * ss - sr * sc) / determinant;
-            for ((s, c), r) in waves.iter().zip(part.iter_mut()) {
-                *r -= a * s + b * c;
-            }
-        }
-        start += stretch.samples;
-    }
-}
-
 /// The step in which a force is read, if all of its values are multiples of one that is coarser than its noise; in its unit.
 pub fn step_of_values(values: &[f64], noise: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
@@ -364,6 +228,8 @@ impl Problem {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
     use crate::diagnose::column::Column;
     use crate::diagnose::problem::{Layout, Stretch};

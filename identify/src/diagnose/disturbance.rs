@@ -65,6 +65,11 @@ const COLOURED: f64 = 0.5;
 /// And where its variance is so many times that of the white noise.
 const ABOVE_WHITE: f64 = 1.5;
 
+/// Whether noise of a variance is no more than the white noise of its channel.
+pub(crate) fn is_white(problem: &Problem, channel: usize, variance: f64) -> bool {
+    variance < ABOVE_WHITE * problem.noise[channel].powi(2)
+}
+
 impl Bench<'_> {
     /// Members of a set that are faults of the recordings, with what they are worth.
     pub(crate) fn disturbances(&self, picks: &[Pick]) -> Vec<Disturbance> {
@@ -143,8 +148,7 @@ impl Bench<'_> {
     fn coloured(&self, channel: usize, rest: &[f64], again: f64) -> Option<Disturbance> {
         let layout = &self.problem.layout;
         let variance = dot(rest, rest) / rest.len().max(1) as f64;
-        let white = self.problem.noise[channel];
-        if variance * (1.0 - again) < ABOVE_WHITE * white * white {
+        if is_white(self.problem, channel, variance * (1.0 - again)) {
             return None;
         }
         let worth = effective_samples(rest) / rest.len().max(1) as f64;

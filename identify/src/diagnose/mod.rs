@@ -10,7 +10,7 @@
 //! 4. `aliases` - what this recording cannot tell apart; `reproducible` - what no candidate explains and no noise is.
 //! 5. [`Diagnosis`] - the answer.
 //!
-//! What recordings have and the model does not lack is told by name too: `cleaning` takes outliers and hum off beforehand,
+//! What recordings have and the model does not lack is told by name too: `cleaning` takes outliers and `hum` off beforehand,
 //! `drifts` and `readings` are candidates among the others, and `disturbance` says what is left, and of which sort.
 
 mod aliases;
@@ -27,6 +27,7 @@ mod estimates;
 mod evidence;
 mod factored;
 mod following;
+mod hum;
 mod idle;
 mod laws;
 mod noise;
@@ -172,7 +173,21 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
     problem.find_jumps();
     problem.find_noise_of_idle();
     disturbances.extend(cleaning::clean(problem));
-    let problem = &*problem;
+    let diagnosis = search_all(problem, supply, disturbances.clone());
+    let slow = cleaning::clean_again(problem, &diagnosis.rest, &diagnosis.unexplained);
+    if slow.is_empty() {
+        return diagnosis;
+    }
+    disturbances.extend(slow);
+    search_all(problem, supply, disturbances)
+}
+
+/// The diagnosis of a problem whose forces were cleaned from `disturbances`.
+fn search_all(
+    problem: &Problem,
+    supply: &dyn Supply,
+    mut disturbances: Vec<Disturbance>,
+) -> Diagnosis {
     let mut bench = Bench::new(problem, supply);
     bench.look(&[]);
     let alone = bench.explained_alone();

@@ -1,0 +1,307 @@
+//! What is periodic in time: lines of the spectrum, as the hum of the mains.
+//!
+//! A line stands above the spectrum about it, beyond the frequencies of the motion; its frequency is where least squares of a
+//! sine and a cosine explains most. A slow one, among the frequencies of the motion, is seen once all that follows the state is
+//! taken off: it is most of what is left then, at one frequency in every stretch.
+
+use std::f64::consts::TAU;
+
+use super::disturbance::{Disturbance, Quantity, is_white};
+use super::pool::dot;
+use super::problem::Problem;
+use crate::signal::{hann_power, median};
+
+/// How many times the middle of the spectrum about it a line must reach.
+const ABOVE: f64 = 60.0;
+/// Half the width of what counts as about it, and of the line itself, in steps of the spectrum.
+const ABOUT: usize = 48;
+const LINE: usize = 6;
+/// Lines below this frequency, Hz, may be those of the motion; so may those of which there are many. Below the second they
+/// must be most of what is left of a channel.
+const LOWEST: f64 = 3.0;
+const LOW: f64 = 8.0;
+const MOST_OF: f64 = 0.6;
+const MOST_LINES: usize = 6;
+/// The part of a channel's squared rest that all of its lines must be.
+const LEAST: f64 = 0.02;
+/// Turns that a slow line makes in every stretch.
+const TURNS: f64 = 4.0;
+
+/// Lines of the spectrum, taken off with a phase of their own in every stretch.
+pub(crate) fn lines(problem: &mut Problem, rest: &[Vec<f64>]) -> Vec<Disturbance> {
+    let channels = rest.len();
+    let mut left = rest.to_vec();
+    let mut frequencies: Vec<f64> = Vec::new();
+    let mut lowest = LOWEST;
+    while frequencies.len() <= MOST_LINES {
+        let Some(frequency) = (0..channels)
+            .filter_map(|d| line(problem, &left[d], lowest))
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, frequency)| frequency)
+        else {
+            break;
+        };
+        let frequency = finest(problem, &left, frequency);
+        let mut without = left.clone();
+        for left in &mut without {
+            take_off(problem, left, frequency);
+        }
+        let is_most = |(before, after): (&Vec<f64>, &Vec<f64>)| {
+            dot(after, after) < (1.0 - MOST_OF) * dot(before, before)
+        };
+        if frequency < LOW && !left.iter().zip(&without).any(is_most) {
+            lowest = LOW;
+            continue;
+        }
+        left = without;
+        frequencies.push(frequency);
+    }
+    if frequencies.is_empty() || frequencies.len() > MOST_LINES {
+        return Vec::new();
+    }
+    let mut found = Vec::new();
+    for d in 0..channels {
+        let taken: Vec<f64> = rest[d].iter().zip(&left[d]).map(|(a, b)| a - b).collect();
+        if dot(&taken, &taken) > LEAST * dot(&rest[d], &rest[d]) {
+            found.extend(told(problem, d, &taken, &frequencies));
+        }
+    }
+    found
+}
+
+/// Slow lines in what a diagnosis leaves of the channels that it takes for noise, taken off in the same way.
+pub(crate) fn slow_lines(
+    problem: &mut Problem,
+    rest: &[Vec<f64>],
+    unexplained: &[usize],
+) -> Vec<Disturbance> {
+    let noise = (0..rest.len()).filter(|d| !unexplained.contains(d));
+    let mut found = Vec::new();
+    for d in noise {
+        let own = &rest[d];
+        let variance = dot(own, own) / own.len().max(1) as f64;
+        if is_white(problem, d, variance) {
+            continue;
+        }
+        let Some(frequency) = strongest(problem, own) else {
+            continue;
+        };
+        let frequency = finest(problem, std::slice::from_ref(own), frequency);
+        let mut left = own.clone();
+        take_off(problem, &mut left, frequency);
+        let mut start = 0;
+        let is_its = problem.layout.stretches.iter().all(|stretch| {
+            let range = start..start + stretch.samples;
+            start = range.end;
+            let [before, after] = [own, &left].map(|r| dot(&r[range.clone()], &r[range.clone()]));
+            frequency * stretch.samples as f64 * stretch.step > TURNS
+                && after < (1.0 - MOST_OF) * before
+        });
+        if is_its {
+            let taken: Vec<f64> = own.iter().zip(&left).map(|(a, b)| a - b).collect();
+            found.extend(told(problem, d, &taken, &[frequency]));
+        }
+    }
+    found
+}
+
+/// Takes lines off the measured force of a channel and says which.
+fn told(
+    problem: &mut Problem,
+    channel: usize,
+    taken: &[f64],
+    frequencies: &[f64],
+) -> Option<Disturbance> {
+    let values = problem.measured.0[channel].as_mut()?;
+    for (value, taken) in values.iter_mut().zip(taken) {
+        *value -= taken;
+    }
+    let amplitude = (2.0 * dot(taken, taken) / taken.len().max(1) as f64).sqrt();
+    let mut estimates = vec![Quantity::new("amplitude", amplitude, "")];
+    let each = frequencies.iter();
+    estimates.extend(each.map(|f| Quantity::new("frequency", *f, "Hz")));
+    Some(Disturbance {
+        kind: "periodic_in_time".to_owned(),
+        at: vec![problem.layout.channels[channel].clone()],
+        estimates,
+        recordings: Vec::new(),
+        interval: None,
+        says: None,
+    })
+}
+
+/// The frequency of the highest peak in the longest stretch, Hz.
+fn strongest(problem: &Problem, rest: &[f64]) -> Option<f64> {
+    let mut start = 0;
+    let mut longest: Option<(f64, &[f64], f64)> = None;
+    for stretch in &problem.layout.stretches {
+        let part = &rest[start..start + stretch.samples];
+        start += stretch.samples;
+        let lasts = stretch.samples as f64 * stretch.step;
+        if longest.is_none_or(|(most, ..)| lasts > most) {
+            longest = Some((lasts, part, stretch.step));
+        }
+    }
+    let (_, part, step) = longest?;
+    let power = hann_power(part);
+    let highest = (1..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b]))?;
+    Some(highest as f64 * 0.5 / step / (power.len() - 1) as f64)
+}
+
+/// The line that stands out most from the spectrum about it: by how much, and its frequency, Hz.
+fn line(problem: &Problem, rest: &[f64], lowest: f64) -> Option<(f64, f64)> {
+    let mut best: Option<(f64, f64)> = None;
+    let mut start = 0;
+    for stretch in &problem.layout.stretches {
+        let power = hann_power(&rest[start..start + stretch.samples]);
+        start += stretch.samples;
+        if power.len() < 4 * ABOUT {
+            continue;
+        }
+        let per_step = 0.5 / stretch.step / (power.len() - 1) as f64;
+        for k in LINE..power.len() {
+            let frequency = k as f64 * per_step;
+            // A line is the highest of its neighbours.
+            let near = &power[k - LINE..(k + LINE + 1).min(power.len())];
+            if frequency < lowest || near.iter().any(|p| *p > power[k]) {
+                continue;
+            }
+            let about = (k.saturating_sub(ABOUT)..(k + ABOUT + 1).min(power.len()))
+                .filter(|i| i.abs_diff(k) > LINE)
+                .map(|i| power[i]);
+            let level = median(about.collect());
+            let above = power[k] / level.max(f64::MIN_POSITIVE);
+            if level > 0.0 && above > ABOVE && best.is_none_or(|(most, _)| above > most) {
+                best = Some((above, frequency));
+            }
+        }
+    }
+    best
+}
+
+/// The frequency about which a sine and a cosine explain most of all channels.
+fn finest(problem: &Problem, rest: &[Vec<f64>], about: f64) -> f64 {
+    let longest = problem.layout.stretches.iter();
+    let longest = longest.map(|s| s.samples as f64 * s.step);
+    let width = 1.0 / longest.fold(f64::MIN_POSITIVE, f64::max);
+    let explained = |frequency: f64| -> f64 {
+        let all = rest.iter().map(|rest| {
+            let mut left = rest.clone();
+            take_off(problem, &mut left, frequency);
+            dot(rest, rest) - dot(&left, &left)
+        });
+        all.sum()
+    };
+    let (mut centre, mut step) = (about, 0.5 * width);
+    for _ in 0..12 {
+        let tried = [centre - step, centre, centre + step].map(|f| (explained(f), f));
+        let best = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        centre = best.map_or(centre, |(_, f)| f);
+        step *= 0.6;
+    }
+    centre
+}
+
+/// Takes the best sine and cosine off a series, stretch by stretch.
+fn take_off(problem: &Problem, rest: &mut [f64], frequency: f64) {
+    let mut start = 0;
+    for stretch in &problem.layout.stretches {
+        let part = &mut rest[start..start + stretch.samples];
+        let waves: Vec<(f64, f64)> = (0..part.len())
+            .map(|i| (TAU * frequency * stretch.step * i as f64).sin_cos())
+            .collect();
+        let mut sums = [0.0; 5];
+        for ((s, c), r) in waves.iter().zip(part.iter()) {
+            for (sum, x) in sums.iter_mut().zip([s * s, s * c, c * c, s * r, c * r]) {
+                *sum += x;
+            }
+        }
+        let [ss, sc, cc, sr, cr] = sums;
+        let determinant = ss * cc - sc * sc;
+        if determinant > 1e-9 * ss * cc {
+            let a = (sr * cc - cr * sc) / determinant;
+            let b = (cr * ss - sr * sc) / determinant;
+            for ((s, c), r) in waves.iter().zip(part.iter_mut()) {
+                *r -= a * s + b * c;
+            }
+        }
+        start += stretch.samples;
+    }
+}
+
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::column::Column;
+    use crate::diagnose::problem::{Layout, Stretch};
+    use crate::test_noise::Noise;
+
+    /// Two stretches of 300 samples at 44 Hz, with what is left of a force.
+    fn problem(rest: &[f64]) -> Problem {
+        let stretch = |name: &str, is_check: bool| Stretch {
+            name: name.into(),
+            samples: rest.len() / 2,
+            step: 1.0 / 44.0,
+            sampled: 1.0 / 44.0,
+            is_check,
+        };
+        Problem {
+            layout: Layout {
+                channels: vec!["a".into()],
+                stretches: vec![stretch("fit", false), stretch("check", true)],
+                left_out: Vec::new(),
+            },
+            measured: Column(vec![Some(rest.to_vec())]),
+            noise: vec![0.3],
+            ..Problem::default()
+        }
+    }
+
+    #[test]
+    fn a_slow_hum_is_taken_off() {
+        for seed in 0..10 {
+            let mut noise = Noise::new(seed);
+            let rest: Vec<f64> = (0..600)
+                .map(|i| {
+                    let phase = if i < 300 { 0.4 } else { 2.0 };
+                    5.0 * (TAU * 2.31 / 44.0 * f64::from(i) + phase).sin() + noise.normal()
+                })
+                .collect();
+            let mut problem = problem(&rest);
+            let found = slow_lines(&mut problem, &[rest], &[]);
+            let values = &found[0].estimates;
+            assert!((values[0].value - 5.0).abs() < 0.3, "{values:?}");
+            assert!((values[1].value - 2.31).abs() < 0.02, "{values:?}");
+            let left = problem.measured.0[0].as_ref().unwrap();
+            let left = dot(left, left) / left.len() as f64;
+            assert!((0.8..1.2).contains(&left), "{left}");
+        }
+    }
+
+    #[test]
+    fn noise_of_few_hertz_is_no_hum() {
+        for corner in [3.0, 1.0, 0.3] {
+            for seed in 0..100 {
+                let mut noise = Noise::new(seed);
+                let keeps = (-TAU * corner / 44.0_f64).exp();
+                let mut last = [0.0; 2];
+                let rest: Vec<f64> = (0..600)
+                    .map(|_| {
+                        last[0] = keeps * last[0] + noise.normal();
+                        last[1] = keeps * last[1] + last[0];
+                        last[1]
+                    })
+                    .collect();
+                let found = slow_lines(&mut problem(&rest), &[rest.clone()], &[]);
+                assert_eq!(found, [], "{corner} Hz, seed {seed}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_comes_again_with_the_state_is_no_hum() {
+        let rest: Vec<f64> = (0..600).map(|i| (0.4 * f64::from(i)).sin()).collect();
+        assert_eq!(slow_lines(&mut problem(&rest), &[rest.clone()], &[0]), []);
+    }
+}
