@@ -229,7 +229,6 @@ fn take_off(problem: &Problem, rest: &mut [f64], frequency: f64) {
     }
 }
 
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -11,6 +11,8 @@ use super::problem::{
 
 /// Below this part of a sample a derivative says what a delay does.
 const SLIGHT: f64 = 0.1;
+/// Samples of a recording to one that is kept, from which on the filter between them is felt.
+const ROUNDS_OFF: f64 = 1.5;
 
 impl Fault {
     /// The kind of effect, the symbol of its parameter, and the unit and sign of that.
@@ -84,8 +86,10 @@ impl Bench<'_> {
                 if samples.abs() < SLIGHT {
                     changes.extend(slopes(part).map(|slope| -slope / stretch.step));
                 } else if reading.fault == Fault::Late {
-                    let rates = self.problem.friction.get(3 * d);
-                    let rates = rates.and_then(|column| column.0[d].as_deref());
+                    // The parallel filter rounds the jumps of dry friction off.
+                    let has_jumps = stretch.step < ROUNDS_OFF * stretch.sampled;
+                    let rates = has_jumps.then(|| self.problem.friction.get(3 * d));
+                    let rates = rates.flatten().and_then(|column| column.0[d].as_deref());
                     let rates = rates.map(|rates| &rates[start..start + stretch.samples]);
                     let late = (0..part.len()).map(|i| between(part, rates, i as f64 - samples));
                     changes.extend(late.zip(part).map(|(then, now)| (then - now) / value));
@@ -222,6 +226,50 @@ fn between(values: &[f64], rates: Option<&[f64]>, at: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::problem::{Layout, NoSupply, Stretch};
+
+    /// Where one in nine samples is kept nothing jumps any more, so that a force is smooth where its drive turns round, too.
+    #[test]
+    fn a_late_force_of_few_samples_is_smooth_where_the_drive_turns_round() {
+        let (step, delay) = (0.036, 0.0041);
+        let force = |t: f64| 300.0 * (6.0 * t + 0.4).sin();
+        let times: Vec<f64> = (0..300).map(|i| step * f64::from(i)).collect();
+        let forces = Column(vec![Some(times.iter().map(|t| force(*t)).collect())]);
+        let rates = Column(vec![Some(times.iter().map(|t| (5.0 * t).sin()).collect())]);
+        let problem = Problem {
+            layout: Layout {
+                channels: vec!["a".into()],
+                stretches: vec![Stretch {
+                    name: "run".into(),
+                    samples: times.len(),
+                    step,
+                    sampled: 0.004,
+                    is_check: false,
+                }],
+                left_out: Vec::new(),
+            },
+            measured: forces.clone(),
+            friction: vec![rates.clone(), rates.clone(), rates],
+            noise: vec![1.0],
+            removed: vec![0.0],
+            ..Problem::default()
+        };
+        let bench = Bench::new(&problem, &NoSupply);
+        let late = Reading {
+            fault: Fault::Late,
+            channel: None,
+        };
+        let changes = bench.misread(late, &forces, delay);
+        let changes = changes.0[0].as_ref().unwrap();
+        for (i, t) in times.iter().enumerate().skip(2).take(times.len() - 4) {
+            let expected = (force(t - delay) - force(*t)) / delay;
+            assert!(
+                (changes[i] - expected).abs() < 5.0,
+                "{t}: {} {expected}",
+                changes[i]
+            );
+        }
+    }
 
     /// Between samples a force is straight, but for a jump at the instant at which the drive turns round.
     #[test]
