@@ -1,8 +1,9 @@
 //! What a model says of a recording before anything is believed: delays between force and motion, columns that are
-//! exchanged or turned round, angles in degrees. Everything goes into the notes.
+//! exchanged or turned round, angles in degrees, gravity that pulls the other way. Everything goes into the notes.
 
 mod delay;
 pub(crate) mod events;
+mod gravity;
 mod nominal_forces;
 mod rows;
 
@@ -105,6 +106,10 @@ fn findings(model: &Model, data: &Stretch) -> Vec<Note> {
             notes = suspects_of_motion(model, data, &samples);
         }
     }
+    // A change of the motion may look like it.
+    if notes.is_empty() {
+        notes.extend(gravity::upside_down(model, data, &samples, &measured));
+    }
     if notes.is_empty() {
         notes = beside;
     }
@@ -120,17 +125,28 @@ fn beside_nominal(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<Note>
         return Vec::new();
     };
     let forces = data.run.force.as_deref().unwrap_or(&[]);
-    let expected = regressor * DVector::from_column_slice(&model.nominal);
+    let nominal = DVector::from_column_slice(&model.nominal);
     let n = forces.len();
-    let expected: Vec<Vec<f64>> = (0..n)
-        .map(|d| expected.iter().skip(d).step_by(n).copied().collect())
-        .collect();
+    let by_drive = |forces: DVector<f64>| -> Vec<Vec<f64>> {
+        let of = |d: usize| forces.iter().skip(d).step_by(n).copied().collect();
+        (0..n).map(of).collect()
+    };
+    let expected = regressor * &nominal;
+    let to_rest = |[_, rates, accelerations]: &mut Motion| {
+        for column in rates.iter_mut().chain(accelerations) {
+            column.fill(0.0);
+        }
+    };
+    let at_rest = self::regressor(model, data, samples, &to_rest).map(|rows| rows * &nominal);
+    let upside_down = at_rest.map(|at_rest| by_drive(&expected - 2.0 * at_rest));
+    let expected = by_drive(expected);
     let measured: Vec<Vec<f64>> = forces
         .iter()
         .map(|force| samples.iter().map(|k| force[*k]).collect())
         .collect();
     let mechanism = &model.derivation.mechanism;
-    nominal_forces::oddities(mechanism, &measured, &expected, &data.run.file)
+    let upside_down = upside_down.as_deref();
+    nominal_forces::oddities(mechanism, &measured, &expected, upside_down, &data.run.file)
         .into_iter()
         .map(Note::warning)
         .collect()

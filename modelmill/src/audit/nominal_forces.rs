@@ -12,6 +12,10 @@ const TOLERANCE: f64 = 4.0;
 /// Forces that are so many times as small may be those of motors before their gears; nearer, nominal values may be wrong.
 const GEARS: std::ops::Range<f64> = 12.0..1000.0 / TOLERANCE;
 
+/// What else turns forces.
+const HANGS: &str = " Gravity that pulls the other way would turn them, too: check `gravity` in the model file, and which way \
+                     up the machine is mounted, first.";
+
 /// How a column of forces may have been misread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Misread {
@@ -32,12 +36,16 @@ enum Oddity {
     BeforeGear(f64),
 }
 
+/// How much two forces resemble each other, -1 to 1, and by how much the first is larger.
+fn compared(one: &[f64], other: &[f64]) -> (f64, f64) {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let sizes = [one, other].map(|force| dot(force, force).sqrt());
+    (dot(one, other) / (sizes[0] * sizes[1]), sizes[0] / sizes[1])
+}
+
 /// How a measured force is related to the nominal one.
 fn oddity(measured: &[f64], nominal: &[f64]) -> Option<Oddity> {
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let sizes = [measured, nominal].map(|force| dot(force, force).sqrt());
-    let correlation = dot(measured, nominal) / (sizes[0] * sizes[1]);
-    let ratio = sizes[0] / sizes[1];
+    let (correlation, ratio) = compared(measured, nominal);
     if !correlation.is_finite() || correlation.abs() < CLEAR {
         return None;
     }
@@ -56,11 +64,12 @@ fn oddity(measured: &[f64], nominal: &[f64]) -> Option<Oddity> {
 }
 
 /// Sentences about drives whose measured forces are not those of the nominal values by their sign or unit; forces are
-/// `[drive][sample]`.
+/// `[drive][sample]`, `upside_down` those of the nominal values if gravity pulled the other way.
 pub(crate) fn oddities(
     mechanism: &Mechanism,
     measured: &[Vec<f64>],
     nominal: &[Vec<f64>],
+    upside_down: Option<&[Vec<f64>]>,
     file: &str,
 ) -> Vec<String> {
     let found: Vec<(&Drive, Oddity)> = (mechanism.drives.iter().zip(measured).zip(nominal))
@@ -74,7 +83,13 @@ pub(crate) fn oddities(
                 .filter(|(_, oddity)| *oddity == Oddity::Misread(which))
                 .map(|(drive, _)| *drive)
                 .collect();
-            (!drives.is_empty()).then(|| says(mechanism, &drives, which, file))
+            let mut told = (!drives.is_empty()).then(|| says(mechanism, &drives, which, file))?;
+            if which == Misread::Turned
+                && upside_down.is_some_and(|forces| explains(forces, measured))
+            {
+                told.push_str(HANGS);
+            }
+            Some(told)
         })
         .collect();
     let before_gears = found.iter().filter_map(|(drive, oddity)| match oddity {
@@ -86,6 +101,14 @@ pub(crate) fn oddities(
         says.push(asks_what_they_are(&before_gears, file));
     }
     says
+}
+
+/// Whether forces resemble those of all drives that resemble them at all, by their sign.
+fn explains(forces: &[Vec<f64>], measured: &[Vec<f64>]) -> bool {
+    let pairs = measured.iter().zip(forces);
+    let alike = pairs.map(|(measured, forces)| compared(measured, forces).0);
+    let clear: Vec<f64> = alike.filter(|alike| alike.abs() > CLEAR).collect();
+    !clear.is_empty() && clear.iter().all(|alike| *alike > 0.0)
 }
 
 /// Asks what the columns of drives are whose forces are so many times as small as the nominal ones.
@@ -145,6 +168,22 @@ fn says(mechanism: &Mechanism, drives: &[&Drive], which: Misread, file: &str) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn gravity_may_turn_forces_if_that_is_so_of_all() {
+        let force = |phase: f64| {
+            (0..200)
+                .map(|k| (0.1 * f64::from(k) + phase).sin())
+                .collect()
+        };
+        let [one, other, opposite]: [Vec<f64>; 3] = [0.0, 1.5, std::f64::consts::PI].map(force);
+        let measured = [one.clone(), other.clone()];
+        assert!(explains(&measured, &measured));
+        // What resembles nothing says nothing.
+        assert!(explains(&[one.clone(), one.clone()], &measured));
+        assert!(!explains(&[other.clone(), one.clone()], &measured));
+        assert!(!explains(&[opposite, other], &measured));
+    }
 
     #[test]
     fn signs_and_units_are_told_where_forces_are_alike() {

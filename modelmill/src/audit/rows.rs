@@ -44,6 +44,23 @@ impl Rows {
         })
     }
 
+    /// The regressor and the further columns if gravity pulled the other way: what columns are at rest is gravity's, or an effect's
+    /// of which a fit knows no sign.
+    pub(super) fn upside_down(
+        model: &Model,
+        data: &Stretch,
+        samples: &[usize],
+    ) -> Option<ByChannel> {
+        let around = Around::new(model, data, samples)?;
+        let evaluator = Evaluator::new(&model.derivation);
+        let at_rest = Inputs::new(data, samples).at_rest();
+        let at_rest = at_rest.with(|states| evaluator.regressor(states)).ok()?;
+        let mut rows = regressor(model, data, samples)? - 2.0 * at_rest;
+        around.add_further(&mut rows, |further| further.values);
+        let is_finite = rows.iter().all(|x| x.is_finite());
+        is_finite.then(|| ByChannel::new(&rows, around.rates[1].len()))
+    }
+
     /// The slope in time of the regressor and the further columns, per s.
     pub(super) fn slope(model: &Model, data: &Stretch, samples: &[usize]) -> Option<ByChannel> {
         let around = Around::new(model, data, samples)?;
@@ -186,6 +203,15 @@ impl Inputs {
             motion: [&data.run.q, &data.run.qd, &data.run.qdd].map(|all| picked(all, samples)),
             load: picked(data.run.force.as_deref().unwrap_or(&[]), samples),
         }
+    }
+
+    /// The same poses at rest.
+    fn at_rest(mut self) -> Self {
+        let [_, rates, accelerations] = &mut self.motion;
+        for column in rates.iter_mut().chain(accelerations) {
+            column.fill(0.0);
+        }
+        self
     }
 
     fn with<R>(&self, evaluate: impl FnOnce(&States<'_>) -> R) -> R {

@@ -1,0 +1,41 @@
+//! Gravity that pulls the other way: a machine that hangs where its model stands, or the sign of `gravity` in the model file.
+
+use modelmill_identify::{ForceAudit, Note};
+use nalgebra::DVector;
+
+use super::BETTER;
+use super::rows::Rows;
+use crate::model::Model;
+use crate::stretch::Stretch;
+use crate::text::table::percent;
+
+/// Relative errors, friction and offsets of the drives taken off, below which nothing is wrong with gravity.
+const BEARABLE: f64 = 0.01;
+
+/// Says so where gravity the other way explains the forces far better.
+pub(super) fn upside_down(
+    model: &Model,
+    data: &Stretch,
+    samples: &[usize],
+    measured: &DVector<f64>,
+) -> Option<Note> {
+    if model.gravity() == [0.0; 3] {
+        return None;
+    }
+    let error = |regressor| ForceAudit::new(regressor)?.error(measured);
+    let before = error(Rows::new(model, data, samples)?.regressor)?;
+    if before < BEARABLE {
+        return None;
+    }
+    let after = error(Rows::upside_down(model, data, samples)?)?;
+    (after < BETTER * before).then(|| {
+        Note::warning(format!(
+            "Gravity seems to pull the other way in {}: the best fit of the model with friction and offsets of its drives is off \
+             by {} as it is, and would be off by {} then. Check `gravity` in the model file, and which way up the machine is \
+             mounted.",
+            data.run.file,
+            percent(Some(before)),
+            percent(Some(after))
+        ))
+    })
+}
