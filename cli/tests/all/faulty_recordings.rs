@@ -176,8 +176,19 @@ fn exchanged_columns_are_named() {
         "{says}"
     );
     let arm = table.spoilt("angles.csv", |t| t.names.swap(1, 2));
-    let ran = ran(&["identify", &spidermill(), "--data", &arm]);
-    assert!(ran.err.contains("exchanged"), "{}", ran.err);
+    let told = ran(&["identify", &spidermill(), "--data", &arm]);
+    assert!(told.err.contains("exchanged"), "{}", told.err);
+    let told = ran(&["diagnose", &spidermill(), "--data", &arm]);
+    let first =
+        "Look first at what may be wrong with the recording or the model: the coordinates theta1";
+    assert!(told.out.starts_with(first), "{}", told.out);
+    let found = json(&["diagnose", &spidermill(), "--data", &path, "--json"]);
+    let kinds = found["disturbances"]
+        .as_array()
+        .expect("disturbances")
+        .iter();
+    let kinds: Vec<&str> = kinds.filter_map(|one| one["kind"].as_str()).collect();
+    assert!(kinds.contains(&"exchanged_columns"), "{kinds:?}");
 }
 
 #[test]

@@ -1,10 +1,10 @@
 //! Gravity that pulls the other way: a machine that hangs where its model stands, or the sign of `gravity` in the model file.
 
-use modelmill_identify::{ForceAudit, Note};
+use modelmill_identify::ForceAudit;
 use nalgebra::DVector;
 
-use super::BETTER;
 use super::rows::Rows;
+use super::{BETTER, Finding, GRAVITY};
 use crate::model::Model;
 use crate::stretch::Stretch;
 use crate::text::table::percent;
@@ -18,7 +18,7 @@ pub(super) fn upside_down(
     data: &Stretch,
     samples: &[usize],
     measured: &DVector<f64>,
-) -> Option<Note> {
+) -> Option<Finding> {
     if model.gravity() == [0.0; 3] {
         return None;
     }
@@ -29,13 +29,14 @@ pub(super) fn upside_down(
     }
     let after = error(Rows::upside_down(model, data, samples)?)?;
     (after < BETTER * before).then(|| {
-        Note::warning(format!(
-            "Gravity seems to pull the other way in {}: the best fit of the model with friction and offsets of its drives is off \
-             by {} as it is, and would be off by {} then. Check `gravity` in the model file, and which way up the machine is \
-             mounted.",
-            data.run.file,
+        let says = "gravity seems to pull the other way".to_owned();
+        let file = &data.run.file;
+        let note = format!(
+            "In {file} {says}: the best fit of the model with friction and offsets of its drives is off by {} as it is, and \
+             would be off by {} then. Check `gravity` in the model file, and which way up the machine is mounted.",
             percent(Some(before)),
             percent(Some(after))
-        ))
+        );
+        Finding::suspicion(GRAVITY, vec!["base".to_owned()], says, file, note)
     })
 }

@@ -8,6 +8,7 @@ mod nominal_forces;
 mod rows;
 
 use modelmill_codegen::{Evaluator, States};
+use modelmill_identify::diagnose::Disturbance;
 use modelmill_identify::{ByChannel, ForceAudit, Note, Suspect};
 use nalgebra::{DMatrix, DVector};
 
@@ -15,6 +16,13 @@ use crate::model::Model;
 use crate::stretch::Stretch;
 use crate::text::table::percent;
 use delay::Late;
+
+/// Kinds of suspicions: before one is cleared up, whatever else is found may be part of it.
+const EXCHANGED: &str = "exchanged_columns";
+const WRONG_SIGN: &str = "wrong_sign";
+const UNITS: &str = "units";
+const GRAVITY: &str = "gravity_direction";
+pub(crate) const SUSPICIONS: [&str; 4] = [EXCHANGED, WRONG_SIGN, UNITS, GRAVITY];
 
 /// Samples that are looked at, spread over the recording; fewer of many drives, but at least [`FEWEST_LOOKED_AT`].
 const LOOKED_AT: usize = 1500;
@@ -41,8 +49,9 @@ const AFFORDABLE: u64 = 20_000_000_000;
 /// more where `leave_out_events`.
 pub fn examine(model: &Model, data: &mut [Stretch], leave_out_events: bool) {
     for one in data {
-        for note in findings(model, one) {
+        for Finding { note, fault } in findings(model, one) {
             one.note(model, note);
+            one.faults.extend(fault);
         }
         for note in events::found(model, one, leave_out_events) {
             one.note(model, note);
@@ -50,7 +59,31 @@ pub fn examine(model: &Model, data: &mut [Stretch], leave_out_events: bool) {
     }
 }
 
-fn findings(model: &Model, data: &Stretch) -> Vec<Note> {
+/// What is told of a recording, and what a diagnosis calls it if it makes sense of nothing before that is mended.
+struct Finding {
+    note: Note,
+    fault: Option<Disturbance>,
+}
+
+impl Finding {
+    /// A suspicion of a kind in [`SUSPICIONS`], as a clause and as the whole note.
+    fn suspicion(kind: &str, at: Vec<String>, says: String, file: &str, note: String) -> Self {
+        let fault = Disturbance {
+            kind: kind.to_owned(),
+            at,
+            estimates: Vec::new(),
+            recordings: vec![file.to_owned()],
+            interval: None,
+            says: Some(says),
+        };
+        Self {
+            note: Note::warning(note),
+            fault: Some(fault),
+        }
+    }
+}
+
+fn findings(model: &Model, data: &Stretch) -> Vec<Finding> {
     let run = &data.run;
     let n = data.samples();
     let Some(forces) = run.force.as_deref().filter(|_| n > FEWEST) else {
@@ -79,28 +112,38 @@ fn findings(model: &Model, data: &Stretch) -> Vec<Note> {
             // Nominal values know which drive it is.
             && (beside.is_empty() || !matches!(suspect, Suspect::Turned(_)))
         {
-            let what = match suspect {
-                Suspect::Swapped(a, b) => {
+            let (kind, at, says) = match suspect {
+                Suspect::Swapped(a, b) => (
+                    EXCHANGED,
+                    vec![a, b],
                     format!(
-                        "The forces of `{}` and `{}` in {} seem to be exchanged",
-                        drives[a], drives[b], run.file
-                    )
-                }
-                Suspect::Turned(_) if drives.len() == 2 => format!(
-                    "One of the forces of `{}` and `{}` in {} seems to have the wrong sign",
-                    drives[0], drives[1], run.file
+                        "the forces of `{}` and `{}` seem to be exchanged",
+                        drives[a], drives[b]
+                    ),
                 ),
-                Suspect::Turned(a) => format!(
-                    "The force of `{}` in {} seems to have the wrong sign",
-                    drives[a], run.file
+                Suspect::Turned(_) if drives.len() == 2 => (
+                    WRONG_SIGN,
+                    vec![0, 1],
+                    format!(
+                        "one of the forces of `{}` and `{}` seems to have the wrong sign",
+                        drives[0], drives[1]
+                    ),
+                ),
+                Suspect::Turned(a) => (
+                    WRONG_SIGN,
+                    vec![a],
+                    format!("the force of `{}` seems to have the wrong sign", drives[a]),
                 ),
             };
-            notes.push(Note::warning(format!(
-                "{what}: the best fit of the model is off by {} as the columns are, and by {} then. Check which column is \
+            let note = format!(
+                "In {} {says}: the best fit of the model is off by {} as the columns are, and by {} then. Check which column is \
                  which (option `columns`).",
+                run.file,
                 percent(Some(before)),
                 percent(Some(after))
-            )));
+            );
+            let at = at.into_iter().map(|d| drives[d].clone()).collect();
+            notes.push(Finding::suspicion(kind, at, says, &run.file, note));
         }
         if notes.is_empty() {
             notes = suspects_of_motion(model, data, &samples);
@@ -114,13 +157,14 @@ fn findings(model: &Model, data: &Stretch) -> Vec<Note> {
         notes = beside;
     }
     if notes.is_empty() {
-        notes.extend(late.and_then(|late| late.note(model, &run.file)));
+        let late = late.and_then(|late| late.note(model, &run.file));
+        notes.extend(late.map(|note| Finding { note, fault: None }));
     }
     notes
 }
 
 /// Signs and units of the forces, held against those that the nominal values give.
-fn beside_nominal(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<Note> {
+fn beside_nominal(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<Finding> {
     let Some(regressor) = regressor(model, data, samples, &|_| {}) else {
         return Vec::new();
     };
@@ -147,9 +191,6 @@ fn beside_nominal(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<Note>
     let mechanism = &model.derivation.mechanism;
     let upside_down = upside_down.as_deref();
     nominal_forces::oddities(mechanism, &measured, &expected, upside_down, &data.run.file)
-        .into_iter()
-        .map(Note::warning)
-        .collect()
 }
 
 /// Positions, rates and accelerations, `[order][coordinate][sample]`.
@@ -176,12 +217,12 @@ fn explained(
 }
 
 /// Coordinates that are exchanged or turned round, or angles in degrees.
-fn suspects_of_motion(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<Note> {
+fn suspects_of_motion(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<Finding> {
     let Some(forces) = data.run.force.as_deref() else {
         return Vec::new();
     };
     let file = &data.run.file;
-    let mut hypotheses = hypotheses(model, &data.maps_from_degrees, file);
+    let mut hypotheses = hypotheses(model, &data.maps_from_degrees);
     let thinned = |hypotheses: usize| {
         let rows = (samples.len() * forces.len() * hypotheses) as u64;
         let all = (model.base.len() as u64).pow(2) * rows;
@@ -191,7 +232,7 @@ fn suspects_of_motion(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<N
     let most = (samples.len() * forces.len() / fewest).max(1);
     if thinned(hypotheses.len()) > most {
         // Exchanges come last, and are many.
-        let turned = hypotheses.iter().rposition(|one| one.turns.is_some());
+        let turned = hypotheses.iter().rposition(|one| one.kind == WRONG_SIGN);
         hypotheses.truncate(turned.map_or(0, |last| last + 1));
     }
     let thinned = thinned(hypotheses.len()).min(most);
@@ -208,46 +249,51 @@ fn suspects_of_motion(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<N
         .filter(|(_, error)| *error < limit)
         .collect();
     tried.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let best = tried.first().map(|(first, error)| {
-        let alike = tried.iter().filter(|(one, other)| {
-            one.turns.is_some() && *other <= (1.0 + ALIKE) * error + EXACT
-        });
-        let turned: Vec<String> = alike
-            .filter_map(|(one, _)| Some(format!("`{}`", one.turns.as_deref()?)))
-            .collect();
-        let says = if first.turns.is_some() && turned.len() > 1 {
-            format!(
-                "One of the coordinates {} in {file} seems to have the wrong sign: check which way each counts (option `columns`)",
-                turned.join(", ")
-            )
-        } else {
-            first.says.clone()
-        };
-        (says, *error)
-    });
-    let Some((says, error)) = best else {
+    let Some((first, error)) = tried.first() else {
         return Vec::new();
+    };
+    let alike = tried
+        .iter()
+        .filter(|(one, other)| one.kind == WRONG_SIGN && *other <= (1.0 + ALIKE) * error + EXACT);
+    let turned: Vec<&str> = alike
+        .flat_map(|(one, _)| one.at.iter().map(String::as_str))
+        .collect();
+    let (at, says) = if first.kind == WRONG_SIGN && turned.len() > 1 {
+        let says = format!(
+            "one of the coordinates `{}` seems to have the wrong sign",
+            turned.join("`, `")
+        );
+        (turned.into_iter().map(str::to_owned).collect(), says)
+    } else {
+        (first.at.clone(), first.says.clone())
     };
     let as_it_is = match now {
         Some(now) => format!("is off by {}", percent(Some(now))),
         None => "does not exist, for the mechanism cannot reach such poses".to_owned(),
     };
-    vec![Note::warning(format!(
-        "{says}. The best fit of the model {as_it_is} as the columns are, and would be off by {} then.",
-        percent(Some(error))
-    ))]
+    let note = format!(
+        "In {file} {says}: {}. The best fit of the model {as_it_is} as the columns are, and would be off by {} then.",
+        first.advice,
+        percent(Some(*error))
+    );
+    vec![Finding::suspicion(first.kind, at, says, file, note)]
 }
 
 /// What may have happened to the columns of a motion.
 struct Hypothesis {
+    /// One of [`SUSPICIONS`].
+    kind: &'static str,
+    /// Coordinates that it changes.
+    at: Vec<String>,
+    /// What happened, as a clause.
     says: String,
-    /// The coordinate that it turns round, if that is all.
-    turns: Option<String>,
+    /// What to do about it.
+    advice: String,
     change: Box<Change<'static>>,
 }
 
 /// Angles in degrees, coordinates with the wrong sign, and pairs that are exchanged.
-fn hypotheses(model: &Model, maps_from_degrees: &str, file: &str) -> Vec<Hypothesis> {
+fn hypotheses(model: &Model, maps_from_degrees: &str) -> Vec<Hypothesis> {
     let motions = model.motions();
     let mut hypotheses = Vec::new();
     let scaled = |coordinates: Vec<usize>, factor: f64| -> Box<Change<'static>> {
@@ -264,19 +310,19 @@ fn hypotheses(model: &Model, maps_from_degrees: &str, file: &str) -> Vec<Hypothe
     let angles: Vec<usize> = (0..motions.len()).filter(|i| motions[*i].1).collect();
     if !angles.is_empty() {
         hypotheses.push(Hypothesis {
-            says: format!(
-                "The angles in {file} seem to be in degrees; they must be in rad: say {maps_from_degrees}"
-            ),
-            turns: None,
+            kind: UNITS,
+            at: angles.iter().map(|i| motions[*i].0.clone()).collect(),
+            says: "the angles seem to be in degrees".to_owned(),
+            advice: format!("they must be in rad, so say {maps_from_degrees}"),
             change: scaled(angles, 1.0_f64.to_radians()),
         });
     }
     for (a, (name, _)) in motions.iter().enumerate() {
         hypotheses.push(Hypothesis {
-            says: format!(
-                "The coordinate `{name}` in {file} seems to have the wrong sign: check which way it counts (option `columns`)"
-            ),
-            turns: Some(name.clone()),
+            kind: WRONG_SIGN,
+            at: vec![name.clone()],
+            says: format!("the coordinate `{name}` seems to have the wrong sign"),
+            advice: "check which way it counts (option `columns`)".to_owned(),
             change: scaled(vec![a], -1.0),
         });
     }
@@ -284,11 +330,13 @@ fn hypotheses(model: &Model, maps_from_degrees: &str, file: &str) -> Vec<Hypothe
         for b in a + 1..motions.len() {
             if motions[a].1 == motions[b].1 {
                 hypotheses.push(Hypothesis {
+                    kind: EXCHANGED,
+                    at: [a, b].map(|i| motions[i].0.clone()).to_vec(),
                     says: format!(
-                        "The coordinates `{}` and `{}` in {file} seem to be exchanged: check which column is which (option `columns`)",
+                        "the coordinates `{}` and `{}` seem to be exchanged",
                         motions[a].0, motions[b].0
                     ),
-                    turns: None,
+                    advice: "check which column is which (option `columns`)".to_owned(),
                     change: Box::new(move |states| {
                         for order in states.iter_mut() {
                             order.swap(a, b);

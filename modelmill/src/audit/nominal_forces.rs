@@ -2,7 +2,10 @@
 //! forces point the other way or are in another unit come out, with the option that mends it. A fit alone does not show
 //! either, since parameters may take any sign and size.
 
+use modelmill_identify::Note;
 use modelmill_spec::{Drive, Mechanism};
+
+use super::{Finding, UNITS, WRONG_SIGN};
 
 /// Below this correlation with the nominal forces nothing is said: friction and wrong nominal values may be behind it.
 const CLEAR: f64 = 0.8;
@@ -63,7 +66,7 @@ fn oddity(measured: &[f64], nominal: &[f64]) -> Option<Oddity> {
     }
 }
 
-/// Sentences about drives whose measured forces are not those of the nominal values by their sign or unit; forces are
+/// What is told of drives whose measured forces are not those of the nominal values by their sign or unit; forces are
 /// `[drive][sample]`, `upside_down` those of the nominal values if gravity pulled the other way.
 pub(crate) fn oddities(
     mechanism: &Mechanism,
@@ -71,11 +74,11 @@ pub(crate) fn oddities(
     nominal: &[Vec<f64>],
     upside_down: Option<&[Vec<f64>]>,
     file: &str,
-) -> Vec<String> {
+) -> Vec<Finding> {
     let found: Vec<(&Drive, Oddity)> = (mechanism.drives.iter().zip(measured).zip(nominal))
         .filter_map(|((drive, measured), nominal)| Some((drive, oddity(measured, nominal)?)))
         .collect();
-    let mut says: Vec<String> = [Misread::Turned, Misread::TooSmall, Misread::TooLarge]
+    let mut told: Vec<Finding> = [Misread::Turned, Misread::TooSmall, Misread::TooLarge]
         .into_iter()
         .filter_map(|which| {
             let drives: Vec<&Drive> = found
@@ -83,13 +86,10 @@ pub(crate) fn oddities(
                 .filter(|(_, oddity)| *oddity == Oddity::Misread(which))
                 .map(|(drive, _)| *drive)
                 .collect();
-            let mut told = (!drives.is_empty()).then(|| says(mechanism, &drives, which, file))?;
-            if which == Misread::Turned
-                && upside_down.is_some_and(|forces| explains(forces, measured))
-            {
-                told.push_str(HANGS);
-            }
-            Some(told)
+            let may_hang = which == Misread::Turned
+                && upside_down.is_some_and(|forces| explains(forces, measured));
+            let besides = if may_hang { HANGS } else { "" };
+            (!drives.is_empty()).then(|| misread(mechanism, &drives, which, besides, file))
         })
         .collect();
     let before_gears = found.iter().filter_map(|(drive, oddity)| match oddity {
@@ -98,9 +98,10 @@ pub(crate) fn oddities(
     });
     let before_gears: Vec<(&Drive, f64)> = before_gears.collect();
     if !before_gears.is_empty() {
-        says.push(asks_what_they_are(&before_gears, file));
+        let note = Note::warning(asks_what_they_are(&before_gears, file));
+        told.push(Finding { note, fault: None });
     }
-    says
+    told
 }
 
 /// Whether forces resemble those of all drives that resemble them at all, by their sign.
@@ -131,7 +132,14 @@ fn asks_what_they_are(drives: &[(&Drive, f64)], file: &str) -> String {
     )
 }
 
-fn says(mechanism: &Mechanism, drives: &[&Drive], which: Misread, file: &str) -> String {
+/// Forces of drives that were misread, with what may be behind it `besides`.
+fn misread(
+    mechanism: &Mechanism,
+    drives: &[&Drive],
+    which: Misread,
+    besides: &str,
+    file: &str,
+) -> Finding {
     let names: Vec<String> = drives.iter().map(|d| format!("`{}`", d.name)).collect();
     let (forces, are, they_are) = match drives {
         [_] => ("force", "is", "it is"),
@@ -153,16 +161,19 @@ fn says(mechanism: &Mechanism, drives: &[&Drive], which: Misread, file: &str) ->
             }
         })
         .collect();
-    let what = match which {
-        Misread::Turned => format!("of the opposite sign; if {they_are} counted the other way"),
-        Misread::TooSmall => format!("about 1000 times as small; if {they_are} in kN or kN m"),
-        Misread::TooLarge => format!("about 1000 times as large; if {they_are} in mN or mN m"),
+    let (kind, what, if_so) = match which {
+        Misread::Turned => (WRONG_SIGN, "of the opposite sign", "counted the other way"),
+        Misread::TooSmall => (UNITS, "about 1000 times as small", "in kN or kN m"),
+        Misread::TooLarge => (UNITS, "about 1000 times as large", "in mN or mN m"),
     };
-    format!(
-        "Beside what the nominal values give, the {forces} of {} in {file} {are} {what}, say {}.",
-        names.join(", "),
+    let names = names.join(", ");
+    let says = format!("the {forces} of {names} {are} {what} beside what the nominal values give");
+    let note = format!(
+        "Beside what the nominal values give, the {forces} of {names} in {file} {are} {what}; if {they_are} {if_so}, say {}.{besides}",
         maps.join(" ")
-    )
+    );
+    let at = drives.iter().map(|drive| drive.name.clone()).collect();
+    Finding::suspicion(kind, at, says, file, note)
 }
 
 #[cfg(test)]

@@ -57,8 +57,15 @@ pub(crate) fn take_off(
     coarse(problem, model, all)?;
     pushes(problem, all);
     for one in all.iter().flat_map(|(one, _)| &one.faults) {
-        if one.kind != "contact_event" {
-            problem.disturbances.push(one.clone());
+        if one.kind == "contact_event" {
+            continue;
+        }
+        let is_same = |told: &&mut Disturbance| {
+            told.says.is_some() && (&told.kind, &told.says) == (&one.kind, &one.says)
+        };
+        match problem.disturbances.iter_mut().find(is_same) {
+            Some(told) => told.recordings.extend(one.recordings.iter().cloned()),
+            None => problem.disturbances.push(one.clone()),
         }
     }
     Ok(())

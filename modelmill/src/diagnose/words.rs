@@ -2,6 +2,7 @@
 
 use modelmill_identify::diagnose::{Diagnosis, Disturbance, Effect, Rung, Verdict};
 
+use crate::audit::SUSPICIONS;
 use crate::text::table::{number, percent, significant};
 use modelmill_identify::diagnose::ROUNDING;
 
@@ -73,7 +74,7 @@ pub fn floor(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// The verdict with figures, success first: what was found, what is left and of which kind, what the recordings have besides.
+/// The verdict with figures, what may be wrong with the input first of all, then success first: what was found, what is left and of which kind, what the recordings have besides.
 pub fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged) -> String {
     let ladder = &diagnosis.ladder;
     let (Some(first), Some(last)) = (ladder.first(), ladder.last()) else {
@@ -127,16 +128,30 @@ pub fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged) -> St
             }
         }
     };
-    match besides(diagnosis) {
-        Some(besides) => format!("{says} {besides}"),
-        None => says,
-    }
+    let all = [first_of_all(diagnosis), Some(says), besides(diagnosis)];
+    all.into_iter().flatten().collect::<Vec<_>>().join(" ")
+}
+
+/// What is to be cleared up before anything else is believed.
+fn first_of_all(diagnosis: &Diagnosis) -> Option<String> {
+    let suspicions = (diagnosis.disturbances.iter()).filter(|one| is_suspicion(one));
+    let says: Vec<&str> = suspicions.filter_map(|one| one.says.as_deref()).collect();
+    (!says.is_empty()).then(|| {
+        format!(
+            "Look first at what may be wrong with the recording or the model: {}.",
+            says.join("; ").replace('`', "")
+        )
+    })
+}
+
+fn is_suspicion(one: &Disturbance) -> bool {
+    SUSPICIONS.contains(&one.kind.as_str())
 }
 
 /// What the recordings have besides, by name.
 fn besides(diagnosis: &Diagnosis) -> Option<String> {
     let mut kinds: Vec<(&str, Vec<&str>)> = Vec::new();
-    for one in &diagnosis.disturbances {
+    for one in diagnosis.disturbances.iter().filter(|d| !is_suspicion(d)) {
         let places = one.at.iter().map(String::as_str);
         match kinds.iter_mut().find(|(kind, _)| *kind == one.kind) {
             Some((_, at)) => at.extend(places.filter(|p| *p != "t")),
