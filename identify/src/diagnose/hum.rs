@@ -292,7 +292,7 @@ mod tests {
                         last[1]
                     })
                     .collect();
-                let found = slow_lines(&mut problem(&rest), &[rest.clone()], &[]);
+                let found = slow_lines(&mut problem(&rest), std::slice::from_ref(&rest), &[]);
                 assert_eq!(found, [], "{corner} Hz, seed {seed}");
             }
         }
@@ -301,6 +301,9 @@ mod tests {
     #[test]
     fn what_comes_again_with_the_state_is_no_hum() {
         let rest: Vec<f64> = (0..600).map(|i| (0.4 * f64::from(i)).sin()).collect();
-        assert_eq!(slow_lines(&mut problem(&rest), &[rest.clone()], &[0]), []);
+        assert_eq!(
+            slow_lines(&mut problem(&rest), std::slice::from_ref(&rest), &[0]),
+            []
+        );
     }
 }

@@ -19,7 +19,7 @@ pub(super) fn upside_down(
     samples: &[usize],
     measured: &DVector<f64>,
 ) -> Option<Finding> {
-    if model.gravity() == [0.0; 3] {
+    if model.gravity().iter().all(|g| *g == 0.0) {
         return None;
     }
     let error = |regressor| ForceAudit::new(regressor)?.error(measured);
