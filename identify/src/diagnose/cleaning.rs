@@ -34,14 +34,16 @@ pub(crate) fn clean(problem: &mut Problem) -> Vec<Disturbance> {
     })
 }
 
-/// Takes off slow lines that only show themselves in what a diagnosis leaves, `[channel][sample]`, and says which there were.
+/// Takes off slow lines that only show themselves in what a diagnosis leaves, `[channel][sample]`, and says which there were;
+/// `again` is the share of each channel that comes again with the state.
 pub(crate) fn clean_again(
     problem: &mut Problem,
     left: &[Vec<f64>],
+    again: &[f64],
     unexplained: &[usize],
 ) -> Vec<Disturbance> {
     counted(problem, |problem| {
-        hum::slow_lines(problem, left, unexplained)
+        hum::slow_lines(problem, left, again, unexplained)
     })
 }
 

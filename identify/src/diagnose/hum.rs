@@ -2,12 +2,13 @@
 //!
 //! A line stands above the spectrum about it, beyond the frequencies of the motion; its frequency is where least squares of a
 //! sine and a cosine explains most. A slow one, among the frequencies of the motion, is seen once all that follows the state is
-//! taken off: it is most of what is left then, at one frequency in every stretch.
+//! taken off: it is most of what is left then, with one frequency in every stretch, and one phase from its begin to its end.
 
 use std::f64::consts::TAU;
 
+use super::column::Column;
 use super::disturbance::{Disturbance, Quantity, is_white};
-use super::pool::dot;
+use super::pool::{On, Pool, dot, solve};
 use super::problem::Problem;
 use crate::signal::{hann_power, median};
 
@@ -26,10 +27,13 @@ const MOST_LINES: usize = 6;
 const LEAST: f64 = 0.02;
 /// Turns that a slow line makes in every stretch.
 const TURNS: f64 = 4.0;
+/// Parts of every stretch of which it must be most with the same amplitude and phase.
+const PARTS: usize = 4;
 
 /// Lines of the spectrum, taken off with a phase of their own in every stretch.
 pub(crate) fn lines(problem: &mut Problem, rest: &[Vec<f64>]) -> Vec<Disturbance> {
     let channels = rest.len();
+    let unfit = unfit(problem);
     let mut left = rest.to_vec();
     let mut frequencies: Vec<f64> = Vec::new();
     let mut lowest = LOWEST;
@@ -41,10 +45,10 @@ pub(crate) fn lines(problem: &mut Problem, rest: &[Vec<f64>]) -> Vec<Disturbance
         else {
             break;
         };
-        let frequency = finest(problem, &left, frequency);
+        let frequency = finest(problem, &left, &unfit, frequency);
         let mut without = left.clone();
-        for left in &mut without {
-            take_off(problem, left, frequency);
+        for (left, unfit) in without.iter_mut().zip(&unfit) {
+            take_off(problem, left, unfit, frequency);
         }
         let is_most = |(before, after): (&Vec<f64>, &Vec<f64>)| {
             dot(after, after) < (1.0 - MOST_OF) * dot(before, before)
@@ -69,40 +73,105 @@ pub(crate) fn lines(problem: &mut Problem, rest: &[Vec<f64>]) -> Vec<Disturbance
     found
 }
 
-/// Slow lines in what a diagnosis leaves of the channels that it takes for noise, taken off in the same way.
+/// Slow lines in what a diagnosis leaves of the channels that it takes for noise, but for the share of squares that comes `again`
+/// with the state; taken off in the same way.
 pub(crate) fn slow_lines(
     problem: &mut Problem,
     rest: &[Vec<f64>],
+    again: &[f64],
     unexplained: &[usize],
 ) -> Vec<Disturbance> {
-    let noise = (0..rest.len()).filter(|d| !unexplained.contains(d));
+    let unfit = unfit(problem);
     let mut found = Vec::new();
-    for d in noise {
+    for d in (0..rest.len()).filter(|d| !unexplained.contains(d)) {
         let own = &rest[d];
         let variance = dot(own, own) / own.len().max(1) as f64;
-        if is_white(problem, d, variance) {
+        if is_white(problem, d, variance * (1.0 - again[d])) {
             continue;
         }
         let Some(frequency) = strongest(problem, own) else {
             continue;
         };
-        let frequency = finest(problem, std::slice::from_ref(own), frequency);
-        let mut left = own.clone();
-        take_off(problem, &mut left, frequency);
-        let mut start = 0;
-        let is_its = problem.layout.stretches.iter().all(|stretch| {
-            let range = start..start + stretch.samples;
-            start = range.end;
-            let [before, after] = [own, &left].map(|r| dot(&r[range.clone()], &r[range.clone()]));
-            frequency * stretch.samples as f64 * stretch.step > TURNS
-                && after < (1.0 - MOST_OF) * before
-        });
-        if is_its {
-            let taken: Vec<f64> = own.iter().zip(&left).map(|(a, b)| a - b).collect();
+        let own = std::slice::from_ref(own);
+        let frequency = finest(problem, own, std::slice::from_ref(&unfit[d]), frequency);
+        if let Some(taken) = beside_the_model(problem, rest, d, frequency) {
             found.extend(told(problem, d, &taken, &[frequency]));
         }
     }
     found
+}
+
+/// A wave of a frequency with an amplitude and a phase in every stretch, fitted beside the base and friction; `None` unless it is
+/// most of what is left of a channel in every part of every stretch. What swings by itself has no such phase.
+fn beside_the_model(
+    problem: &Problem,
+    rest: &[Vec<f64>],
+    channel: usize,
+    frequency: f64,
+) -> Option<Vec<f64>> {
+    let layout = &problem.layout;
+    let mut pool = Pool::new(layout).without(&problem.undecided());
+    let columns = problem.base.iter().chain(&problem.friction);
+    let mut which: Vec<usize> = columns.map(|c| pool.add(c)).collect();
+    let known = which.len();
+    let mut waves: Vec<Vec<f64>> = Vec::new();
+    let mut start = 0;
+    for stretch in &layout.stretches {
+        if stretch.samples as f64 * stretch.step * frequency < TURNS {
+            return None;
+        }
+        for shift in [0.0, 0.25] {
+            let mut wave = vec![0.0; layout.samples()];
+            for (i, x) in wave[start..start + stretch.samples].iter_mut().enumerate() {
+                *x = (TAU * (frequency * stretch.step * i as f64 + shift)).sin();
+            }
+            let mut column = Column(vec![None; rest.len()]);
+            column.0[channel] = Some(wave.clone());
+            which.push(pool.add(column));
+            waves.push(wave);
+        }
+        start += stretch.samples;
+    }
+    let target = pool.add(Column(rest.iter().cloned().map(Some).collect()));
+    let weight = |rest: &Vec<f64>| {
+        let squares = dot(rest, rest) / rest.len().max(1) as f64;
+        1.0 / squares.max(f64::MIN_POSITIVE)
+    };
+    let weights: Vec<f64> = rest.iter().map(weight).collect();
+    which.push(target);
+    let (factors, _) = solve(&pool.gram(&which, &weights, On::All));
+    which.pop();
+    let left = pool.rest(target, &which, factors.as_slice());
+    let mut start = 0;
+    for stretch in &layout.stretches {
+        for part in 0..PARTS {
+            let [from, to] = [part, part + 1].map(|k| start + k * stretch.samples / PARTS);
+            let [before, after] =
+                [&rest[channel], &left[channel]].map(|r| dot(&r[from..to], &r[from..to]));
+            if after > (1.0 - MOST_OF) * before {
+                return None;
+            }
+        }
+        start += stretch.samples;
+    }
+    let mut taken = vec![0.0; layout.samples()];
+    for (wave, factor) in waves.iter().zip(factors.iter().skip(known)) {
+        for (sum, x) in taken.iter_mut().zip(wave) {
+            *sum += factor * x;
+        }
+    }
+    Some(taken)
+}
+
+/// Samples that tell no wave, by channel: such as were not measured, and such as decide nothing.
+fn unfit(problem: &Problem) -> Vec<Vec<bool>> {
+    let mut unfit = problem.undecided();
+    for (unfit, lost) in unfit.iter_mut().zip(&problem.layout.left_out) {
+        for (unfit, lost) in unfit.iter_mut().zip(lost) {
+            *unfit |= lost;
+        }
+    }
+    unfit
 }
 
 /// Takes lines off the measured force of a channel and says which.
@@ -113,10 +182,14 @@ fn told(
     frequencies: &[f64],
 ) -> Option<Disturbance> {
     let values = problem.measured.0[channel].as_mut()?;
-    for (value, taken) in values.iter_mut().zip(taken) {
-        *value -= taken;
+    let lost = problem.layout.left_out.get(channel);
+    for (i, (value, taken)) in values.iter_mut().zip(taken).enumerate() {
+        if lost.is_none_or(|lost| lost.get(i) != Some(&true)) {
+            *value -= taken;
+        }
     }
-    let amplitude = (2.0 * dot(taken, taken) / taken.len().max(1) as f64).sqrt();
+    let acts = taken.iter().filter(|x| **x != 0.0).count();
+    let amplitude = (2.0 * dot(taken, taken) / acts.max(1) as f64).sqrt();
     let mut estimates = vec![Quantity::new("amplitude", amplitude, "")];
     let each = frequencies.iter();
     estimates.extend(each.map(|f| Quantity::new("frequency", *f, "Hz")));
@@ -180,14 +253,14 @@ fn line(problem: &Problem, rest: &[f64], lowest: f64) -> Option<(f64, f64)> {
 }
 
 /// The frequency about which a sine and a cosine explain most of all channels.
-fn finest(problem: &Problem, rest: &[Vec<f64>], about: f64) -> f64 {
+fn finest(problem: &Problem, rest: &[Vec<f64>], unfit: &[Vec<bool>], about: f64) -> f64 {
     let longest = problem.layout.stretches.iter();
     let longest = longest.map(|s| s.samples as f64 * s.step);
     let width = 1.0 / longest.fold(f64::MIN_POSITIVE, f64::max);
     let explained = |frequency: f64| -> f64 {
-        let all = rest.iter().map(|rest| {
+        let all = rest.iter().zip(unfit).map(|(rest, unfit)| {
             let mut left = rest.clone();
-            take_off(problem, &mut left, frequency);
+            take_off(problem, &mut left, unfit, frequency);
             dot(rest, rest) - dot(&left, &left)
         });
         all.sum()
@@ -202,16 +275,18 @@ fn finest(problem: &Problem, rest: &[Vec<f64>], about: f64) -> f64 {
     centre
 }
 
-/// Takes the best sine and cosine off a series, stretch by stretch.
-fn take_off(problem: &Problem, rest: &mut [f64], frequency: f64) {
+/// Takes the best sine and cosine off a series, stretch by stretch, where it tells anything.
+fn take_off(problem: &Problem, rest: &mut [f64], unfit: &[bool], frequency: f64) {
     let mut start = 0;
     for stretch in &problem.layout.stretches {
         let part = &mut rest[start..start + stretch.samples];
+        let counts = |i: &usize| unfit.get(start + i) != Some(&true);
         let waves: Vec<(f64, f64)> = (0..part.len())
             .map(|i| (TAU * frequency * stretch.step * i as f64).sin_cos())
             .collect();
         let mut sums = [0.0; 5];
-        for ((s, c), r) in waves.iter().zip(part.iter()) {
+        for i in (0..part.len()).filter(counts) {
+            let ((s, c), r) = (waves[i], part[i]);
             for (sum, x) in sums.iter_mut().zip([s * s, s * c, c * c, s * r, c * r]) {
                 *sum += x;
             }
@@ -221,8 +296,9 @@ fn take_off(problem: &Problem, rest: &mut [f64], frequency: f64) {
         if determinant > 1e-9 * ss * cc {
             let a = (sr * cc - cr * sc) / determinant;
             let b = (cr * ss - sr * sc) / determinant;
-            for ((s, c), r) in waves.iter().zip(part.iter_mut()) {
-                *r -= a * s + b * c;
+            for i in (0..part.len()).filter(counts) {
+                let (s, c) = waves[i];
+                part[i] -= a * s + b * c;
             }
         }
         start += stretch.samples;
@@ -232,7 +308,6 @@ fn take_off(problem: &Problem, rest: &mut [f64], frequency: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::column::Column;
     use crate::diagnose::problem::{Layout, Stretch};
     use crate::test_noise::Noise;
 
@@ -268,7 +343,7 @@ mod tests {
                 })
                 .collect();
             let mut problem = problem(&rest);
-            let found = slow_lines(&mut problem, &[rest], &[]);
+            let found = slow_lines(&mut problem, &[rest], &[0.0], &[]);
             let values = &found[0].estimates;
             assert!((values[0].value - 5.0).abs() < 0.3, "{values:?}");
             assert!((values[1].value - 2.31).abs() < 0.02, "{values:?}");
@@ -292,18 +367,77 @@ mod tests {
                         last[1]
                     })
                     .collect();
-                let found = slow_lines(&mut problem(&rest), std::slice::from_ref(&rest), &[]);
+                let found = slow_lines(
+                    &mut problem(&rest),
+                    std::slice::from_ref(&rest),
+                    &[0.0],
+                    &[],
+                );
                 assert_eq!(found, [], "{corner} Hz, seed {seed}");
             }
         }
     }
 
+    /// A lightly damped mode that noise drives has a frequency, but neither amplitude nor phase.
     #[test]
-    fn what_comes_again_with_the_state_is_no_hum() {
-        let rest: Vec<f64> = (0..600).map(|i| (0.4 * f64::from(i)).sin()).collect();
-        assert_eq!(
-            slow_lines(&mut problem(&rest), std::slice::from_ref(&rest), &[0]),
-            []
-        );
+    fn what_swings_by_itself_is_no_hum() {
+        for damping in [0.05, 0.02, 0.01] {
+            let mut taken = 0;
+            for seed in 0..50 {
+                let mut noise = Noise::new(seed);
+                let omega = TAU * 2.0 / 44.0;
+                let keeps = (-damping * omega).exp();
+                let mut last = [0.0; 2];
+                let swings: Vec<f64> = (0..1200)
+                    .map(|_| {
+                        let now = 2.0 * keeps * omega.cos() * last[0] - keeps * keeps * last[1]
+                            + noise.normal();
+                        last = [now, last[0]];
+                        now
+                    })
+                    .collect();
+                let rest = &swings[600..];
+                let found = slow_lines(&mut problem(rest), &[rest.to_vec()], &[0.0], &[]);
+                taken += found.len();
+            }
+            assert!(taken <= 1, "damping {damping}: {taken} of 50");
+        }
+    }
+
+    /// A third of a stretch was not measured, and a column of the base has nearly the frequency of the hum.
+    #[test]
+    fn a_hum_is_told_by_its_size_beside_the_model_and_lost_samples() {
+        let mut noise = Noise::new(4);
+        let n = 600;
+        let base: Vec<f64> = (0..n)
+            .map(|i| (TAU * 0.7 / 44.0 * f64::from(i)).sin())
+            .collect();
+        let hum = |i: i32| 1.0 * (TAU * 0.78 / 44.0 * f64::from(i) + 0.3).sin();
+        let measured: Vec<f64> = (0..n)
+            .map(|i| 4.0 * base[usize::try_from(i).unwrap()] + hum(i) + 0.1 * noise.normal())
+            .collect();
+        let lost: Vec<bool> = (0..n).map(|i| (100..200).contains(&i)).collect();
+        let measured: Vec<f64> = measured
+            .iter()
+            .zip(&lost)
+            .map(|(y, lost)| if *lost { 0.0 } else { *y })
+            .collect();
+        let mut problem = problem(&measured);
+        problem.base = vec![Column(vec![Some(base)])];
+        problem.layout.left_out = vec![lost.clone()];
+        problem.removed = vec![0.0];
+        let mut pool = Pool::new(&problem.layout);
+        let which = [pool.add(&problem.base[0]), pool.add(&problem.measured)];
+        let (factors, _) = solve(&pool.gram(&which, &[1.0], On::All));
+        let rest = pool.rest(which[1], &which[..1], factors.as_slice());
+        drop(pool);
+        let found = slow_lines(&mut problem, &rest, &[0.0], &[]);
+        let values = &found[0].estimates;
+        assert!((values[0].value - 1.0).abs() < 0.03, "{values:?}");
+        assert!((values[1].value - 0.78).abs() < 0.005, "{values:?}");
+        for (i, lost) in lost.iter().enumerate() {
+            let value = problem.measured.0[0].as_ref().unwrap()[i];
+            assert!(!lost || value == 0.0, "{i}: {value}");
+        }
     }
 }

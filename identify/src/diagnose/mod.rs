@@ -174,7 +174,13 @@ pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
     problem.find_noise_of_idle();
     disturbances.extend(cleaning::clean(problem));
     let diagnosis = search_all(problem, supply, disturbances.clone());
-    let slow = cleaning::clean_again(problem, &diagnosis.rest, &diagnosis.unexplained);
+    let Diagnosis {
+        rest,
+        reproducible: again,
+        unexplained,
+        ..
+    } = &diagnosis;
+    let slow = cleaning::clean_again(problem, rest, again, unexplained);
     if slow.is_empty() {
         return diagnosis;
     }

@@ -33,7 +33,8 @@ pub(super) fn upside_down(
         let file = &data.run.file;
         let note = format!(
             "In {file} {says}: the best fit of the model with friction and offsets of its drives is off by {} as it is, and \
-             would be off by {} then. Check `gravity` in the model file, and which way up the machine is mounted.",
+             would be off by {} then. Check `gravity` in the model file, and which way up the machine is mounted; something \
+             that more than balances its weight looks alike.",
             percent(Some(before)),
             percent(Some(after))
         );

@@ -59,7 +59,7 @@ pub fn examine(model: &Model, data: &mut [Stretch], leave_out_events: bool) {
     }
 }
 
-/// What is told of a recording, and what a diagnosis calls it if it makes sense of nothing before that is mended.
+/// What is told of a recording, and the disturbance that the verdict of a diagnosis begins with.
 struct Finding {
     note: Note,
     fault: Option<Disturbance>,

@@ -88,8 +88,7 @@ pub(crate) fn oddities(
                 .collect();
             let may_hang = which == Misread::Turned
                 && upside_down.is_some_and(|forces| explains(forces, measured));
-            let besides = if may_hang { HANGS } else { "" };
-            (!drives.is_empty()).then(|| misread(mechanism, &drives, which, besides, file))
+            (!drives.is_empty()).then(|| misread(mechanism, &drives, which, may_hang, file))
         })
         .collect();
     let before_gears = found.iter().filter_map(|(drive, oddity)| match oddity {
@@ -132,12 +131,12 @@ fn asks_what_they_are(drives: &[(&Drive, f64)], file: &str) -> String {
     )
 }
 
-/// Forces of drives that were misread, with what may be behind it `besides`.
+/// Forces of drives that were misread; gravity the other way may be behind it.
 fn misread(
     mechanism: &Mechanism,
     drives: &[&Drive],
     which: Misread,
-    besides: &str,
+    may_hang: bool,
     file: &str,
 ) -> Finding {
     let names: Vec<String> = drives.iter().map(|d| format!("`{}`", d.name)).collect();
@@ -167,7 +166,13 @@ fn misread(
         Misread::TooLarge => (UNITS, "about 1000 times as large", "in mN or mN m"),
     };
     let names = names.join(", ");
-    let says = format!("the {forces} of {names} {are} {what} beside what the nominal values give");
+    let [or, besides] = if may_hang {
+        [", or gravity pulls the other way", HANGS]
+    } else {
+        ["", ""]
+    };
+    let says =
+        format!("the {forces} of {names} {are} {what} beside what the nominal values give{or}");
     let note = format!(
         "Beside what the nominal values give, the {forces} of {names} in {file} {are} {what}; if {they_are} {if_so}, say {}.{besides}",
         maps.join(" ")

@@ -64,7 +64,14 @@ pub(crate) fn take_off(
             told.says.is_some() && (&told.kind, &told.says) == (&one.kind, &one.says)
         };
         match problem.disturbances.iter_mut().find(is_same) {
-            Some(told) => told.recordings.extend(one.recordings.iter().cloned()),
+            Some(told) => {
+                let files = one
+                    .recordings
+                    .iter()
+                    .filter(|file| !told.recordings.contains(file));
+                let new: Vec<String> = files.cloned().collect();
+                told.recordings.extend(new);
+            }
             None => problem.disturbances.push(one.clone()),
         }
     }

@@ -161,7 +161,8 @@ fn besides(diagnosis: &Diagnosis) -> Option<String> {
     let named: Vec<String> = kinds
         .into_iter()
         .map(|(name, mut at)| {
-            at.dedup();
+            let mut seen = std::collections::HashSet::new();
+            at.retain(|place| seen.insert(*place));
             match at.as_slice() {
                 [] => kind(name),
                 at => format!("{} ({})", kind(name), at.join(", ")),
