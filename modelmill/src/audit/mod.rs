@@ -175,15 +175,9 @@ fn beside_nominal(model: &Model, data: &Stretch, samples: &[usize]) -> Vec<Findi
         let of = |d: usize| forces.iter().skip(d).step_by(n).copied().collect();
         (0..n).map(of).collect()
     };
-    let expected = regressor * &nominal;
-    let to_rest = |[_, rates, accelerations]: &mut Motion| {
-        for column in rates.iter_mut().chain(accelerations) {
-            column.fill(0.0);
-        }
-    };
-    let at_rest = self::regressor(model, data, samples, &to_rest).map(|rows| rows * &nominal);
-    let upside_down = at_rest.map(|at_rest| by_drive(&expected - 2.0 * at_rest));
-    let expected = by_drive(expected);
+    let expected = by_drive(regressor * &nominal);
+    let upside_down = rows::upside_down(model, data, samples);
+    let upside_down = upside_down.map(|rows| by_drive(rows * &nominal));
     let measured: Vec<Vec<f64>> = forces
         .iter()
         .map(|force| samples.iter().map(|k| force[*k]).collect())

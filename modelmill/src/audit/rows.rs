@@ -44,18 +44,14 @@ impl Rows {
         })
     }
 
-    /// The regressor and the further columns if gravity pulled the other way: what columns are at rest is gravity's, or an effect's
-    /// of which a fit knows no sign.
+    /// The regressor and the further columns if gravity pulled the other way.
     pub(super) fn upside_down(
         model: &Model,
         data: &Stretch,
         samples: &[usize],
     ) -> Option<ByChannel> {
         let around = Around::new(model, data, samples)?;
-        let evaluator = Evaluator::new(&model.derivation);
-        let at_rest = Inputs::new(data, samples).at_rest();
-        let at_rest = at_rest.with(|states| evaluator.regressor(states)).ok()?;
-        let mut rows = regressor(model, data, samples)? - 2.0 * at_rest;
+        let mut rows = upside_down(model, data, samples)?;
         around.add_further(&mut rows, |further| further.values);
         let is_finite = rows.iter().all(|x| x.is_finite());
         is_finite.then(|| ByChannel::new(&rows, around.rates[1].len()))
@@ -189,6 +185,19 @@ fn regressor(model: &Model, data: &Stretch, samples: &[usize]) -> Option<DMatrix
     let evaluator = Evaluator::new(&model.derivation);
     let found = Inputs::new(data, samples).with(|states| evaluator.regressor(states));
     found.ok()
+}
+
+/// The regressor if gravity pulled the other way: what columns are at rest is gravity's, or an effect's of which a fit knows no
+/// sign.
+pub(super) fn upside_down(
+    model: &Model,
+    data: &Stretch,
+    samples: &[usize],
+) -> Option<DMatrix<f64>> {
+    let evaluator = Evaluator::new(&model.derivation);
+    let at_rest = Inputs::new(data, samples).at_rest();
+    let at_rest = at_rest.with(|states| evaluator.regressor(states)).ok()?;
+    Some(regressor(model, data, samples)? - 2.0 * at_rest)
 }
 
 /// States at some samples.
