@@ -135,7 +135,8 @@ fn beside_the_model(
     let target = pool.add(Column(rest.iter().cloned().map(Some).collect()));
     let weight = |rest: &Vec<f64>| {
         let squares = dot(rest, rest) / rest.len().max(1) as f64;
-        1.0 / squares.max(f64::MIN_POSITIVE)
+        // A channel of which nothing is left says nothing of the noise of others.
+        if squares > 0.0 { 1.0 / squares } else { 0.0 }
     };
     let weights: Vec<f64> = rest.iter().map(weight).collect();
     which.push(target);
@@ -148,7 +149,8 @@ fn beside_the_model(
             let [from, to] = [part, part + 1].map(|k| start + k * stretch.samples / PARTS);
             let [before, after] =
                 [&rest[channel], &left[channel]].map(|r| dot(&r[from..to], &r[from..to]));
-            if after > (1.0 - MOST_OF) * before {
+            let is_most = after <= (1.0 - MOST_OF) * before;
+            if !is_most {
                 return None;
             }
         }
