@@ -47,8 +47,13 @@ pub(crate) fn lines(problem: &mut Problem, rest: &[Vec<f64>]) -> Vec<Disturbance
         };
         let frequency = finest(problem, &left, &unfit, frequency);
         let mut without = left.clone();
-        for (left, unfit) in without.iter_mut().zip(&unfit) {
-            take_off(problem, left, unfit, frequency);
+        for (d, left) in without.iter_mut().enumerate() {
+            let lost = problem
+                .layout
+                .left_out
+                .get(d)
+                .map_or(&[][..], Vec::as_slice);
+            take_off(problem, left, &unfit[d], lost, frequency);
         }
         let is_most = |(before, after): (&Vec<f64>, &Vec<f64>)| {
             dot(after, after) < (1.0 - MOST_OF) * dot(before, before)
@@ -262,7 +267,7 @@ fn finest(problem: &Problem, rest: &[Vec<f64>], unfit: &[Vec<bool>], about: f64)
     let explained = |frequency: f64| -> f64 {
         let all = rest.iter().zip(unfit).map(|(rest, unfit)| {
             let mut left = rest.clone();
-            take_off(problem, &mut left, unfit, frequency);
+            take_off(problem, &mut left, unfit, unfit, frequency);
             dot(rest, rest) - dot(&left, &left)
         });
         all.sum()
@@ -277,17 +282,17 @@ fn finest(problem: &Problem, rest: &[Vec<f64>], unfit: &[Vec<bool>], about: f64)
     centre
 }
 
-/// Takes the best sine and cosine off a series, stretch by stretch, where it tells anything.
-fn take_off(problem: &Problem, rest: &mut [f64], unfit: &[bool], frequency: f64) {
+/// Takes the best sine and cosine off a series, stretch by stretch: fitted without what is `unfit`, taken off all that is not `spared`.
+fn take_off(problem: &Problem, rest: &mut [f64], unfit: &[bool], spared: &[bool], frequency: f64) {
     let mut start = 0;
     for stretch in &problem.layout.stretches {
         let part = &mut rest[start..start + stretch.samples];
-        let counts = |i: &usize| unfit.get(start + i) != Some(&true);
+        let is_out = |out: &[bool], i: usize| out.get(start + i) == Some(&true);
         let waves: Vec<(f64, f64)> = (0..part.len())
             .map(|i| (TAU * frequency * stretch.step * i as f64).sin_cos())
             .collect();
         let mut sums = [0.0; 5];
-        for i in (0..part.len()).filter(counts) {
+        for i in (0..part.len()).filter(|i| !is_out(unfit, *i)) {
             let ((s, c), r) = (waves[i], part[i]);
             for (sum, x) in sums.iter_mut().zip([s * s, s * c, c * c, s * r, c * r]) {
                 *sum += x;
@@ -298,7 +303,7 @@ fn take_off(problem: &Problem, rest: &mut [f64], unfit: &[bool], frequency: f64)
         if determinant > 1e-9 * ss * cc {
             let a = (sr * cc - cr * sc) / determinant;
             let b = (cr * ss - sr * sc) / determinant;
-            for i in (0..part.len()).filter(counts) {
+            for i in (0..part.len()).filter(|i| !is_out(spared, *i)) {
                 let (s, c) = waves[i];
                 part[i] -= a * s + b * c;
             }
