@@ -18,6 +18,8 @@
       const svg = run.querySelector('figure.plot svg');
       svg.scrollIntoView();
       await wait(600);
+      // While a page scrolls, a wheel zooms only what was picked; the event of the scrolling above may come at any time.
+      svg.focus({ preventScroll: true });
       const box = svg.getBoundingClientRect();
       const at = { clientX: box.left + box.width * 0.5, clientY: box.top + box.height * 0.5, bubbles: true, cancelable: true };
       const span = () => Number(run.dataset.to) - Number(run.dataset.from);
