@@ -172,11 +172,6 @@ impl Browser {
         let scheme = json!([{ "name": "prefers-color-scheme", "value": scheme }]);
         let media = json!({ "media": media, "features": scheme });
         self.ask(Some(window), "Emulation.setEmulatedMedia", &media);
-        // Pictures are drawn anew in the frame after next, where they are at all.
-        self.run(
-            window,
-            "await new Promise((done) => setTimeout(done, 250));",
-        );
     }
 
     /// Presses a key of a name, such as `Enter`, with letters that it types.
