@@ -43,7 +43,10 @@ pub(crate) fn check(browser: &mut Browser, window: &Window, what: &str) {
             let none: [&str; 0] = [];
             assert_eq!(texts(&wrong), none, "{what}, {width} wide");
             let counted = browser.run(window, "return window.faint().counted;");
-            assert!(counted.as_u64().is_some_and(|n| n > 20), "{what}: {counted}");
+            assert!(
+                counted.as_u64().is_some_and(|n| n > 20),
+                "{what}: {counted}"
+            );
             let faint = browser.run(window, &settled("window.faint().found"));
             assert_eq!(texts(&faint), none, "{what}, {medium:?}");
             let nameless = browser.run(window, "return window.nameless();");

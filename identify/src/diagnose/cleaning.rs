@@ -5,7 +5,7 @@
 //! robust deviations, and not where a drive reverses.
 
 use super::disturbance::{Disturbance, Quantity};
-use super::hum;
+use super::hum::{self, Line};
 use super::pool::{On, Pool, dot, solve};
 use super::problem::Problem;
 use crate::signal::median;
@@ -34,17 +34,15 @@ pub(crate) fn clean(problem: &mut Problem) -> Vec<Disturbance> {
     })
 }
 
-/// Takes off slow lines that only show themselves in what a diagnosis leaves, `[channel][sample]`, and says which there were;
-/// `again` is the share of each channel that comes again with the state.
-pub(crate) fn clean_again(
-    problem: &mut Problem,
-    left: &[Vec<f64>],
-    again: &[f64],
-    unexplained: &[usize],
-) -> Vec<Disturbance> {
-    counted(problem, |problem| {
-        hum::slow_lines(problem, left, again, unexplained)
-    })
+/// Takes slow lines off forces that were not cleaned yet, and cleans what they leave: their crests are taken for outliers where
+/// nobody knows of them. Says what there was.
+pub(crate) fn clean_beside(problem: &mut Problem, slow: &[Line]) -> Vec<Disturbance> {
+    let mut found = counted(problem, |problem| {
+        let lines = slow.iter();
+        lines.filter_map(|line| line.take_off(problem)).collect()
+    });
+    found.extend(clean(problem));
+    found
 }
 
 /// Counts what `clean` takes off among what was removed.

@@ -29,6 +29,11 @@ const LEAST: f64 = 0.02;
 const TURNS: f64 = 4.0;
 /// Parts of every stretch of which it must be most with the same amplitude and phase.
 const PARTS: usize = 4;
+/// The part of what no function of the state explains that it may leave, where the state explains some.
+const LEFT_BESIDE: f64 = 0.5;
+/// The part of every stretch that it must be for its frequency to be sought, and how many times that is narrowed.
+const WORTH_A_LOOK: f64 = 0.3;
+const NARROWED: usize = 10;
 
 /// Lines of the spectrum, taken off with a phase of their own in every stretch.
 pub(crate) fn lines(problem: &mut Problem, rest: &[Vec<f64>]) -> Vec<Disturbance> {
@@ -78,96 +83,187 @@ pub(crate) fn lines(problem: &mut Problem, rest: &[Vec<f64>]) -> Vec<Disturbance
     found
 }
 
-/// Slow lines in what a diagnosis leaves of the channels that it takes for noise, but for the share of squares that comes `again`
-/// with the state; taken off in the same way.
+/// A slow line that one channel has.
+pub(crate) struct Line {
+    channel: usize,
+    /// Hz
+    frequency: f64,
+    /// Its force, sample by sample.
+    force: Vec<f64>,
+}
+
+impl Line {
+    /// Takes it off the measured force of its channel and says so.
+    pub(crate) fn take_off(&self, problem: &mut Problem) -> Option<Disturbance> {
+        told(problem, self.channel, &self.force, &[self.frequency])
+    }
+}
+
+/// Slow lines in what a diagnosis leaves of the channels, `[channel][sample]`; `again` is the share of its squares that comes again
+/// with the state. Where that is more than noise, a line must explain more than all that the state may: what comes again after a
+/// period of the motion comes with the state, and a hum may come again nearly, too.
 pub(crate) fn slow_lines(
-    problem: &mut Problem,
+    problem: &Problem,
     rest: &[Vec<f64>],
     again: &[f64],
     unexplained: &[usize],
-) -> Vec<Disturbance> {
+) -> Vec<Line> {
     let unfit = unfit(problem);
     let mut found = Vec::new();
-    for d in (0..rest.len()).filter(|d| !unexplained.contains(d)) {
-        let own = &rest[d];
-        let variance = dot(own, own) / own.len().max(1) as f64;
-        if is_white(problem, d, variance * (1.0 - again[d])) {
+    for (channel, own) in rest.iter().enumerate() {
+        let by_no_state = dot(own, own) * (1.0 - again[channel]);
+        if is_white(problem, channel, by_no_state / own.len().max(1) as f64) {
             continue;
         }
         let Some(frequency) = strongest(problem, own) else {
             continue;
         };
         let own = std::slice::from_ref(own);
-        let frequency = finest(problem, own, std::slice::from_ref(&unfit[d]), frequency);
-        if let Some(taken) = beside_the_model(problem, rest, d, frequency) {
-            found.extend(told(problem, d, &taken, &[frequency]));
+        let frequency = finest(
+            problem,
+            own,
+            std::slice::from_ref(&unfit[channel]),
+            frequency,
+        );
+        let Some((frequency, wave)) = Beside::new(problem, rest, channel).most(frequency) else {
+            continue;
+        };
+        let explains_more = dot(&wave.left, &wave.left) < LEFT_BESIDE * by_no_state;
+        if explains_more || !unexplained.contains(&channel) {
+            found.push(Line {
+                channel,
+                frequency,
+                force: wave.taken,
+            });
         }
     }
     found
 }
 
-/// A wave of a frequency with an amplitude and a phase in every stretch, fitted beside the base and friction; `None` unless it is
-/// most of what is left of a channel in every part of every stretch. What swings by itself has no such phase.
-fn beside_the_model(
-    problem: &Problem,
-    rest: &[Vec<f64>],
+/// A channel whose rest is asked for one wave, with an amplitude and a phase in every stretch, beside the base and friction.
+struct Beside<'a> {
+    problem: &'a Problem,
     channel: usize,
-    frequency: f64,
-) -> Option<Vec<f64>> {
-    let layout = &problem.layout;
-    let mut pool = Pool::new(layout).without(&problem.undecided());
-    let columns = problem.base.iter().chain(&problem.friction);
-    let mut which: Vec<usize> = columns.map(|c| pool.add(c)).collect();
-    let known = which.len();
-    let mut waves: Vec<Vec<f64>> = Vec::new();
-    let mut start = 0;
-    for stretch in &layout.stretches {
-        if stretch.samples as f64 * stretch.step * frequency < TURNS {
+    /// What is left of the channel without a wave.
+    before: &'a [f64],
+    pool: Pool<'a>,
+    /// Base and friction.
+    known: Vec<usize>,
+    /// What is left of all channels.
+    target: usize,
+    weights: Vec<f64>,
+}
+
+/// A wave of some frequency beside the model.
+struct Wave {
+    taken: Vec<f64>,
+    /// What it leaves of its channel.
+    left: Vec<f64>,
+    /// What it leaves of all channels: squares, each weighed by those before.
+    squares: f64,
+}
+
+impl<'a> Beside<'a> {
+    fn new(problem: &'a Problem, rest: &'a [Vec<f64>], channel: usize) -> Self {
+        let mut pool = Pool::new(&problem.layout).without(&problem.undecided());
+        let columns = problem.base.iter().chain(&problem.friction);
+        let known = columns.map(|c| pool.add(c)).collect();
+        let target = pool.add(Column(rest.iter().cloned().map(Some).collect()));
+        let weight = |rest: &Vec<f64>| {
+            let squares = dot(rest, rest) / rest.len().max(1) as f64;
+            // A channel of which nothing is left says nothing of the noise of others.
+            if squares > 0.0 { 1.0 / squares } else { 0.0 }
+        };
+        Self {
+            problem,
+            channel,
+            before: &rest[channel],
+            pool,
+            known,
+            target,
+            weights: rest.iter().map(weight).collect(),
+        }
+    }
+
+    fn wave(&mut self, frequency: f64) -> Wave {
+        let layout = &self.problem.layout;
+        let mut which = self.known.clone();
+        let mut start = 0;
+        for stretch in &layout.stretches {
+            for shift in [0.0, 0.25] {
+                let mut wave = vec![0.0; layout.samples()];
+                for (i, x) in wave[start..start + stretch.samples].iter_mut().enumerate() {
+                    *x = (TAU * (frequency * stretch.step * i as f64 + shift)).sin();
+                }
+                let mut column = Column(vec![None; self.weights.len()]);
+                column.0[self.channel] = Some(wave);
+                which.push(self.pool.add(column));
+            }
+            start += stretch.samples;
+        }
+        which.push(self.target);
+        let (factors, _) = solve(&self.pool.gram(&which, &self.weights, On::All));
+        which.pop();
+        let mut left = self.pool.rest(self.target, &which, factors.as_slice());
+        let weighed = left.iter().zip(&self.weights);
+        let squares = weighed.map(|(left, weight)| weight * dot(left, left)).sum();
+        let mut taken = vec![0.0; layout.samples()];
+        let waves = self.pool.split_off(self.target + 1);
+        for (wave, factor) in waves.iter().zip(factors.iter().skip(self.known.len())) {
+            for (sum, x) in taken.iter_mut().zip(wave.0[self.channel].iter().flatten()) {
+                *sum += factor * x;
+            }
+        }
+        Wave {
+            taken,
+            left: left.swap_remove(self.channel),
+            squares,
+        }
+    }
+
+    /// The part of what is left of the channel that a wave takes, in the part of a stretch or a whole one of which it takes least.
+    fn least_taken(&self, wave: &Wave, parts: usize) -> f64 {
+        let mut start = 0;
+        let mut least: Option<f64> = None;
+        for stretch in &self.problem.layout.stretches {
+            for part in 0..parts {
+                let [from, to] = [part, part + 1].map(|k| start + k * stretch.samples / parts);
+                let [before, after] =
+                    [self.before, &wave.left].map(|r| dot(&r[from..to], &r[from..to]));
+                if before > 0.0 {
+                    let taken = 1.0 - after / before;
+                    least = Some(least.map_or(taken, |least| least.min(taken)));
+                }
+            }
+            start += stretch.samples;
+        }
+        least.unwrap_or(0.0)
+    }
+
+    /// The frequency, about one that is nearly right, at which least is left, and its wave; `None` unless that is most of what is
+    /// left of the channel in every part of every stretch. What swings by itself has no such phase.
+    fn most(&mut self, about: f64) -> Option<(f64, Wave)> {
+        let lasts = self.problem.layout.stretches.iter();
+        let lasts: Vec<f64> = lasts.map(|s| s.samples as f64 * s.step).collect();
+        if lasts.iter().any(|lasts| lasts * about < TURNS) {
             return None;
         }
-        for shift in [0.0, 0.25] {
-            let mut wave = vec![0.0; layout.samples()];
-            for (i, x) in wave[start..start + stretch.samples].iter_mut().enumerate() {
-                *x = (TAU * (frequency * stretch.step * i as f64 + shift)).sin();
+        let mut best = (about, self.wave(about));
+        if self.least_taken(&best.1, 1) < WORTH_A_LOOK {
+            return None;
+        }
+        let mut step = 0.4 / lasts.iter().fold(f64::MIN_POSITIVE, |a, b| a.max(*b));
+        for _ in 0..NARROWED {
+            for frequency in [best.0 - step, best.0 + step] {
+                let wave = self.wave(frequency);
+                if wave.squares < best.1.squares {
+                    best = (frequency, wave);
+                }
             }
-            let mut column = Column(vec![None; rest.len()]);
-            column.0[channel] = Some(wave.clone());
-            which.push(pool.add(column));
-            waves.push(wave);
+            step *= 0.6;
         }
-        start += stretch.samples;
+        (self.least_taken(&best.1, PARTS) >= MOST_OF).then_some(best)
     }
-    let target = pool.add(Column(rest.iter().cloned().map(Some).collect()));
-    let weight = |rest: &Vec<f64>| {
-        let squares = dot(rest, rest) / rest.len().max(1) as f64;
-        // A channel of which nothing is left says nothing of the noise of others.
-        if squares > 0.0 { 1.0 / squares } else { 0.0 }
-    };
-    let weights: Vec<f64> = rest.iter().map(weight).collect();
-    which.push(target);
-    let (factors, _) = solve(&pool.gram(&which, &weights, On::All));
-    which.pop();
-    let left = pool.rest(target, &which, factors.as_slice());
-    let mut start = 0;
-    for stretch in &layout.stretches {
-        for part in 0..PARTS {
-            let [from, to] = [part, part + 1].map(|k| start + k * stretch.samples / PARTS);
-            let [before, after] =
-                [&rest[channel], &left[channel]].map(|r| dot(&r[from..to], &r[from..to]));
-            let is_most = after <= (1.0 - MOST_OF) * before;
-            if !is_most {
-                return None;
-            }
-        }
-        start += stretch.samples;
-    }
-    let mut taken = vec![0.0; layout.samples()];
-    for (wave, factor) in waves.iter().zip(factors.iter().skip(known)) {
-        for (sum, x) in taken.iter_mut().zip(wave) {
-            *sum += factor * x;
-        }
-    }
-    Some(taken)
 }
 
 /// Samples that tell no wave, by channel: such as were not measured, and such as decide nothing.
@@ -339,6 +435,12 @@ mod tests {
         }
     }
 
+    fn taken_off(problem: &mut Problem, rest: &[Vec<f64>]) -> Vec<Disturbance> {
+        let lines = slow_lines(problem, rest, &vec![0.0; rest.len()], &[]);
+        let off = lines.iter().filter_map(|line| line.take_off(problem));
+        off.collect()
+    }
+
     #[test]
     fn a_slow_hum_is_taken_off() {
         for seed in 0..10 {
@@ -350,7 +452,7 @@ mod tests {
                 })
                 .collect();
             let mut problem = problem(&rest);
-            let found = slow_lines(&mut problem, &[rest], &[0.0], &[]);
+            let found = taken_off(&mut problem, &[rest]);
             let values = &found[0].estimates;
             assert!((values[0].value - 5.0).abs() < 0.3, "{values:?}");
             assert!((values[1].value - 2.31).abs() < 0.02, "{values:?}");
@@ -374,12 +476,7 @@ mod tests {
                         last[1]
                     })
                     .collect();
-                let found = slow_lines(
-                    &mut problem(&rest),
-                    std::slice::from_ref(&rest),
-                    &[0.0],
-                    &[],
-                );
+                let found = taken_off(&mut problem(&rest), std::slice::from_ref(&rest));
                 assert_eq!(found, [], "{corner} Hz, seed {seed}");
             }
         }
@@ -404,7 +501,7 @@ mod tests {
                     })
                     .collect();
                 let rest = &swings[600..];
-                let found = slow_lines(&mut problem(rest), &[rest.to_vec()], &[0.0], &[]);
+                let found = taken_off(&mut problem(rest), &[rest.to_vec()]);
                 taken += found.len();
             }
             assert!(taken <= 1, "damping {damping}: {taken} of 50");
@@ -438,7 +535,7 @@ mod tests {
         let (factors, _) = solve(&pool.gram(&which, &[1.0], On::All));
         let rest = pool.rest(which[1], &which[..1], factors.as_slice());
         drop(pool);
-        let found = slow_lines(&mut problem, &rest, &[0.0], &[]);
+        let found = taken_off(&mut problem, &rest);
         let values = &found[0].estimates;
         assert!((values[0].value - 1.0).abs() < 0.03, "{values:?}");
         assert!((values[1].value - 0.78).abs() < 0.005, "{values:?}");

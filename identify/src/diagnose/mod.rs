@@ -169,23 +169,26 @@ pub struct Diagnosis {
 /// forces of the problem, and what is to be left out becomes zero.
 pub fn diagnose(problem: &mut Problem, supply: &dyn Supply) -> Diagnosis {
     problem.removed.resize(problem.layout.channels.len(), 0.0);
-    let mut disturbances = problem.disturbances.clone();
     problem.find_jumps();
     problem.find_noise_of_idle();
-    disturbances.extend(cleaning::clean(problem));
-    let diagnosis = search_all(problem, supply, disturbances.clone());
+    let known = problem.disturbances.clone();
+    let raw = (problem.measured.clone(), problem.removed.clone());
+    let with = |found: Vec<Disturbance>| known.iter().cloned().chain(found).collect();
+    let cleaned = cleaning::clean(problem);
+    let diagnosis = search_all(problem, supply, with(cleaned));
     let Diagnosis {
         rest,
         reproducible: again,
         unexplained,
         ..
     } = &diagnosis;
-    let slow = cleaning::clean_again(problem, rest, again, unexplained);
+    let slow = hum::slow_lines(problem, rest, again, unexplained);
     if slow.is_empty() {
         return diagnosis;
     }
-    disturbances.extend(slow);
-    search_all(problem, supply, disturbances)
+    (problem.measured, problem.removed) = raw;
+    let cleaned = cleaning::clean_beside(problem, &slow);
+    search_all(problem, supply, with(cleaned))
 }
 
 /// The diagnosis of a problem whose forces were cleaned from `disturbances`.
