@@ -1,6 +1,6 @@
 //! `diagnose` where an arm carries more than its model, where a length of the model or the direction of gravity is wrong, and where
-//! a gear yields. Forces are
-//! those of a model file that has the body or the length; the encoder's error is put into the recorded positions.
+//! a gear yields or an encoder has another zero. Forces are those of a model file that has the body or the length; errors of
+//! encoders are put into the recorded positions.
 
 mod draws;
 #[allow(dead_code, reason = "other tests do more to runs")]
@@ -99,6 +99,29 @@ fn a_gear_that_yields_is_found_with_its_compliance() {
         4e-4,
         0.2,
     );
+}
+
+/// A zero is a fault of the recording: the model lacks nothing. Beside free base parameters only joints behind it tell.
+#[test]
+fn an_encoder_with_another_zero_is_found_with_its_shift() {
+    for (seed, joint, held) in [
+        (750, 1, Held::Known),
+        (751, 2, Held::Known),
+        (752, 1, Held::All),
+        (753, 2, Held::All),
+    ] {
+        let file = run(ARM, seed, Made::Zero(joint, 0.05));
+        let findings = diagnosed(&file, held);
+        assert!(findings.missing.is_empty(), "{:#?}", findings.missing);
+        let zeros = findings.diagnosis.disturbances.iter();
+        let zeros: Vec<_> = zeros.filter(|one| one.kind == "encoder_zero").collect();
+        let [zero] = &zeros[..] else {
+            panic!("{:#?}", findings.diagnosis.disturbances);
+        };
+        assert_eq!(zero.at, [format!("q{}", joint + 1)]);
+        let shift = zero.estimates[0].value;
+        assert!((shift - 0.05).abs() < 0.006, "{seed}: {shift}");
+    }
 }
 
 /// No polynomial is like a pull that gives way: it is one effect all the same, with one place.

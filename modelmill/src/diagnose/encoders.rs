@@ -1,5 +1,5 @@
-//! Encoders that err as they turn: an eccentric disc reads the position too large and too small once or several times a turn,
-//! and the model takes that for motion. What forces change by with each reading, its rate and its acceleration is had by
+//! Encoders that err: by a zero that is not the model's, or as they turn, since an eccentric disc reads the position too large
+//! and too small once or several times a turn; and the model takes that for motion. What forces change by with each reading, its rate and its acceleration is had by
 //! central differences of the fitted model, so that any error along the motion is a sum of three products.
 
 use modelmill_identify::changes::Moments;
@@ -34,6 +34,47 @@ pub(crate) fn sensitivities(
     coordinates
         .map(|i| sensitivity(model, all, values, i))
         .collect()
+}
+
+/// What the positions of each encoder read too much throughout.
+pub(crate) fn zeros(model: &Model, slopes: &[Option<[Column; 3]>]) -> Vec<Candidate> {
+    let each = model.motions().into_iter().zip(slopes);
+    let candidate = |((name, is_angle), slopes): ((String, bool), &Option<[Column; 3]>)| {
+        let [by_position, ..] = slopes.as_ref()?;
+        let mut column = Column(vec![None; model.drives().len()]);
+        // Forces are those of the true motion.
+        column.add(-1.0, by_position);
+        Some(Candidate {
+            source: Source::Columns(vec![Choice {
+                constants: Vec::new(),
+                columns: vec![column],
+            }]),
+            ..disturbance("encoder_zero", name, &["shift"], is_angle)
+        })
+    };
+    each.filter_map(candidate).collect()
+}
+
+/// A fault of a coordinate's encoder with parameters in its unit.
+fn disturbance(kind: &str, name: String, symbols: &[&str], is_angle: bool) -> Candidate {
+    let parameter = |symbol: &&str| EffectParameter {
+        symbol: (*symbol).to_owned(),
+        unit: if is_angle { "rad" } else { "m" }.to_owned(),
+        sign: Sign::Any,
+    };
+    Candidate {
+        effect: Effect {
+            kind: kind.to_owned(),
+            at: vec![name],
+        },
+        parameters: symbols.iter().map(parameter).collect(),
+        searched: 0,
+        is_part_of_load: false,
+        refines: None,
+        nature: Nature::Disturbance,
+        is_per_run: false,
+        source: Source::Columns(Vec::new()),
+    }
 }
 
 /// An error of each encoder with sine and cosine of its angle, for each number of waves that may be.
@@ -105,23 +146,15 @@ pub(crate) fn encoders(
         if choices.is_empty() {
             continue;
         }
-        let parameter = |symbol: &str| EffectParameter {
-            symbol: symbol.to_owned(),
-            unit: if *is_angle { "rad" } else { "m" }.to_owned(),
-            sign: Sign::Any,
-        };
         candidates.push(Candidate {
-            effect: Effect {
-                kind: "encoder_eccentricity".to_owned(),
-                at: vec![name.clone()],
-            },
-            parameters: vec![parameter("sine"), parameter("cosine")],
             searched: 1,
-            is_part_of_load: false,
-            refines: None,
-            nature: Nature::Disturbance,
-            is_per_run: false,
             source: Source::Columns(choices),
+            ..disturbance(
+                "encoder_eccentricity",
+                name.clone(),
+                &["sine", "cosine"],
+                *is_angle,
+            )
         });
     }
     candidates

@@ -101,6 +101,7 @@ pub(crate) fn find(
     further.extend(memories(model, &all)?);
     let values = encoders::values(model, &problem, held);
     let slopes = encoders::sensitivities(model, &all, &values);
+    further.extend(encoders::zeros(model, &slopes));
     further.extend(encoders(model, &all, &problem, &slopes));
     further.extend(gears(model, &all, &values, &slopes)?);
     further.extend(constants(model, &all, &|k| is_held(model, held, k)));

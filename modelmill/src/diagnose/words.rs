@@ -238,6 +238,10 @@ pub fn disturbance(one: &Disturbance) -> String {
             "the encoder of {at} errs as an eccentric one does, {} times per turn: {all}",
             value("times_per_turn")
         ),
+        "encoder_zero" => format!(
+            "the encoder of {at} reads too much throughout, as one with another zero than the model does: {all}; \
+             `--map` can take it off"
+        ),
         "contact_event" => {
             let [from, to] = one.interval.unwrap_or_default();
             format!(

@@ -40,6 +40,8 @@ pub(crate) enum Made<'a> {
     Push(&'a Model, f64, usize, usize),
     /// The encoder of a joint sits before a gear that yields by so much for each unit of what its drive carries.
     Yields(usize, f64),
+    /// The encoder of a joint reads so much too much.
+    Zero(usize, f64),
     /// A hose pulls a joint back by at most so much, beyond so much of its way from the middle hardly more.
     Hose(usize, f64, f64),
     /// The force of a drive lacks between two samples.
@@ -196,11 +198,12 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
     for k in 0..SAMPLES {
         let _ = write!(text, "\n{}", clock * STEP * k as f64);
         for (i, column) in columns[0].iter().enumerate() {
-            let yielded = match made {
+            let read_more = match made {
                 Made::Yields(drive, by) if drive == i => by * carried[drive][k],
+                Made::Zero(joint, by) if joint == i => by,
                 _ => 0.0,
             };
-            let _ = write!(text, ",{}", column[k] + yielded);
+            let _ = write!(text, ",{}", column[k] + read_more);
         }
         for (d, force) in forces.iter().enumerate() {
             let is_lost = matches!(made, Made::Lost(drive, from, to) if drive == d && (from..to).contains(&k));
