@@ -124,6 +124,41 @@ fn an_encoder_with_another_zero_is_found_with_its_shift() {
     }
 }
 
+/// Friction that the model has, with values of another day: it lacks none, and what is other about it is said.
+#[test]
+fn friction_of_another_day_is_no_further_friction() {
+    let friction = "[[effect]]\nkind = \"coulomb_friction\"\nat = \"PLACE\"\nparameters = { Fc = { name = \"Fc\", nominal = 2.0 } }\n\n\
+                    [[effect]]\nkind = \"viscous_friction\"\nat = \"PLACE\"\nparameters = { Fv = { name = \"Fv\", nominal = 3.0 } }\n";
+    let text = std::fs::read_to_string(bundled(ARM)).expect("a model");
+    let drive = Model::open(bundled(ARM)).expect("the model").drives()[1].clone();
+    let text = format!("{text}\n{}", friction.replace("PLACE", &drive));
+    let model = Model::from_text("with friction", &text).expect("the model");
+    let file = run(ARM, 760, Made::Friction(1, 5.0, 7.0));
+    let recording = model.recording(&file, &Reading::default());
+    let recording = recording.expect("the recording");
+    let question = Question {
+        held: Held::All,
+        again_with_nominal: false,
+    };
+    let findings = model.diagnose(&[&recording], &[], &question);
+    let findings = findings.expect("an answer");
+    assert!(findings.missing.is_empty(), "{:#?}", findings.missing);
+    let changes = findings.diagnosis.disturbances.iter();
+    let changes: Vec<_> = changes.filter(|one| one.kind == "different_runs").collect();
+    let [change] = &changes[..] else {
+        panic!("{:#?}", findings.diagnosis.disturbances);
+    };
+    assert_eq!(
+        (change.kind.as_str(), &change.at),
+        ("different_runs", &vec![drive])
+    );
+    for (name, truth) in [("change of Fc", 3.0), ("change of Fv", 4.0)] {
+        let value = change.estimates.iter().find(|one| one.name == name);
+        let value = value.expect("an estimate").value;
+        assert!((value - truth).abs() < 0.1 * truth, "{name}: {value}");
+    }
+}
+
 /// No polynomial is like a pull that gives way: it is one effect all the same, with one place.
 #[test]
 fn a_hose_that_gives_way_is_one_effect() {

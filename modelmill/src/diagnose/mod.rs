@@ -17,6 +17,7 @@ mod encoders;
 mod faults;
 mod findings;
 mod gears;
+mod held_friction;
 mod laws;
 mod long;
 mod memory;

@@ -20,6 +20,7 @@ use super::constants::constants;
 use super::encoders::{self, encoders};
 use super::faults::take_off;
 use super::gears::gears;
+use super::held_friction;
 use super::laws::sites;
 use super::memory::memories;
 use super::numbers::{layout, stack, variables};
@@ -90,6 +91,10 @@ pub(crate) fn find(
                 problem(&candidates, model, &all)
             })??;
     let mut origins = made.origins;
+    let other_friction = match held {
+        Held::All => held_friction::changes(model, &problem.base),
+        Held::Known => Vec::new(),
+    };
     hold(&mut problem, model, held);
     problem.effects_only = !asked.in_full;
     take_off(&mut problem, model, &all, asked.between)?;
@@ -105,6 +110,7 @@ pub(crate) fn find(
     further.extend(encoders(model, &all, &problem, &slopes));
     further.extend(gears(model, &all, &values, &slopes)?);
     further.extend(constants(model, &all, &|k| is_held(model, held, k)));
+    further.extend(other_friction);
     if asked.in_full && (held == Held::All || problem.base.is_empty()) {
         further.extend(payloads(model, &all)?);
     }

@@ -238,6 +238,9 @@ pub fn disturbance(one: &Disturbance) -> String {
             "the encoder of {at} errs as an eccentric one does, {} times per turn: {all}",
             value("times_per_turn")
         ),
+        "different_runs" => {
+            format!("the friction of {at} is not what the values say that are held: {all}")
+        }
         "encoder_zero" => format!(
             "the encoder of {at} reads too much throughout, as one with another zero than the model does: {all}; \
              `--map` can take it off"

@@ -1,0 +1,80 @@
+//! Friction that is not what the values say that are held: it is another on another day, and a model that has friction does not
+//! lack it.
+
+use modelmill_identify::diagnose::{
+    Candidate, Choice, Column, Effect, EffectParameter, Nature, Sign, Source,
+};
+use modelmill_spec::{EffectTerm, Place};
+
+use crate::model::Model;
+use crate::runs::per_rate;
+
+/// Kinds of friction whose values change from day to day.
+const KINDS: [&str; 2] = ["coulomb_friction", "viscous_friction"];
+
+/// A change of the friction that the model has, for each set of drives at which it has the same; `base` are the columns of all
+/// base parameters.
+pub(crate) fn changes(model: &Model, base: &[Column]) -> Vec<Candidate> {
+    let effects = &model.derivation.mechanism.effects;
+    let own = effects
+        .iter()
+        .filter(|effect| KINDS.contains(&effect.kind.as_str()));
+    let mut of_places: Vec<(&[Place], Vec<&EffectTerm>)> = Vec::new();
+    for effect in own {
+        match of_places
+            .iter_mut()
+            .find(|(at, _)| *at == &effect.places[..])
+        {
+            Some((_, terms)) => terms.extend(&effect.terms),
+            None => of_places.push((&effect.places, effect.terms.iter().collect())),
+        }
+    }
+    let candidates = of_places.into_iter();
+    let candidates = candidates.filter_map(|(at, terms)| change(model, base, at, &terms));
+    candidates.collect()
+}
+
+fn change(
+    model: &Model,
+    base: &[Column],
+    at: &[Place],
+    terms: &[&EffectTerm],
+) -> Option<Candidate> {
+    let drive = |place: &Place| match place {
+        Place::Drive(d) => Some(d.0),
+        _ => None,
+    };
+    let drives: Vec<usize> = at.iter().map(drive).collect::<Option<_>>()?;
+    let unit = model.force_unit(*drives.first()?);
+    let reduction = &model.derivation.reduction;
+    let column = |term: &&EffectTerm| {
+        let is_its = |k: &usize| reduction.products[*k].0 == [(term.parameter.0, 1)];
+        let k = reduction.retained.iter().position(|k| is_its(k))?;
+        Some(base[k].clone())
+    };
+    let parameter = |term: &&EffectTerm| EffectParameter {
+        symbol: format!("change of {}", term.symbol),
+        unit: match term.symbol.as_str() {
+            "Fv" => per_rate(unit).to_owned(),
+            _ => unit.to_owned(),
+        },
+        sign: Sign::Any,
+    };
+    let names = model.drives();
+    Some(Candidate {
+        effect: Effect {
+            kind: "different_runs".to_owned(),
+            at: drives.iter().map(|d| names[*d].clone()).collect(),
+        },
+        parameters: terms.iter().map(parameter).collect(),
+        searched: 0,
+        is_part_of_load: false,
+        refines: None,
+        nature: Nature::Disturbance,
+        is_per_run: false,
+        source: Source::Columns(vec![Choice {
+            constants: Vec::new(),
+            columns: terms.iter().map(column).collect::<Option<_>>()?,
+        }]),
+    })
+}
