@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-use crate::common::{json, model, number, printed, refused, scratch, workspace};
+use crate::common::{json, model, number, printed, refused, run, scratch, workspace};
 use modelmill_codegen::{Evaluator, States};
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
@@ -453,4 +453,69 @@ fn a_special_case_is_told_one_way() {
     // What is left is a constant of (20 - 10)/2 N in one of two drives, less what the base takes up.
     let apart = number(&found, "/separation/trajectory/apart");
     assert!(apart > 0.3 && apart < 5.0 / 2.0_f64.sqrt(), "{apart}");
+}
+
+/// The command that a diagnosis prints names a recording; where the model has no limits of positions, motion keeps to those of
+/// the recording.
+#[test]
+fn a_model_without_limits_keeps_to_what_was_recorded() {
+    let text = std::fs::read_to_string(model("spidermill.toml")).expect("a model");
+    let mut is_limit = false;
+    let bare: Vec<&str> = text
+        .lines()
+        .filter(|line| {
+            if line.starts_with('[') {
+                is_limit = line.starts_with("[limits");
+            }
+            !is_limit
+        })
+        .collect();
+    assert!(bare.len() < text.lines().count());
+    let file = scratch("without-limits.toml");
+    std::fs::write(&file, bare.join("\n")).expect("a model");
+    let recording = run("with-rods-fit.csv");
+    let out = scratch("within-the-recording.csv");
+    let asked = [
+        "excite",
+        &file,
+        "--separate",
+        LEFT,
+        "--from",
+        "load_friction@spindle_left",
+        "--noise",
+        "2",
+        "--random",
+        "40",
+        "--starts",
+        "1",
+        "--out",
+        &out,
+    ];
+    let says = refused(1, &asked);
+    assert!(says.contains("have no limits"), "{says}");
+    let with_data: Vec<&str> = asked.into_iter().chain(["--data", &recording]).collect();
+    printed(&with_data);
+    let positions = |path: &str| -> Vec<[f64; 2]> {
+        let text = std::fs::read_to_string(path).expect("a table");
+        let names: Vec<&str> = text.lines().next().expect("a head").split(',').collect();
+        let range = |name: &str| {
+            let k = names.iter().position(|one| *one == name).expect("a column");
+            let values = text.lines().skip(1);
+            let values = values.map(|line| -> f64 {
+                let value = line.split(',').nth(k).expect("a value");
+                value.parse().expect("a number")
+            });
+            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+                [low.min(x), high.max(x)]
+            })
+        };
+        ["theta1", "theta2"].map(range).to_vec()
+    };
+    for (made, recorded) in positions(&out).iter().zip(positions(&recording)) {
+        assert!(
+            made[0] > recorded[0] - 1e-6 && made[1] < recorded[1] + 1e-6,
+            "{made:?} {recorded:?}"
+        );
+        assert!(made[1] - made[0] > 0.05, "{made:?}");
+    }
 }

@@ -98,6 +98,8 @@ pub struct Rung {
     pub fit: f64,
     /// The same on those of the check, or of cross-validation if there are none.
     pub check: f64,
+    /// As `check`, of each channel beside its own force.
+    pub check_by_channel: Vec<f64>,
     /// What spoke for it.
     pub evidence: Option<Evidence>,
 }
@@ -446,41 +448,49 @@ impl Bench<'_> {
             new.map(|pick| self.candidate(pick).effect.clone())
                 .collect()
         };
-        let [fit, check] = self.errors(after);
+        let (fit, check, check_by_channel) = self.errors(after);
         Rung {
             added: effects(after, before),
             dropped: effects(before, after),
             fit,
             check,
+            check_by_channel,
             evidence,
         }
     }
 
-    /// Relative errors on fit and check, fitted to the fit; without a check by cross-validation.
-    fn errors(&self, picks: &[Pick]) -> [f64; 2] {
+    /// Relative errors on fit and check, and of each channel on the check, fitted to the fit; without a check by cross-validation.
+    fn errors(&self, picks: &[Pick]) -> (f64, f64, Vec<f64>) {
         let layout = &self.problem.layout;
         let split = layout.fit_samples();
         let rest = self.whole(picks);
-        let forces: Vec<Vec<f64>> = (0..rest.len()).map(|d| self.problem.force(d)).collect();
+        let channels = 0..rest.len();
+        let forces: Vec<Vec<f64>> = channels.clone().map(|d| self.problem.force(d)).collect();
         let norm = |part: &[f64]| dot(part, part);
-        let size = |range: std::ops::Range<usize>| -> f64 {
-            let channels = forces.iter();
-            channels.map(|values| norm(&values[range.clone()])).sum()
+        let squares = |of: &[Vec<f64>], range: std::ops::Range<usize>| -> Vec<f64> {
+            of.iter().map(|all| norm(&all[range.clone()])).collect()
         };
-        let fit: f64 = rest.iter().map(|r| norm(&r[..split])).sum();
-        let fit = (fit / size(0..split).max(f64::MIN_POSITIVE)).sqrt();
-        let check = if layout.has_check() {
-            let error: f64 = rest.iter().map(|r| norm(&r[split..])).sum();
-            error / size(split..layout.samples()).max(f64::MIN_POSITIVE)
+        let relative = |error: f64, force: f64| (error / force.max(f64::MIN_POSITIVE)).sqrt();
+        let whole =
+            |errors: &[f64], forces: &[f64]| relative(errors.iter().sum(), forces.iter().sum());
+        let fit = whole(&squares(&rest, 0..split), &squares(&forces, 0..split));
+        let judged = if layout.has_check() {
+            split..layout.samples()
         } else {
-            let all = 0..rest.len();
-            // Weights differ by channel, figures do not.
-            let error: f64 = all
-                .map(|d| self.held_out(picks, &[d], true).iter().sum::<f64>() / self.weights[d])
-                .sum();
-            error / size(0..split).max(f64::MIN_POSITIVE)
+            0..split
         };
-        [fit, check.sqrt()]
+        let errors = if layout.has_check() {
+            squares(&rest, judged.clone())
+        } else {
+            // Weights differ by channel, figures do not.
+            let held_out =
+                |d: usize| self.held_out(picks, &[d], true).iter().sum::<f64>() / self.weights[d];
+            channels.map(held_out).collect()
+        };
+        let forces = squares(&forces, judged);
+        let pairs = errors.iter().zip(&forces);
+        let by_channel = pairs.map(|(error, force)| relative(*error, *force));
+        (fit, whole(&errors, &forces), by_channel.collect())
     }
 
     /// What a set leaves where it is fitted to the fit. What decides nothing counts, but for what is left out altogether.

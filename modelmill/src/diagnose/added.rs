@@ -7,6 +7,7 @@ use modelmill_spec::{EffectKind, Loaded};
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
+use super::places::spots;
 use super::problem::Answer;
 
 /// Significant digits of estimates that go into a model file.
@@ -22,11 +23,18 @@ pub struct Added {
 }
 
 /// The effects that were found, as entries with the estimates for nominal values.
-pub(crate) fn entries(answer: &Answer) -> Vec<NewEffect> {
+pub(crate) fn entries(model: &Model, answer: &Answer) -> Vec<NewEffect> {
+    let spots = spots(&model.derivation.mechanism);
     let found = answer.diagnosis.effects.iter();
     let entries = found.filter_map(|found| {
         let kinds = &answer.candidates.kinds;
         let kind = kinds.iter().find(|kind| kind.name == found.effect.kind)?;
+        // A late reading of one drive is a fault of the recording, though all forces may have a delay.
+        let may_act = |name: &String| {
+            let mut of_name = spots.iter().filter(|spot| spot.name == *name);
+            of_name.any(|spot| kind.on.contains(&spot.sort))
+        };
+        found.effect.at.first().filter(|name| may_act(name))?;
         Some((entry(found, kind, answer), kind.places == Some(2)))
     });
     // What couples two places may couple each with a third, and is no sum at either.

@@ -8,11 +8,12 @@ use modelmill_spec::edit::NewEffect;
 
 use crate::along;
 use crate::compare::{self, Places};
-use crate::error::Outcome;
+use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::{Recording, stretches};
 use crate::runs::Difference;
 use crate::stretch::Stretch;
+use crate::text::table::percent;
 
 use super::added::{self, Added};
 use super::chosen::Named;
@@ -22,7 +23,28 @@ use super::long;
 use super::off_nominal::{OffNominal, off_nominal, turned};
 use super::problem::{self, Answer, Asked, Held};
 use super::versions::Version;
-use super::words::Judged;
+use super::words::{self, Judged};
+
+/// Fails where what is fitted to the recordings misses the forces of others by more than these are: nothing that is found in the
+/// fit holds then.
+fn foretells(answer: &Answer, judged: Judged) -> Outcome {
+    let diagnosis = &answer.diagnosis;
+    let last = diagnosis.ladder.last();
+    let Some(last) = last.filter(|last| last.check > 1.0) else {
+        return Ok(());
+    };
+    if words::is_to_be_cleared_up(diagnosis) {
+        return Ok(());
+    }
+    Err(Error::input(format!(
+        "what is fitted to these recordings ({} of the forces is left there) misses the forces {} by {}, more than a model without \
+         any force would: nothing can be said of what is missing. Record longer to fit to, with all drives moving far and fast \
+         (verb `excite`), or hold the parameters of an earlier run (option `parameters`)",
+        percent(Some(last.fit)),
+        judged.words(),
+        percent(Some(last.check))
+    )))
+}
 
 /// Recordings that differ leave so many times as much where that is not said.
 const NO_WORSE: f64 = 1.5;
@@ -146,6 +168,28 @@ pub struct WithNominal {
     pub missing: Vec<(Effect, Vec<Estimate>)>,
 }
 
+impl Findings {
+    /// What is to be done where nothing, or not all, is to be added to the model file.
+    pub(crate) fn beside_the_file(&self) -> Option<&'static str> {
+        if self.missing.is_empty() {
+            return None;
+        }
+        if words::is_to_be_cleared_up(&self.diagnosis) {
+            return Some(
+                "First clear up what the verdict begins with: effects may only make up for it.",
+            );
+        }
+        let is_late = |found: &Missing| {
+            let is_its = |entry: &NewEffect| entry.kind == found.effect.kind;
+            ["time_delay", "force_lag"].contains(&found.effect.kind.as_str())
+                && !self.entries.iter().any(is_its)
+        };
+        self.missing.iter().any(is_late).then_some(
+            "A force that is read late is mended where it is read: a model file has nothing for it.",
+        )
+    }
+}
+
 impl Model {
     /// Finds which physical effect the model lacks: `fit` is what parameters are fitted to, errors are judged on `check`, or
     /// by cross-validation if there is none.
@@ -193,9 +237,16 @@ impl Model {
         } else {
             Judged::Check
         };
+        if held == Held::Known {
+            foretells(&answer, judged)?;
+        }
         let notes = data.iter().flatten().flat_map(Stretch::notes);
         let notes = self.caution().into_iter().chain(notes.cloned()).collect();
-        let entries = added::entries(&answer);
+        let entries = if words::is_to_be_cleared_up(&answer.diagnosis) {
+            Vec::new()
+        } else {
+            added::entries(self, &answer)
+        };
         let (edited, after) = if entries.is_empty() {
             (None, Err(String::new()))
         } else {

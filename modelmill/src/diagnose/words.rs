@@ -6,6 +6,9 @@ use crate::audit::SUSPICIONS;
 use crate::text::table::{number, percent, significant};
 use modelmill_identify::diagnose::ROUNDING;
 
+/// Where more than this part of the error stays, figures of all drives say little.
+const HARDLY: f64 = 0.99;
+
 /// Where errors are judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Judged {
@@ -82,12 +85,7 @@ pub fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged) -> St
     };
     let noise = floor(diagnosis);
     let found: Vec<Effect> = diagnosis.effects.iter().map(|f| f.effect.clone()).collect();
-    let falls = format!(
-        "the error {} falls from {} to {}",
-        judged.words(),
-        percent(Some(first.check)),
-        percent(Some(last.check))
-    );
+    let falls = falls(first, last, channels, judged);
     let them = if found.len() == 1 { "it" } else { "them" };
     let says = match diagnosis.verdict {
         Verdict::Adequate => format!(
@@ -132,6 +130,27 @@ pub fn verdict(diagnosis: &Diagnosis, channels: &[String], judged: Judged) -> St
     all.into_iter().flatten().collect::<Vec<_>>().join(" ")
 }
 
+/// How the error falls: of all drives, or where that hardly does, of the drive whose error falls most, since the others hide it.
+fn falls(first: &Rung, last: &Rung, channels: &[String], judged: Judged) -> String {
+    let pairs = first.check_by_channel.iter().zip(&last.check_by_channel);
+    let most = (channels.iter().zip(pairs)).min_by(|(_, a), (_, b)| {
+        let share = |(before, after): &(&f64, &f64)| **after / before.max(f64::MIN_POSITIVE);
+        share(a).total_cmp(&share(b))
+    });
+    let (of, before, after) = match most {
+        Some((channel, (before, after))) if last.check > HARDLY * first.check && after < before => {
+            (format!(" of {channel}"), *before, *after)
+        }
+        _ => (String::new(), first.check, last.check),
+    };
+    format!(
+        "the error{of} {} falls from {} to {}",
+        judged.words(),
+        percent(Some(before)),
+        percent(Some(after))
+    )
+}
+
 /// What is to be cleared up before anything else is believed.
 fn first_of_all(diagnosis: &Diagnosis) -> Option<String> {
     let suspicions = (diagnosis.disturbances.iter()).filter(|one| is_suspicion(one));
@@ -142,6 +161,11 @@ fn first_of_all(diagnosis: &Diagnosis) -> Option<String> {
             says.join("; ").replace('`', "")
         )
     })
+}
+
+/// Whether something is: until then no effect is worth adding.
+pub(crate) fn is_to_be_cleared_up(diagnosis: &Diagnosis) -> bool {
+    diagnosis.disturbances.iter().any(is_suspicion)
 }
 
 fn is_suspicion(one: &Disturbance) -> bool {

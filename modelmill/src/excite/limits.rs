@@ -1,12 +1,15 @@
 //! Limits on the command line, which join those of the model file or replace them: `theta1=1.5:2.1`, `theta1_d=1.2`,
 //! `spindle_left=1500`, `R3m.x=0.2:0.7`, `singularity=0.3`.
 
+use modelmill_identify::Note;
 use modelmill_identify::excite::CoordinateLimits;
 use modelmill_spec::{CoordinateIdx, DriveIdx, Limits, PointIdx};
 
 use crate::error::{Error, Outcome};
 use crate::excite::plant::AXES;
 use crate::model::Model;
+use crate::stretch::Stretch;
+use crate::text::table::significant;
 
 /// One limit of the command line.
 #[derive(Debug, Clone, PartialEq)]
@@ -127,6 +130,64 @@ fn coordinate(model: &Model, limits: &mut Limits, limit: &Limit) -> Outcome {
     let one = &mut limits.coordinates[k].1;
     *[&mut one.position, &mut one.rate, &mut one.acceleration][derivative] = Some(limit.ends);
     Ok(())
+}
+
+/// Gives active coordinates without a range of positions that of recordings, with the rates and accelerations there: what a machine
+/// has done it can do again. A note that says so.
+pub(crate) fn as_recorded(
+    model: &Model,
+    limits: &mut Limits,
+    recordings: &[Stretch],
+) -> Option<Note> {
+    let (active, _) = model.derivation.coordinates();
+    let coordinates = &model.derivation.mechanism.coordinates;
+    let mut says = Vec::new();
+    for (k, i) in active.iter().enumerate() {
+        let known = limits.coordinates.iter().position(|(c, _)| c.0 == *i);
+        let mut one = known.map(|k| limits.coordinates[k].1).unwrap_or_default();
+        if one.position.is_some() {
+            continue;
+        }
+        let range = |order: usize| {
+            let runs = recordings.iter().map(|stretch| &stretch.run);
+            let values = runs.flat_map(|run| &[&run.q, &run.qd, &run.qdd][order][k]);
+            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+                [low.min(*x), high.max(*x)]
+            })
+        };
+        let [low, high] = range(0);
+        if low >= high {
+            continue;
+        }
+        one.position = Some([low, high]);
+        let around_zero = |order: usize| {
+            let [low, high] = range(order);
+            let most = high.max(-low);
+            (most > 0.0).then_some([-most, most])
+        };
+        one.rate = one.rate.or_else(|| around_zero(1));
+        one.acceleration = one.acceleration.or_else(|| around_zero(2));
+        limits.coordinates.retain(|(c, _)| c.0 != *i);
+        limits.coordinates.push((CoordinateIdx(*i), one));
+        let ends = [low, high].map(|x| significant(x, 3));
+        let unit = if coordinates[*i].motion.is_angle() {
+            "rad"
+        } else {
+            "m"
+        };
+        says.push(format!(
+            "`{}` from {} to {} {unit}",
+            coordinates[*i].name, ends[0], ends[1]
+        ));
+    }
+    (!says.is_empty()).then(|| {
+        Note::info(format!(
+            "{} has no limits of positions for {}, as recorded; motion keeps within that, and within the largest rates and \
+             accelerations there. The option `limits`, or `[limits.coordinates]` in the model file, allows more.",
+            model.path,
+            says.join(", ")
+        ))
+    })
 }
 
 /// Limits of the active coordinates, in their order; each must have a range of positions.

@@ -14,8 +14,8 @@ use modelmill_identify::excite::{
 use crate::diagnose::Named;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::recording::Recording;
 use crate::recording::free::free_bodies;
+use crate::recording::{self, Recording};
 use crate::text::csv::csv;
 use crate::text::svg::Figure;
 use crate::text::table::significant;
@@ -99,7 +99,12 @@ impl Model {
                 self.path
             )));
         }
-        let all_limits = limits::limits(self, &request.limits)?;
+        let mut all_limits = limits::limits(self, &request.limits)?;
+        let [recorded, _] = recording::stretches(self, recordings, &[]);
+        let as_recorded = limits::as_recorded(self, &mut all_limits, &recorded);
+        if let Some(note) = &as_recorded {
+            self.host().note(note);
+        }
         let coordinates = limits::of_active(self, &all_limits)?;
         let mut options = request.options.clone();
         let plant = ModelPlant::new(self, &all_limits);
@@ -114,9 +119,8 @@ impl Model {
             )?),
             None => None,
         };
-        let notes = asked
-            .as_ref()
-            .map_or_else(Vec::new, |asked| asked.notes.clone());
+        let of_asked = asked.iter().flat_map(|asked| asked.notes.clone());
+        let notes = as_recorded.into_iter().chain(of_asked).collect();
         let separating = asked.as_ref().map(|asked| asked.plant(&plant, self));
         if separating.is_some() {
             options.criterion = Criterion::Separation;

@@ -154,12 +154,14 @@ impl Findings {
         self.refused_text(style, &mut lines);
         self.untold_text(style, &mut lines);
         self.off_text(style, spelling, &mut lines);
-        if !self.entries.is_empty() {
+        let mut next: Vec<String> = (self.entries.iter())
+            .map(|entry| spelling.add(&self.before.model, entry))
+            .collect();
+        next.extend(self.beside_the_file().map(str::to_owned));
+        if !next.is_empty() {
             lines.push(String::new());
             lines.push(style.bold("how to go on"));
-            for entry in &self.entries {
-                lines.push(format!("  {}", spelling.add(&self.before.model, entry)));
-            }
+            lines.extend(next.iter().map(|line| format!("  {line}")));
         }
         if let Err(says) = &self.after
             && !says.is_empty()

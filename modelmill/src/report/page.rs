@@ -184,6 +184,9 @@ fn laws(findings: &Findings, spelling: &dyn Spelling) -> String {
 
 fn effects(findings: &Findings, spelling: &dyn Spelling) -> String {
     if findings.entries.is_empty() {
+        if let Some(says) = findings.beside_the_file() {
+            return format!("{}<p>{says}</p>\n", tables::effects(findings));
+        }
         let says = match findings.diagnosis.verdict {
             Verdict::Adequate => {
                 "Nothing needs to be added. The parameters below are those that the recordings ask for."
