@@ -49,7 +49,7 @@ fn change(
     let reduction = &model.derivation.reduction;
     let column = |term: &&EffectTerm| {
         let is_its = |k: &usize| reduction.products[*k].0 == [(term.parameter.0, 1)];
-        let k = reduction.retained.iter().position(|k| is_its(k))?;
+        let k = reduction.retained.iter().position(is_its)?;
         Some(base[k].clone())
     };
     let parameter = |term: &&EffectTerm| EffectParameter {

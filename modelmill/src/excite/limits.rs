@@ -8,7 +8,7 @@ use modelmill_spec::{CoordinateIdx, DriveIdx, Limits, PointIdx};
 use crate::error::{Error, Outcome};
 use crate::excite::plant::AXES;
 use crate::model::Model;
-use crate::stretch::Stretch;
+use crate::recording::{self, Recording};
 use crate::text::table::significant;
 
 /// One limit of the command line.
@@ -132,13 +132,14 @@ fn coordinate(model: &Model, limits: &mut Limits, limit: &Limit) -> Outcome {
     Ok(())
 }
 
-/// Gives active coordinates without a range of positions that of recordings, with the rates and accelerations there: what a machine
-/// has done it can do again. A note that says so.
-pub(crate) fn as_recorded(
+/// Limits in which active coordinates without a range of positions have that of recordings, with the rates and accelerations
+/// there: what a machine has done it can do again. A note says so.
+pub(crate) fn with_recorded(
     model: &Model,
-    limits: &mut Limits,
-    recordings: &[Stretch],
-) -> Option<Note> {
+    mut limits: Limits,
+    recordings: &[&Recording],
+) -> (Limits, Option<Note>) {
+    let [recordings, _] = recording::stretches(model, recordings, &[]);
     let (active, _) = model.derivation.coordinates();
     let coordinates = &model.derivation.mechanism.coordinates;
     let mut says = Vec::new();
@@ -180,14 +181,18 @@ pub(crate) fn as_recorded(
             coordinates[*i].name, ends[0], ends[1]
         ));
     }
-    (!says.is_empty()).then(|| {
+    let note = (!says.is_empty()).then(|| {
         Note::info(format!(
             "{} has no limits of positions for {}, as recorded; motion keeps within that, and within the largest rates and \
              accelerations there. The option `limits`, or `[limits.coordinates]` in the model file, allows more.",
             model.path,
             says.join(", ")
         ))
-    })
+    });
+    if let Some(note) = &note {
+        model.host().note(note);
+    }
+    (limits, note)
 }
 
 /// Limits of the active coordinates, in their order; each must have a range of positions.

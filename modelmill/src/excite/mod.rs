@@ -14,8 +14,8 @@ use modelmill_identify::excite::{
 use crate::diagnose::Named;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
+use crate::recording::Recording;
 use crate::recording::free::free_bodies;
-use crate::recording::{self, Recording};
 use crate::text::csv::csv;
 use crate::text::svg::Figure;
 use crate::text::table::significant;
@@ -99,12 +99,8 @@ impl Model {
                 self.path
             )));
         }
-        let mut all_limits = limits::limits(self, &request.limits)?;
-        let [recorded, _] = recording::stretches(self, recordings, &[]);
-        let as_recorded = limits::as_recorded(self, &mut all_limits, &recorded);
-        if let Some(note) = &as_recorded {
-            self.host().note(note);
-        }
+        let (all_limits, as_recorded) =
+            limits::with_recorded(self, limits::limits(self, &request.limits)?, recordings);
         let coordinates = limits::of_active(self, &all_limits)?;
         let mut options = request.options.clone();
         let plant = ModelPlant::new(self, &all_limits);

@@ -110,6 +110,15 @@ fn hose(force: &mut [f64], positions: &[f64], most: f64, way: f64) {
     }
 }
 
+/// What an encoder reads beside where its joint is.
+fn read_more(made: Made, joint: usize, carried: &[Vec<f64>], sample: usize) -> f64 {
+    match made {
+        Made::Yields(drive, by) if drive == joint => by * carried[drive][sample],
+        Made::Zero(other, by) if other == joint => by,
+        _ => 0.0,
+    }
+}
+
 /// A recording of a model that is derived already.
 pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBuf {
     let mut draws = Draws(seed);
@@ -198,12 +207,7 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
     for k in 0..SAMPLES {
         let _ = write!(text, "\n{}", clock * STEP * k as f64);
         for (i, column) in columns[0].iter().enumerate() {
-            let read_more = match made {
-                Made::Yields(drive, by) if drive == i => by * carried[drive][k],
-                Made::Zero(joint, by) if joint == i => by,
-                _ => 0.0,
-            };
-            let _ = write!(text, ",{}", column[k] + read_more);
+            let _ = write!(text, ",{}", column[k] + read_more(made, i, &carried, k));
         }
         for (d, force) in forces.iter().enumerate() {
             let is_lost = matches!(made, Made::Lost(drive, from, to) if drive == d && (from..to).contains(&k));
