@@ -11,6 +11,9 @@ use crate::words::{count_of, seven_digits, with_digits};
 const LARGE_ANGLE: f64 = 4.0 * PI;
 /// Samples at a limit before a force counts as saturated.
 const FEWEST_AT_LIMIT: usize = 8;
+/// And so many times as many as at the value next to it: the crest of a wave is at its last step 2.4 times as long as at the one
+/// before.
+const CROWDED: usize = 3;
 
 /// Noise about a limit, in standard deviations of white noise.
 const SPREAD: f64 = 5.0;
@@ -171,23 +174,22 @@ impl Recording {
                 ))
             });
         }
+        // The highest value below the upper end, and the lowest above the lower one.
+        let below = force.iter().copied().filter(|x| *x < high);
+        let above = force.iter().copied().filter(|x| *x > low);
+        let ends = [
+            (high, below.fold(f64::NEG_INFINITY, f64::max)),
+            (low, above.fold(f64::INFINITY, f64::min)),
+        ];
         let mut found: Vec<(f64, usize, usize)> = Vec::new();
-        for limit in [high, low] {
-            let (mut count, mut first) = (0, None);
-            let mut i = 0;
-            while i < force.len() {
-                let start = i;
-                while i < force.len() && force[i].total_cmp(&limit).is_eq() {
-                    i += 1;
-                }
-                let moves = |q: &&[f64]| i > start && q[start].total_cmp(&q[i - 1]).is_ne();
-                if i - start >= 3 && positions.iter().any(moves) {
-                    count += i - start;
-                    first.get_or_insert(start);
-                }
-                i = i.max(start + 1);
-            }
-            if let Some(first) = first.filter(|_| count >= FEWEST_AT_LIMIT) {
+        for (limit, next) in ends {
+            let (count, first) = stays(force, limit, positions);
+            // A force that is read in coarse steps stays at each of them.
+            let (at_next, _) = stays(force, next, positions);
+            if let Some(first) = first
+                && count >= FEWEST_AT_LIMIT
+                && count > CROWDED * at_next
+            {
                 found.push((limit, count, first));
             }
         }
@@ -210,6 +212,25 @@ impl Recording {
             self.line(first).unwrap_or(0),
         )))
     }
+}
+
+/// Samples in which a force stays exactly at a value, three of them or more one after the other, while something moves; and the first.
+fn stays(force: &[f64], value: f64, positions: &[&[f64]]) -> (usize, Option<usize>) {
+    let (mut count, mut first) = (0, None);
+    let mut i = 0;
+    while i < force.len() {
+        let start = i;
+        while i < force.len() && force[i].total_cmp(&value).is_eq() {
+            i += 1;
+        }
+        let moves = |q: &&[f64]| i > start && q[start].total_cmp(&q[i - 1]).is_ne();
+        if i - start >= 3 && positions.iter().any(moves) {
+            count += i - start;
+            first.get_or_insert(start);
+        }
+        i = i.max(start + 1);
+    }
+    (count, first)
 }
 
 /// A level near an end of the range of a force at which samples crowd: its value and how far they spread about it.
@@ -271,6 +292,11 @@ mod tests {
             ),
             none
         );
+        // A force in coarse steps stays at each of them.
+        for step in [1.5, 3.0, 6.0] {
+            let force = |t: f64| (20.0 * (7.0 * t).cos() / step).round() * step;
+            assert_eq!(says(|t| (3.0 * t).sin(), force), none, "{step}");
+        }
         // At rest a force may stay where it is.
         assert_eq!(
             says(
@@ -304,6 +330,9 @@ mod tests {
             |t| (3.0 * t).sin(),
             |t| (20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0),
         );
+        let coarse = |t: f64| ((20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0) / 1.5).round() * 1.5;
+        let of_steps = says(|t| (3.0 * t).sin(), coarse);
+        assert!(of_steps[0].contains("stays exactly at 15"), "{of_steps:?}");
         // sin(7 t) passes 3/4 at t = 0.1212 s, in the 61st sample, on line 63.
         assert!(found[0].contains("first in line 63"), "{found:?}");
     }

@@ -462,6 +462,20 @@ mod tests {
         }
     }
 
+    /// What comes again with the state may be a hum too, if that explains more than any state can.
+    #[test]
+    fn a_hum_that_nearly_comes_again_is_told_and_a_law_is_not() {
+        let mut noise = Noise::new(3);
+        let rest: Vec<f64> = (0..600)
+            .map(|i| 5.0 * (TAU * 2.31 / 44.0 * f64::from(i)).sin() + noise.normal())
+            .collect();
+        let noise_share = 1.0 / (12.5 + 1.0);
+        for (again, lines) in [(0.6, 1), (1.0 - noise_share, 0)] {
+            let found = slow_lines(&problem(&rest), std::slice::from_ref(&rest), &[again], &[0]);
+            assert_eq!(found.len(), lines, "{again}");
+        }
+    }
+
     #[test]
     fn noise_of_few_hertz_is_no_hum() {
         for corner in [3.0, 1.0, 0.3] {

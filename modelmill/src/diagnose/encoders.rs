@@ -1,6 +1,7 @@
 //! Encoders that err: by a zero that is not the model's, or as they turn, since an eccentric disc reads the position too large
-//! and too small once or several times a turn; and the model takes that for motion. What forces change by with each reading, its rate and its acceleration is had by
-//! central differences of the fitted model, so that any error along the motion is a sum of three products.
+//! and too small once or several times a turn; and the model takes that for motion. What forces change by with each reading, its
+//! rate and its acceleration is had by central differences of the fitted model, so that any error along the motion is a sum of
+//! three products.
 
 use modelmill_identify::changes::Moments;
 use modelmill_identify::diagnose::{

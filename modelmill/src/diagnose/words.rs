@@ -263,7 +263,7 @@ pub fn disturbance(one: &Disturbance) -> String {
             value("times_per_turn")
         ),
         "different_runs" => {
-            format!("the friction of {at} is not what the values say that are held: {all}")
+            format!("the friction of {at} differs from that of the values that are held: {all}")
         }
         "encoder_zero" => format!(
             "the encoder of {at} reads too much throughout, as one with another zero than the model does: {all}; \

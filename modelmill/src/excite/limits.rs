@@ -183,8 +183,8 @@ pub(crate) fn with_recorded(
     }
     let note = (!says.is_empty()).then(|| {
         Note::info(format!(
-            "{} has no limits of positions for {}, as recorded; motion keeps within that, and within the largest rates and \
-             accelerations there. The option `limits`, or `[limits.coordinates]` in the model file, allows more.",
+            "{} has no limits for positions; motion keeps within what was recorded: {}, and within the largest rates and \
+             accelerations there. Option `limits`, or `[limits.coordinates]` in the model file, allows more.",
             model.path,
             says.join(", ")
         ))
