@@ -154,6 +154,24 @@ fn gaps_and_standstill_are_said() {
     );
     assert!(number(&fit, "/fit/nrms") < 3e-3);
 
+    // Times that jitter are no gaps; one among them is.
+    let jitter = |t: &mut Table| {
+        let step = t.rows[1][0] - t.rows[0][0];
+        for (k, row) in t.rows.iter_mut().enumerate() {
+            let fraction = (k as f64 * 0.618_034).fract();
+            row[0] += 0.4 * step * (2.0 * fraction - 1.0);
+        }
+    };
+    let path = table.spoilt("jitter.csv", jitter);
+    let (_, says) = notes(&path, &[]);
+    assert!(!says.contains("gap"), "{says}");
+    let path = table.spoilt("jitter-and-gap.csv", |t| {
+        jitter(t);
+        drop(t.rows.drain(800..1000));
+    });
+    let (_, says) = notes(&path, &[]);
+    assert!(says.contains("1 gap in time"), "{says}");
+
     let path = table.spoilt("still.csv", |t| {
         for row in &mut t.rows {
             row[1] = 1.8;

@@ -18,6 +18,8 @@ use crate::words::{count_of, list};
 
 /// A gap of this part of a period of the highest frequency at which forces follow a motion is bridged by the spline.
 const BRIDGED: f64 = 0.5;
+/// In a step so many times as long as the usual one samples lack.
+const LACKS: f64 = 1.5;
 
 /// States along a run, ready for the regressor. All columns have the length of `time`.
 #[derive(Debug, Clone, PartialEq)]
@@ -298,12 +300,21 @@ impl Recording {
         if even::is_even(time) {
             return Ok(());
         }
-        let gaps = steps.iter().filter(|step| **step > 1.5 * median).count();
+        // Where times only jitter, short steps are as many as long ones, and none is longer than the shortest lets expect.
+        let many = |is: &dyn Fn(f64) -> bool| steps.iter().filter(|step| is(**step)).count();
+        let jitters = 2 * many(&|step| step < 0.5 * median) > many(&|step| step > LACKS * median);
+        let longer = if jitters {
+            (1.05 * (2.0 * median - shortest)).max(LACKS * median)
+        } else {
+            LACKS * median
+        };
+        let gaps = many(&|step| step > longer);
         let how = "Where anything is filtered, positions are put on even times by the spline through them at their true \
                    times, and states are read off at these again.";
         notes.push(if gaps > 0 {
-            let lost = steps.iter().map(|step| (step / median).round() - 1.0);
-            let first = steps.iter().position(|step| *step > 1.5 * median);
+            let lost = steps.iter().filter(|step| **step > longer);
+            let lost = lost.map(|step| (step / median).round() - 1.0);
+            let first = steps.iter().position(|step| *step > longer);
             Note::warning(format!(
                 "{} has {} in time: steps up to {longest:.6} s where {median:.6} s is usual, {} samples too few, the first \
                  after {} {}. {how}",
