@@ -425,7 +425,7 @@ fn friction_and_the_coupled_wrist_of_a_real_arm_are_found() {
     run.extend(flags);
     let [with, none] = ["nothing", "coupled_drive"].map(|kind| {
         let fit = identified(&answer, &bare, kind, &run);
-        100.0 * number(&fit, "/fit/channels/joint5/nrms")
+        100.0 * number(&fit, "/fit/rows/channels/joint5/nrms")
     });
     println!("joint 5: {none:.1} % without the coupling, {with:.1} % with it");
     assert!(with < 15.5 && (none - 54.0).abs() < 3.0);

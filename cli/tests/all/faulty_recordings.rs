@@ -158,7 +158,7 @@ fn gaps_and_standstill_are_said() {
     let jitter = |t: &mut Table| {
         let step = t.rows[1][0] - t.rows[0][0];
         for (k, row) in t.rows.iter_mut().enumerate() {
-            let fraction = (k as f64 * 0.618_034).fract();
+            let fraction = (4e4 * (k as f64 + 1.0).sin()).abs().fract();
             row[0] += 0.4 * step * (2.0 * fraction - 1.0);
         }
     };

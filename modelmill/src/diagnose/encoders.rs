@@ -13,6 +13,7 @@ use crate::model::Model;
 use crate::stretch::Stretch;
 
 use super::numbers::stack;
+use super::places::is_free;
 use super::problem::Held;
 use crate::regressors::Runs;
 
@@ -37,9 +38,12 @@ pub(crate) fn sensitivities(
         .collect()
 }
 
-/// What the positions of each encoder read too much throughout.
+/// What the positions of each encoder read too much throughout; a free body has none.
 pub(crate) fn zeros(model: &Model, slopes: &[Option<[Column; 3]>]) -> Vec<Candidate> {
-    let each = model.motions().into_iter().zip(slopes);
+    let (active, _) = model.derivation.coordinates();
+    let has_encoder = |i: &usize| !is_free(&model.derivation.mechanism, *i);
+    let each = model.motions().into_iter().zip(slopes).zip(active);
+    let each = each.filter_map(|(one, i)| has_encoder(&i).then_some(one));
     let candidate = |((name, is_angle), slopes): ((String, bool), &Option<[Column; 3]>)| {
         let [by_position, ..] = slopes.as_ref()?;
         let mut column = Column(vec![None; model.drives().len()]);

@@ -66,7 +66,7 @@ pub(crate) fn spots(mechanism: &Mechanism) -> Vec<Spot> {
 }
 
 /// Whether a coordinate belongs to a free body, which has no joint that could rub.
-fn is_free(mechanism: &Mechanism, coordinate: usize) -> bool {
+pub(crate) fn is_free(mechanism: &Mechanism, coordinate: usize) -> bool {
     let mut bodies = free_bodies(mechanism);
     bodies.any(|body| {
         let mut all = body.position.iter().chain(&body.quaternion);

@@ -266,8 +266,7 @@ pub fn disturbance(one: &Disturbance) -> String {
             format!("the friction of {at} differs from that of the values that are held: {all}")
         }
         "encoder_zero" => format!(
-            "the encoder of {at} reads too much throughout, as one with another zero than the model does: {all}; \
-             `--map` can take it off"
+            "the encoder of {at} reads too much throughout, as one with another zero than the model does: {all}"
         ),
         "contact_event" => {
             let [from, to] = one.interval.unwrap_or_default();
