@@ -232,7 +232,7 @@ fn what_turns_the_sign_of_bodies_is_suspected() {
     assert_ne!(turned, text);
     let says = suspicions(&turned);
     assert!(
-        says.len() == 1 && says[0].starts_with("p1_min") && says[0].contains("with a sign"),
+        says.len() == 1 && says[0].starts_with("p1_min comes out"),
         "{says:?}"
     );
 }

@@ -585,7 +585,7 @@ impl Sitting {
         let findings = model.diagnose(&fit, &check, &Question::default())?;
         Ok((
             told::findings(&findings, &*self.commands),
-            findings.entries.clone(),
+            findings.to_add().to_vec(),
         ))
     }
 

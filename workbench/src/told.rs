@@ -111,7 +111,7 @@ pub(crate) fn findings(findings: &Findings, commands: &dyn Commands) -> Value {
     told["ladder"] = json!(report::ladder(findings));
     told["judged"] = json!(findings.judged.words());
     told["entries"] = findings
-        .entries
+        .to_add()
         .iter()
         .map(|entry| {
             let mut told = edit::described(entry);

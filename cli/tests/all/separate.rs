@@ -10,6 +10,15 @@ use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 
 const LEFT: &str = "coulomb_friction@spindle_left:Fc=12";
+/// Dry friction from friction by load, beside noise of 2 N.
+const FROM_LOAD: [&str; 6] = [
+    "--separate",
+    LEFT,
+    "--from",
+    "load_friction@spindle_left",
+    "--noise",
+    "2",
+];
 
 /// Columns of a trajectory without its times: `theta1, theta2`, their rates, their accelerations.
 fn states(path: &str) -> Vec<Vec<f64>> {
@@ -45,23 +54,9 @@ fn left(force: &DVector<f64>, columns: &[DVector<f64>]) -> f64 {
 #[test]
 fn the_difference_is_what_least_squares_leaves() {
     let out = scratch("separate-once-more.csv");
-    let found = json(&[
-        "excite",
-        &model("spidermill.toml"),
-        "--separate",
-        LEFT,
-        "--from",
-        "load_friction@spindle_left",
-        "--noise",
-        "2",
-        "--random",
-        "100",
-        "--starts",
-        "1",
-        "--out",
-        &out,
-        "--json",
-    ]);
+    let file = model("spidermill.toml");
+    let search = ["--random", "100", "--starts", "1", "--out", &out, "--json"];
+    let found = json(&[&["excite", &file], &FROM_LOAD[..], &search].concat());
     assert_eq!(found["violations"], 0);
     assert_eq!(found["criterion"], "separation");
     let columns = states(&out);
@@ -475,22 +470,8 @@ fn a_model_without_limits_keeps_to_what_was_recorded() {
     std::fs::write(&file, bare.join("\n")).expect("a model");
     let recording = run("with-rods-fit.csv");
     let out = scratch("within-the-recording.csv");
-    let asked = [
-        "excite",
-        &file,
-        "--separate",
-        LEFT,
-        "--from",
-        "load_friction@spindle_left",
-        "--noise",
-        "2",
-        "--random",
-        "40",
-        "--starts",
-        "1",
-        "--out",
-        &out,
-    ];
+    let search = ["--random", "40", "--starts", "1", "--out", &out];
+    let asked = [&["excite", &file], &FROM_LOAD[..], &search].concat();
     let says = refused(1, &asked);
     assert!(says.contains("have no limits"), "{says}");
     let with_data: Vec<&str> = asked.into_iter().chain(["--data", &recording]).collect();

@@ -20,6 +20,8 @@ use crate::words::{count_of, list};
 const BRIDGED: f64 = 0.5;
 /// In a step so many times as long as the usual one samples lack.
 const LACKS: f64 = 1.5;
+/// One step in so many is less than half as long as the usual one where times jitter.
+const JITTERS: usize = 100;
 
 /// States along a run, ready for the regressor. All columns have the length of `time`.
 #[derive(Debug, Clone, PartialEq)]
@@ -300,9 +302,11 @@ impl Recording {
         if even::is_even(time) {
             return Ok(());
         }
-        // Where times only jitter, short steps are as many as long ones, and none is longer than the shortest lets expect.
+        // Where times only jitter, short steps are many and as many as long ones, and none is longer than the shortest lets expect.
         let many = |is: &dyn Fn(f64) -> bool| steps.iter().filter(|step| is(**step)).count();
-        let jitters = 2 * many(&|step| step < 0.5 * median) > many(&|step| step > LACKS * median);
+        let short = many(&|step| step < 0.5 * median);
+        let jitters =
+            2 * short > many(&|step| step > LACKS * median) && JITTERS * short > steps.len();
         let longer = if jitters {
             (1.05 * (2.0 * median - shortest)).max(LACKS * median)
         } else {

@@ -169,6 +169,15 @@ pub struct WithNominal {
 }
 
 impl Findings {
+    /// The entries that are worth adding: none while the recording or the model is in doubt.
+    pub fn to_add(&self) -> &[NewEffect] {
+        if words::is_to_be_cleared_up(&self.diagnosis) {
+            &[]
+        } else {
+            &self.entries
+        }
+    }
+
     /// What is to be done where nothing, or not all, is to be added to the model file.
     pub(crate) fn beside_the_file(&self) -> Option<&'static str> {
         if self.missing.is_empty() {
@@ -242,11 +251,7 @@ impl Model {
         }
         let notes = data.iter().flatten().flat_map(Stretch::notes);
         let notes = self.caution().into_iter().chain(notes.cloned()).collect();
-        let entries = if words::is_to_be_cleared_up(&answer.diagnosis) {
-            Vec::new()
-        } else {
-            added::entries(self, &answer)
-        };
+        let entries = added::entries(self, &answer);
         let (edited, after) = if entries.is_empty() {
             (None, Err(String::new()))
         } else {

@@ -7,7 +7,6 @@ use modelmill_identify::diagnose::{
 use modelmill_spec::{EffectTerm, Place};
 
 use crate::model::Model;
-use crate::runs::per_rate;
 
 /// Kinds of friction whose values change from day to day.
 const KINDS: [&str; 2] = ["coulomb_friction", "viscous_friction"];
@@ -45,19 +44,15 @@ fn change(
         _ => None,
     };
     let drives: Vec<usize> = at.iter().map(drive).collect::<Option<_>>()?;
-    let unit = model.force_unit(*drives.first()?);
     let reduction = &model.derivation.reduction;
-    let column = |term: &&EffectTerm| {
+    let base_of = |term: &&EffectTerm| {
         let is_its = |k: &usize| reduction.products[*k].0 == [(term.parameter.0, 1)];
-        let k = reduction.retained.iter().position(is_its)?;
-        Some(base[k].clone())
+        reduction.retained.iter().position(is_its)
     };
-    let parameter = |term: &&EffectTerm| EffectParameter {
+    let which: Vec<usize> = terms.iter().map(base_of).collect::<Option<_>>()?;
+    let parameter = |(term, k): (&&EffectTerm, &usize)| EffectParameter {
         symbol: format!("change of {}", term.symbol),
-        unit: match term.symbol.as_str() {
-            "Fv" => per_rate(unit).to_owned(),
-            _ => unit.to_owned(),
-        },
+        unit: model.base[*k].unit.clone(),
         sign: Sign::Any,
     };
     let names = model.drives();
@@ -66,7 +61,7 @@ fn change(
             kind: "different_runs".to_owned(),
             at: drives.iter().map(|d| names[*d].clone()).collect(),
         },
-        parameters: terms.iter().map(parameter).collect(),
+        parameters: terms.iter().zip(&which).map(parameter).collect(),
         searched: 0,
         is_part_of_load: false,
         refines: None,
@@ -74,7 +69,7 @@ fn change(
         is_per_run: false,
         source: Source::Columns(vec![Choice {
             constants: Vec::new(),
-            columns: terms.iter().map(column).collect::<Option<_>>()?,
+            columns: which.iter().map(|k| base[*k].clone()).collect(),
         }]),
     })
 }

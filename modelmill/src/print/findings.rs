@@ -154,7 +154,7 @@ impl Findings {
         self.refused_text(style, &mut lines);
         self.untold_text(style, &mut lines);
         self.off_text(style, spelling, &mut lines);
-        let mut next: Vec<String> = (self.entries.iter())
+        let mut next: Vec<String> = (self.to_add().iter())
             .map(|entry| spelling.add(&self.before.model, entry))
             .collect();
         next.extend(self.beside_the_file().map(str::to_owned));

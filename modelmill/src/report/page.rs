@@ -183,7 +183,7 @@ fn laws(findings: &Findings, spelling: &dyn Spelling) -> String {
 }
 
 fn effects(findings: &Findings, spelling: &dyn Spelling) -> String {
-    if findings.entries.is_empty() {
+    if findings.to_add().is_empty() {
         if let Some(says) = findings.beside_the_file() {
             return format!("{}<p>{says}</p>\n", tables::effects(findings));
         }
@@ -208,7 +208,7 @@ fn effects(findings: &Findings, spelling: &dyn Spelling) -> String {
     }
     let model = &findings.before.model;
     let mut commands: Vec<String> = findings
-        .entries
+        .to_add()
         .iter()
         .map(|entry| spelling.add(model, entry))
         .collect();

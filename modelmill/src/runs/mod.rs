@@ -27,7 +27,6 @@ use crate::model::Model;
 use crate::recording::Recording;
 use crate::stretch::Stretch;
 
-pub(crate) use changes::per_rate;
 pub use changes::{Changed, Estimate, Named, What};
 use changes::{Possible, centre};
 use layout::Layout;
